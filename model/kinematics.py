@@ -1,0 +1,154 @@
+"""State, frames and slip: equations (1)-(8), in both directions.
+
+The state of the paper is ``x = [y, v_y, omega_c, slip_x, slip_y, slip_z]`` (19). Motion away from the wall adds
+``h = R - rho``, the gap at B (rho is the radius of the centre's orbit), and its rate ``v_h``, so that the full state
+has eight entries, `VARIABLES`; a state of six entries means ``h = v_h = 0``.
+
+Vectors are given in the co-rotating frame of the paper: i points radially inwards, j upwards, k = i x j along the
+orbit. The world frame has z along the vessel's axis, up from the floor, and the centre of the ball stands at
+``(rho cos theta, rho sin theta, r + y)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from model.arrays import Array
+from model.errors import InputError
+from model.parameters import Parameters
+
+VARIABLES = ("y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")
+UNITS = ("m", "m s-1", "rad s-1", "rad s-1", "rad s-1", "rad s-1", "m", "m s-1")
+
+
+@dataclass(frozen=True)
+class WorldState:
+    """A rigid ball in the world frame; arrays of shape (..., 3), quaternion (..., 4) with the scalar first."""
+
+    position: Array
+    """Centre of the ball, m."""
+    quaternion: Array
+    """Orientation of the ball, body to world."""
+    velocity: Array
+    """Velocity of the centre, m s-1."""
+    angular_velocity: Array
+    """Angular velocity of the ball in world axes, rad s-1."""
+
+    @property
+    def angular_velocity_body(self) -> Array:
+        """Angular velocity in the ball's own axes, as MuJoCo's free and ball joints hold it, rad s-1."""
+        rotation = Rotation.from_quat(self.quaternion, scalar_first=True)
+        return np.asarray(rotation.apply(self.angular_velocity, inverse=True))
+
+
+def full_state(x: Array) -> Array:
+    """Return states of shape (..., 8), adding h = v_h = 0 to states of shape (..., 6).
+
+    Raises `InputError` for another length or a value that is not finite.
+    """
+    state = np.asarray(x, dtype=float)
+    if state.ndim == 0 or state.shape[-1] not in (6, 8):
+        raise InputError(
+            f"a state has 6 entries (y, v_y, omega_c, slip_x, slip_y, slip_z) or 8 (and h, v_h), not shape {state.shape}"
+        )
+    if not np.all(np.isfinite(state)):
+        k = int(np.argwhere(~np.isfinite(state))[0][-1])
+        raise InputError(f"{VARIABLES[k]} = {state[..., k]} {UNITS[k]} must be finite")
+    if state.shape[-1] == 6:
+        state = np.concatenate([state, np.zeros((*state.shape[:-1], 2))], axis=-1)
+    return state
+
+
+def frame(theta: Array | float) -> Array:
+    """Basis vectors i, j, k of the co-rotating frame as rows, shape (..., 3, 3), in world axes."""
+    cos, sin = np.cos(theta), np.sin(theta)
+    zero, one = np.zeros_like(cos), np.ones_like(cos)
+    rows = [[-cos, -sin, zero], [zero, zero, one], [-sin, cos, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def rolling_part(x: Array, p: Parameters) -> Array:
+    """Rolling part of the angular velocity (4), shape (..., 3), with rho for R away from the wall."""
+    _, v_y, omega_c, _, _, _, h, _ = np.moveaxis(full_state(x), -1, 0)
+    roll = (p.R - h) / p.r * omega_c
+    return np.stack([roll, -roll, v_y / p.r], axis=-1)
+
+
+def angular_velocity(x: Array, p: Parameters) -> Array:
+    """Angular velocity of the ball (4) in the co-rotating frame, shape (..., 3)."""
+    return rolling_part(x, p) + full_state(x)[..., 3:6]
+
+
+def slip_velocities(x: Array, p: Parameters) -> tuple[Array, Array]:
+    """Velocities v_A, v_B of the lowest and the outermost point of the ball, each (..., 3), m s-1.
+
+    (6) with its first row completed by v_y and v_h: v_A = (v_h + v_y + r w_z, v_y, -r w_x),
+    v_B = (v_h, -r w_z, r w_y).
+    """
+    _, v_y, _, w_x, w_y, w_z, _, v_h = np.moveaxis(full_state(x), -1, 0)
+    v_A = np.stack([v_h + v_y + p.r * w_z, v_y, -p.r * w_x], axis=-1)
+    v_B = np.stack([v_h, -p.r * w_z, p.r * w_y], axis=-1)
+    return v_A, v_B
+
+
+def slip_speeds(x: Array, p: Parameters) -> tuple[Array, Array]:
+    """Tangential slip speeds at A and B (7), each (...), m s-1."""
+    v_A, v_B = slip_velocities(x, p)
+    return np.hypot(v_A[..., 0], v_A[..., 2]), np.hypot(v_B[..., 1], v_B[..., 2])
+
+
+def slip_directions(x: Array, p: Parameters) -> tuple[Array, Array]:
+    """Slip directions alpha, beta (8), each (...), rad: alpha = atan2(w_x, w_z), beta = atan2(w_y, w_z)."""
+    v_A, v_B = slip_velocities(x, p)
+    return np.arctan2(-v_A[..., 2], v_A[..., 0]), np.arctan2(v_B[..., 2], -v_B[..., 1])
+
+
+def to_world(
+    x: Array, theta: Array | float, p: Parameters, quaternion: Array | tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+) -> WorldState:
+    """World coordinates of states x (..., 6 or 8) at azimuths theta (...).
+
+    The orientation of a homogeneous ball is free: `quaternion` is handed through.
+    """
+    state = full_state(x)
+    theta = np.asarray(theta, dtype=float)
+    y, v_y, omega_c, h, v_h = (state[..., k] for k in (0, 1, 2, 6, 7))
+    rho = p.R - h
+    axes = frame(theta)
+    position = np.stack([rho * np.cos(theta), rho * np.sin(theta), p.r + y], axis=-1)
+    velocity = np.stack([v_h, v_y, rho * omega_c], axis=-1)
+    return WorldState(
+        position=position,
+        quaternion=np.broadcast_to(np.asarray(quaternion, dtype=float), (*position.shape[:-1], 4)),
+        velocity=_to_world_axes(axes, velocity),
+        angular_velocity=_to_world_axes(axes, angular_velocity(state, p)),
+    )
+
+
+def from_world(world: WorldState, p: Parameters) -> tuple[Array, Array]:
+    """States x (..., 8) and azimuths theta (...) of a ball in world coordinates; the inverse of `to_world`.
+
+    On the axis itself the orbit has no direction: theta is 0 there and omega_c is nan.
+    """
+    px, py, pz = np.moveaxis(world.position, -1, 0)
+    theta, rho = np.arctan2(py, px), np.hypot(px, py)
+    axes = frame(theta)
+    v_h, v_y, v_k = np.moveaxis(_to_frame_axes(axes, world.velocity), -1, 0)
+    omega = _to_frame_axes(axes, world.angular_velocity)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        omega_c = np.where(rho > 0, v_k / rho, np.nan)
+    # v_k is rho omega_c: the rolling part needs no division by rho.
+    slip = omega - np.stack([v_k / p.r, -v_k / p.r, v_y / p.r], axis=-1)
+    x = np.stack([pz - p.r, v_y, omega_c, slip[..., 0], slip[..., 1], slip[..., 2], p.R - rho, v_h], axis=-1)
+    return x, theta
+
+
+def _to_world_axes(axes: Array, vector: Array) -> Array:
+    return np.asarray(np.einsum("...ab,...a->...b", axes, vector))
+
+
+def _to_frame_axes(axes: Array, vector: Array) -> Array:
+    return np.asarray(np.einsum("...ab,...b->...a", axes, vector))

@@ -1,0 +1,191 @@
+"""The physical parameters of the ball, the vessel and the fluid (Table 1)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any, Self
+
+import tomli_w
+
+from model.errors import InputError, StorageError, suggestion
+
+_SETS = resources.files("model") / "parameter_sets"
+
+
+def _quantity(symbol: str, unit: str, meaning: str, allowed: str, low: float, high: float = math.inf) -> Any:
+    """Declare a parameter; `allowed` is the range as a person reads it, `low` is open when it says so."""
+    return dataclasses.field(
+        metadata={
+            "symbol": symbol, "unit": unit, "meaning": meaning, "allowed": allowed, "low": low, "high": high,
+        }
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """Everything the model of the paper depends on, in SI units (Table 1).
+
+    Raises
+    ------
+    InputError
+        If a value is not a finite number in its range; the message names field, value, unit and range.
+    """
+
+    m: float = _quantity("m", "kg", "mass of the ball", "> 0", 0.0)
+    r: float = _quantity("r", "m", "radius of the ball", "> 0", 0.0)
+    R: float = _quantity("R", "m", "radius of the centre's orbit; the vessel's radius is R + r", "> 0", 0.0)
+    j: float = _quantity("j", "1", "dimensionless moment of inertia", "> 0 and <= 2/3", 0.0, 2.0 / 3.0)
+    mu: float = _quantity("μ", "1", "friction coefficient between ball and floor (A)", ">= 0", 0.0)
+    eta: float = _quantity("η", "1", "friction coefficient between ball and wall (B)", ">= 0", 0.0)
+    g: float = _quantity("g", "m s-2", "gravitational acceleration reduced by buoyancy", "> 0", 0.0)
+    c: float = _quantity("c", "s-1", "viscous drag coefficient over mass", ">= 0", 0.0)
+    omega_0: float = _quantity("ω₀", "rad s-1", "angular velocity of the fluid", "any", -math.inf)
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = check_number(field.name, getattr(self, field.name), field.metadata["unit"])
+            low, allowed = field.metadata["low"], field.metadata["allowed"]
+            below = value <= low if allowed.startswith("> ") else value < low
+            if below or value > field.metadata["high"]:
+                raise InputError(
+                    f"{field.name} = {value:g} {field.metadata['unit']} is out of range: "
+                    f"{field.metadata['meaning']} must be {allowed}"
+                )
+            object.__setattr__(self, field.name, value)
+
+    @property
+    def kappa(self) -> float:
+        """Dimensionless drag, c sqrt(R/g)."""
+        return self.c * math.sqrt(self.R / self.g)
+
+    @property
+    def Omega_0(self) -> float:
+        """Dimensionless angular velocity of the fluid, omega_0 sqrt(R/g)."""
+        return self.omega_0 * math.sqrt(self.R / self.g)
+
+    def replace(self, **changes: float) -> Self:
+        """Return a copy with some values changed; an unknown name is an `InputError`."""
+        _refuse_unknown(changes, [f.name for f in dataclasses.fields(self)], "parameter")
+        return dataclasses.replace(self, **changes)
+
+    @classmethod
+    def from_fluid(
+        cls, *, nu_f: float, rho_f: float, rho_b: float, r: float, R: float, mu: float, eta: float,
+        j: float = 0.4, gravity: float = 9.81, omega_0: float = 0.0,
+    ) -> Self:  # fmt: skip
+        """Parameters of a uniform ball in a fluid: mass, Stokes drag by (10), gravity less buoyancy.
+
+        Parameters
+        ----------
+        nu_f : kinematic viscosity of the fluid, m2 s-1, > 0
+        rho_f, rho_b : densities of fluid and ball, kg m-3; the ball must be the denser
+        r, R, mu, eta, j, omega_0 : as in `Parameters`
+        gravity : gravitational acceleration in vacuum, m s-2
+        """
+        for name, value, unit in (
+            ("nu_f", nu_f, "m2 s-1"), ("rho_f", rho_f, "kg m-3"), ("rho_b", rho_b, "kg m-3"),
+            ("r", r, "m"), ("gravity", gravity, "m s-2"),
+        ):  # fmt: skip
+            if check_number(name, value, unit) <= 0:
+                raise InputError(f"{name} = {value:g} {unit} is out of range: must be > 0")
+        if rho_b <= rho_f:
+            raise InputError(
+                f"rho_b = {rho_b:g} kg m-3 is out of range: a ball not denser than the fluid "
+                f"(rho_f = {rho_f:g} kg m-3) floats; must be > rho_f"
+            )
+        return cls(
+            m=4 / 3 * math.pi * r**3 * rho_b, r=r, R=R, j=j, mu=mu, eta=eta,
+            g=gravity * (1 - rho_f / rho_b), c=9 * nu_f / (2 * r**2) * rho_f / rho_b, omega_0=omega_0,
+        )  # fmt: skip
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Self:
+        """Build from a mapping: the nine parameters, or the arguments of `from_fluid` with a ``fluid`` table.
+
+        The table ``fluid`` holds nu_f, rho_f, rho_b and optionally gravity; m, g and c then follow from it
+        and may not be given. Raises `InputError` for an unknown, missing or contradictory key.
+        """
+        names = [f.name for f in dataclasses.fields(cls)]
+        if "fluid" not in values:
+            _refuse_unknown(values, [*names, "fluid"], "parameter")
+            _refuse_missing(values, names, "parameter")
+            return cls(**values)
+        fluid = values["fluid"]
+        if not isinstance(fluid, Mapping):
+            raise InputError(f"fluid = {fluid!r} must be a table with nu_f, rho_f and rho_b")
+        rest = {k: v for k, v in values.items() if k != "fluid"}
+        for name in ("m", "g", "c"):
+            if name in rest:
+                raise InputError(f"{name} follows from the [fluid] table and may not be given beside it")
+        _refuse_unknown(rest, names, "parameter")
+        _refuse_missing(rest, ["r", "R", "mu", "eta"], "parameter")
+        _refuse_unknown(fluid, ["nu_f", "rho_f", "rho_b", "gravity"], "fluid property")
+        _refuse_missing(fluid, ["nu_f", "rho_f", "rho_b"], "fluid property")
+        return cls.from_fluid(**rest, **fluid)
+
+    @classmethod
+    def named(cls, name: str) -> Self:
+        """Return the named set (`names` lists them)."""
+        if name not in cls.names():
+            raise InputError(
+                f"no parameter set is named {name!r}{suggestion(name, cls.names())}; "
+                f"there are {', '.join(cls.names())}"
+            )
+        return cls.from_mapping(tomllib.loads((_SETS / f"{name}.toml").read_text("utf-8")))
+
+    @staticmethod
+    def names() -> list[str]:
+        """Names of the sets that come with the package."""
+        return sorted(entry.name.removesuffix(".toml") for entry in _SETS.iterdir() if entry.name.endswith(".toml"))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a TOML file; raises `StorageError` if it can't be read, `InputError` for what it says."""
+        try:
+            values = tomllib.loads(Path(path).read_text("utf-8"))
+        except OSError as error:
+            raise StorageError(f"cannot read parameters from {path}: {error.strerror}") from error
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise StorageError(f"{path} is not valid TOML: {error}") from error
+        try:
+            return cls.from_mapping(values)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+
+    def save(self, path: str | Path) -> None:
+        """Write the nine values as TOML, exactly."""
+        try:
+            Path(path).write_text(tomli_w.dumps(dataclasses.asdict(self)), "utf-8")
+        except OSError as error:
+            raise StorageError(f"cannot write parameters to {path}: {error.strerror}") from error
+
+
+def check_number(name: str, value: Any, unit: str) -> float:
+    """Return `value` as a float; `InputError` if it is not a finite real number."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) and not hasattr(value, "__float__"):
+        raise InputError(f"{name} = {value!r} must be a number in {unit}")
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} = {value!r} must be a number in {unit}") from error
+    if not math.isfinite(number):
+        raise InputError(f"{name} = {number} {unit} must be finite")
+    return number
+
+
+def _refuse_unknown(given: Mapping[str, Any], known: list[str], kind: str) -> None:
+    for name in given:
+        if name not in known:
+            raise InputError(f"unknown {kind} {name!r}{suggestion(name, known)}; known: {', '.join(known)}")
+
+
+def _refuse_missing(given: Mapping[str, Any], needed: list[str], kind: str) -> None:
+    missing = [name for name in needed if name not in given]
+    if missing:
+        raise InputError(f"missing {kind} {', '.join(repr(name) for name in missing)}")

@@ -1,0 +1,169 @@
+"""What every simulator returns."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import platform
+import subprocess
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from model.arrays import Array
+from model.cases import Case
+from model.flow import Flow
+from model.parameters import Parameters
+
+AXES = ("x", "y", "z")
+"""The paper's axes: x radially inwards, y upwards, z along the orbit."""
+
+
+def _column(units: str, long_name: str, equation: str = "", shape: tuple[int, ...] = ()) -> Any:
+    return field(metadata={"units": units, "long_name": long_name, "equation": equation, "shape": shape})
+
+
+@dataclass(frozen=True)
+class Header:
+    """Where a trajectory comes from: enough to run it again."""
+
+    engine: str
+    """``event``, ``time-stepping`` or ``mujoco``."""
+    parameters: Parameters
+    flow: Flow
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Numerical settings of the simulator, JSON-able."""
+    mjcf: str = ""
+    """The exact MJCF that was simulated; empty if none was."""
+    failure: str = ""
+    """Why the run stopped early; empty for a run that reached its end."""
+    versions: Mapping[str, str] = field(default_factory=lambda: versions())
+    """Versions of dualball, mujoco, numpy and Python."""
+    commit: str = field(default_factory=lambda: commit())
+    """The commit of the program, if it ran from a checkout."""
+    created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+    """UTC time."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A motion of the ball, sampled: n samples and k events, in the axes and symbols of the paper.
+
+    Arrays have shape (n,) unless they say (n, axis); the axes are `AXES`.
+    """
+
+    header: Header = field(repr=False)
+    time: Array = _column("s", "time")
+    theta: Array = _column("rad", "azimuth of the ball's centre, not wrapped")
+    y: Array = _column("m", "axial displacement of the centre", "(1)")
+    v_y: Array = _column("m s-1", "axial velocity", "(2)")
+    omega_c: Array = _column("rad s-1", "angular velocity of the ball's orbit", "(2)")
+    slip_x: Array = _column("rad s-1", "radial angular velocity of slipping", "(4)")
+    slip_y: Array = _column("rad s-1", "axial angular velocity of slipping", "(4)")
+    slip_z: Array = _column("rad s-1", "tangential angular velocity of slipping", "(4)")
+    h: Array = _column("m", "displacement of the centre inwards from its orbit at the wall")
+    v_h: Array = _column("m s-1", "inward velocity of the centre")
+    force_A: Array = _column("N", "contact force of the floor on the ball", "(11)", (3,))
+    force_B: Array = _column("N", "contact force of the wall on the ball", "(11)", (3,))
+    slip_speed_A: Array = _column("m s-1", "slip speed at the floor", "(7)")
+    slip_speed_B: Array = _column("m s-1", "slip speed at the wall", "(7)")
+    gap_A: Array = _column("m", "distance between ball and floor, negative where they overlap")
+    gap_B: Array = _column("m", "distance between ball and wall, negative where they overlap")
+    case: npt.NDArray[np.int8] = field(
+        metadata={"units": "1", "long_name": "kinematic case", "equation": "Fig. 2", "shape": (), "dtype": np.int8}
+    )
+    events: Events = field(repr=False)
+
+    @property
+    def x(self) -> Array:
+        """The states in the order of `model.kinematics.VARIABLES`, shape (n, 8)."""
+        columns = (self.y, self.v_y, self.omega_c, self.slip_x, self.slip_y, self.slip_z, self.h, self.v_h)
+        return np.stack(columns, axis=-1)
+
+    @property
+    def cases(self) -> list[Case]:
+        """The case of every sample."""
+        return [Case(code) for code in self.case]
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run reached its end."""
+        return not self.header.failure
+
+    @classmethod
+    def from_blocks(cls, header: Header, blocks: Iterable[npt.NDArray[np.void]], events: Events) -> Self:
+        """Join blocks of samples, structured arrays of dtype `SAMPLE`."""
+        parts = list(blocks)
+        samples = np.concatenate(parts) if parts else np.empty(0, SAMPLE)
+        columns = {name: np.ascontiguousarray(samples[name]) for name in SAMPLE.fields or ()}
+        return cls(header=header, events=events, **columns)
+
+
+def _event_column(units: str, long_name: str, shape: tuple[int, ...] = (), dtype: Any = np.float64) -> Any:
+    return field(
+        default_factory=lambda: np.empty((0, *shape), dtype),
+        metadata={"units": units, "long_name": long_name, "equation": "", "shape": shape, "dtype": dtype},
+    )
+
+
+@dataclass(frozen=True)
+class Events:
+    """Changes of case and impacts, arrays of shape (k,) or (k, axis)."""
+
+    time: Array = _event_column("s", "time of the event")
+    from_case: npt.NDArray[np.int8] = _event_column("1", "case before the event", dtype=np.int8)
+    to_case: npt.NDArray[np.int8] = _event_column("1", "case after the event", dtype=np.int8)
+    impulse_A: Array = _event_column("N s", "impulse of the floor on the ball, zero without impact", (3,))
+    impulse_B: Array = _event_column("N s", "impulse of the wall on the ball, zero without impact", (3,))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]:
+    """Name and metadata (units, long_name, equation, shape, dtype) of every array column, in order."""
+    return {f.name: f.metadata for f in dataclasses.fields(of) if "units" in f.metadata}
+
+
+SAMPLE = np.dtype([(name, meta.get("dtype", np.float64), meta["shape"]) for name, meta in columns(Trajectory).items()])
+"""One sample as a structured dtype; simulators yield blocks of these."""
+
+
+class SimulationError(RuntimeError):
+    """A run that could not reach its end: the message names time and state; `trajectory` holds what there is."""
+
+    def __init__(self, message: str, trajectory: Trajectory) -> None:
+        super().__init__(message)
+        self.trajectory = trajectory
+
+
+@functools.cache
+def versions() -> Mapping[str, str]:
+    """Versions of the packages that determine a result, and of Python."""
+    found = {"python": platform.python_version()}
+    for name in ("dualball", "mujoco", "numpy", "scipy"):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+@functools.cache
+def commit() -> str:
+    """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""
+    here = Path(__file__).resolve().parent
+    try:
+        answer = subprocess.run(
+            ["git", "-C", str(here), "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"],
+            capture_output=True, text=True, timeout=10, check=True,
+        )  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return answer.stdout.strip()
