@@ -52,7 +52,7 @@ def full_state(x: Array) -> Array:
     state = np.asarray(x, dtype=float)
     if state.ndim == 0 or state.shape[-1] not in (6, 8):
         raise InputError(
-            f"a state has 6 entries (y, v_y, omega_c, slip_x, slip_y, slip_z) or 8 (and h, v_h), not shape {state.shape}"
+            f"a state has 6 entries (y, v_y, omega_c, slip_x, slip_y, slip_z) or 8 (with h, v_h), not {state.shape}"
         )
     if not np.all(np.isfinite(state)):
         k = int(np.argwhere(~np.isfinite(state))[0][-1])
@@ -107,7 +107,10 @@ def slip_directions(x: Array, p: Parameters) -> tuple[Array, Array]:
 
 
 def to_world(
-    x: Array, theta: Array | float, p: Parameters, quaternion: Array | tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+    x: Array,
+    theta: Array | float,
+    p: Parameters,
+    quaternion: Array | tuple[float, ...] = (1.0, 0.0, 0.0, 0.0),
 ) -> WorldState:
     """World coordinates of states x (..., 6 or 8) at azimuths theta (...).
 

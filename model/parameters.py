@@ -134,8 +134,7 @@ class Parameters:
         """Return the named set (`names` lists them)."""
         if name not in cls.names():
             raise InputError(
-                f"no parameter set is named {name!r}{suggestion(name, cls.names())}; "
-                f"there are {', '.join(cls.names())}"
+                f"no parameter set is named {name!r}{suggestion(name, cls.names())}; there are {', '.join(cls.names())}"
             )
         return cls.from_mapping(tomllib.loads((_SETS / f"{name}.toml").read_text("utf-8")))
 
@@ -168,7 +167,7 @@ class Parameters:
 
 def check_number(name: str, value: Any, unit: str) -> float:
     """Return `value` as a float; `InputError` if it is not a finite real number."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) and not hasattr(value, "__float__"):
+    if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise InputError(f"{name} = {value!r} must be a number in {unit}")
     try:
         number = float(value)

@@ -26,7 +26,33 @@ AXES = ("x", "y", "z")
 
 
 def _column(units: str, long_name: str, equation: str = "", shape: tuple[int, ...] = ()) -> Any:
-    return field(metadata={"units": units, "long_name": long_name, "equation": equation, "shape": shape})
+    return field(repr=False, metadata={"units": units, "long_name": long_name, "equation": equation, "shape": shape})
+
+
+@functools.cache
+def current_versions() -> Mapping[str, str]:
+    """Versions of the packages that determine a result, and of Python."""
+    found = {"python": platform.python_version()}
+    for name in ("dualball", "mujoco", "numpy", "scipy"):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+@functools.cache
+def current_commit() -> str:
+    """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""
+    here = Path(__file__).resolve().parent
+    try:
+        answer = subprocess.run(
+            ["git", "-C", str(here), "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"],
+            capture_output=True, text=True, timeout=10, check=True,
+        )  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return answer.stdout.strip()
 
 
 @dataclass(frozen=True)
@@ -43,22 +69,22 @@ class Header:
     """The exact MJCF that was simulated; empty if none was."""
     failure: str = ""
     """Why the run stopped early; empty for a run that reached its end."""
-    versions: Mapping[str, str] = field(default_factory=lambda: versions())
+    versions: Mapping[str, str] = field(default_factory=lambda: dict(current_versions()))
     """Versions of dualball, mujoco, numpy and Python."""
-    commit: str = field(default_factory=lambda: commit())
+    commit: str = field(default_factory=current_commit)
     """The commit of the program, if it ran from a checkout."""
     created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     """UTC time."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory:
     """A motion of the ball, sampled: n samples and k events, in the axes and symbols of the paper.
 
     Arrays have shape (n,) unless they say (n, axis); the axes are `AXES`.
     """
 
-    header: Header = field(repr=False)
+    header: Header
     time: Array = _column("s", "time")
     theta: Array = _column("rad", "azimuth of the ball's centre, not wrapped")
     y: Array = _column("m", "axial displacement of the centre", "(1)")
@@ -76,7 +102,14 @@ class Trajectory:
     gap_A: Array = _column("m", "distance between ball and floor, negative where they overlap")
     gap_B: Array = _column("m", "distance between ball and wall, negative where they overlap")
     case: npt.NDArray[np.int8] = field(
-        metadata={"units": "1", "long_name": "kinematic case", "equation": "Fig. 2", "shape": (), "dtype": np.int8}
+        repr=False,
+        metadata={
+            "units": "1",
+            "long_name": "kinematic case",
+            "equation": "Fig. 2",
+            "shape": (),
+            "dtype": np.int8,
+        },
     )
     events: Events = field(repr=False)
 
@@ -112,7 +145,7 @@ def _event_column(units: str, long_name: str, shape: tuple[int, ...] = (), dtype
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Events:
     """Changes of case and impacts, arrays of shape (k,) or (k, axis)."""
 
@@ -141,29 +174,3 @@ class SimulationError(RuntimeError):
     def __init__(self, message: str, trajectory: Trajectory) -> None:
         super().__init__(message)
         self.trajectory = trajectory
-
-
-@functools.cache
-def versions() -> Mapping[str, str]:
-    """Versions of the packages that determine a result, and of Python."""
-    found = {"python": platform.python_version()}
-    for name in ("dualball", "mujoco", "numpy", "scipy"):
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
-
-
-@functools.cache
-def commit() -> str:
-    """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""
-    here = Path(__file__).resolve().parent
-    try:
-        answer = subprocess.run(
-            ["git", "-C", str(here), "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"],
-            capture_output=True, text=True, timeout=10, check=True,
-        )  # fmt: skip
-    except (OSError, subprocess.SubprocessError):
-        return ""
-    return answer.stdout.strip()
