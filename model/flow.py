@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -79,18 +79,16 @@ class Flow:
         return cls._pieces(kind, t, value, slope)
 
     @classmethod
-    def _pieces(cls, kind: str, start: npt.ArrayLike, value: npt.ArrayLike, slope: npt.ArrayLike) -> Self:
+    def _pieces(cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]) -> Self:
         cls._check(start, value)
-        return cls(kind, *(np.array(a, dtype=float) for a in (start, value, slope)))
+        return cls(kind, *(np.array(list(a), dtype=float) for a in (start, value, slope)))
 
     @staticmethod
-    def _check(times: npt.ArrayLike, values: npt.ArrayLike) -> None:
-        t, v = np.atleast_1d(np.asarray(times, dtype=float)), np.atleast_1d(np.asarray(values, dtype=float))
-        if len(v) == 0:
+    def _check(times: Iterable[float], values: Iterable[float]) -> None:
+        t = [check_number(f"time of flow sample {k}", time, "s") for k, time in enumerate(times)]
+        v = [check_number(f"omega_0 of flow sample {k}", value, "rad s-1") for k, value in enumerate(values)]
+        if not v:
             raise InputError("a flow needs at least one value of omega_0")
-        for k, (time, value) in enumerate(zip(t, v, strict=True)):
-            check_number(f"time of flow sample {k}", time, "s")
-            check_number(f"omega_0 of flow sample {k}", value, "rad s-1")
         if np.any(np.diff(t) <= 0):
             k = int(np.argmax(np.diff(t) <= 0))
             raise InputError(f"flow times must increase, but sample {k + 1} is at {t[k + 1]:g} s after {t[k]:g} s")

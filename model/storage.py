@@ -8,11 +8,11 @@ a file that is cut short, foreign, or written by a newer version.
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -58,9 +58,18 @@ class TrajectoryWriter:
         self.path = Path(path)
         self._temporary = self.path.with_name(f".{self.path.name}.{os.getpid()}{TEMPORARY_SUFFIX}")
         self._finished = False
-        with self._disk():
-            self._file = h5py.File(self._temporary, "w", track_order=True)
+        try:
+            self._disk = _Disk(self._temporary, "w+b")
+        except OSError as error:
+            raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
+        self._file = h5py.File(self._disk, "w", track_order=True)
+        try:
             self._create(header)
+            self._file.flush()
+            self._check_disk()
+        except BaseException:
+            self._discard()
+            raise
 
     def __enter__(self) -> Self:
         return self
@@ -73,27 +82,30 @@ class TrajectoryWriter:
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
         """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush it."""
-        with self._disk():
-            for name in columns(Trajectory):
-                dataset = self._file[name]
-                n = dataset.shape[0]
-                dataset.resize(n + len(samples), axis=0)
-                dataset[n:] = samples[name]
-            self._file.flush()
+        for name in columns(Trajectory):
+            dataset = self._file[name]
+            n = dataset.shape[0]
+            dataset.resize(n + len(samples), axis=0)
+            dataset[n:] = samples[name]
+        self._file.flush()
+        self._check_disk()
 
     def finish(self, events: Events, failure: str = "") -> None:
         """Write the events and why the run stopped early, if it did; then give the file its name."""
-        with self._disk():
-            for name in columns(Events):
-                values = getattr(events, name)
-                dataset = self._file[_event_name(name)]
-                dataset.resize(len(values), axis=0)
-                dataset[...] = values
-            self._file.attrs["failure"] = failure
-            self._file.close()
-            with self._temporary.open("rb") as whole:
-                os.fsync(whole.fileno())
+        for name in columns(Events):
+            values = getattr(events, name)
+            dataset = self._file[_event_name(name)]
+            dataset.resize(len(values), axis=0)
+            dataset[...] = values
+        self._file.attrs["failure"] = failure
+        self._file.close()
+        self._check_disk()
+        try:
+            os.fsync(self._disk.fileno())
+            self._disk.close()
             self._temporary.replace(self.path)
+        except OSError as error:
+            raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
         self._finished = True
 
     def _create(self, header: Header) -> None:
@@ -125,22 +137,40 @@ class TrajectoryWriter:
         return dataset
 
     def _discard(self) -> None:
-        try:
-            self._file.close()
-        except (
-            OSError,
-            RuntimeError,
-        ) as error:  # the disk that refused the data may refuse the end of the file, too
-            raise StorageError(f"cannot write {self.path}: {_reason(error)}") from error
-        finally:
-            self._temporary.unlink(missing_ok=True)
+        self._file.close()
+        self._disk.close()
+        self._temporary.unlink(missing_ok=True)
 
-    @contextmanager
-    def _disk(self) -> Iterator[None]:
+    def _check_disk(self) -> None:
+        if self._disk.refusal:
+            raise StorageError(f"cannot write {self.path}: {self._disk.refusal.strerror}") from self._disk.refusal
+
+
+class _Disk(io.FileIO):
+    """A file that remembers the first refusal of the operating system instead of raising it.
+
+    HDF5 can't close a file that it could not write: it crashes the process (HDF5 1.14, disk full). So it never
+    hears of the refusal; the writer asks for it after each flush.
+    """
+
+    refusal: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        view = memoryview(data).cast("B")
+        done = 0
         try:
-            yield
-        except (OSError, RuntimeError) as error:  # h5py reports a failed write as either
-            raise StorageError(f"cannot write {self.path}: {_reason(error)}") from error
+            while self.refusal is None and done < len(view):
+                done += super().write(view[done:])
+        except OSError as error:
+            self.refusal = error
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.refusal = self.refusal or error
+            return size or 0
 
 
 def load(path: str | Path) -> Trajectory:

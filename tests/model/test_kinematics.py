@@ -1,0 +1,118 @@
+"""Round trips between the paper's coordinates and the world's are exact to round-off."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from model import InputError, Parameters
+from model.kinematics import (
+    VARIABLES,
+    angular_velocity,
+    frame,
+    from_world,
+    full_state,
+    slip_directions,
+    slip_speeds,
+    slip_velocities,
+    to_world,
+)
+
+P = Parameters.named("reference")
+EPS = np.finfo(float).eps
+
+speeds = st.floats(-100, 100)
+states = st.tuples(st.floats(0, 1), speeds, speeds, speeds, speeds, speeds, st.floats(0, 0.9 * P.R), speeds).map(
+    np.array
+)
+angles = st.floats(-3.1, 3.1)
+
+
+@given(states, angles)
+def test_to_the_world_and_back(x: np.ndarray, theta: float) -> None:
+    back, angle = from_world(to_world(x, theta, P), P)
+    # Each entry is a sum of terms no larger than this scale; a dozen operations lose at most that many ulps of it,
+    # and dividing by the orbit's radius (>= R/10) magnifies the tangential velocity's error.
+    scale = 1 + np.abs(x).max() * (1 + P.R / P.r)
+    np.testing.assert_allclose(back, x, rtol=0, atol=64 * EPS * scale * 10 / P.R)
+    assert angle == pytest.approx(theta, abs=8 * EPS)
+
+
+@given(states, angles, st.tuples(speeds, speeds, speeds, st.floats(1, 2)))
+def test_orientation_is_handed_through(x: np.ndarray, theta: float, q: tuple[float, ...]) -> None:
+    quaternion = np.roll(q, 1) / np.linalg.norm(q)
+    world = to_world(x, theta, P, quaternion)
+    turned = Rotation.from_quat(quaternion, scalar_first=True).apply(world.angular_velocity_body)
+    np.testing.assert_allclose(
+        turned, world.angular_velocity, atol=64 * EPS * (1 + np.abs(world.angular_velocity).max())
+    )
+
+
+@given(states, angles)
+def test_slip_is_the_velocity_of_the_material_point(x: np.ndarray, theta: float) -> None:
+    """(6) by rigid-body kinematics in the world frame: v = v_C + omega x r."""
+    world, axes = to_world(x, theta, P), frame(theta)
+    scale = 1 + np.abs(world.velocity).max() + P.r * np.abs(world.angular_velocity).max()
+    for v, arm in zip(slip_velocities(x, P), (-P.r * axes[1], -P.r * axes[0]), strict=True):
+        expected = axes @ (world.velocity + np.cross(world.angular_velocity, arm))
+        np.testing.assert_allclose(v, expected, atol=64 * EPS * scale)
+
+
+@given(angles)
+def test_the_frame_is_right_handed_and_points_inwards(theta: float) -> None:
+    i, j, k = frame(theta)
+    np.testing.assert_allclose(np.cross(i, j), k, atol=4 * EPS)
+    position = to_world(np.zeros(6), theta, P).position
+    assert i @ position == pytest.approx(-P.R, rel=8 * EPS)
+    np.testing.assert_array_equal(j, [0, 0, 1])
+
+
+def test_pure_rolling_is_the_state_without_slip() -> None:
+    x = np.array([0, 0, 7.0, 0, 0, 0])
+    v_A, v_B = slip_velocities(x, P)
+    assert not v_A.any()
+    assert not v_B.any()
+    # (4): the ball turns against its orbit, R/r times as fast, about i and j.
+    np.testing.assert_allclose(angular_velocity(x, P), [P.R / P.r * 7, -P.R / P.r * 7, 0])
+
+
+def test_slip_speeds_and_directions_are_7_and_8() -> None:
+    x = np.array([0, 0, 5.0, 3.0, -2.0, 4.0])
+    v_A, v_B = slip_speeds(x, P)
+    assert v_A == pytest.approx(P.r * 5)
+    assert v_B == pytest.approx(P.r * np.sqrt(20))
+    alpha, beta = slip_directions(x, P)
+    assert alpha == pytest.approx(np.arctan2(3, 4))
+    assert beta == pytest.approx(np.arctan2(-2, 4))
+
+
+def test_arrays_of_states_are_the_states_one_by_one() -> None:
+    rng = np.random.default_rng(1)
+    x, theta = rng.uniform(0, 0.04, (5, 3, 8)), rng.uniform(-3, 3, (5, 3))
+    many, angle = from_world(to_world(x, theta, P), P)
+    for index in np.ndindex(5, 3):
+        one, one_angle = from_world(to_world(x[index], theta[index], P), P)
+        np.testing.assert_array_equal(many[index], one)
+        assert angle[index] == one_angle
+
+
+def test_on_the_axis_the_orbit_has_no_angular_velocity() -> None:
+    world = to_world(np.array([0, 0, 3.0, 0, 0, 0, P.R, -1.0]), 0.0, P)
+    x, theta = from_world(world, P)
+    assert np.isnan(x[VARIABLES.index("omega_c")])
+    assert theta == 0
+
+
+@pytest.mark.parametrize(
+    ("x", "says"),
+    [
+        (np.zeros(7), "6 entries"),
+        (3.0, "6 entries"),
+        ([0, 0, np.nan, 0, 0, 0], "omega_c = nan rad s-1 must be finite"),
+        ([0, np.inf, 0, 0, 0, 0, 0, 0], "v_y = inf m s-1 must be finite"),
+    ],
+)
+def test_a_state_that_is_none_is_refused(x: object, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        full_state(x)

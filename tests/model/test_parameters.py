@@ -1,0 +1,152 @@
+import dataclasses
+import math
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from model import InputError, Parameters, StorageError
+
+FIELDS = [f.name for f in dataclasses.fields(Parameters)]
+positive = st.floats(1e-9, 1e9)
+valid = st.builds(
+    Parameters,
+    m=positive,
+    r=positive,
+    R=positive,
+    j=st.floats(1e-9, 2 / 3),
+    mu=st.floats(0, 10),
+    eta=st.floats(0, 10),
+    g=positive,
+    c=st.floats(0, 1e3),
+    omega_0=st.floats(-1e6, 1e6),
+)
+
+
+@pytest.mark.parametrize("name", ["reference", "high-wall-friction", "steel-in-water", "air"])
+def test_every_named_set_loads(name: str) -> None:
+    assert name in Parameters.names()
+    assert Parameters.named(name).m > 0
+
+
+def test_the_reference_sets_are_those_of_the_study() -> None:
+    expected = {"R": 0.05, "r": 0.01, "j": 0.4, "m": 0.03, "g": 9.81, "mu": 0.2, "eta": 0.2, "c": 1.0}
+    reference = dataclasses.asdict(Parameters.named("reference"))
+    assert {k: reference[k] for k in expected} == expected
+    rough = dataclasses.asdict(Parameters.named("high-wall-friction"))
+    assert {k: rough[k] for k in expected} == expected | {"eta": 0.6}
+
+
+def test_steel_in_water_has_the_drag_the_paper_names() -> None:
+    # After (10): for a steel ball of some millimetres in water c is of the order of 1e-2 1/s.
+    assert 1e-2 <= Parameters.named("steel-in-water").c < 1e-1
+
+
+def test_drag_and_gravity_follow_from_the_fluid() -> None:
+    nu, rho_f, rho_b, r = 1e-6, 1000.0, 8000.0, 0.002
+    p = Parameters.from_fluid(nu_f=nu, rho_f=rho_f, rho_b=rho_b, r=r, R=0.02, mu=0.1, eta=0.1, gravity=9.8)
+    # Stokes: F = 6 pi rho_f nu r v = m c v.
+    assert p.m * p.c == pytest.approx(6 * math.pi * rho_f * nu * r, rel=1e-14)
+    # Archimedes: weight less the weight of the displaced fluid.
+    assert p.m * p.g == pytest.approx(4 / 3 * math.pi * r**3 * (rho_b - rho_f) * 9.8, rel=1e-14)
+
+
+@given(valid)
+def test_toml_keeps_every_digit(p: Parameters) -> None:
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "p.toml"
+        p.save(path)
+        assert Parameters.load(path) == p
+
+
+@given(valid, st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
+def test_dimensionless_groups_do_not_depend_on_units(p: Parameters, length: float, time: float) -> None:
+    q = p.replace(R=p.R * length, g=p.g * length / time**2, c=p.c / time, omega_0=p.omega_0 / time)
+    assert q.kappa == pytest.approx(p.kappa, rel=1e-12)
+    assert q.Omega_0 == pytest.approx(p.Omega_0, rel=1e-12)
+
+
+BAD = {
+    "m": [0.0, -1.0],
+    "r": [0.0, -0.01],
+    "R": [0.0, -0.05],
+    "j": [0.0, -0.4, 0.67],
+    "mu": [-1e-12],
+    "eta": [-0.2],
+    "g": [0.0, -9.81],
+    "c": [-1.0],
+    "omega_0": [],
+}
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_a_bad_value_is_named_with_unit_and_range(name: str, reference: Parameters) -> None:
+    field = Parameters.__dataclass_fields__[name]
+    for value in BAD[name]:
+        with pytest.raises(InputError) as caught:
+            reference.replace(**{name: value})
+        message = str(caught.value)
+        assert message.startswith(f"{name} = {value:g} {field.metadata['unit']}")
+        assert field.metadata["allowed"] in message
+        assert "\n" not in message
+    for value in (math.nan, math.inf, -math.inf):
+        with pytest.raises(InputError, match=rf"^{name} = .*must be finite"):
+            reference.replace(**{name: value})
+    for value in ("0.2", None, True, [0.2], 1j):
+        with pytest.raises(InputError, match=f"^{name} = .*must be a number in"):
+            reference.replace(**{name: value})
+
+
+def test_edges_of_the_ranges_are_inside(reference: Parameters) -> None:
+    edge = reference.replace(j=2 / 3, mu=0, eta=0, c=0, omega_0=-3)
+    assert (edge.j, edge.mu, edge.c) == (2 / 3, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("m = 0.03\nmuu = 0.2", "unknown parameter 'muu' (did you mean 'mu'?)"),
+        ("m = 0.03", "missing parameter 'r', 'R', 'j'"),
+        ("m = ", "is not valid TOML"),
+        ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\nm = 1\n[fluid]\nnu_f = 1e-6\nrho_f = 1.0\nrho_b = 2.0", "m follows"),
+        ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu = 1e-6", "unknown fluid property 'nu'"),
+        ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu_f = 1e-6\nrho_f = 2.0\nrho_b = 1.0", "floats"),
+        ("r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu_f = -1e-6\nrho_f = 1.0\nrho_b = 2.0", "nu_f = -1e-06"),
+        ("fluid = 3", "must be a table"),
+        ("r = 0.01\nR = '5 cm'\nm = 1\nj = 0.4\nmu = 0.2\neta = 0.2\ng = 9.8\nc = 1\nomega_0 = 1", "R = '5 cm'"),
+    ],
+)
+def test_a_bad_file_is_one_clear_line(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        Parameters.load(path)
+    assert says in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_cannot_be_read_or_written(tmp_path: Path, reference: Parameters) -> None:
+    with pytest.raises(StorageError, match="No such file"):
+        Parameters.load(tmp_path / "absent.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(StorageError, match="not valid TOML"):
+        Parameters.load(tmp_path / "binary.toml")
+    with pytest.raises(StorageError, match="cannot write"):
+        reference.save(tmp_path / "absent" / "p.toml")
+
+
+def test_an_unknown_name_gets_a_suggestion(reference: Parameters) -> None:
+    with pytest.raises(InputError, match=r"did you mean 'reference'"):
+        Parameters.named("referense")
+    with pytest.raises(InputError, match=r"did you mean 'omega_0'"):
+        reference.replace(omega0=3.0)
+
+
+def test_the_saved_file_is_plain_toml(tmp_path: Path, reference: Parameters) -> None:
+    reference.save(tmp_path / "p.toml")
+    assert tomllib.loads((tmp_path / "p.toml").read_text()) == dataclasses.asdict(reference)

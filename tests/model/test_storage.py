@@ -1,0 +1,184 @@
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+
+from model import Case, Events, Flow, Header, Parameters, StorageError, Trajectory, storage
+from model.trajectory import SAMPLE, columns
+
+
+def make(n: int = 50, events: int = 2, failure: str = "") -> Trajectory:
+    rng = np.random.default_rng(0)
+    samples = np.empty(n, SAMPLE)
+    for name in columns(Trajectory):
+        samples[name] = rng.normal(size=samples[name].shape) if name != "case" else rng.integers(0, 9, n)
+    header = Header(
+        engine="event",
+        parameters=Parameters.named("reference"),
+        flow=Flow.ramp(10, 20, 3),
+        settings={"rtol": 1e-9, "method": "event"},
+        mjcf="<mujoco/>",
+        failure=failure,
+    )
+    happened = Events(
+        time=np.arange(events, dtype=float),
+        from_case=np.full(events, Case.RR, np.int8),
+        to_case=np.full(events, Case.SS, np.int8),
+        impulse_A=rng.normal(size=(events, 3)),
+        impulse_B=np.zeros((events, 3)),
+    )
+    return Trajectory.from_blocks(header, [samples[: n // 3], samples[n // 3 :]], happened)
+
+
+def assert_same(a: Trajectory, b: Trajectory) -> None:
+    for name in columns(Trajectory):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    for name in columns(Events):
+        np.testing.assert_array_equal(getattr(a.events, name), getattr(b.events, name))
+    one, two = dataclasses.asdict(a.header), dataclasses.asdict(b.header)
+    assert one.pop("flow")["value"].tolist() == two.pop("flow")["value"].tolist()
+    assert one == two
+
+
+@pytest.mark.parametrize(("n", "events"), [(50, 2), (0, 0), (1, 0), (5000, 7)])
+def test_what_is_saved_is_loaded(tmp_path: Path, n: int, events: int) -> None:
+    trajectory = make(n, events)
+    storage.save(trajectory, tmp_path / "run.h5")
+    assert_same(storage.load(tmp_path / "run.h5"), trajectory)
+    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_xarray_opens_it_with_axes_units_and_cases(tmp_path: Path) -> None:
+    trajectory = make()
+    storage.save(trajectory, tmp_path / "run.h5")
+    with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
+        assert data.omega_c.dims == ("time",)
+        assert data.force_A.dims == ("time", "axis")
+        assert data.event_from.dims == ("event_time",)
+        np.testing.assert_array_equal(data.omega_c, trajectory.omega_c)
+        assert data.omega_c.units == "rad s-1"
+        assert all({"units", "long_name"} <= set(data[name].attrs) for name in columns(Trajectory))
+        names = data.case.flag_meanings.split()
+        assert [names[code] for code in data.case.values] == [case.name for case in trajectory.cases]
+        assert json.loads(data.parameters)["R"] == 0.05
+
+
+def test_plain_h5py_shows_the_enum(tmp_path: Path) -> None:
+    storage.save(make(), tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert h5py.check_enum_dtype(file["case"].dtype) == {case.name: case.value for case in Case}
+
+
+def test_chunks_arrive_while_the_run_goes_on(tmp_path: Path) -> None:
+    trajectory = make(300)
+    samples = np.empty(300, SAMPLE)
+    for name in columns(Trajectory):
+        samples[name] = getattr(trajectory, name)
+    path = tmp_path / "run.h5"
+    with storage.TrajectoryWriter(path, trajectory.header) as writer:
+        for block in np.array_split(samples, 7):
+            writer.append(block)
+            assert not path.exists()
+        writer.finish(trajectory.events)
+    assert_same(storage.load(path), trajectory)
+
+
+def test_a_run_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
+    def break_off() -> None:
+        with storage.TrajectoryWriter(tmp_path / "run.h5", make().header) as writer:
+            writer.append(np.zeros(10, SAMPLE))
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        break_off()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_run_keeps_its_samples_and_says_why(tmp_path: Path) -> None:
+    storage.save(make(failure="diverged at t = 0.3 s"), tmp_path / "run.h5")
+    back = storage.load(tmp_path / "run.h5")
+    assert not back.complete
+    assert back.header.failure == "diverged at t = 0.3 s"
+    assert len(back.time) == 50
+
+
+def test_no_directory_to_write_to(tmp_path: Path) -> None:
+    with pytest.raises(StorageError, match=r"^cannot write .*: No such file or directory$"):
+        storage.save(make(), tmp_path / "absent" / "run.h5")
+    with pytest.raises(StorageError, match=r"^cannot read .*: there is no such file$"):
+        storage.load(tmp_path / "absent.h5")
+
+
+def test_a_full_disk_is_one_line_and_leaves_no_file(tmp_path: Path) -> None:
+    """A limit on the size of files, in a process of its own, plays the disk that is full."""
+    program = f"""
+import resource, sys
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+import test_storage
+resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+try:
+    test_storage.storage.save(test_storage.make(5000), {str(tmp_path / "run.h5")!r})
+except test_storage.StorageError as error:
+    print(error)
+"""
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert answer.stdout == f"cannot write {tmp_path / 'run.h5'}: File too large\n"
+    assert answer.stderr == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_truncation_is_refused(tmp_path: Path) -> None:
+    storage.save(make(), tmp_path / "run.h5")
+    whole = (tmp_path / "run.h5").read_bytes()
+    cut = tmp_path / "cut.h5"
+    for length in np.linspace(0, len(whole) - 1, 40, dtype=int):
+        cut.write_bytes(whole[:length])
+        with pytest.raises(StorageError) as caught:
+            storage.load(cut)
+        assert "\n" not in str(caught.value)
+
+
+def edit(tmp_path: Path, change) -> Path:
+    path = tmp_path / "run.h5"
+    storage.save(make(), path)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return path
+
+
+def replace(file: h5py.File, name: str, value: object) -> None:
+    del file[name]
+    file[name] = value
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda f: f.attrs.__setitem__("schema", "other"), "not a dualball-trajectory"),
+        (lambda f: f.attrs.__setitem__("schema_version", 99), "newer dualball: its schema version is 99"),
+        (lambda f: f.attrs.__setitem__("schema_version", "x"), "no valid schema version"),
+        (lambda f: f.attrs.__delitem__("engine"), "attribute 'engine' is missing"),
+        (lambda f: f.attrs.__setitem__("flow", "{"), "attribute 'flow' is not JSON"),
+        (lambda f: f.attrs.__setitem__("settings", "[]"), "attribute 'settings' is not a table"),
+        (lambda f: f.attrs.__setitem__("parameters", '{"m": -1}'), "missing parameter"),
+        (lambda f: f.__delitem__("omega_c"), "no dataset 'omega_c'"),
+        (lambda f: replace(f, "omega_c", h5py.ExternalLink("/etc/passwd", "/x")), "no dataset 'omega_c' of its own"),
+        (lambda f: replace(f, "omega_c", h5py.SoftLink("/y")), "no dataset 'omega_c' of its own"),
+        (lambda f: replace(f, "force_A", np.zeros(50)), "'force_A' has shape"),
+        (lambda f: replace(f, "y", np.zeros(49)), "differ in length"),
+        (lambda f: replace(f, "y", np.array([b"a"] * 50)), "'y' has type"),
+        (lambda f: replace(f, "case", np.full(50, 9, np.int8)), "case that does not exist"),
+    ],
+)
+def test_a_foreign_or_damaged_file_is_refused(tmp_path: Path, change, says: str) -> None:
+    path = edit(tmp_path, change)
+    with pytest.raises(StorageError, match=says) as caught:
+        storage.load(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
