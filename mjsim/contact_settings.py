@@ -1,0 +1,169 @@
+"""Settings of MuJoCo's contact model, and the theory of what they do to a ball that slides and rolls.
+
+MuJoCo makes the contact force f of a row obey ``a + R f = a_ref = -b v - k (gap - margin)``, where a is the
+acceleration of the contact point, ``A`` the inverse mass the row sees, ``R = (1 - d)/d A`` its softness, d the
+impedance (`solimp`), and ``b = 2/(d tc)``, ``k = 1/(d tc^2 dr^2)`` follow from ``solref = (tc, dr)``. Friction rows
+have no k, a damping of their own, ``b_f = 2/(d tc_f)`` (`solreffriction`), and the softness ``R / impratio``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from model import InputError, Parameters
+from model.arrays import Array
+from model.errors import suggestion
+from model.parameters import check_number
+
+CONES = ("elliptic", "pyramidal")
+INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactSettings:
+    """How MuJoCo is set; names are its own where it has one. The defaults belong to a step of 1 ms.
+
+    `at` scales the times of the defaults to another step; `for_problem` also looks at the speeds of a run.
+
+    Raises
+    ------
+    InputError
+        If a value is outside what the engine can do or would be unstable.
+    """
+
+    timestep: float = 1e-3
+    """Time step, s."""
+    solref: tuple[float, float] = (2e-3, 1.0)
+    """Time constant (s) and damping ratio of the normal rows."""
+    solreffriction: float = 2e-2
+    """Time constant tc_f of the friction rows, s."""
+    solimp: float = 0.1
+    """Impedance d, one value at every depth."""
+    impratio: float = 1e6
+    """How much stiffer the friction rows are than the normal row."""
+    servo: float = 0.02
+    """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
+    cone: str = "elliptic"
+    integrator: str = "Euler"
+    iterations: int = 100
+    tolerance: float = 1e-12
+    noslip_iterations: int = 0
+
+    def __post_init__(self) -> None:
+        self._check_range("timestep", self.timestep, "s", "> 0")
+        if len(self.solref) != 2:
+            raise InputError(f"solref = {self.solref!r} must be two numbers, time constant (s) and damping ratio")
+        self._check_range("solref time constant", self.solref[0], "s", "> 0")
+        self._check_range("solref damping ratio", self.solref[1], "1", "> 0")
+        self._check_range("solreffriction", self.solreffriction, "s", "> 0")
+        self._check_range("solimp", self.solimp, "1", ">= 0.0001 and <= 0.9999", 1e-4, 0.9999)
+        self._check_range("impratio", self.impratio, "1", ">= 0.1 and <= 1e7 (beyond, the solver fails)", 0.1, 1e7)
+        self._check_range("servo", self.servo, "s", ">= 0", 0.0)
+        self._check_range("tolerance", self.tolerance, "1", ">= 0", 0.0)
+        self._check_range("iterations", self.iterations, "1", ">= 1", 1)
+        self._check_range("noslip_iterations", self.noslip_iterations, "1", ">= 0", 0)
+        for name, value, known in (("cone", self.cone, CONES), ("integrator", self.integrator, INTEGRATORS)):
+            if value not in known:
+                raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(str(value), known)}")
+        if self.timestep > self.largest_timestep * (1 + 1e-12):
+            raise InputError(
+                f"timestep = {self.timestep:g} s is too large for the contact settings: solref {self.solref[0]:g} s, "
+                f"solreffriction {self.solreffriction:g} s and servo {self.servo:g} s allow at most "
+                f"{self.largest_timestep:g} s"
+            )
+
+    @staticmethod
+    def _check_range(
+        name: str, value: float, unit: str, allowed: str, low: float = 0.0, high: float = math.inf
+    ) -> None:
+        number = check_number(name, value, unit)
+        if number < low or number > high or (allowed == "> 0" and number == 0):
+            raise InputError(f"{name} = {number:g} {unit} is out of range: must be {allowed}")
+
+    @property
+    def largest_timestep(self) -> float:
+        """Largest stable time step, s.
+
+        The normal rows need tc >= 2 h (else the engine silently replaces tc), the friction rows b_f h <= 1 to die
+        out without changing sign, and the servo must be slower than a step.
+        """
+        limits = [self.solref[0] / 2, self.solreffriction * self.solimp / 2]
+        return min(limits + ([self.servo] if self.servo else []))
+
+    @property
+    def b_f(self) -> float:
+        """Damping of the friction rows, s-1."""
+        return 2 / (self.solimp * self.solreffriction)
+
+    @property
+    def k(self) -> float:
+        """Stiffness of the normal rows, s-2."""
+        return 1 / (self.solimp * (self.solref[0] * self.solref[1]) ** 2)
+
+    @property
+    def softness(self) -> float:
+        """R/A of the normal rows, (1 - d)/d."""
+        return (1 - self.solimp) / self.solimp
+
+    def penetration(self, load: float) -> float:
+        """Steady depth (m) of a contact whose force over the ball's mass is `load` (m s-2): R f/k."""
+        return self.softness * load / self.k
+
+    def creep_speed(self, load: npt.ArrayLike) -> Array:
+        """Slip speed (m s-1) at which a rolling contact carries the friction force m `load`: R_t f_t / b_f.
+
+        It is also the speed below which friction can't reach its Coulomb value.
+        """
+        return np.asarray(self.softness / self.impratio * np.asarray(load, dtype=float) / self.b_f)
+
+    @property
+    def servo_gain(self) -> float:
+        """Share of a gap that the servo takes off a margin in one step."""
+        return self.timestep / self.servo if self.servo else 0.0
+
+    def servo_reach(self, g: npt.ArrayLike) -> Array:
+        """Gap (m) within which the servo works: as far as twice the depth under gravity g, so that a margin stays
+        what it was while the ball is away."""
+        return np.asarray(2 * self.softness * np.asarray(g, dtype=float) / self.k)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """All values, JSON-able."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Self:
+        """Inverse of `to_mapping`; raises `InputError` for an unknown name."""
+        known = [f.name for f in dataclasses.fields(cls)]
+        for name in values:
+            if name not in known:
+                raise InputError(
+                    f"unknown contact setting {name!r}{suggestion(name, known)}; known: {', '.join(known)}"
+                )
+        changes = dict(values)
+        if "solref" in changes:
+            changes["solref"] = tuple(changes["solref"])
+        return cls(**changes)
+
+    @classmethod
+    def at(cls, timestep: float, **changes: Any) -> Self:
+        """The defaults with their times scaled to another step, and the given changes."""
+        check_number("timestep", timestep, "s")
+        scale = timestep / 1e-3
+        scaled = {
+            "timestep": timestep,
+            "solref": (cls.solref[0] * scale, cls.solref[1]),
+            "solreffriction": cls.solreffriction * scale,
+        }
+        return cls.from_mapping(scaled | changes)
+
+    @classmethod
+    def for_problem(cls, p: Parameters, timestep: float = 1e-3, max_slip_speed: float = 0.5) -> Self:
+        """Settings for a ball that slips at up to `max_slip_speed` (m s-1); see the module's docstring."""
+        return cls.at(timestep)

@@ -1,0 +1,66 @@
+"""From what the engine holds to samples in the paper's axes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from model import Parameters
+from model.arrays import Array
+from model.kinematics import frame, slip_speeds
+from model.trajectory import SAMPLE
+
+NQ, NV, NSENSOR = 7, 6, 28
+"""Sizes of the scene: (azimuth, inward, upward, quaternion), their velocities, two contact sensors."""
+_FOUND, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11), slice(12, 14)
+
+
+def joint_state(x: Array, theta: float, p: Parameters) -> tuple[Array, Array]:
+    """qpos (..., 7) and qvel (..., 6) of full states x (..., 8), with the orientation at rest.
+
+    The axes of the joints are the paper's, so that the velocities are v_A, v_B and the slip of (4) rearranged:
+    ``qvel = (omega_c, v_h, v_y, o_x, o_y - omega_c, o_z)`` with the angular velocity o of the ball.
+    """
+    y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = np.moveaxis(x, -1, 0)
+    roll = (p.R - h) / p.r * omega_c
+    zero, one = np.zeros_like(y), np.ones_like(y)
+    qpos = np.stack([zero + theta, h, y, one, zero, zero, zero], axis=-1)
+    qvel = np.stack([omega_c, v_h, v_y, slip_x + roll, slip_y - roll - omega_c, slip_z + v_y / p.r], axis=-1)
+    return qpos, qvel
+
+
+def state(qpos: Array, qvel: Array, p: Parameters) -> Array:
+    """Full states (..., 8) of joint coordinates; the inverse of `joint_state`, for any orientation."""
+    shape = qpos.shape[:-1]
+    spin = Rotation.from_quat(qpos[..., 3:7].reshape(-1, 4), scalar_first=True).apply(qvel[..., 3:6].reshape(-1, 3))
+    o_x, o_y, o_z = np.moveaxis(np.asarray(spin).reshape(*shape, 3), -1, 0)
+    h, y = qpos[..., 1], qpos[..., 2]
+    omega_c, v_h, v_y = (qvel[..., k] for k in range(3))
+    roll = (p.R - h) / p.r * omega_c
+    return np.stack([y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h], axis=-1)
+
+
+def samples(time: Array, qpos: Array, qvel: Array, sensors: Array, p: Parameters) -> npt.NDArray[np.void]:
+    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), qpos (n, 7), qvel (n, 6), sensors (n, 28)."""
+    block = np.zeros(len(time), SAMPLE)
+    x = state(qpos, qvel, p)
+    block["time"], block["theta"] = time, qpos[:, 0]
+    for k, name in enumerate(("y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")):
+        block[name] = x[:, k]
+    axes = frame(qpos[:, 0])
+    speeds = slip_speeds(x, p)
+    for k, (contact, distance) in enumerate((("A", x[:, 0]), ("B", x[:, 6]))):
+        sensor = sensors[:, 14 * k : 14 * (k + 1)]
+        found = sensor[:, _FOUND] > 0
+        block[f"force_{contact}"] = np.einsum("nab,nb->na", axes, _world_force(sensor))
+        # Apart, the engine has no contact to report on: the coordinates say how far.
+        block[f"gap_{contact}"] = np.where(found, sensor[:, _DIST], distance)
+        block[f"slip_speed_{contact}"] = np.where(found, np.hypot(*sensor[:, _SLIP].T), speeds[k])
+    return block
+
+
+def _world_force(sensor: Array) -> Array:
+    normal, tangent = sensor[:, _NORMAL], sensor[:, _TANGENT]
+    force = sensor[:, _FORCE, None]
+    return force[:, 0] * normal + force[:, 1] * tangent + force[:, 2] * np.cross(normal, tangent)

@@ -1,0 +1,111 @@
+"""The MJCF scene, filled in from `Parameters` and `ContactSettings`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from mjsim.contact_settings import ContactSettings
+from model import InputError, Parameters
+
+SCENE = Path(__file__).with_name("scene.xml")
+
+_ELEMENTS = {
+    "body": ("ball", "tangent"), "geom": ("ball", "floor", "wall", "vessel"), "pair": ("A", "B"), "sensor": ("A", "B"),
+    "joint": ("azimuth", "inward", "upward", "spin"),
+}  # fmt: skip
+_INTEGRATORS = {
+    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
+    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+    "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
+}
+_CONES = {"elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC, "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL}
+
+
+def spec(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -> Any:
+    """The scene as an `mujoco.MjSpec`.
+
+    Raises `InputError` if the file can't be read or lacks one of the named elements.
+    """
+    spec = _read(Path(scene))
+    found = {kind: {name: _find(spec, kind, name, scene) for name in names} for kind, names in _ELEMENTS.items()}
+    _set_options(spec.option, p, settings)
+    _set_geometry(found["body"], found["geom"], found["joint"], p)
+    for name, friction in (("A", p.mu), ("B", p.eta)):
+        _set_pair(found["pair"][name], friction, settings)
+    return spec
+
+
+def build(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -> Any:
+    """The scene compiled to an `mujoco.MjModel`; raises as `spec`."""
+    filled = spec(p, settings, scene)
+    try:
+        return filled.compile()
+    except ValueError as error:
+        raise InputError(f"MuJoCo cannot compile {scene}: {_one_line(error)}") from error
+
+
+def mjcf(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -> str:
+    """The scene as the MJCF text that is simulated; raises as `spec`."""
+    filled = spec(p, settings, scene)
+    filled.compile()
+    return str(filled.to_xml())
+
+
+def _read(scene: Path) -> Any:
+    try:
+        return mujoco.MjSpec.from_string(scene.read_text("utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read the scene {scene}: {error.strerror}") from error
+    except ValueError as error:
+        raise InputError(f"{scene} is not a valid MJCF scene: {_one_line(error)}") from error
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _find(spec: Any, kind: str, name: str, scene: str | Path) -> Any:
+    element = getattr(spec, kind)(name)
+    if element is None:
+        raise InputError(f"{scene} has no {kind} named {name!r}, which the simulation needs")
+    return element
+
+
+def _set_options(option: Any, p: Parameters, settings: ContactSettings) -> None:
+    option.gravity = (0.0, 0.0, -p.g)
+    option.timestep = settings.timestep
+    option.impratio = settings.impratio
+    option.iterations = settings.iterations
+    option.tolerance = settings.tolerance
+    option.noslip_iterations = settings.noslip_iterations
+    option.cone = _CONES[settings.cone]
+    option.integrator = _INTEGRATORS[settings.integrator]
+
+
+def _set_geometry(body: dict[str, Any], geom: dict[str, Any], joint: dict[str, Any], p: Parameters) -> None:
+    height = 2 * p.r
+    body["ball"].pos = (p.R, 0.0, p.r)
+    body["ball"].mass = p.m
+    body["ball"].inertia = (p.j * p.m * p.r**2,) * 3
+    joint["azimuth"].pos = (p.R, -p.r, 0.0)
+    geom["ball"].size = (p.r, 0.0, 0.0)
+    geom["wall"].pos = (p.R + p.r, 0.0, height)
+    geom["wall"].size = (height, height, p.r)
+    geom["floor"].size = (4 * p.R, 4 * p.R, p.r)
+    geom["vessel"].pos = (0.0, 0.0, height * 1.005)
+    geom["vessel"].size = (p.R + p.r, height, 0.0)
+
+
+def _set_pair(pair: Any, friction: float, settings: ContactSettings) -> None:
+    # The engine raises friction coefficients to 1e-5; no friction at all takes a contact of one row.
+    pair.condim = 3 if friction > 0 else 1
+    pair.friction = (friction, friction, 0.0, 0.0, 0.0)
+    pair.solref = settings.solref
+    pair.solreffriction = (settings.solreffriction, 1.0)
+    pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
+    pair.margin = 0.0
+    pair.gap = 0.0

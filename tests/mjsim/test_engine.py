@@ -1,0 +1,77 @@
+"""The engine against motions whose exact form is short enough to stand in the test."""
+
+import numpy as np
+import pytest
+
+import mjsim
+from mjsim import ContactSettings, recorder
+from model import Flow, InputError, Parameters, SimulationError
+
+P = Parameters.named("reference")
+
+
+def test_joint_coordinates_round_trip() -> None:
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(50, 8)) * [1e-3, 0.1, 10, 5, 5, 5, 1e-3, 0.1]
+    qpos, qvel = recorder.joint_state(x, 0.7, P)
+    np.testing.assert_allclose(recorder.state(qpos, qvel, P), x, rtol=0, atol=1e-12)
+
+
+def test_falls_freely_through_the_fluid_at_first_order() -> None:
+    """Off floor and wall only gravity and drag act: v_y' = -g - c v_y, and no moment turns the ball in space."""
+    p = P.replace(omega_0=0.0, c=3.0)
+    x0 = [0.5, 0, 0, 2.0, 1.0, -3.0, 0.02, 0]
+    errors = []
+    for timestep in (2e-3, 1e-3):
+        run = mjsim.simulate(p, x0, 0.2, settings=ContactSettings.at(timestep), sample_interval=0.02)
+        exact = -p.g / p.c * (1 - np.exp(-p.c * run.time))
+        errors.append(np.abs(run.v_y - exact).max())
+        np.testing.assert_array_equal(run.force_A, 0)
+        assert {case.name for case in run.cases} == {"NN"}
+        # 4: o = roll + slip, and roll_z = v_y / r is all that changes.
+        np.testing.assert_allclose(run.slip_z + run.v_y / p.r, -3.0, rtol=0, atol=1e-10)
+    # Euler's local error h^2 v''/2 adds up to h g c t/2 at most.
+    assert errors[1] <= 1e-3 * p.g * p.c * 0.2
+    assert errors[0] / errors[1] == pytest.approx(2, rel=0.02)
+
+
+def test_batch_is_the_single_run() -> None:
+    sets = [P.replace(omega_0=25.0), Parameters.named("high-wall-friction").replace(omega_0=20.0, r=0.02, m=0.1)]
+    x0 = [0, 0, 12.0, -2, 1, 6]
+    ramp = Flow.ramp(20.0, 25.0, 0.2)
+    many = mjsim.simulate_many(sets, [x0, x0], 0.3, ramp, sample_interval=0.01)
+    for p, run in zip(sets, many, strict=True):
+        alone = mjsim.simulate(p, x0, 0.3, ramp, sample_interval=0.01)
+        np.testing.assert_allclose(run.x, alone.x, rtol=0, atol=1e-9)
+        np.testing.assert_array_equal(run.case, alone.case)
+
+
+def test_contact_force_is_the_weight_at_rest() -> None:
+    """At rest in still fluid away from the wall, the floor carries m g and nothing else acts."""
+    run = mjsim.simulate(P.replace(omega_0=0.0), [0, 0, 0, 0, 0, 0, 0.01, 0], 1.0)
+    np.testing.assert_allclose(run.force_A[-1], [0, P.m * P.g, 0], atol=1e-9 * P.m * P.g)
+    assert abs(run.gap_A[-1]) < 1e-12
+
+
+def test_divergence_stops_a_run_and_keeps_what_there_is() -> None:
+    wild = [0, 0, 1e9, 0, 0, 0]
+    with pytest.raises(SimulationError, match=r"diverged by t = .* s") as caught:
+        mjsim.simulate(P, wild, 0.1)
+    assert caught.value.trajectory.header.failure
+    failed, sound = mjsim.simulate_many([P, P], [wild, [0, 0, 1, 0, 0, 0]], 0.1)
+    assert not failed.complete
+    assert sound.complete
+    assert len(sound.time) == 101
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"t_end": -1.0}, "t_end = -1 s"),
+        ({"t_end": 1.0, "sample_interval": 1e-5}, "sample_interval = 1e-05 s"),
+        ({"t_end": float("nan")}, "t_end"),
+    ],
+)
+def test_bad_arguments(arguments, words) -> None:
+    with pytest.raises(InputError, match=words):
+        mjsim.simulate(P, [0, 0, 1, 0, 0, 0], **arguments)
