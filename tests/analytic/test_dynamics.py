@@ -1,0 +1,294 @@
+"""Vector fields and contact forces against two origins they don't share.
+
+Symbolically: sympy differentiates vectors to Newton-Euler (20), adds Table 3 and solves; the difference from the code
+is simplified to zero. Numerically: the linear system (21) with Table 3 is solved at random states, and errors are
+measured against the largest term of the equation they enter, as round-off is.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from analytic import contact_forces, dynamics, vector_field
+from model import Case, Contact, InputError, Parameters
+from model.cases import TRAITS
+from model.kinematics import VARIABLES, slip_velocities
+
+spec = importlib.util.spec_from_file_location("newton_euler", Path(__file__).with_name("newton_euler.py"))
+ne = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(ne)
+
+P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
+N = 10_000
+WALL = [case for case in Case if case.B is not Contact.N]
+
+
+def random_states(case: Case, n: int, seed: int = 0) -> np.ndarray:
+    """States (n, 8) of a case with entries over several orders of magnitude."""
+    rng = np.random.default_rng([seed, int(case)])
+    sign = rng.choice([-1.0, 1.0], (n, 8))
+    x = sign * 10.0 ** rng.uniform(-3, 2, (n, 8)) * [1, 0.1, 1, 1, 1, 1, 1, 0.1]
+    x[:, 0] = rng.uniform(0, 0.1, n)
+    x[:, 6] = rng.uniform(0, 0.9 * P.R, n)
+    for k, name in enumerate(VARIABLES):
+        if name in TRAITS[case].constraints:
+            x[:, k] = 0.0
+    if case is Case.RN:
+        x[:, 5] = -x[:, 7] / P.r
+    return x
+
+
+# --- symbolically ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", [case for case in Case if case is not Case.RR])
+def test_newton_euler_symbolically(case: Case) -> None:
+    unknowns = [*ne.RATE, *ne.FORCE_A, *ne.FORCE_B]
+    solution = sp.solve([e.subs(ne.held(case)) for e in ne.balance() + ne.closure(case)], unknowns, dict=True)
+    assert len(solution) == 1, "the system must have a unique solution"
+    x = [sp.sympify(v).subs(ne.held(case)) for v in ne.STATE]
+    p = SimpleNamespace(m=ne.m, r=ne.r, R=ne.R, j=ne.j, mu=ne.mu, eta=ne.eta, g=ne.g, c=ne.c)
+    slips = {}
+    if case.A is Contact.S:
+        slips["slip_A"] = (sp.sin(ne.alpha), sp.cos(ne.alpha))
+    if case.B is Contact.S:
+        slips["slip_B"] = (sp.sin(ne.beta), sp.cos(ne.beta))
+    if case is Case.SR:  # w_z = 0: the direction at A is +-1, sin^2 = 1
+        solution = [{k: v.subs(sp.cos(ne.alpha), 0) for k, v in solution[0].items()}]
+        slips["slip_A"] = (sp.sin(ne.alpha), sp.Integer(0))
+    if case is Case.RS:
+        solution = [{k: v.subs(sp.cos(ne.beta), 0) for k, v in solution[0].items()}]
+        slips["slip_B"] = (sp.sin(ne.beta), sp.Integer(0))
+    force = dynamics.forces(case, x, p, ne.omega_0, **slips)
+    rates = dynamics.newton_euler(case, x, force, p, ne.omega_0)
+    for name, mine in zip(unknowns, [*rates, *force], strict=True):
+        assert sp.simplify(mine - solution[0][name]) == 0, f"{name} in {case.name}"
+
+
+def test_rolling_at_both_points_symbolically() -> None:
+    """RR has one equation too few: all forces follow from B_y, all rates are free of it (23)."""
+    rank_unknowns = [*ne.RATE, *ne.FORCE_A, ne.FORCE_B[0], ne.FORCE_B[2]]
+    # dv_y = 0 follows from A, dslip_z = 0 from both contacts: the doubled equation is what leaves a force free.
+    equations = [e.subs(ne.held(Case.RR)) for e in ne.balance() + ne.closure(Case.RR)]
+    solution = sp.solve(equations, rank_unknowns, dict=True)
+    assert len(solution) == 1
+    omega_c, B_y = ne.STATE[2], ne.FORCE_B[1]
+    p = SimpleNamespace(m=ne.m, r=ne.r, R=ne.R, j=ne.j, mu=ne.mu, eta=ne.eta, g=ne.g, c=ne.c)
+    family = dynamics.rolling_family(omega_c, p, ne.omega_0, B_y)
+    for name, mine in zip([*ne.FORCE_A, *ne.FORCE_B], family, strict=True):
+        assert sp.simplify(mine - solution[0].get(name, name)) == 0, str(name)
+    x = [omega_c if name == "omega_c" else sp.Integer(0) for name in ne.NAMES]
+    for name, mine in zip(ne.RATE, dynamics.newton_euler(Case.RR, x, family, p, ne.omega_0), strict=True):
+        assert sp.simplify(mine - solution[0][name]) == 0, str(name)
+
+
+def test_velocities_of_the_contact_points() -> None:
+    """(6), whose printed first row lacks v_y, against v_C + omega x r."""
+    x = np.random.default_rng(5).normal(size=8)
+    values = dict(zip(ne.STATE, x, strict=True)) | {ne.r: P.r, ne.R: P.R}
+    for mine, derived in zip(slip_velocities(x, P), ne.velocities(), strict=True):
+        np.testing.assert_allclose(mine, np.array(derived.subs(values), dtype=float).ravel(), rtol=1e-14, atol=1e-15)
+
+
+# --- numerically -----------------------------------------------------------------------------------------------
+
+
+def linear_solution(case: Case, x: np.ndarray, p: Parameters) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Solve (21) with Table 3, written out for motion off the wall too: forces (n, 6), rates (n, 8), scale of rates.
+
+    Unknowns: A_x A_y A_z B_x B_y B_z, dv_y, domega_c, dslip_x, dslip_y, dslip_z, dv_h.
+    """
+    n = len(x)
+    _, v_y, oc, wx, _, wz, h, vh = x.T
+    rho, jmr, one = p.R - h, p.j * p.m * p.r, np.ones(n)
+    oz = v_y / p.r + wz
+    M, b = np.zeros((n, 12, 12)), np.zeros((n, 12))
+    size = np.zeros((n, 6))
+
+    def row(k: int, terms: dict[int, np.ndarray | float], *rhs: np.ndarray | float) -> None:
+        for column, value in terms.items():
+            M[:, k, column] = value
+        b[:, k] = sum(rhs)
+        if k < 6:
+            size[:, k] = sum(np.abs(part) * one for part in rhs)
+
+    row(0, {0: 1, 3: 1, 11: -p.m}, p.m * rho * oc**2, p.m * p.c * vh)
+    row(1, {1: 1, 4: 1, 6: -p.m}, p.m * p.g, p.m * p.c * v_y)
+    row(2, {2: 1, 5: 1, 7: -p.m * rho}, -2 * p.m * vh * oc, p.m * p.c * rho * oc, -p.m * p.c * rho * p.omega_0)
+    droll = {7: rho / p.r}  # (rho omega_c)'/r = rho omega_c'/r - v_h omega_c/r
+    row(3, {2: 1, 7: jmr * droll[7], 8: jmr}, jmr * vh * oc / p.r, -jmr * oc * oz)
+    row(4, {5: 1, 7: jmr * droll[7], 9: -jmr}, jmr * vh * oc / p.r)
+    row(5, {0: 1, 4: -1, 6: -jmr / p.r, 10: -jmr}, -jmr * oc * rho * oc / p.r, -jmr * oc * wx)
+    v_A, v_B = slip_velocities(x, p)
+    k = 6
+    for contact, first, normal, others, rest, slide in (
+        (case.A, 0, 1, (0, 2), 6, v_A), (case.B, 3, 3, (4, 5), 11, v_B),
+    ):  # fmt: skip
+        if contact is Contact.N:
+            for column in range(first, first + 3):
+                row(k, {column: 1}, 0.0)
+                k += 1
+            continue
+        row(k, {rest: 1}, 0.0)
+        k += 1
+        if contact is Contact.S:
+            friction = p.mu if first == 0 else p.eta
+            direction = slide / np.linalg.norm(slide, axis=1, keepdims=True)
+            for column in others:
+                row(k, {column: 1, normal: friction * direction[:, column - first]}, 0.0)
+                k += 1
+        elif first == 0:  # rates of v_A: (dv_h + dv_y + r dw_z, -r dw_x)
+            row(k, {11: 1 / p.r, 6: 1 / p.r, 10: 1}, 0.0)
+            row(k + 1, {8: 1}, 0.0)
+            k += 2
+        else:
+            if case is Case.RR:
+                row(k, {4: 1}, 0.0)  # w_z' = 0 is there already: fix the free force instead
+            else:
+                row(k, {10: 1}, 0.0)
+            row(k + 1, {9: 1}, 0.0)
+            k += 2
+    assert k == 12
+    # Equilibrate: one unit of force, one unit of angular acceleration.
+    scale = np.array([p.m * p.g] * 6 + [p.g, p.g / p.r, p.g / p.r, p.g / p.r, p.g / p.r, p.g])
+    M, weight = M * scale, np.abs(M * scale).max(axis=2)
+    solved = np.linalg.solve(M / weight[..., None], (b / weight)[..., None])[..., 0] * scale
+    dx = np.stack([v_y, *(solved[:, c] for c in (6, 7, 8, 9, 10)), vh, solved[:, 11]], axis=1)
+    newton, euler = size[:, :3].max(axis=1) + np.abs(solved[:, :6]).max(axis=1), size.max(axis=1)
+    load = np.maximum(newton, euler)
+    accelerations = load / (p.m * min(p.j, 1.0))
+    rates = np.stack([
+        np.abs(v_y), accelerations, accelerations / rho, *[accelerations / p.r] * 3, np.abs(vh), accelerations,
+    ], axis=1)  # fmt: skip
+    return solved[:, :6], dx, np.concatenate([rates, np.repeat(load[:, None], 6, axis=1)], axis=1)
+
+
+@pytest.mark.parametrize("case", list(Case))
+def test_against_the_linear_system(case: Case) -> None:
+    x = random_states(case, N)
+    force, dx, scale = linear_solution(case, x, P)
+    if case is Case.RR:
+        mine = np.stack(np.broadcast_arrays(*dynamics.rolling_family(x[:, 2], P, P.omega_0, 0.0)), axis=-1)
+    else:
+        mine = np.concatenate(contact_forces(case, x, P), axis=-1)
+    error = np.abs(np.concatenate([vector_field(case, x, P) - dx, mine - force], axis=1))
+    assert np.max(error / np.where(scale > 0, scale, 1.0)) <= 1e-12
+
+
+@pytest.mark.parametrize("case", list(Case))
+def test_floats_and_arrays_agree(case: Case) -> None:
+    """An integrator's eight floats and an array of states give the same rates to the last digits."""
+    x = random_states(case, 20)
+    many = vector_field(case, x, P)
+    scale = np.abs(many).max(axis=0)
+    for one, expected in zip(x, many, strict=True):
+        rate = dynamics.rates(case, one.tolist(), P, P.omega_0)
+        assert np.all(np.abs(rate - expected) <= 1e-13 * np.maximum(scale, np.abs(expected)))
+
+
+@pytest.mark.parametrize("case", list(Case))
+def test_shapes_and_a_flow_of_its_own(case: Case) -> None:
+    x = random_states(case, 6).reshape(2, 3, 8)
+    fluid = np.array([1.0, 2.0, 3.0])
+    rate = vector_field(case, x, P, fluid)
+    assert rate.shape == (2, 3, 8)
+    single = vector_field(case, x[1, 2], P.replace(omega_0=3.0))
+    np.testing.assert_allclose(rate[1, 2], single, rtol=1e-14)
+    if case is not Case.RR:
+        assert [f.shape for f in contact_forces(case, x, P, fluid)] == [(2, 3, 3)] * 2
+
+
+@pytest.mark.parametrize("case", WALL)
+def test_six_entries_mean_a_closed_wall(case: Case) -> None:
+    x = random_states(case, 10)
+    np.testing.assert_array_equal(vector_field(case, x[:, :6], P), vector_field(case, x, P)[:, :6])
+
+
+@pytest.mark.parametrize("case", list(Case))
+def test_constraints_are_kept_exactly(case: Case) -> None:
+    x = random_states(case, 100)
+    rate = dict(zip(VARIABLES, vector_field(case, x, P).T, strict=True))
+    for name in TRAITS[case].constraints:
+        if name in rate:
+            assert np.all(rate[name] == 0), name
+        else:
+            np.testing.assert_allclose(rate["v_h"], -P.r * rate["slip_z"], rtol=1e-14)
+
+
+@pytest.mark.parametrize("case", list(Case))
+def test_mirror_symmetry(case: Case) -> None:
+    """Reflection in a plane through the axis turns (omega_c, slip_x, slip_y, omega_0) and leaves the rest."""
+    flip = np.array([1, 1, -1, -1, -1, 1, 1, 1.0])
+    x = random_states(case, 100)
+    mirrored = vector_field(case, flip * x, P.replace(omega_0=-P.omega_0))
+    np.testing.assert_allclose(mirrored, flip * vector_field(case, x, P), rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("case", list(Case))
+@pytest.mark.parametrize("zero", [{"mu": 0.0}, {"eta": 0.0}, {"c": 0.0}, {"omega_0": 0.0}, {"mu": 0.0, "eta": 0.0}])
+def test_vanishing_parameters(case: Case, zero: dict[str, float]) -> None:
+    """Each has a defined result, also with an orbit at rest (omega_c = 0)."""
+    p = P.replace(**zero)
+    x = random_states(case, 50)
+    x[:25, 2] = 0.0
+    rates = vector_field(case, x, p)
+    assert np.all(np.isfinite(rates))
+    if case is not Case.RR:
+        F_A, F_B = contact_forces(case, x, p)
+        assert np.all(np.isfinite([F_A, F_B]))
+        if case.A is Contact.S and p.mu == 0:
+            assert np.all(F_A[:, [0, 2]] == 0)
+
+
+@given(st.floats(-60, 60), st.floats(-100, 100), st.floats(0.01, 0.9), st.floats(0.01, 0.9))
+def test_coulomb_in_slipping(omega_c: float, w_z: float, mu: float, eta: float) -> None:
+    """In SS friction is exactly the friction coefficient times the normal force, against the sliding velocity."""
+    p = P.replace(mu=mu, eta=eta)
+    x = np.array([0, 0, omega_c, 3.0, -2.0, w_z])
+    for force, velocity, normal, friction in zip(
+        contact_forces(Case.SS, x, p), slip_velocities(x, p), (1, 0), (mu, eta), strict=True
+    ):
+        tangential = np.delete(force, normal)
+        v = np.delete(velocity, normal)
+        np.testing.assert_allclose(
+            tangential, -friction * force[normal] * v / np.linalg.norm(v), atol=1e-14 * np.abs(force).max()
+        )
+
+
+# --- bad input -------------------------------------------------------------------------------------------------
+
+BAD = [
+    (Case.RS, [0, 0, 1, 1, 1, 0], "slip_x = 1 rad s-1 must be 0 in case RS"),
+    (Case.RS, [0, 0, 1, 0, 0, 0], "slip speed at B = 0 m s-1 must be > 0 in case RS"),
+    (Case.SR, [0, 0, 1, 0, 0, 0], "slip speed at A = 0 m s-1 must be > 0 in case SR"),
+    (Case.SS, [0, 0, 1, 0, 1, 0], "slip speed at A = 0 m s-1 must be > 0 in case SS"),
+    (Case.SS, [0, 0, 1, 1, 0, 0], "slip speed at B = 0 m s-1 must be > 0 in case SS"),
+    (Case.SS, [0, 2, 1, 1, 1, 0], "v_y = 2 m s-1 must be 0 in case SS"),
+    (Case.RR, [1, 0, 1, 0, 0, 0], "y = 1 m must be 0 in case RR"),
+    (Case.NR, [-1, 0, 1, 1, 0, 0], "y = -1 m must be >= 0 in case NR"),
+    (Case.NS, [0, 0, 1, 1, 0, 0], "slip speed at B = 0 m s-1 must be > 0 in case NS"),
+    (Case.NN, [0, 0, 1, 1, 0, 0, -1, 0], "h = -1 m must be >= 0 in case NN"),
+    (Case.NN, [0, 0, 1, 1, 0, 0, 0.05, 0], "h = 0.05 m must be < R = 0.05 m"),
+    (Case.RN, [0, 0, 1, 0, 0, 1, 0.01, 0], "v_h + r slip_z = 0.01 m s-1 must be 0 in case RN"),
+    (Case.NR, [0, 0, 1, 1, 0, 0, 0.01, 0], "h = 0.01 m must be 0 in case NR"),
+]
+
+
+@pytest.mark.parametrize(("case", "x", "message"), BAD)
+def test_states_of_another_case_are_refused_by_name(case: Case, x: list[float], message: str) -> None:
+    for function in (vector_field, contact_forces):
+        with pytest.raises(InputError, match=message.replace("+", r"\+")):
+            function(case, x, P)
+
+
+def test_a_bad_flow_is_refused() -> None:
+    with pytest.raises(InputError, match="omega_0 = nan rad s-1 must be finite"):
+        vector_field(Case.RR, [0, 0, 1, 0, 0, 0], P, float("nan"))

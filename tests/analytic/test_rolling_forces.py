@@ -1,0 +1,146 @@
+"""The one-parameter family of forces in RR against brute force over its parameter, and against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analytic import contact_forces, rolling_forces
+from analytic.dynamics import newton_euler, rolling_family
+from model import Case, InputError, Parameters
+
+P = Parameters.named("reference")
+FRICTION = [(0.2, 0.2), (0.2, 0.6), (0.6, 0.2), (0.4, 0.4), (1.5, 0.3), (0.3, 1.5), (1.0, 1.0), (2.0, 2.0)]
+RNG = np.random.default_rng(7)
+OMEGA_C = RNG.uniform(-40, 40, 300)
+OMEGA_0 = OMEGA_C + RNG.normal(0, 60, 300)
+
+
+def utilisation(omega_c: np.ndarray, p: Parameters, omega_0: np.ndarray, B_y: np.ndarray) -> np.ndarray:
+    """The larger utilisation at given B_y, inf where a contact would have to pull."""
+    A_x, A_y, A_z, B_x, B_y, B_z = rolling_family(omega_c, p, omega_0, B_y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        A = np.where(A_y > 0, np.hypot(A_x, A_z) / (p.mu * A_y), np.inf)
+        B = np.where(B_x > 0, np.hypot(B_y, B_z) / (p.eta * B_x), np.inf)
+    return np.maximum(A, B)
+
+
+def test_every_member_gives_the_same_motion() -> None:
+    x = [0.0, 0.0, 12.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    rates = [
+        newton_euler(Case.RR, x, rolling_family(12.0, P, 30.0, B_y), P, 30.0)[2]
+        for B_y in (-1.0, 0.0, 0.7)
+    ]  # fmt: skip
+    np.testing.assert_allclose(rates, -P.c * (12 - 30) / (1 + 2 * P.j), rtol=1e-14)
+
+
+@pytest.mark.parametrize(("mu", "eta"), FRICTION)
+def test_least_utilisation_is_the_least(mu: float, eta: float) -> None:
+    """No B_y of a dense scan does better, and the member itself attains what is claimed."""
+    p = P.replace(mu=mu, eta=eta)
+    best = rolling_forces.least_utilisation(OMEGA_C, p, OMEGA_0)
+    scan = p.m * p.g * (1 - np.geomspace(1e-4, 1e4, 4000))
+    low = utilisation(OMEGA_C[:, None], p, OMEGA_0[:, None], scan).min(axis=1)
+    assert np.all(best.utilisation <= low * (1 + 1e-12))
+    finite = np.isfinite(best.B_y)
+    assert finite.any()
+    attained = utilisation(OMEGA_C, p, OMEGA_0, best.B_y)[finite]
+    # The root of the crossing is known to round-off of q, which the steepest utilisation amplifies.
+    np.testing.assert_allclose(attained, best.utilisation[finite], rtol=1e-10)
+
+
+@pytest.mark.parametrize(("mu", "eta"), FRICTION)
+def test_interval_margin_and_utilisation_agree(mu: float, eta: float) -> None:
+    p = P.replace(mu=mu, eta=eta)
+    least, greatest = rolling_forces.admissible_interval(OMEGA_C, p, OMEGA_0)
+    best = rolling_forces.least_utilisation(OMEGA_C, p, OMEGA_0)
+    holds = np.isfinite(greatest)
+    assert holds.any()
+    assert holds.all() == (min(mu, eta) > 1), "only between two contacts rougher than 1 is there always a force"
+    np.testing.assert_array_equal(rolling_forces.margin(OMEGA_C, p, OMEGA_0) >= 0, holds)
+    attained = np.isfinite(best.B_y)
+    np.testing.assert_array_equal((best.utilisation <= 1)[attained], holds[attained])
+    for ends in (least, greatest):
+        end = holds & np.isfinite(ends)
+        np.testing.assert_allclose(utilisation(OMEGA_C, p, OMEGA_0, ends)[end], 1, rtol=1e-9)
+
+
+@pytest.mark.parametrize("eta", [0.05, 0.2, 0.35, 0.4, 0.45, 1.0, 2.0])
+@pytest.mark.parametrize("mu", [0.05, 0.2, 0.8, 1.0])
+def test_stationary_rolling_ends_at_omega_01_or_omega_03(mu: float, eta: float) -> None:
+    """(84) for eta < j, (86) for eta >= j, as long as the ball can't jam (mu <= 1)."""
+    p = P.replace(mu=mu, eta=eta)
+    limit = p.g / (p.j * p.R)
+    if eta < p.j:
+        limit = p.g / p.R * mu * (1 + eta) / (mu * eta * (1 + p.j) + p.j - eta)
+    ends = np.sqrt(limit) * np.array([1 - 1e-12, 1 + 1e-12])
+    assert list(rolling_forces.margin(ends, p, ends) >= 0) == [True, False]
+
+
+@pytest.mark.parametrize(("mu", "eta"), [(1.5, 0.3), (1.2, 0.1), (3.0, 0.5)])
+def test_stationary_rolling_jams_for_mu_over_1(mu: float, eta: float) -> None:
+    """omega_0^2 <= (g/R) mu(1 - eta)/(j + eta - mu eta(1 + j)) if that is positive, without end if not."""
+    p = P.replace(mu=mu, eta=eta)
+    divisor = p.j + eta - mu * eta * (1 + p.j)
+    if divisor > 0:
+        edge = np.sqrt(p.g / p.R * mu * (1 - eta) / divisor)
+        ends = edge * np.array([1 - 1e-12, 1 + 1e-12])
+        assert list(rolling_forces.margin(ends, p, ends) >= 0) == [True, False]
+    else:
+        ends = np.array([50.0, 500.0])
+        assert np.all(rolling_forces.margin(ends, p, ends) >= 0)
+
+
+@pytest.mark.parametrize("mu", [0.2, 0.9])
+def test_the_floor_alone_limits_the_drag(mu: float) -> None:
+    """With a wall that holds everything: T < mu(1 - jR omega_c^2/g)/sqrt(1 - mu^2), T = A_z/(m g) (cf. (73))."""
+    p, omega_c = P.replace(mu=mu, eta=1e6), 9.0
+    T = mu * (1 - p.j * p.R * omega_c**2 / p.g) / np.sqrt(1 - mu**2)
+    D = T * (1 + 2 * p.j) * p.g / (p.j * p.c * p.R)
+    margins = rolling_forces.margin(omega_c, p, omega_c + D * np.array([1 - 1e-12, 1 + 1e-12]))
+    assert list(margins >= 0) == [True, False]
+
+
+def test_margin_is_continuous_through_its_zero() -> None:
+    omega_c = np.linspace(10, 16, 100_001)
+    margin = rolling_forces.margin(omega_c, P, omega_c + 1.0)
+    assert margin.max() > 0 > margin.min()
+    assert np.abs(np.diff(margin)).max() < 1e-3 * np.ptp(margin)
+
+
+def test_a_ball_at_rest_in_a_driving_flow_cannot_start_in_rolling() -> None:
+    """B_x = 0 at omega_c = 0: spin-up begins in RS (eta <= 1)."""
+    assert rolling_forces.margin(0.0, P, 1.0) < 0
+    assert rolling_forces.margin(0.0, P, 0.0) >= 0
+    assert rolling_forces.least_utilisation(0.0, P, 0.0).utilisation == 0
+
+
+def test_public_forces_are_the_member_of_least_utilisation() -> None:
+    omega = np.array([5.0, 12.0])
+    F_A, F_B = contact_forces(Case.RR, np.stack([0 * omega, 0 * omega, omega, *[0 * omega] * 3], axis=-1), P, omega)
+    best = rolling_forces.least_utilisation(omega, P, omega)
+    np.testing.assert_array_equal(F_B[:, 1], best.B_y)
+    need_A = np.hypot(F_A[:, 0], F_A[:, 2]) / (P.mu * F_A[:, 1])
+    need_B = np.hypot(F_B[:, 1], F_B[:, 2]) / (P.eta * F_B[:, 0])
+    np.testing.assert_allclose(np.maximum(need_A, need_B), best.utilisation, rtol=1e-10)
+
+
+def test_forces_that_do_not_exist_are_refused() -> None:
+    with pytest.raises(
+        InputError, match=r"omega_c = 20 rad s-1 cannot be rolled at both points: it takes .* the limit is 1"
+    ):
+        contact_forces(Case.RR, [[0, 0, 5.0, 0, 0, 0], [0, 0, 20.0, 0, 0, 0]], P, [5.0, 20.0])
+
+
+@pytest.mark.parametrize(
+    ("friction", "holds"),
+    [
+        ({"mu": 0.0, "eta": 0.6}, True),  # B_y alone keeps the spin axis turning: eta (1 + j - j) >= j
+        ({"mu": 0.0, "eta": 0.3}, False),
+        ({"mu": 0.2, "eta": 0.0}, True),  # A_x alone does, up to omega_0^2 = mu g/(j R)
+        ({"mu": 0.0, "eta": 0.0}, False),
+    ],
+)
+def test_one_frictionless_contact(friction: dict[str, float], holds: bool) -> None:
+    p = P.replace(**friction)
+    assert (rolling_forces.least_utilisation(8.0, p, 8.0).utilisation <= 1) == holds
