@@ -46,8 +46,10 @@ class ContactSettings:
     """Time constant tc_f of the friction rows, s."""
     solimp: float = 0.1
     """Impedance d, one value at every depth."""
-    impratio: float = 1e6
+    impratio: float = 1e2
     """How much stiffer the friction rows are than the normal row."""
+    memory: bool = True
+    """Whether the friction force of the last step shifts the surface velocity, so that rolling doesn't creep."""
     servo: float = 0.02
     """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
     cone: str = "elliptic"
@@ -72,6 +74,10 @@ class ContactSettings:
         for name, value, known in (("cone", self.cone, CONES), ("integrator", self.integrator, INTEGRATORS)):
             if value not in known:
                 raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(str(value), known)}")
+        if self.memory and self.cone != "elliptic":
+            raise InputError(
+                f"memory needs the elliptic cone, not cone = {self.cone!r}: its rows mix normal and friction"
+            )
         if self.timestep > self.largest_timestep * (1 + 1e-12):
             raise InputError(
                 f"timestep = {self.timestep:g} s is too large for the contact settings: solref {self.solref[0]:g} s, "
@@ -127,6 +133,14 @@ class ContactSettings:
     def servo_gain(self) -> float:
         """Share of a gap that the servo takes off a margin in one step."""
         return self.timestep / self.servo if self.servo else 0.0
+
+    def memory_gain(self, m: float) -> float:
+        """Surface velocity per friction force, R_t/b_f, m s-1 N-1, for a ball of mass m.
+
+        With it the friction rows read ``a + R_t (f - f_last) = -b_f v``: once the force is steady nothing is left to
+        creep. The cone stays where it is, and in steady sliding the shift is parallel to the slip.
+        """
+        return self.softness / (m * self.impratio * self.b_f) if self.memory else 0.0
 
     def servo_reach(self, g: npt.ArrayLike) -> Array:
         """Gap (m) within which the servo works: as far as twice the depth under gravity g, so that a margin stays

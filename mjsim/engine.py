@@ -1,8 +1,13 @@
 """Stepping one or many simulations: drag, wall and margins from outside, MuJoCo's contact solver inside.
 
 Before each step the wall is turned to be tangent at the ball's azimuth and the drag of the fluid (9) is written as a
-generalised force; after it, the margins of the contacts move against what is left of the penetration. Nothing else is
-added to what MuJoCo does by itself.
+generalised force. Two slow corrections take out what the softness of MuJoCo's contacts would leave: the margins of the
+contacts move against what is left of the penetration, and the surfaces get the velocity at which the last friction
+force would make them creep, backwards. The body axes of a homogeneous ball are arbitrary: they are set upright before
+each step, so that forces and velocities of the ball's joint are along the paper's axes.
+
+The generalised contact force of the chain is then, with r times the moments about the centre,
+``Q = (., A_x + B_x, A_y + B_y, -r A_z, r B_z, r (A_x - B_y))``, which with the normal forces gives the friction.
 """
 
 from __future__ import annotations
@@ -26,6 +31,9 @@ from model.parameters import check_number
 
 BLOCK = 256
 """Samples a run keeps before it hands them out."""
+_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+_NORMAL_A, _NORMAL_B = 1, 15
+"""Where the sensors hold the normal forces."""
 _HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 
@@ -87,6 +95,11 @@ class Run:
         """Samples each run will have, for progress."""
         return self._count
 
+    @property
+    def margins(self) -> Array:
+        """Present margins of the contacts A and B, shape (runs, 2), m."""
+        return self._stepper.margins
+
     def __iter__(self) -> Iterator[list[npt.NDArray[np.void]]]:
         n = len(self._parameters)
         for first in range(0, self._count, BLOCK):
@@ -96,7 +109,7 @@ class Run:
                 omega_0 = self._omega_0(row * self._interval, self._interval if row + 1 < self._count else 1)
                 self._stepper.sample(omega_0[0], raw[k])
                 self._stepper.advance(omega_0[1:])
-            time = np.arange(rows.start, rows.stop) * (self._interval * self._settings.timestep)
+            time = np.arange(rows.start, rows.stop, dtype=np.float64) * (self._interval * self._settings.timestep)
             yield [self._finish(i, time, raw[:, i]) for i in range(n)]
             if all(header.failure for header in self.headers):
                 return
@@ -106,7 +119,7 @@ class Run:
         time = (np.arange(first, first + count) + 0.5) * self._settings.timestep
         return np.stack([flow(time) for flow in self._flows], axis=-1)
 
-    def _finish(self, i: int, time: npt.NDArray[np.floating], raw: Array) -> npt.NDArray[np.void]:
+    def _finish(self, i: int, time: Array, raw: Array) -> npt.NDArray[np.void]:
         """Samples of run i from raw rows, cut where they diverge."""
         p = self._parameters[i]
         qpos, qvel, sensors = np.split(raw, [recorder.NQ, recorder.NQ + recorder.NV], axis=1)
@@ -206,6 +219,9 @@ def _sampling(t_end: float, timestep: float, sample_interval: float | None) -> t
 class _Stepper(Protocol):
     """One or many simulations in the engine."""
 
+    margins: Array
+    """Margins of the contacts, shape (runs, 2), m."""
+
     def sample(self, omega_0: Array, row: Array) -> None:
         """Take one step; write (qpos, qvel, sensors) of its beginning to row (runs, 41); omega_0 (runs,)."""
 
@@ -219,9 +235,8 @@ class _Single(_Stepper):
     def __init__(self, model: Any, p: Parameters, settings: ContactSettings, start: tuple[Array, Array]) -> None:
         self._model, self._data = model, mujoco.MjData(model)
         self._data.qpos[:], self._data.qvel[:] = start
-        self._mc, self._R = p.m * p.c, p.R
-        self._gain = settings.servo_gain
-        self._reach = settings.servo_reach(p.g)
+        self._p, self._settings = p, settings
+        self.margins = model.pair_margin[None]
 
     def sample(self, omega_0: Array, row: Array) -> None:
         data = self._data
@@ -231,19 +246,29 @@ class _Single(_Stepper):
 
     def advance(self, omega_0: Array) -> None:
         model, data, step, cos, sin = self._model, self._data, mujoco.mj_step, math.cos, math.sin
-        qpos, qvel, force, wall, margin = data.qpos, data.qvel, data.qfrc_applied, data.mocap_quat[0], model.pair_margin
-        mc, R, gain, reach = self._mc, self._R, self._gain, self._reach
-        margin_A, margin_B = margin.tolist()
+        qpos, qvel, drag, wall = data.qpos, data.qvel, data.qfrc_applied, data.mocap_quat[0]
+        constraint, sensors, margins = data.qfrc_constraint, data.sensordata, model.pair_margin
+        floor_slip, wall_slip = (model.geom_surfacevel[model.geom(name).id] for name in ("floor", "wall"))
+        orientation = qpos[3:7]
+        mc, R, r = self._p.m * self._p.c, self._p.R, self._p.r
+        gain, reach = self._settings.servo_gain, float(self._settings.servo_reach(self._p.g))
+        shift = self._settings.memory_gain(self._p.m)
+        margin_A, margin_B = margins.tolist()
         for omega in omega_0[:, 0].tolist():
-            theta, h, y = qpos[:3].tolist()
-            omega_c, v_h, v_y = qvel[:3].tolist()
+            theta, h, y, *_ = qpos.tolist()
+            omega_c, v_h, v_y, *_ = qvel.tolist()
             wall[0], wall[3] = cos(theta / 2), sin(theta / 2)
-            force[0], force[1], force[2] = -mc * (R - h) * (R - h) * (omega_c - omega), -mc * v_h, -mc * v_y
+            orientation[:] = _UPRIGHT
+            drag[0], drag[1], drag[2] = -mc * (R - h) * (R - h) * (omega_c - omega), -mc * v_h, -mc * v_y
             if gain:
                 if y < reach:
-                    margin[0] = margin_A = max(0.0, margin_A - gain * y)
+                    margins[0] = margin_A = max(0.0, margin_A - gain * y)
                 if h < reach:
-                    margin[1] = margin_B = max(0.0, margin_B - gain * h)
+                    margins[1] = margin_B = max(0.0, margin_B - gain * h)
+            if shift:
+                _, force_h, force_y, moment_x, moment_y, _ = constraint.tolist()
+                floor_slip[0], floor_slip[1] = -shift / r * moment_x, shift * (force_h - sensors[_NORMAL_B])
+                wall_slip[0], wall_slip[1] = shift * (force_y - sensors[_NORMAL_A]), shift / r * moment_y
             step(model, data)
 
 
@@ -258,12 +283,19 @@ class _Many(_Stepper):
         _expand_differences(batch, models)
         self._qpos, self._qvel, self._sensors = (batch.bind(name) for name in ("qpos", "qvel", "sensordata"))
         self._qpos[:], self._qvel[:] = (np.stack(part) for part in zip(*start, strict=True))
-        self._force, self._wall = batch.bind("qfrc_applied"), batch.bind("mocap_quat")[:, 0]
-        self._margin = batch.expand("pair_margin")
+        self._drag, self._wall = batch.bind("qfrc_applied"), batch.bind("mocap_quat")[:, 0]
+        self._constraint = batch.bind("qfrc_constraint")
+        self.margins = batch.expand("pair_margin")
+        surface = batch.expand("geom_surfacevel")
+        self._floor_slip, self._wall_slip = (surface[:, models[0].geom(name).id, :2] for name in ("floor", "wall"))
         self._minus_mc = np.array([[-p.m * p.c] for p in parameters])
         self._R = np.array([p.R for p in parameters])
         self._gain = settings.servo_gain
         self._reach = settings.servo_reach(np.array([[p.g] for p in parameters]))
+        shift = np.array([settings.memory_gain(p.m) for p in parameters])
+        r = np.array([p.r for p in parameters])
+        self._shift, self._shift_r = shift, shift / r
+        self._remembers = settings.memory
 
     def sample(self, omega_0: Array, row: Array) -> None:
         split = recorder.NQ + recorder.NV
@@ -272,22 +304,33 @@ class _Many(_Stepper):
         row[:, split:] = self._sensors
 
     def advance(self, omega_0: Array) -> None:
-        qpos, qvel, margin = self._qpos, self._qvel, self._margin
+        qpos, qvel, margins, wall = self._qpos, self._qvel, self.margins, self._wall
         gaps = qpos[:, 2:0:-1]
-        velocity, drag = qvel[:, :3], self._force[:, :3]
-        half, rho, wall = np.empty(len(qpos)), np.empty(len(qpos)), self._wall
+        velocity, drag = qvel[:, :3], self._drag[:, :3]
+        half, rho = np.empty(len(qpos)), np.empty(len(qpos))
         for omega in omega_0:
             np.multiply(qpos[:, 0], 0.5, out=half)
             np.cos(half, out=wall[:, 0])
             np.sin(half, out=wall[:, 3])
+            qpos[:, 3:7] = _UPRIGHT
             np.multiply(velocity, self._minus_mc, out=drag)
             np.subtract(self._R, qpos[:, 1], out=rho)
             drag[:, 0] -= self._minus_mc[:, 0] * omega
             drag[:, 0] *= rho * rho
             if self._gain:
-                lower = margin - self._gain * gaps
-                np.maximum(lower, 0.0, out=margin, where=gaps < self._reach)
+                lower = margins - self._gain * gaps
+                np.maximum(lower, 0.0, out=margins, where=gaps < self._reach)
+            if self._remembers:
+                self._remember()
             self._batch.step()
+
+    def _remember(self) -> None:
+        """Shift the surfaces by the last friction forces: A_z, A_x of the floor, B_y, B_z of the wall."""
+        force, sensors, shift = self._constraint, self._sensors, self._shift
+        np.multiply(force[:, 3], -self._shift_r, out=self._floor_slip[:, 0])
+        np.multiply(force[:, 1] - sensors[:, _NORMAL_B], shift, out=self._floor_slip[:, 1])
+        np.multiply(force[:, 2] - sensors[:, _NORMAL_A], shift, out=self._wall_slip[:, 0])
+        np.multiply(force[:, 4], self._shift_r, out=self._wall_slip[:, 1])
 
 
 def _expand_differences(batch: Batch, models: Sequence[Any]) -> None:

@@ -43,9 +43,12 @@ def build(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -
     """The scene compiled to an `mujoco.MjModel`; raises as `spec`."""
     filled = spec(p, settings, scene)
     try:
-        return filled.compile()
+        model = filled.compile()
     except ValueError as error:
         raise InputError(f"MuJoCo cannot compile {scene}: {_one_line(error)}") from error
+    # The engine looks at surface velocities only if one was there at compile time, or if told.
+    model.flg_surfacevel = settings.memory
+    return model
 
 
 def mjcf(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -> str:
