@@ -107,7 +107,7 @@ def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> Array:
     if case.B is Contact.N:
         _refuse(columns["h"] < 0, columns["h"], "h", f"must be >= 0 in case {case.name}")
         _refuse(columns["h"] >= p.R, columns["h"], "h", f"must be < R = {p.R:g} m")
-    slide_A, slide_B = _slides(list(columns.values()), p)
+    slide_A, slide_B = slides(list(columns.values()), p)
     for point, slipping, slide in (
         ("A", case.A is Contact.S, slide_A),
         ("B", case.B is Contact.S, slide_B),
@@ -161,7 +161,7 @@ def forces(
     Sine and cosine of the slip directions alpha, beta (8) are taken from x; give `slip_A`, `slip_B` for the limit
     of vanishing slip in a direction (53).
     """
-    slide_A, slide_B = _slides(x, p)
+    slide_A, slide_B = slides(x, p)
     if case.A is Contact.S and slip_A is None:
         slip_A = _direction(*slide_A)
     if case.B is Contact.S and slip_B is None:
@@ -248,7 +248,7 @@ _HELD = {
 """Indices of the variables that a case holds at zero."""
 
 
-def _slides(x: Sequence[Real], p: Parameters) -> tuple[Direction, Direction]:
+def slides(x: Sequence[Real], p: Parameters) -> tuple[Direction, Direction]:
     """Sliding speeds in m s-1 at A and B along the directions of sine and cosine of alpha and beta: (6), (8)."""
     _, v_y, _, w_x, w_y, w_z, _, v_h = x
     return (p.r * w_x, v_h + v_y + p.r * w_z), (p.r * w_y, p.r * w_z)

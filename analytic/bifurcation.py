@@ -1,0 +1,245 @@
+"""Bifurcations over omega_0: the thresholds omega_01 ... omega_04, eta_cr, and what meets there (section 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic import slipping_branch
+from analytic.stationary import StationarySolution, branch_states
+from model import Case, InputError, Parameters
+from model.arrays import Array
+from model.kinematics import VARIABLES
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """One row of Table 5: what happens to the stationary solutions at a threshold."""
+
+    threshold: str
+    """Field of `Thresholds`."""
+    name: str
+    abbreviation: str
+    codimension: int | None
+    """Codimension of the discontinuity set in state space; None for a smooth bifurcation."""
+    cases: tuple[Case, ...]
+    where: str
+    """Range of eta in which it happens."""
+
+
+TABLE_5 = (
+    Bifurcation("omega_01", "persistence", "P3", 3, (Case.RR, Case.SS), "eta < j"),
+    Bifurcation("omega_02", "nonsmooth fold", "NF2", 2, (Case.SS, Case.SR), "eta_cr < eta < j"),
+    Bifurcation("omega_02", "persistence", "P2", 2, (Case.NS, Case.NR), "eta > 0"),
+    Bifurcation("omega_03", "nonsmooth transcritical", "NT1", 1, (Case.RR, Case.SR), "eta > j"),
+    Bifurcation("omega_04", "fold", "F", None, (Case.SS,), "eta_cr < eta < j"),
+)
+"""The bifurcations of codimension 1 in the parameter space, for SR with (12) released where eta > j (Fig. 12).
+
+For eta < eta_cr the branch of SS reaches SR at omega_02 from below: a persistence of codimension 2 instead of NF2.
+"""
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """The flows omega_0 > 0 at which stationary solutions change, rad s-1, and eta_cr; nan for what doesn't exist."""
+
+    omega_01: float
+    """(84): RR gives way to SS. nan for eta > j, where A_y would have to be negative. 0 for mu = 0."""
+    omega_02: float
+    """(85): the wall begins to carry the weight. nan for eta = 0: a smooth wall never does."""
+    omega_03: float
+    """(86): the gyroscopic moment carries the weight, and RR lifts off the floor if nothing ended it before."""
+    omega_04: float
+    """(88): the fold of SS. nan unless eta_cr < eta < j, mu > 0 and c > 0."""
+    eta_cr: float
+    """(87): c^2 R/(4 g mu^2). inf for mu = 0 (no fold at any eta), nan for mu = c = 0."""
+
+
+def thresholds(p: Parameters) -> Thresholds:
+    """Thresholds of a set of parameters; p.omega_0 plays no part."""
+    Omega = threshold_curves(p, p.mu, p.eta)
+    unit = np.sqrt(p.g / p.R)
+    omega = {name: float(Omega[name] * unit) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
+    return Thresholds(**omega, eta_cr=float(Omega["eta_cr"]))
+
+
+def threshold_curves(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False) -> dict[str, Array]:
+    """The fields of `Thresholds` over arrays mu and eta, with Omega = omega sqrt(R/g); for the lines of Figs. 7, 8.
+
+    `released` drops (12), as Fig. 12 does: omega_01 and omega_04 are then continued beyond eta = j as far as the
+    equations have solutions.
+    """
+    mu, eta = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(mu, eta))
+    divisor = mu * eta * (1 + p.j) + p.j - eta
+    real = (divisor > 0) & ((eta <= p.j) | released)
+    Omega_01 = np.where(real, np.sqrt(mu * (1 + eta) / np.where(real, divisor, 1.0)), np.nan)
+    fold = slipping_branch.fold(p.j, mu, eta, p.kappa, released)
+    folds = np.isfinite(fold)
+    safe = np.where(folds, mu, 1.0), np.where(folds, eta, p.j / 2)
+    turning = slipping_branch.branch(np.where(folds, fold, 0.0), p.j, *safe, p.kappa if folds.any() else 1.0)
+    return {
+        "omega_01": np.asarray(Omega_01),
+        "omega_02": np.where(eta > 0, 1 / np.sqrt(np.where(eta > 0, eta, 1.0)), np.nan),
+        "omega_03": np.full(mu.shape, 1 / np.sqrt(p.j)),
+        "omega_04": np.where(folds, turning.Omega_0, np.nan),
+        "eta_cr": np.broadcast_to(slipping_branch.eta_critical(mu, p.kappa), mu.shape),
+    }
+
+
+def fold_without_drag(p: Parameters) -> float:
+    """The limit of c omega_04 in rad s-2 for c -> 0: the height of mu (j - eta) cos sin/den, for 0 < eta < j.
+
+    omega_04 ~ K/c: with the drag of water or air the fold is tens of times beyond omega_02.
+    """
+    if not (0 < p.eta < p.j and p.mu > 0):
+        raise InputError(f"eta = {p.eta:g} is out of range: there is a fold for mu > 0 and 0 < eta < j = {p.j:g} only")
+    return slipping_branch.fold_without_drag(p.j, p.mu, p.eta)[1] * p.g / p.R
+
+
+@dataclass(frozen=True)
+class SpecialPoint:
+    """A bifurcation found: what, where, and how well it is known."""
+
+    bifurcation: Bifurcation
+    omega_0: float
+    """rad s-1"""
+    x: Array
+    """The state in which the solutions meet, shape (8,)."""
+    method: str
+    precision: float
+    """Relative uncertainty of omega_0."""
+
+    def __str__(self) -> str:
+        b = self.bifurcation
+        cases = "-".join(case.name for case in b.cases)
+        return f"{b.abbreviation} ({b.name}) of {cases} at omega_0 = {self.omega_0:.12g} rad s-1, {self.method}"
+
+
+def special_points(p: Parameters) -> list[SpecialPoint]:
+    """The bifurcations of Table 5 that a set of parameters has, in the order of omega_0."""
+    found, values = [], thresholds(p)
+    happens = {
+        "P3": p.eta < p.j and p.mu > 0,
+        "NF2": np.isfinite(values.omega_04),
+        "P2": p.eta > 0,
+        "NT1": p.eta > p.j,
+        "F": np.isfinite(values.omega_04),
+    }
+    eps = float(np.finfo(float).eps)
+    for bifurcation in TABLE_5:
+        if not happens[bifurcation.abbreviation]:
+            continue
+        omega_0 = getattr(values, bifurcation.threshold)
+        x = np.zeros(8)
+        x[2] = omega_0
+        if bifurcation.threshold == "omega_02":
+            x[3] = p.g / (p.j * omega_0 * p.r) - omega_0 * p.R / p.r
+        if bifurcation.abbreviation == "F":
+            s = float(slipping_branch.fold(p.j, p.mu, p.eta, p.kappa))
+            x = branch_states(s, p)[0]
+            found.append(SpecialPoint(bifurcation, omega_0, x, "bracketed root of (89)", 16 * eps))
+        else:
+            found.append(SpecialPoint(bifurcation, omega_0, x, "closed form", 8 * eps))
+    return sorted(found, key=lambda point: point.omega_0)
+
+
+@dataclass(frozen=True)
+class DoublePoint:
+    """A point of codimension 2 in the plane (eta, omega_0): a black dot of Figs. 7 and 8."""
+
+    eta: float
+    omega_0: float
+    """rad s-1"""
+    meets: tuple[str, ...]
+    """The thresholds that meet there."""
+
+
+def double_points(p: Parameters) -> list[DoublePoint]:
+    """Where the curves of Fig. 7 (eta varied at fixed mu) meet: at eta_cr, where the fold is born, and at eta = j."""
+    unit, found = np.sqrt(p.g / p.R), []
+    eta_cr = float(slipping_branch.eta_critical(p.mu, p.kappa))
+    if 0 < eta_cr < p.j:
+        found.append(DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04")))
+    if p.mu > 0:
+        folds = ("omega_04",) if eta_cr < p.j and p.c > 0 else ()
+        found.append(DoublePoint(p.j, float(unit / np.sqrt(p.j)), ("omega_01", "omega_02", "omega_03", *folds)))
+    return found
+
+
+def double_points_of_equal_friction(p: Parameters) -> list[DoublePoint]:
+    """The same for Fig. 8, where mu = eta are varied together: eta_cr is then (kappa^2/4)^(1/3)."""
+    unit, found = np.sqrt(p.g / p.R), []
+    eta_cr = float(np.cbrt(p.kappa**2 / 4))
+    if 0 < eta_cr < p.j:
+        found.append(DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04")))
+    folds = ("omega_04",) if 0 < eta_cr < p.j else ()
+    found.append(DoublePoint(p.j, float(unit / np.sqrt(p.j)), ("omega_01", "omega_02", "omega_03", *folds)))
+    return found
+
+
+class Exists(IntFlag):
+    """Which stationary solutions exist: the labels of the regions of Figs. 7 and 8 (RS exists on omega_0 = 0 only)."""
+
+    RR = 1
+    SS = 2
+    """The part of the branch that begins in RR."""
+    SS_BEYOND_FOLD = 4
+    """The unstable part, between the fold and SR."""
+    SR = 8
+    NR = 16
+    NS = 32
+
+
+def case_map(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+    """Flags `Exists` at every point of a plane of parameters, shape (number of eta, number of omega_0).
+
+    Parameters
+    ----------
+    mu, eta : 1-D, of one length (Fig. 8) or mu a number (Fig. 7)
+    omega_0 : 1-D, rad s-1, of either sign
+
+    RR counts where it is stable with respect to slipping; for mu > 1 it may also jam beyond that, see `rolling_forces`.
+    """
+    Omega = np.abs(np.asarray(omega_0, dtype=float)) / np.sqrt(p.g / p.R)
+    eta = np.asarray(eta, dtype=float)
+    curves = {name: value[:, None] for name, value in threshold_curves(p, mu, eta).items()}
+    mu = np.broadcast_to(np.asarray(mu, dtype=float), eta.shape)[:, None]
+    eta = eta[:, None]
+    one, two, four = (curves[f"omega_0{k}"] for k in (1, 2, 4))
+    two = np.where(np.isnan(two), np.inf, two)
+    end_of_rr = np.where(eta < p.j, one, curves["omega_03"])
+    slips = (eta < p.j) & (mu > 0) & (p.c > 0)
+    folds = np.isfinite(four)
+    carried = two <= Omega
+    flags = [
+        (Exists.RR, end_of_rr >= Omega),
+        (Exists.SS, slips & (one < Omega) & (Omega < np.where(folds, four, two))),
+        (Exists.SS_BEYOND_FOLD, folds & (two < Omega) & (four > Omega)),
+        (Exists.SR, carried),
+        (Exists.NR, carried),
+        (Exists.NS, ~carried & (p.c > 0)),
+    ]
+    plane = np.zeros(np.broadcast_shapes(eta.shape, Omega.shape), dtype=np.uint8)
+    for flag, where in flags:
+        plane |= np.where(where, np.uint8(flag), np.uint8(0))
+    return plane
+
+
+def operating_range(p: Parameters) -> float:
+    """The largest omega_0 in rad s-1 up to which omega_c = omega_0 is the ball's only stationary motion (section 5.3).
+
+    It ends where RR ends in slipping (omega_01, eta < j). It doesn't end, inf, for eta >= j, where RR, SR and NR all go
+    round with the fluid, nor on a smooth floor, which can't hold the ball back. Without drag there is none, 0.
+    """
+    if p.c == 0:
+        return 0.0
+    return thresholds(p).omega_01 if p.eta < p.j and p.mu > 0 else np.inf
+
+
+def wall_spin(solution: StationarySolution, p: Parameters) -> float:
+    """omega_x^0 = slip_x + omega_c R/r of (91), rad s-1: the spin on the wall, ordinate of Figs. 9-12."""
+    return float(solution.x[VARIABLES.index("slip_x")] + p.R / p.r * solution.x[VARIABLES.index("omega_c")])

@@ -1,0 +1,255 @@
+"""Stability with respect to slipping (section 3): does a slight slip, or lift, out of a rolling case die out or grow?
+
+From a state x* of a case Y the ball is pushed along n into a case Z of more freedom (the arrows of Fig. 6, and NR->NS);
+gamma(x*, n) = lim f_Z(x* + eps n) . n (53) tells whether it is driven further. Three measures of one question:
+
+* ``gamma`` with the paper's Euclidean product: exact as (56), (66), (73), (82), (83) quote it, but over all directions
+  its maximum may be positive though no slip can last (docs/errata.md);
+* ``gamma`` with the product of kinetic energy, the mass matrix reduced to the slip: the work done on the slip;
+* the forces: rolling goes on as long as admissible forces exist (`stick_margin`).
+
+With two or more directions to slip, growth along one is not yet lasting slip: the direction turns. It lasts along a
+limit direction, where f_Z is parallel to n (`limit_directions`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize, root
+
+from analytic import dynamics, rolling_forces
+from model import Case, Contact, Parameters
+from model.arrays import Array
+from model.cases import TRAITS
+from model.kinematics import VARIABLES
+
+SLIP_ARROWS = (
+    (Case.RR, Case.RS), (Case.RR, Case.SR), (Case.RR, Case.SS), (Case.RS, Case.SS), (Case.SR, Case.SS),
+    (Case.NR, Case.NS),
+)  # fmt: skip
+"""The arrows of Fig. 6 along which a contact begins to slip."""
+LIFT_ARROWS = ((Case.RR, Case.NR), (Case.RS, Case.NS), (Case.SR, Case.NR), (Case.SS, Case.NS))
+"""The arrows of Fig. 6 along which the ball leaves the floor."""
+_SLIPS = ("slip_x", "slip_y", "slip_z")
+
+
+class Metric(Enum):
+    """The inner product of (52)."""
+
+    EUCLID = "Euclidean, in slip angular velocity, as in the paper"
+    ENERGY = "kinetic energy of the slip"
+
+
+@dataclass(frozen=True)
+class Push:
+    """One direction of slip and how the slip grows along it."""
+
+    n: Array
+    """Unit vector in the product used, over `normals`."""
+    gamma: float
+    """Growth rate of the slip angular velocity, rad s-2."""
+
+
+def normals(inner: Case, outer: Case) -> tuple[str, ...]:
+    """The variables that span W (51): what may slip in `outer` and doesn't in `inner`."""
+    return tuple(name for name in _SLIPS if name in TRAITS[outer].active and name not in TRAITS[inner].active)
+
+
+def direction(alpha: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
+    """Unit vectors (slip_x, slip_y, slip_z) with slip directions alpha, beta: (75), shape (..., 3).
+
+    Both angles must lie in [-pi/2, pi/2] or both in [pi/2, 3 pi/2] (76); the quarter turns themselves are singular.
+    """
+    tan_a, tan_b = np.tan(alpha), np.tan(beta)
+    sign = np.sign(np.pi / 2 - np.asarray(alpha, dtype=float))
+    n = np.stack(np.broadcast_arrays(tan_a, tan_b, 1.0), axis=-1)
+    return np.asarray(sign[..., None] * n / np.linalg.norm(n, axis=-1, keepdims=True))
+
+
+def slip_mass(inner: Case, outer: Case, p: Parameters) -> Array:
+    """Mass matrix of the slip in units of m r^2, shape (d, d): the kinetic energy reduced to W.
+
+    In (v_y/r, omega_c R/r, slips) the energy is that of the centre plus that of the spin (4); what moves in `inner` is
+    eliminated (Schur complement). For RR->SS: j/(1+2j) [[1+j, j, 0], [j, 1+j, 0], [0, 0, 1+2j]].
+    """
+    spin = np.array([[0.0, 1, 1, 0, 0], [0, -1, 0, 1, 0], [1, 0, 0, 0, 1]])
+    mass = np.diag([1.0, 1, 0, 0, 0]) + p.j * spin.T @ spin
+    order = ("v_y", "omega_c", *_SLIPS)
+    W = [order.index(name) for name in normals(inner, outer)]
+    Y = [k for k, name in enumerate(order) if name in TRAITS[inner].active]
+    cross = mass[np.ix_(Y, W)]
+    return np.asarray(mass[np.ix_(W, W)] - cross.T @ np.linalg.solve(mass[np.ix_(Y, Y)], cross))
+
+
+def slip_rates(
+    inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters
+) -> tuple[Array, Array, Array]:
+    """lim f_Z(x* + eps n) in W, and the normal forces A_y, B_x in N there: (..., d), (...), (...).
+
+    x is one state of `inner`, n directions (..., d) over `normals`, of any length. A negative normal force means that
+    the contact opens instead of slipping that way.
+    """
+    state = dynamics.check_state(inner, x, p)
+    n = np.asarray(n, dtype=float)
+    pushed = np.broadcast_to(state, (*n.shape[:-1], 8)).copy()
+    W = [VARIABLES.index(name) for name in normals(inner, outer)]
+    directions = {}
+    slid, push = dynamics.slides(state.tolist(), p), np.zeros_like(pushed)
+    push[..., W] = n
+    pushes = dynamics.slides(list(np.moveaxis(push, -1, 0)), p)
+    for name, before, after, old, new in zip(
+        ("slip_A", "slip_B"), (inner.A, inner.B), (outer.A, outer.B), slid, pushes, strict=True
+    ):
+        if after is Contact.S:
+            sine, cosine = old if before is Contact.S else new
+            speed = np.hypot(sine, cosine)
+            directions[name] = (sine / speed, cosine / speed)
+    columns = list(np.moveaxis(pushed, -1, 0))
+    force = dynamics.forces(outer, columns, p, p.omega_0, **directions)
+    rates = dynamics.newton_euler(outer, columns, force, p, p.omega_0)
+    shape = n.shape[:-1]
+    A_y, B_x = (np.broadcast_to(force[k], shape) for k in (1, 3))
+    return np.stack([np.broadcast_to(rates[k], shape) for k in W], axis=-1), A_y, B_x
+
+
+def gamma(
+    inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters, metric: Metric = Metric.EUCLID
+) -> Array:
+    """gamma of (53) in rad s-2 for directions n (..., d), which are scaled to unit length in the metric."""
+    n = np.asarray(n, dtype=float)
+    rates, _, _ = slip_rates(inner, outer, x, n, p)
+    M = np.eye(n.shape[-1]) if metric is Metric.EUCLID else slip_mass(inner, outer, p)
+    length = np.sqrt(np.einsum("...a,ab,...b->...", n, M, n))
+    return np.asarray(np.einsum("...a,ab,...b->...", n, M, rates) / length)
+
+
+def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
+    """v_y' in m s-2 of the case without the floor, at a state with it: the ball lifts if it is positive.
+
+    This is (53) for the dotted arrows of Fig. 6, with n along v_y.
+    """
+    state = list(dynamics.check_state(inner, x, p))
+    return float(dynamics.rates(outer, [float(v) for v in state], p, p.omega_0)[1])
+
+
+def extrema(
+    inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters, metric: Metric = Metric.EUCLID
+) -> tuple[Push, Push]:
+    """The directions of least and of greatest gamma over all of W, whatever the sign of the normal forces there."""
+    dimension = len(normals(inner, outer))
+    M = np.eye(dimension) if metric is Metric.EUCLID else slip_mass(inner, outer, p)
+    grid = _directions(dimension)
+    values = gamma(inner, outer, x, grid, p, metric)
+    found = []
+    for sign, start in ((1.0, np.argmin(values)), (-1.0, np.argmax(values))):
+        best, value, scale = grid[start], values[start], np.abs(values).max()
+        if dimension > 1:
+            # Quasi-Newton from the best direction of the grid; gamma doesn't depend on the length of n.
+            def scaled(n: Array, factor: float = sign / scale) -> float:
+                return factor * float(gamma(inner, outer, x, n, p, metric))
+
+            polished = minimize(scaled, best, method="BFGS")
+            if sign * scale * polished.fun < sign * value:
+                best, value = polished.x, sign * scale * polished.fun
+        found.append(Push(best / np.sqrt(best @ M @ best), float(value)))
+    return found[0], found[1]
+
+
+def limit_directions(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> list[Push]:
+    """Unit directions n along which the slip neither turns nor opens a contact: f_Z parallel to n, A_y, B_x >= 0.
+
+    A slip that lasts is along one with gamma > 0; vanishing slip arrives along one with gamma < 0.
+    """
+    dimension = len(normals(inner, outer))
+    found: list[Push] = []
+    for start in _directions(dimension, coarse=True):
+        n = start
+        if dimension > 1:
+
+            def turning(n: Array) -> Array:
+                rates, _, _ = slip_rates(inner, outer, x, n, p)
+                # f - (f.n) n/|n|^2 lies across n; the last term holds the length of n at 1.
+                return np.asarray(rates - (rates @ n) / (n @ n) * n + _SCALE * (n @ n - 1) * n)
+
+            solution = root(turning, start, tol=1e-13)
+            if not solution.success:
+                continue
+            n = solution.x / np.linalg.norm(solution.x)
+        rates, A_y, B_x = slip_rates(inner, outer, x, n, p)
+        if A_y < 0 or B_x < 0 or any(np.linalg.norm(n - other.n) < 1e-6 for other in found):
+            continue
+        found.append(Push(n, float(rates @ n)))
+    return sorted(found, key=lambda push: -push.gamma)
+
+
+def onset_direction(case: Case, x: npt.ArrayLike, p: Parameters) -> dict[str, float]:
+    """Slip directions alpha, beta in rad at which rolling contacts would begin to slip: against their friction.
+
+    cos alpha = -A_x/(mu A_y), sin alpha = A_z/(mu A_y); cos beta = B_y/(eta B_x), sin beta = -B_z/(eta B_x). In RR
+    the forces are those of least utilisation.
+    """
+    (A_x, _, A_z), (_, B_y, B_z) = dynamics.contact_forces(case, x, p)
+    angles = {}
+    if case.A is Contact.R:
+        angles["alpha"] = float(np.arctan2(A_z, -A_x))
+    if case.B is Contact.R:
+        angles["beta"] = float(np.arctan2(-B_z, B_y))
+    return angles
+
+
+def stick_margin(case: Case, x: npt.ArrayLike, p: Parameters) -> float:
+    """Slack of the friction cones (13) of the rolling contacts in units of m g: >= 0 where rolling can go on.
+
+    In RR the margin of the whole family of forces (`rolling_forces.margin`); inf if nothing rolls.
+    """
+    state = dynamics.check_state(case, x, p)
+    if case is Case.RR:
+        return float(rolling_forces.margin(state[2], p))
+    A_x, A_y, A_z, B_x, B_y, B_z = dynamics.forces(case, state.tolist(), p, p.omega_0)
+    slacks = [np.inf]
+    if case.A is Contact.R:
+        slacks.append((p.mu * A_y - np.hypot(A_x, A_z)) / (p.m * p.g))
+    if case.B is Contact.R:
+        slacks.append((p.eta * B_x - np.hypot(B_y, B_z)) / (p.m * p.g))
+    return float(min(slacks))
+
+
+def is_stable(case: Case, p: Parameters) -> bool:
+    """Whether the stationary solution of RR, SR or NR is stable or neutral with respect to slipping.
+
+    RR: (67), (74), and (82), which can be met only for eta < j because A_y < 0 otherwise. SR and NR: (61). These are
+    the signs of gamma in the metric of kinetic energy over all directions along which the contacts stay closed.
+    """
+    Omega2 = p.Omega_0**2
+    if case is not Case.RR:
+        return p.eta * Omega2 >= 1
+    slides_at_A, slides_at_both = p.j * Omega2 > 1, False
+    if p.eta < p.j:
+        slides_at_both = Omega2 * (p.mu * p.eta * (1 + p.j) + p.j - p.eta) > p.mu * (1 + p.eta)
+    return not (slides_at_A or slides_at_both)
+
+
+_SCALE = 1e3
+
+
+def _directions(dimension: int, coarse: bool = False) -> Array:
+    """Directions all over the unit sphere of W, but for those that leave a contact rolling."""
+    if dimension == 1:
+        return np.array([[1.0], [-1.0]])
+    if dimension == 2:
+        angle = np.linspace(0, 2 * np.pi, 16 if coarse else 360, endpoint=False)
+        return np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    return np.concatenate(list(_sphere(7 if coarse else 60)))
+
+
+def _sphere(n: int) -> Iterator[Array]:
+    # Slip along slip_x or slip_y alone leaves one contact rolling: those axes don't belong to SS.
+    angle = (np.arange(n) + 0.5) / n * np.pi - np.pi / 2
+    for half in (0.0, np.pi):
+        yield direction(angle[:, None] + half, angle[None, :] + half).reshape(-1, 3)
+        yield direction(np.array([half]), np.array([half]))

@@ -1,0 +1,269 @@
+"""Stationary solutions of every case: Propositions 1-6, with forces, existence and stability.
+
+A solution of a case's equations (31) is listed whether or not its forces are admissible; `StationarySolution.exists`
+says so. Stability within the case comes from the eigenvalues of the exact Jacobian, taken by complex steps through the
+vector field itself. For omega_0 < 0 everything is the mirror image of omega_0 > 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic import dynamics, rolling_forces, slip_stability, slipping_branch
+from model import Case, Contact, Parameters
+from model.arrays import Array
+from model.cases import TRAITS
+from model.kinematics import VARIABLES
+
+_MIRROR = np.array([1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
+_STEP = 1e-100
+"""Complex step: its square vanishes beside any state, so that the derivative is exact to round-off."""
+_ROUND_OFF = 1e-9
+"""Real part over modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
+
+
+class Stability(Enum):
+    """Stability within the case's own state space."""
+
+    ASYMPTOTIC = "asymptotically stable"
+    NEUTRAL = "neutrally stable"
+    UNSTABLE = "unstable"
+
+
+@dataclass(frozen=True)
+class StationarySolution:
+    """One stationary solution of one case."""
+
+    case: Case
+    x: Array
+    """State, shape (8,); of a family one member: y = 0, slip_y = 1 rad s-1 where it must slip, omega_c = omega_0."""
+    force_A: Array
+    """Force of the floor, N, shape (3,); in RR the member of least friction utilisation."""
+    force_B: Array
+    """Force of the wall, N, shape (3,)."""
+    eigenvalues: npt.NDArray[np.complex128]
+    """Of the Jacobian in the active variables (in NS without the cyclic y), rad s-1, rightmost first."""
+    exists: bool
+    """Whether the contact forces obey (12) and (13)."""
+    stability: Stability
+    """Within the case, by the eigenvalues."""
+    slip_stable: bool
+    """No direction of slipping grows from it (Definitions 1 and 3, see `slip_stability`); True if nothing rolls."""
+    family: tuple[str, ...] = ()
+    """Variables that are free: the solution is a member of a family."""
+    alpha: float = np.nan
+    """Slip direction at A, rad, in SS."""
+
+    @property
+    def stable(self) -> bool:
+        """Whether disturbances within the case don't grow (asymptotic or neutral)."""
+        return self.stability is not Stability.UNSTABLE
+
+    @property
+    def moves(self) -> bool:
+        """Whether the ball sinks along the wall all the same: stationary but for y (NS, Proposition 6)."""
+        return bool(self.x[1] != 0)
+
+
+def stationary_solutions(p: Parameters) -> list[StationarySolution]:
+    """All stationary solutions at p.omega_0, in the order of `Case`; SS in the order of |alpha|.
+
+    Solutions with inadmissible forces are listed with ``exists`` False. For omega_0 = 0 there are RR, RS and NS; for
+    c = 0 RR, SR and NR, with omega_c undetermined in RR; SS needs mu, c > 0 and eta < j.
+    """
+    if p.omega_0 < 0:
+        return [_mirrored(s) for s in stationary_solutions(p.replace(omega_0=-p.omega_0))]
+    return [*_rr(p), *_rs(p), *_sr(p), *_ss(p), *_nr(p), *_ns(p)]
+
+
+def jacobian(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+    """Exact Jacobians of the vector field at states x (..., 6 or 8), shape (..., d, d), rad s-1.
+
+    Rows and columns are the active variables of the case, ``TRAITS[case].active``; in RN slip_z moves with v_h.
+    `omega_0` in rad s-1 is p.omega_0 unless given, and broadcasts against (...).
+    """
+    state = dynamics.check_state(case, x, p)
+    fluid = p.omega_0 if omega_0 is None else np.asarray(omega_0, dtype=float)
+    active = [VARIABLES.index(name) for name in TRAITS[case].active]
+    columns = []
+    for k in active:
+        z = list(np.moveaxis(state.astype(complex), -1, 0))
+        z[k] = z[k] + 1j * _STEP
+        if case is Case.RN:
+            z[5] = -z[7] / p.r
+        rates = _complex_rates(case, z, p, fluid)
+        columns.append(np.stack(np.broadcast_arrays(*(np.imag(rates[row]) / _STEP for row in active)), axis=-1))
+    return np.stack(np.broadcast_arrays(*columns), axis=-1)
+
+
+def branch_states(s: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
+    """States (..., 8) of SS at places s of its branch (`slipping_branch`), and their flows omega_0 (37), (41)."""
+    b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
+    unit, w = np.sqrt(p.g / p.R), b.v_A * np.sqrt(p.g * p.R) / p.r
+    zero = np.zeros_like(w)
+    turn = np.sign(p.eta - p.j) * b.sin
+    return np.stack([zero, zero, b.Omega_c * unit, w * turn, zero, w * b.cos, zero, zero], axis=-1), b.Omega_0 * unit
+
+
+def branch_eigenvalues(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128]:
+    """Eigenvalues (..., 4) of SS at places s of its branch, rad s-1, rightmost first.
+
+    Those of `jacobian`, from the coordinates omega_c, v_A/r, alpha and slip_y/slip_z instead: near the ends, where
+    slip vanishes and two directions stiffen like 1/v_A, the others would drown in its round-off.
+    """
+    b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
+    unit = np.sqrt(p.g / p.R)
+    omega_c, fluid, q = b.Omega_c * unit, b.Omega_0 * unit, b.v_A * np.sqrt(p.g * p.R) / p.r
+    sin, cos, h = np.sign(p.eta - p.j) * b.sin, b.cos, 1j * _STEP
+    columns = []
+    for d_omega, d_q, d_alpha, d_t in np.eye(4) * h:
+        slip_A = (sin + d_alpha * cos, cos - d_alpha * sin)
+        length = q + d_q
+        w_z = length * slip_A[1]
+        x = [0.0, 0.0, omega_c + d_omega, length * slip_A[0], d_t * w_z, w_z, 0.0, 0.0]
+        force = dynamics.forces(Case.SS, x, p, fluid, slip_A, (d_t, 1.0))
+        _, _, orbit, f_x, f_y, f_z, _, _ = dynamics.newton_euler(Case.SS, x, force, p, fluid)
+        # At the solution itself all rates vanish, so that the frame may be held fixed.
+        rates = (orbit, sin * f_x + cos * f_z, (cos * f_x - sin * f_z) / q, f_y / (q * cos))
+        columns.append(np.stack([np.imag(rate) / _STEP for rate in rates], axis=-1))
+    return _eigenvalues(np.stack(columns, axis=-1))
+
+
+def _eigenvalues(matrix: Array) -> npt.NDArray[np.complex128]:
+    # From stiff slip to slow orbit: graded downwards, which keeps the small ones accurate.
+    values: npt.NDArray[np.complex128] = np.linalg.eigvals(matrix[..., ::-1, ::-1].astype(complex))
+    order = np.lexsort((values.imag, -values.real), axis=-1)
+    return np.take_along_axis(values, order, axis=-1)
+
+
+def _complex_rates(case: Case, x: list[dynamics.Real], p: Parameters, fluid: dynamics.Real) -> list[dynamics.Real]:
+    """`dynamics.rates` with slip directions that are analytic in x."""
+    if case is Case.RR:
+        return dynamics.rates(case, x, p, fluid)
+    directions = {}
+    for name, contact, (sine, cosine) in zip(
+        ("slip_A", "slip_B"), (case.A, case.B), dynamics.slides(x, p), strict=True
+    ):
+        if contact is Contact.S:
+            size = np.maximum(np.abs(sine), np.abs(cosine))
+            speed = size * np.sqrt((sine / size) ** 2 + (cosine / size) ** 2)
+            directions[name] = (sine / speed, cosine / speed)
+    return dynamics.newton_euler(case, x, dynamics.forces(case, x, p, fluid, **directions), p, fluid)
+
+
+def _solution(
+    case: Case, p: Parameters, x: list[float], exists: bool, slip_stable: bool = True,
+    family: tuple[str, ...] = (), alpha: float = np.nan, values: npt.NDArray[np.complex128] | None = None,
+) -> StationarySolution:  # fmt: skip
+    state = np.array([*x, 0.0, 0.0])
+    if p.c == 0:  # nothing pulls omega_c to omega_0
+        family = (*family, "omega_c")
+    if case is Case.RR:
+        B_y = float(rolling_forces.least_utilisation(x[2], p).B_y)
+        force = dynamics.rolling_family(x[2], p, p.omega_0, B_y if np.isfinite(B_y) else 0.0)
+    else:
+        force = dynamics.forces(case, state.tolist(), p, p.omega_0)
+    zeros = len(family)
+    if case is Case.NS:  # the reduced field (48), without y
+        values, zeros = _eigenvalues(jacobian(case, state, p)[1:, 1:]), zeros - 1
+    elif values is None:
+        values = _eigenvalues(jacobian(case, state, p))
+    return StationarySolution(
+        case=case, x=state, force_A=np.array(force[:3]), force_B=np.array(force[3:]), eigenvalues=values,
+        exists=bool(exists), stability=_stability(values, zeros, bool(family) or case is Case.NS),
+        slip_stable=slip_stable, family=family, alpha=alpha,
+    )  # fmt: skip
+
+
+def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) -> Stability:
+    """By the rightmost of the eigenvalues, without the `zeros` that belong to the free variables of a family."""
+    rest = values[np.argsort(np.abs(values))][zeros:]
+    if np.any(rest.real > _ROUND_OFF * np.abs(rest)):
+        return Stability.UNSTABLE
+    return Stability.NEUTRAL if neutral else Stability.ASYMPTOTIC
+
+
+def _rr(p: Parameters) -> list[StationarySolution]:
+    """Proposition 1. Without drag every omega_c is stationary."""
+    best = rolling_forces.least_utilisation(p.omega_0, p)
+    exists = bool(best.utilisation <= 1 and (np.isfinite(best.B_y) or rolling_forces.margin(p.omega_0, p) >= 0))
+    return [_solution(Case.RR, p, [0.0, 0.0, p.omega_0, 0.0, 0.0, 0.0], exists, slip_stability.is_stable(Case.RR, p))]
+
+
+def _rs(p: Parameters) -> list[StationarySolution]:
+    """Proposition 2: the ball spins on the spot, if the fluid rests or drags nothing; on a smooth wall, anywhere."""
+    if p.eta > 0 and p.c > 0 and p.omega_0 != 0:
+        return []
+    omega_c = p.omega_0 if p.eta == 0 else 0.0
+    exists = p.j * p.R * omega_c**2 <= p.mu * p.g
+    return [_solution(Case.RS, p, [0.0, 0.0, omega_c, 0.0, 1.0, 0.0], exists, exists, ("slip_y",))]
+
+
+def _sr(p: Parameters) -> list[StationarySolution]:
+    """Proposition 3, for the formal field: A_y = 0 puts the solution on the border to NR.
+
+    On a smooth floor any slip_x is stationary; the member given is the one that doesn't spin about the radius.
+    """
+    if p.omega_0 == 0:
+        return []
+    if p.mu == 0:
+        x = [0.0, 0.0, p.omega_0, -p.omega_0 * p.R / p.r, 0.0, 0.0]
+        return [_solution(Case.SR, p, x, True, family=("slip_x",))]
+    w_x = _lifting_spin(p)
+    if w_x == 0:
+        return []
+    x = [0.0, 0.0, p.omega_0, w_x, 0.0, 0.0]
+    return [_solution(Case.SR, p, x, _wall_carries(p), slip_stability.is_stable(Case.SR, p))]
+
+
+def _ss(p: Parameters) -> list[StationarySolution]:
+    """Proposition 4, by root finding along the branch. On a smooth wall slip_y is free: the member given has none."""
+    smooth = ("slip_y",) if p.eta == 0 else ()
+    if p.mu == p.eta == 0 and p.omega_0 != 0:
+        x = [0.0, 0.0, p.omega_0, -p.omega_0 * p.R / p.r, 1.0, 0.0]
+        return [_solution(Case.SS, p, x, True, family=smooth)]
+    found = []
+    for s in slipping_branch.points_at(p.Omega_0, p.j, p.mu, p.eta, p.kappa):
+        x, alpha = branch_states(s, p)[0].tolist()[:6], -float(np.arctan(np.exp(s)))
+        found.append(_solution(Case.SS, p, x, True, family=smooth, alpha=alpha, values=branch_eigenvalues(s, p)))
+    return found
+
+
+def _nr(p: Parameters) -> list[StationarySolution]:
+    """Proposition 5."""
+    if p.omega_0 == 0:
+        return []
+    x = [0.0, 0.0, p.omega_0, _lifting_spin(p), 0.0, 0.0]
+    return [_solution(Case.NR, p, x, _wall_carries(p), slip_stability.is_stable(Case.NR, p), ("y",))]
+
+
+def _ns(p: Parameters) -> list[StationarySolution]:
+    """Proposition 6: sinking along the wall at a constant speed, which takes drag to be constant."""
+    sink = p.g - p.eta * p.R * p.omega_0**2
+    if p.c == 0 or sink <= 0:
+        return []
+    v_y = -sink / p.c
+    x = [0.0, v_y, p.omega_0, (p.eta - p.j) / p.j * p.omega_0 * p.R / p.r, 0.0, -v_y / p.r]
+    return [_solution(Case.NS, p, x, True, family=("y", "slip_y") if p.eta == 0 else ("y",))]
+
+
+def _lifting_spin(p: Parameters) -> float:
+    """slip_x of (35) and (46), at which the gyroscopic moment carries the weight."""
+    return p.g / (p.j * p.omega_0 * p.r) - p.omega_0 * p.R / p.r
+
+
+def _wall_carries(p: Parameters) -> bool:
+    """Whether friction at the wall carries the weight: (35), whose sign is misprinted, and (46)."""
+    return p.eta * p.Omega_0**2 >= 1
+
+
+def _mirrored(s: StationarySolution) -> StationarySolution:
+    flip = np.array([1.0, 1.0, -1.0])
+    return replace(
+        s, x=_MIRROR * s.x + 0.0, force_A=flip * s.force_A + 0.0, force_B=flip * s.force_B + 0.0,
+        alpha=-s.alpha,
+    )  # fmt: skip
