@@ -27,9 +27,10 @@ def _contact(
 ) -> npt.NDArray[np.intp]:
     """Index into `_LETTERS` for one contact: slipping takes both a speed beyond creep and the whole of the friction."""
     closed = normal > 0
-    load = np.maximum(normal / p.m, p.g)
-    fast = speed > 10 * settings.creep_speed(coefficient * load)
-    slips = fast & (friction > 0.999 * coefficient * normal)
+    regular = settings.regularisation_speed(coefficient * np.maximum(normal / p.m, p.g))
+    # With memory a force that changes little from step to step leaves no more than that share of the speed.
+    fast = speed > regular * (1e-3 if settings.memory else 10)
+    slips = fast & (friction >= (1 - 1e-6) * coefficient * normal)
     return np.where(closed, np.where(slips, 1, 0), 2)
 
 

@@ -122,12 +122,13 @@ class ContactSettings:
         """Steady depth (m) of a contact whose force over the ball's mass is `load` (m s-2): R f/k."""
         return self.softness * load / self.k
 
-    def creep_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed (m s-1) at which a rolling contact carries the friction force m `load`: R_t f_t / b_f.
-
-        It is also the speed below which friction can't reach its Coulomb value.
-        """
+    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
+        """Slip speed (m s-1) below which one step can't build up the friction force m `load`: R_t f_t / b_f."""
         return np.asarray(self.softness / self.impratio * np.asarray(load, dtype=float) / self.b_f)
+
+    def creep_speed(self, load: npt.ArrayLike) -> Array:
+        """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory."""
+        return self.regularisation_speed(load) * (0.0 if self.memory else 1.0)
 
     @property
     def servo_gain(self) -> float:
