@@ -8,8 +8,8 @@ from enum import IntFlag
 import numpy as np
 import numpy.typing as npt
 
-from analytic import slipping_branch
-from analytic.stationary import StationarySolution, branch_states
+from analytic import branch_stability, slipping_branch
+from analytic.stationary import StationarySolution
 from model import Case, InputError, Parameters
 from model.arrays import Array
 from model.kinematics import VARIABLES
@@ -41,6 +41,8 @@ TABLE_5 = (
 
 For eta < eta_cr the branch of SS reaches SR at omega_02 from below: a persistence of codimension 2 instead of NF2.
 """
+HOPF = Bifurcation("", "Hopf", "H", None, (Case.SS,), "eta < j, for mu > 1.7 or so")
+"""Not in the paper: on floors far rougher than any real one the stable part of the branch loses a stretch."""
 
 
 @dataclass(frozen=True)
@@ -120,30 +122,29 @@ class SpecialPoint:
 
 
 def special_points(p: Parameters) -> list[SpecialPoint]:
-    """The bifurcations of Table 5 that a set of parameters has, in the order of omega_0."""
-    found, values = [], thresholds(p)
-    happens = {
-        "P3": p.eta < p.j and p.mu > 0,
-        "NF2": np.isfinite(values.omega_04),
-        "P2": p.eta > 0,
-        "NT1": p.eta > p.j,
-        "F": np.isfinite(values.omega_04),
-    }
-    eps = float(np.finfo(float).eps)
-    for bifurcation in TABLE_5:
-        if not happens[bifurcation.abbreviation]:
-            continue
-        omega_0 = getattr(values, bifurcation.threshold)
-        x = np.zeros(8)
-        x[2] = omega_0
-        if bifurcation.threshold == "omega_02":
-            x[3] = p.g / (p.j * omega_0 * p.r) - omega_0 * p.R / p.r
-        if bifurcation.abbreviation == "F":
-            s = float(slipping_branch.fold(p.j, p.mu, p.eta, p.kappa))
-            x = branch_states(s, p)[0]
-            found.append(SpecialPoint(bifurcation, omega_0, x, "bracketed root of (89)", 16 * eps))
-        else:
-            found.append(SpecialPoint(bifurcation, omega_0, x, "closed form", 8 * eps))
+    """The bifurcations that a set of parameters has, Table 5 and Hopf points, in the order of omega_0."""
+    eps, values = float(np.finfo(float).eps), thresholds(p)
+    slips = p.eta < p.j and p.mu > 0
+    folds = bool(np.isfinite(values.omega_04))
+    lifted = np.zeros(8)
+    if p.eta > 0:
+        lifted[2:4] = values.omega_02, p.g / (p.j * values.omega_02 * p.r) - values.omega_02 * p.R / p.r
+    happens = {"P3": slips, "NF2": folds, "P2": p.eta > 0, "NT1": p.eta > p.j, "F": False}
+    found = []
+    for b in TABLE_5:
+        if happens[b.abbreviation]:
+            omega_0 = getattr(values, b.threshold)
+            rolls = np.array([0.0, 0.0, omega_0, 0.0, 0.0, 0.0, 0.0, 0.0])
+            x = lifted if b.threshold == "omega_02" else rolls
+            found.append(SpecialPoint(b, omega_0, x, "closed form", 8 * eps))
+    places = [(TABLE_5[-1], float(slipping_branch.fold(p.j, p.mu, p.eta, p.kappa)))] if folds else []
+    if slips and p.c > 0:
+        places += [(HOPF, s) for s in branch_stability.hopf_places(p)]
+    for b, s in places:
+        x, fluid = branch_stability.states(s, p)
+        # omega_0 is flat at the fold, and s is known to some round-offs of 1 elsewhere.
+        method = "bracketed root of (89)" if b is not HOPF else "bracketed root of the sums of eigenvalues"
+        found.append(SpecialPoint(b, float(fluid), x, method, 16 * eps if b is not HOPF else 1e-10))
     return sorted(found, key=lambda point: point.omega_0)
 
 

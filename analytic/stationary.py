@@ -13,15 +13,12 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from analytic import dynamics, rolling_forces, slip_stability, slipping_branch
-from model import Case, Contact, Parameters
+from analytic import branch_stability, dynamics, rolling_forces, slip_stability, slipping_branch
+from analytic.jacobian import eigenvalues, jacobian
+from model import Case, Parameters
 from model.arrays import Array
-from model.cases import TRAITS
-from model.kinematics import VARIABLES
 
 _MIRROR = np.array([1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
-_STEP = 1e-100
-"""Complex step: its square vanishes beside any state, so that the derivative is exact to round-off."""
 _ROUND_OFF = 1e-9
 """Real part over modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
 
@@ -80,81 +77,6 @@ def stationary_solutions(p: Parameters) -> list[StationarySolution]:
     return [*_rr(p), *_rs(p), *_sr(p), *_ss(p), *_nr(p), *_ns(p)]
 
 
-def jacobian(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
-    """Exact Jacobians of the vector field at states x (..., 6 or 8), shape (..., d, d), rad s-1.
-
-    Rows and columns are the active variables of the case, ``TRAITS[case].active``; in RN slip_z moves with v_h.
-    `omega_0` in rad s-1 is p.omega_0 unless given, and broadcasts against (...).
-    """
-    state = dynamics.check_state(case, x, p)
-    fluid = p.omega_0 if omega_0 is None else np.asarray(omega_0, dtype=float)
-    active = [VARIABLES.index(name) for name in TRAITS[case].active]
-    columns = []
-    for k in active:
-        z = list(np.moveaxis(state.astype(complex), -1, 0))
-        z[k] = z[k] + 1j * _STEP
-        if case is Case.RN:
-            z[5] = -z[7] / p.r
-        rates = _complex_rates(case, z, p, fluid)
-        columns.append(np.stack(np.broadcast_arrays(*(np.imag(rates[row]) / _STEP for row in active)), axis=-1))
-    return np.stack(np.broadcast_arrays(*columns), axis=-1)
-
-
-def branch_states(s: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
-    """States (..., 8) of SS at places s of its branch (`slipping_branch`), and their flows omega_0 (37), (41)."""
-    b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
-    unit, w = np.sqrt(p.g / p.R), b.v_A * np.sqrt(p.g * p.R) / p.r
-    zero = np.zeros_like(w)
-    turn = np.sign(p.eta - p.j) * b.sin
-    return np.stack([zero, zero, b.Omega_c * unit, w * turn, zero, w * b.cos, zero, zero], axis=-1), b.Omega_0 * unit
-
-
-def branch_eigenvalues(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128]:
-    """Eigenvalues (..., 4) of SS at places s of its branch, rad s-1, rightmost first.
-
-    Those of `jacobian`, from the coordinates omega_c, v_A/r, alpha and slip_y/slip_z instead: near the ends, where
-    slip vanishes and two directions stiffen like 1/v_A, the others would drown in its round-off.
-    """
-    b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
-    unit = np.sqrt(p.g / p.R)
-    omega_c, fluid, q = b.Omega_c * unit, b.Omega_0 * unit, b.v_A * np.sqrt(p.g * p.R) / p.r
-    sin, cos, h = np.sign(p.eta - p.j) * b.sin, b.cos, 1j * _STEP
-    columns = []
-    for d_omega, d_q, d_alpha, d_t in np.eye(4) * h:
-        slip_A = (sin + d_alpha * cos, cos - d_alpha * sin)
-        length = q + d_q
-        w_z = length * slip_A[1]
-        x = [0.0, 0.0, omega_c + d_omega, length * slip_A[0], d_t * w_z, w_z, 0.0, 0.0]
-        force = dynamics.forces(Case.SS, x, p, fluid, slip_A, (d_t, 1.0))
-        _, _, orbit, f_x, f_y, f_z, _, _ = dynamics.newton_euler(Case.SS, x, force, p, fluid)
-        # At the solution itself all rates vanish, so that the frame may be held fixed.
-        rates = (orbit, sin * f_x + cos * f_z, (cos * f_x - sin * f_z) / q, f_y / (q * cos))
-        columns.append(np.stack([np.imag(rate) / _STEP for rate in rates], axis=-1))
-    return _eigenvalues(np.stack(columns, axis=-1))
-
-
-def _eigenvalues(matrix: Array) -> npt.NDArray[np.complex128]:
-    # From stiff slip to slow orbit: graded downwards, which keeps the small ones accurate.
-    values: npt.NDArray[np.complex128] = np.linalg.eigvals(matrix[..., ::-1, ::-1].astype(complex))
-    order = np.lexsort((values.imag, -values.real), axis=-1)
-    return np.take_along_axis(values, order, axis=-1)
-
-
-def _complex_rates(case: Case, x: list[dynamics.Real], p: Parameters, fluid: dynamics.Real) -> list[dynamics.Real]:
-    """`dynamics.rates` with slip directions that are analytic in x."""
-    if case is Case.RR:
-        return dynamics.rates(case, x, p, fluid)
-    directions = {}
-    for name, contact, (sine, cosine) in zip(
-        ("slip_A", "slip_B"), (case.A, case.B), dynamics.slides(x, p), strict=True
-    ):
-        if contact is Contact.S:
-            size = np.maximum(np.abs(sine), np.abs(cosine))
-            speed = size * np.sqrt((sine / size) ** 2 + (cosine / size) ** 2)
-            directions[name] = (sine / speed, cosine / speed)
-    return dynamics.newton_euler(case, x, dynamics.forces(case, x, p, fluid, **directions), p, fluid)
-
-
 def _solution(
     case: Case, p: Parameters, x: list[float], exists: bool, slip_stable: bool = True,
     family: tuple[str, ...] = (), alpha: float = np.nan, values: npt.NDArray[np.complex128] | None = None,
@@ -169,9 +91,9 @@ def _solution(
         force = dynamics.forces(case, state.tolist(), p, p.omega_0)
     zeros = len(family)
     if case is Case.NS:  # the reduced field (48), without y
-        values, zeros = _eigenvalues(jacobian(case, state, p)[1:, 1:]), zeros - 1
+        values, zeros = eigenvalues(jacobian(case, state, p)[1:, 1:]), zeros - 1
     elif values is None:
-        values = _eigenvalues(jacobian(case, state, p))
+        values = eigenvalues(jacobian(case, state, p))
     return StationarySolution(
         case=case, x=state, force_A=np.array(force[:3]), force_B=np.array(force[3:]), eigenvalues=values,
         exists=bool(exists), stability=_stability(values, zeros, bool(family) or case is Case.NS),
@@ -228,8 +150,10 @@ def _ss(p: Parameters) -> list[StationarySolution]:
         return [_solution(Case.SS, p, x, True, family=smooth)]
     found = []
     for s in slipping_branch.points_at(p.Omega_0, p.j, p.mu, p.eta, p.kappa):
-        x, alpha = branch_states(s, p)[0].tolist()[:6], -float(np.arctan(np.exp(s)))
-        found.append(_solution(Case.SS, p, x, True, family=smooth, alpha=alpha, values=branch_eigenvalues(s, p)))
+        x, alpha = branch_stability.states(s, p)[0].tolist()[:6], -float(np.arctan(np.exp(s)))
+        found.append(
+            _solution(Case.SS, p, x, True, family=smooth, alpha=alpha, values=branch_stability.eigenvalues_at(s, p))
+        )
     return found
 
 

@@ -1,0 +1,82 @@
+"""Stability along the branch of slipping at both points (SS), between its ends in RR and SR."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from analytic import dynamics, slipping_branch
+from analytic.jacobian import STEP, eigenvalues
+from model import Case, InputError, Parameters
+from model.arrays import Array
+
+
+def states(s: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
+    """States (..., 8) of SS at places s of its branch (`slipping_branch`), and their flows omega_0 (37), (41)."""
+    b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
+    unit, w = np.sqrt(p.g / p.R), b.v_A * np.sqrt(p.g * p.R) / p.r
+    zero = np.zeros_like(w)
+    turn = np.sign(p.eta - p.j) * b.sin
+    return np.stack([zero, zero, b.Omega_c * unit, w * turn, zero, w * b.cos, zero, zero], axis=-1), b.Omega_0 * unit
+
+
+def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128]:
+    """Eigenvalues (..., 4) of SS at places s of its branch, rad s-1, rightmost first.
+
+    Those of `jacobian.jacobian`, from the coordinates omega_c, v_A/r, alpha and slip_y/slip_z instead: near the
+    ends, where slip vanishes and two directions stiffen like 1/v_A, the others would drown in its round-off.
+    """
+    b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
+    unit = np.sqrt(p.g / p.R)
+    omega_c, fluid, q = b.Omega_c * unit, b.Omega_0 * unit, b.v_A * np.sqrt(p.g * p.R) / p.r
+    sin, cos, h = np.sign(p.eta - p.j) * b.sin, b.cos, 1j * STEP
+    columns = []
+    for d_omega, d_q, d_alpha, d_t in np.eye(4) * h:
+        slip_A = (sin + d_alpha * cos, cos - d_alpha * sin)
+        length = q + d_q
+        w_z = length * slip_A[1]
+        x = [0.0, 0.0, omega_c + d_omega, length * slip_A[0], d_t * w_z, w_z, 0.0, 0.0]
+        force = dynamics.forces(Case.SS, x, p, fluid, slip_A, (d_t, 1.0))
+        _, _, orbit, f_x, f_y, f_z, _, _ = dynamics.newton_euler(Case.SS, x, force, p, fluid)
+        # At the solution itself all rates vanish, so that the frame may be held fixed.
+        rates = (orbit, sin * f_x + cos * f_z, (cos * f_x - sin * f_z) / q, f_y / (q * cos))
+        columns.append(np.stack([np.imag(rate) / STEP for rate in rates], axis=-1))
+    return eigenvalues(np.stack(columns, axis=-1))
+
+
+def end_eigenvalues(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
+    """The eigenvalues that stay finite at the ends of the branch in closed form, rad s-1; needs mu > 0, 0 < eta < j.
+
+    In RR (omega_01) two: lambda^2 + c lambda/(1+2j) + 2 (g/R) mu (1+eta)/((1+mu eta)(1+2j)) = 0. In SR (omega_02)
+    three: (2 mu eta omega_02 - c)/(1+j), which is positive exactly if there is a fold (87), and +-i omega_02.
+    The others, two and one, tend to minus infinity like 1/v_A and 1/v_B.
+    """
+    if not (p.mu > 0 and 0 < p.eta < p.j):
+        raise InputError(f"eta = {p.eta:g} is out of range: the branch has two ends for mu > 0 and 0 < eta < j only")
+    stiffness = 2 * p.g / p.R * p.mu * (1 + p.eta) / ((1 + p.mu * p.eta) * (1 + 2 * p.j))
+    omega_02 = np.sqrt(p.g / (p.eta * p.R))
+    at_sr = [(2 * p.mu * p.eta * omega_02 - p.c) / (1 + p.j), 1j * omega_02, -1j * omega_02]
+    return np.roots([1.0, p.c / (1 + 2 * p.j), stiffness]).astype(complex), np.array(at_sr)
+
+
+def hopf_places(p: Parameters) -> list[float]:
+    """Places s of the branch at which a complex pair crosses the imaginary axis (Hopf); none but for large mu."""
+
+    def pair_sums(s: npt.ArrayLike) -> Array:
+        """Product of the sums of all pairs of eigenvalues: zero where lambda_i = -lambda_k."""
+        values = eigenvalues_at(s, p)
+        product = np.ones(values.shape[:-1], dtype=complex)
+        for i, k in zip(*np.triu_indices(4, 1), strict=True):
+            total = values[..., i] + values[..., k]
+            product = product * total / (1 + np.abs(total))  # bounded, the zeros stay
+        return np.asarray(product.real)
+
+    s = np.linspace(-30.0, 30.0, 1201)
+    values, found = pair_sums(s), []
+    for k in np.flatnonzero(np.sign(values[1:]) * np.sign(values[:-1]) < 0):
+        place = float(brentq(lambda t: float(pair_sums(t)), s[k], s[k + 1], xtol=1e-14, rtol=1e-14))
+        pair = eigenvalues_at(place, p)
+        if np.any((np.abs(pair.real) < 1e-6 * np.abs(pair.imag)) & (pair.imag > 0)):
+            found.append(place)
+    return found

@@ -1,0 +1,58 @@
+"""Exact Jacobians of the vector fields, by complex steps through them, and their eigenvalues."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic import dynamics
+from model import Case, Contact, Parameters
+from model.arrays import Array
+from model.cases import TRAITS
+from model.kinematics import VARIABLES
+
+STEP = 1e-100
+"""Complex step: its square vanishes beside any state, so that the derivative is exact to round-off."""
+
+
+def jacobian(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+    """Exact Jacobians of the vector field at states x (..., 6 or 8), shape (..., d, d), rad s-1.
+
+    Rows and columns are the active variables of the case, ``TRAITS[case].active``; in RN slip_z moves with v_h.
+    `omega_0` in rad s-1 is p.omega_0 unless given, and broadcasts against (...).
+    """
+    state = dynamics.check_state(case, x, p)
+    fluid = p.omega_0 if omega_0 is None else np.asarray(omega_0, dtype=float)
+    active = [VARIABLES.index(name) for name in TRAITS[case].active]
+    columns = []
+    for k in active:
+        z = list(np.moveaxis(state.astype(complex), -1, 0))
+        z[k] = z[k] + 1j * STEP
+        if case is Case.RN:
+            z[5] = -z[7] / p.r
+        rates = _complex_rates(case, z, p, fluid)
+        columns.append(np.stack(np.broadcast_arrays(*(np.imag(rates[row]) / STEP for row in active)), axis=-1))
+    return np.stack(np.broadcast_arrays(*columns), axis=-1)
+
+
+def eigenvalues(matrix: Array) -> npt.NDArray[np.complex128]:
+    """Eigenvalues (..., d) of matrices (..., d, d), rightmost first."""
+    # From stiff slip to slow orbit: graded downwards, which keeps the small ones accurate.
+    values: npt.NDArray[np.complex128] = np.linalg.eigvals(matrix[..., ::-1, ::-1].astype(complex))
+    order = np.lexsort((values.imag, -values.real), axis=-1)
+    return np.take_along_axis(values, order, axis=-1)
+
+
+def _complex_rates(case: Case, x: list[dynamics.Real], p: Parameters, fluid: dynamics.Real) -> list[dynamics.Real]:
+    """`dynamics.rates` with slip directions that are analytic in x."""
+    if case is Case.RR:
+        return dynamics.rates(case, x, p, fluid)
+    directions = {}
+    for name, contact, (sine, cosine) in zip(
+        ("slip_A", "slip_B"), (case.A, case.B), dynamics.slides(x, p), strict=True
+    ):
+        if contact is Contact.S:
+            size = np.maximum(np.abs(sine), np.abs(cosine))
+            speed = size * np.sqrt((sine / size) ** 2 + (cosine / size) ** 2)
+            directions[name] = (sine / speed, cosine / speed)
+    return dynamics.newton_euler(case, x, dynamics.forces(case, x, p, fluid, **directions), p, fluid)

@@ -1,0 +1,312 @@
+"""Stationary solutions: zeros of the vector fields, the formulas of Propositions 1-6, eigenvalues by differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analytic import Stability, StationarySolution, contact_forces, stationary_solutions, thresholds, vector_field
+from analytic import branch_stability as stability
+from analytic.jacobian import jacobian
+from analytic.slipping_branch import branch, fold, points_at
+from model import Case, Parameters
+from model.cases import TRAITS
+from model.kinematics import VARIABLES, slip_directions, slip_speeds
+
+P = Parameters.named("reference")
+EPS = np.finfo(float).eps
+FLOWS = [1.0, 8.0, 13.0, 14.0, 22.0, 28.0, 33.0, 41.0, 60.0]
+
+
+def of_case(p: Parameters, case: Case) -> list[StationarySolution]:
+    return [s for s in stationary_solutions(p) if s.case is case]
+
+
+@pytest.mark.parametrize("eta", [0.02, 0.2, 0.39, 0.6])
+@pytest.mark.parametrize("omega_0", FLOWS)
+def test_solutions_are_zeros_of_the_fields(omega_0: float, eta: float) -> None:
+    """Round-off of the largest acceleration is all that may be left; NS sinks, which is its only rate (48)."""
+    p = P.replace(omega_0=omega_0, eta=eta)
+    scale = (p.g + p.R * (omega_0**2 + p.c * omega_0)) / (p.j * p.r)
+    for s in stationary_solutions(p):
+        rate = vector_field(s.case, s.x, p)
+        if s.case is Case.NS:
+            assert s.moves
+            assert rate[0] == s.x[1] < 0
+            rate[0] = 0
+        assert np.abs(rate).max() <= 100 * EPS * scale, s
+        if s.case is not Case.RR:
+            force = contact_forces(s.case, s.x, p)
+            np.testing.assert_array_equal([s.force_A, s.force_B], force)
+
+
+@pytest.mark.parametrize("omega_0", [1.0, 8.0, 13.0])
+def test_proposition_1(omega_0: float) -> None:
+    p = P.replace(omega_0=omega_0)
+    (s,) = of_case(p, Case.RR)
+    assert s.exists
+    assert s.stability is Stability.ASYMPTOTIC
+    assert s.x[2] == omega_0
+    assert s.force_A[2] == 0
+    np.testing.assert_allclose(s.eigenvalues, [-p.c / (1 + 2 * p.j)], rtol=1e-14)
+
+
+def test_proposition_2() -> None:
+    (s,) = of_case(P.replace(omega_0=0.0), Case.RS)
+    assert (s.family, s.stability) == (("slip_y",), Stability.NEUTRAL)
+    np.testing.assert_allclose(s.force_A, [0, P.m * P.g, 0], atol=1e-18)
+    np.testing.assert_array_equal(s.force_B, 0)
+    assert not of_case(P, Case.RS)
+
+
+@pytest.mark.parametrize("eta", [0.2, 0.6])
+def test_propositions_3_and_5(eta: float) -> None:
+    """(35) with the sign of its range corrected, (36); (46), (47). Stability in SR turns at sqrt(g/(jR))."""
+    for factor, exists in ((0.999999, False), (1.000001, True)):
+        p = P.replace(eta=eta)
+        p = p.replace(omega_0=factor * np.sqrt(p.g / (eta * p.R)))
+        for case in (Case.SR, Case.NR):
+            (s,) = of_case(p, case)
+            assert s.exists == s.slip_stable == exists
+            np.testing.assert_allclose(s.x[3], p.g / (p.j * p.omega_0 * p.r) - p.omega_0 * p.R / p.r, rtol=1e-13)
+            np.testing.assert_allclose(s.force_B, [p.m * p.R * p.omega_0**2, p.m * p.g, 0], rtol=1e-13)
+            np.testing.assert_allclose(s.force_A, 0, atol=1e-13 * p.m * p.g)
+        (s,) = of_case(p, Case.NR)
+        assert (s.stability, s.family) == (Stability.NEUTRAL, ("y",))
+    for factor, kind in ((0.999, Stability.UNSTABLE), (1.001, Stability.ASYMPTOTIC)):
+        (s,) = of_case(P.replace(omega_0=factor * np.sqrt(P.g / (P.j * P.R))), Case.SR)
+        assert s.stability is kind
+
+
+@pytest.mark.parametrize("omega_0", [14.0, 25.0, 33.0, 41.0])
+def test_proposition_4(omega_0: float) -> None:
+    """(37)-(42) at the alpha of the solution."""
+    p = P.replace(omega_0=omega_0)
+    found = of_case(p, Case.SS)
+    assert len(found) == (1 if omega_0 < thresholds(p).omega_02 else 2)
+    for s in found:
+        assert s.exists
+        alpha, _ = slip_directions(s.x, p)
+        np.testing.assert_allclose(alpha, s.alpha, rtol=1e-12)
+        cos, sin = np.cos(s.alpha), np.sin(s.alpha)
+        den = (1 + p.j * cos**2) * p.mu * p.eta + (p.j - p.eta) * cos
+        omega_c = np.sqrt(p.mu * p.g / p.R) * np.sqrt((1 + p.eta * cos**2) / den)
+        v_A = -p.mu * p.g / (p.j * omega_c) * (p.j - p.eta) * sin / den
+        np.testing.assert_allclose(s.x[2], omega_c, rtol=1e-12)
+        np.testing.assert_allclose(slip_speeds(s.x, p)[0], v_A, rtol=1e-12)
+        drag = p.g * p.mu / (p.R * p.c) * cos * sin * (p.j - p.eta) / den
+        np.testing.assert_allclose(omega_0, omega_c - drag, rtol=1e-12)
+        np.testing.assert_allclose(s.force_A[1], p.m * p.g * (p.j - p.eta) * cos / den, rtol=1e-12)
+        np.testing.assert_allclose(s.force_B[0], p.mu * p.m * p.g * (1 + p.j * cos**2) / den, rtol=1e-12)
+    assert [s.stability for s in found] == [Stability.ASYMPTOTIC, Stability.UNSTABLE][: len(found)]
+
+
+def test_proposition_6() -> None:
+    """(49) with its second row, omega_c = omega_0, restored; (50); eigenvalues +-i omega_0, also where omega_0 = 0."""
+    for omega_0 in (0.0, 12.0, 31.0):
+        p = P.replace(omega_0=omega_0)
+        (s,) = of_case(p, Case.NS)
+        sink = (p.g - p.eta * omega_0**2 * p.R) / p.c
+        expected = [0, -sink, omega_0, (p.eta - p.j) / p.j * omega_0 * p.R / p.r, 0, sink / p.r, 0, 0]
+        np.testing.assert_allclose(s.x, expected, rtol=1e-13, atol=1e-13)
+        np.testing.assert_allclose(s.force_B, p.m * p.R * omega_0**2 * np.array([1, p.eta, 0]), rtol=1e-13)
+        assert s.stability is Stability.NEUTRAL
+        pair = s.eigenvalues[np.abs(s.eigenvalues.real) <= 1e-12 * max(omega_0, 1)]
+        np.testing.assert_allclose(sorted(pair.imag)[0], -omega_0, rtol=1e-12)
+        np.testing.assert_allclose(sorted(pair.imag)[-1], omega_0, rtol=1e-12)
+    assert not of_case(P.replace(omega_0=32.0), Case.NS)
+
+
+# --- eigenvalues -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("omega_0", [14.0, 33.0, 41.0])
+def test_jacobian_against_differences(omega_0: float) -> None:
+    """Central differences err by round-off/step + step^2: with the step 1e-5 of the slip about 1e-9 of the size."""
+    p = P.replace(omega_0=omega_0)
+    for s in stationary_solutions(p):
+        active = [VARIABLES.index(name) for name in TRAITS[s.case].active]
+        exact = jacobian(s.case, s.x, p)
+        step = 1e-5 * max(np.abs(s.x[3:6]).min(where=s.x[3:6] != 0, initial=1.0), 1e-2)
+        x = s.x + (0.1 if s.case in (Case.NR, Case.NS) else 0.0) * np.eye(8)[0]
+        numeric = np.stack(
+            [
+                (vector_field(s.case, x + step * e, p) - vector_field(s.case, x - step * e, p))[active] / (2 * step)
+                for e in np.eye(8)[active]
+            ],
+            axis=-1,
+        )
+        assert np.abs(numeric - exact).max() <= 1e-7 * np.abs(exact).max(), s.case
+
+
+def test_jacobian_of_cases_without_stationary_solutions() -> None:
+    """RN, SN, NN by differences too; in RN slip_z goes with v_h."""
+    x = np.array([0, 0, 9.0, 0, 2.0, -0.3 / P.r, 0.01, 0.3])
+    exact = jacobian(Case.RN, x, P)
+    names = TRAITS[Case.RN].active
+    for column, name in enumerate(names):
+        e = np.eye(8)[VARIABLES.index(name)] * 1e-6
+        if name == "v_h":
+            e = e + np.eye(8)[5] * (-1e-6 / P.r)
+        difference = (vector_field(Case.RN, x + e, P) - vector_field(Case.RN, x - e, P)) / 2e-6
+        rows = [VARIABLES.index(n) for n in names]
+        np.testing.assert_allclose(exact[:, column], difference[rows], atol=1e-6 * np.abs(exact).max())
+
+
+def test_eigenvalues_of_the_branch_in_both_coordinates() -> None:
+    """Where slip is not yet tiny the plain Jacobian gives the same eigenvalues."""
+    s = np.linspace(-5, 5, 21)
+    states, flow = stability.states(s, P)
+    values = stability.eigenvalues_at(s, P)
+    for x, omega_0, expected in zip(states, flow, values, strict=True):
+        matrix = jacobian(Case.SS, x, P.replace(omega_0=float(omega_0)))
+        found = np.linalg.eigvals(matrix)
+        # Round-off of the stiff entries is what the small eigenvalues suffer.
+        tolerance = 1e3 * EPS * np.abs(matrix).max()
+        for value in expected:
+            assert np.abs(found - value).min() <= tolerance
+
+
+@pytest.mark.parametrize(("mu", "eta", "c"), [(0.2, 0.2, 1.0), (0.2, 0.02, 1.0), (0.7, 0.35, 0.01), (1.5, 0.1, 5.0)])
+def test_ends_of_the_branch(mu: float, eta: float, c: float) -> None:
+    """The finite eigenvalues tend to the closed forms linearly in the distance exp(-|s|) from the end."""
+    p = P.replace(mu=mu, eta=eta, c=c)
+    at_rr, at_sr = stability.end_eigenvalues(p)
+    for expected, sign in ((at_rr, -1), (at_sr, 1)):
+        for distance in (18.0, 25.0):
+            values = stability.eigenvalues_at(sign * distance, p)
+            for value in expected:
+                assert np.abs(values - value).min() <= 1e4 * np.exp(-distance) * max(np.abs(expected).max(), 1)
+    assert (at_sr[0].real > 0) == (eta > c**2 * p.R / (4 * p.g * mu**2))
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("eta", [0.05, 0.2, 0.39])
+def test_the_branch_is_stable_before_the_fold_and_has_one_unstable_direction_after(mu: float, eta: float) -> None:
+    """As far as mu <= 1."""
+    p = P.replace(mu=mu, eta=eta)
+    turning = float(fold(p.j, mu, eta, p.kappa))
+    s = np.linspace(-15, 15, 301)
+    unstable = np.sum(stability.eigenvalues_at(s, p).real > 1e-9, axis=-1)
+    beyond = s > turning if np.isfinite(turning) else np.zeros(s.shape, bool)
+    np.testing.assert_array_equal(unstable, beyond)
+
+
+def test_hopf_points_exist_for_rough_floors_only() -> None:
+    assert stability.hopf_places(P) == []
+    p = P.replace(mu=3.0, eta=0.35)
+    places = stability.hopf_places(p)
+    assert len(places) == 2
+    for place in places:
+        values = stability.eigenvalues_at(place, p)
+        pair = values[np.abs(values.imag) > 1]
+        assert np.abs(pair.real).max() <= 1e-9 * np.abs(pair).max()
+    between = stability.eigenvalues_at(np.mean(places), p)
+    assert np.sum(between.real > 0) == 2
+
+
+# --- the branch without loss of digits -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("eta", [0.05, 0.2, 0.39, 0.4 - 1e-9])
+@pytest.mark.parametrize("kappa", [1e-6, 1e-2, 1.0, 30.0])
+@pytest.mark.parametrize("mu", [0.05, 0.2, 1.0])
+def test_roots_of_the_branch_to_round_off(mu: float, kappa: float, eta: float) -> None:
+    """Every place found belongs to its flow, over the whole branch and right up to its ends."""
+    for s in (-25.0, -12.0, -3.0, 0.0, 3.0, 12.0):
+        Omega_0 = float(branch(s, 0.4, mu, eta, kappa).Omega_0)
+        low, high = (float(branch(end, 0.4, mu, eta, kappa).Omega_0) for end in (-80, 80))
+        if min(abs(Omega_0 - low), abs(Omega_0 - high)) < 4 * EPS * Omega_0:
+            continue  # the flow can't tell the place from the end
+        places = points_at(Omega_0, 0.4, mu, eta, kappa)
+        assert places
+        for place in places:
+            assert abs(float(branch(place, 0.4, mu, eta, kappa).Omega_0) - Omega_0) <= 8 * EPS * Omega_0
+
+
+@given(st.floats(1e-14, 1e-3))
+@settings(max_examples=30, deadline=None)
+def test_just_beyond_the_end_of_rolling(excess: float) -> None:
+    """The slip of a flow a hair beyond omega_01 is that hair over the slope of (41), to the hair's own digits."""
+    omega_01 = thresholds(P).omega_01
+    p = P.replace(omega_0=omega_01 * (1 + excess))
+    (s,) = of_case(p, Case.SS)
+    lead = p.omega_0 - omega_01
+    den = (1 + p.j) * p.mu * p.eta + p.j - p.eta
+    expected = lead / (p.g * p.mu / (p.R * p.c) * (p.j - p.eta) / den)
+    digits = 8 * EPS * omega_01 / lead + 2 * abs(expected)  # of the flow itself, and of the next order in alpha
+    assert abs(-s.alpha / expected - 1) <= digits
+    assert s.stability is Stability.ASYMPTOTIC
+
+
+# --- mirror images and vanishing parameters --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("omega_0", FLOWS)
+def test_mirror_image(omega_0: float) -> None:
+    """Backwards flow: the reflected solutions, which solve the equations, with the same eigenvalues."""
+    p = P.replace(omega_0=-omega_0)
+    for s, forward in zip(stationary_solutions(p), stationary_solutions(P.replace(omega_0=omega_0)), strict=True):
+        np.testing.assert_array_equal(np.abs(s.x), np.abs(forward.x))
+        np.testing.assert_array_equal(s.eigenvalues, forward.eigenvalues)
+        rate = vector_field(s.case, s.x, p)
+        rate[0] = 0
+        assert np.abs(rate).max() <= 1e-10
+        if s.case is not Case.RR:
+            np.testing.assert_allclose(
+                np.concatenate(contact_forces(s.case, s.x, p)), [*s.force_A, *s.force_B], atol=1e-13
+            )
+
+
+def kinds(p: Parameters) -> dict[str, tuple[bool, str, tuple[str, ...]]]:
+    return {s.case.name: (s.exists, s.stability.name, s.family) for s in stationary_solutions(p)}
+
+
+def test_fluid_at_rest() -> None:
+    assert kinds(P.replace(omega_0=0.0)) == {
+        "RR": (True, "ASYMPTOTIC", ()),
+        "RS": (True, "NEUTRAL", ("slip_y",)),
+        "NS": (True, "NEUTRAL", ("y",)),  # nothing holds the ball to the wall: it sinks
+    }
+
+
+def test_without_drag() -> None:
+    """Nothing fixes omega_c, and nothing feeds a steady slip: no SS, no steady sinking."""
+    assert kinds(P.replace(c=0.0)) == {
+        "RR": (True, "NEUTRAL", ("omega_c",)),
+        "RS": (True, "NEUTRAL", ("slip_y", "omega_c")),
+        "SR": (False, "UNSTABLE", ("omega_c",)),
+        "NR": (False, "NEUTRAL", ("y", "omega_c")),
+    }
+
+
+def test_smooth_floor() -> None:
+    """mu = 0: the ball goes round with the fluid, sliding on the floor with any spin about the radius."""
+    found = kinds(P.replace(mu=0.0))
+    assert found["RR"][0] is False
+    assert found["SR"] == (True, "NEUTRAL", ("slip_x",))
+    assert "SS" not in found
+
+
+def test_smooth_wall() -> None:
+    """eta = 0: the wall never carries the weight (NR, SR can't exist), and the spin about the axis is free."""
+    found = kinds(P.replace(eta=0.0))
+    assert found["RR"][0] is False
+    assert found["RS"][0] is False
+    assert found["SR"][0] is False
+    assert found["NR"][0] is False
+    assert found["SS"] == (True, "NEUTRAL", ("slip_y",))
+    assert found["NS"] == (True, "NEUTRAL", ("y", "slip_y"))
+    slow = kinds(P.replace(eta=0.0, omega_0=9.0))
+    assert slow["RR"][0] is slow["RS"][0] is True
+
+
+def test_nothing_at_all() -> None:
+    """mu = eta = 0: the ball goes round with the fluid and spins as it likes about the axis."""
+    found = kinds(P.replace(mu=0.0, eta=0.0))
+    assert found["SS"] == (True, "NEUTRAL", ("slip_y",))
+    for s in stationary_solutions(P.replace(mu=0.0, eta=0.0)):
+        rate = vector_field(s.case, s.x, P.replace(mu=0.0, eta=0.0))
+        assert np.abs(rate[1:]).max() <= 1e-11
