@@ -42,16 +42,18 @@ class ContactSettings:
     """Time step, s."""
     solref: tuple[float, float] = (2e-3, 1.0)
     """Time constant (s) and damping ratio of the normal rows."""
-    solreffriction: float = 2e-2
+    solreffriction: float = 0.4 / 3
     """Time constant tc_f of the friction rows, s."""
-    solimp: float = 0.1
+    solimp: float = 0.03
     """Impedance d, one value at every depth."""
     impratio: float = 1e2
     """How much stiffer the friction rows are than the normal row."""
     memory: bool = True
     """Whether the friction force of the last step shifts the surface velocity, so that rolling doesn't creep."""
-    servo: float = 0.02
+    servo: float = 0.01
     """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
+    order: int = 2
+    """2: forces are taken in the middle of a step; 1: at its beginning, as MuJoCo does by itself."""
     cone: str = "elliptic"
     integrator: str = "Euler"
     iterations: int = 100
@@ -74,6 +76,8 @@ class ContactSettings:
         for name, value, known in (("cone", self.cone, CONES), ("integrator", self.integrator, INTEGRATORS)):
             if value not in known:
                 raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(str(value), known)}")
+        if self.order not in (1, 2):
+            raise InputError(f"order = {self.order!r} must be 1 or 2")
         if self.memory and self.cone != "elliptic":
             raise InputError(
                 f"memory needs the elliptic cone, not cone = {self.cone!r}: its rows mix normal and friction"
@@ -143,6 +147,27 @@ class ContactSettings:
         """
         return self.softness / (m * self.impratio * self.b_f) if self.memory else 0.0
 
+    @property
+    def midpoint(self) -> float:
+        """Where in a step the forces are taken, in steps after its beginning."""
+        return 0.5 if self.order == 2 else 0.0
+
+    @property
+    def lead(self) -> float:
+        """Time by which positions are ahead of velocities, s."""
+        return self.midpoint * self.timestep
+
+    @property
+    def friction_lag(self) -> float:
+        """How far in steps past the middle of a step friction takes its direction by itself, 1/(b_f h) - 1/2."""
+        corrected = self.order == 2 and self.cone == "elliptic"
+        return 1 / (self.b_f * self.timestep) - 0.5 if corrected else 0.0
+
+    @property
+    def shifts_surfaces(self) -> bool:
+        """Whether floor and wall get surface velocities."""
+        return self.memory or self.friction_lag != 0
+
     def servo_reach(self, g: npt.ArrayLike) -> Array:
         """Gap (m) within which the servo works: as far as twice the depth under gravity g, so that a margin stays
         what it was while the ball is away."""
@@ -175,6 +200,7 @@ class ContactSettings:
             "timestep": timestep,
             "solref": (cls.solref[0] * scale, cls.solref[1]),
             "solreffriction": cls.solreffriction * scale,
+            "servo": cls.servo * scale,
         }
         return cls.from_mapping(scaled | changes)
 

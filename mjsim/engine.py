@@ -1,29 +1,17 @@
-"""Stepping one or many simulations: drag, wall and margins from outside, MuJoCo's contact solver inside.
-
-Before each step the wall is turned to be tangent at the ball's azimuth and the drag of the fluid (9) is written as a
-generalised force. Two slow corrections take out what the softness of MuJoCo's contacts would leave: the margins of the
-contacts move against what is left of the penetration, and the surfaces get the velocity at which the last friction
-force would make them creep, backwards. The body axes of a homogeneous ball are arbitrary: they are set upright before
-each step, so that forces and velocities of the ball's joint are along the paper's axes.
-
-The generalised contact force of the chain is then, with r times the moments about the centre,
-``Q = (., A_x + B_x, A_y + B_y, -r A_z, r B_z, r (A_x - B_y))``, which with the normal forces gives the friction.
-"""
+"""Stepping one or many simulations, sampling them, and handing out trajectories."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Protocol
 
-import mujoco
 import numpy as np
 import numpy.typing as npt
-from mujoco.batch import Batch
 
 from mjsim import recorder, scene
 from mjsim.classify import Changes, classify
 from mjsim.contact_settings import ContactSettings
+from mjsim.stepping import Many, Single, Stepper
 from model import Flow, Header, InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
 from model.kinematics import UNITS, VARIABLES, full_state
@@ -31,9 +19,6 @@ from model.parameters import check_number
 
 BLOCK = 256
 """Samples a run keeps before it hands them out."""
-_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-_NORMAL_A, _NORMAL_B = 1, 15
-"""Where the sensors hold the normal forces."""
 _HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 
@@ -73,10 +58,10 @@ class Run:
         theta_0 = check_number("theta_0", theta_0, "rad")
         start = [recorder.joint_state(x, theta_0, p) for x, p in zip(states, parameters, strict=True)]
         models = [scene.build(p, settings) for p in parameters]
-        self._stepper: _Stepper = (
-            _Single(models[0], parameters[0], settings, start[0])
+        self._stepper: Stepper = (
+            Single(models[0], parameters[0], settings, start[0], float(self._omega_0(0, 1)[0, 0]))
             if len(models) == 1
-            else _Many(models, parameters, settings, start)
+            else Many(models, parameters, settings, start, self._omega_0(0, 1)[0])
         )
         shown = settings.to_mapping() | {
             "t_end": float(t_end), "sample_interval": self._interval * settings.timestep,
@@ -214,129 +199,3 @@ def _sampling(t_end: float, timestep: float, sample_interval: float | None) -> t
         )
     steps = max(1, round(sample_interval / timestep))
     return steps, math.floor(t_end / (steps * timestep) + 1e-9) + 1
-
-
-class _Stepper(Protocol):
-    """One or many simulations in the engine."""
-
-    margins: Array
-    """Margins of the contacts, shape (runs, 2), m."""
-
-    def sample(self, omega_0: Array, row: Array) -> None:
-        """Take one step; write (qpos, qvel, sensors) of its beginning to row (runs, 41); omega_0 (runs,)."""
-
-    def advance(self, omega_0: Array) -> None:
-        """Take a step for every row of omega_0 (steps, runs)."""
-
-
-class _Single(_Stepper):
-    """One simulation in plain floats, which beat arrays of one."""
-
-    def __init__(self, model: Any, p: Parameters, settings: ContactSettings, start: tuple[Array, Array]) -> None:
-        self._model, self._data = model, mujoco.MjData(model)
-        self._data.qpos[:], self._data.qvel[:] = start
-        self._p, self._settings = p, settings
-        self.margins = model.pair_margin[None]
-
-    def sample(self, omega_0: Array, row: Array) -> None:
-        data = self._data
-        row[0, : recorder.NQ], row[0, recorder.NQ : recorder.NQ + recorder.NV] = data.qpos, data.qvel
-        self.advance(omega_0[None])
-        row[0, recorder.NQ + recorder.NV :] = data.sensordata
-
-    def advance(self, omega_0: Array) -> None:
-        model, data, step, cos, sin = self._model, self._data, mujoco.mj_step, math.cos, math.sin
-        qpos, qvel, drag, wall = data.qpos, data.qvel, data.qfrc_applied, data.mocap_quat[0]
-        constraint, sensors, margins = data.qfrc_constraint, data.sensordata, model.pair_margin
-        floor_slip, wall_slip = (model.geom_surfacevel[model.geom(name).id] for name in ("floor", "wall"))
-        orientation = qpos[3:7]
-        mc, R, r = self._p.m * self._p.c, self._p.R, self._p.r
-        gain, reach = self._settings.servo_gain, float(self._settings.servo_reach(self._p.g))
-        shift = self._settings.memory_gain(self._p.m)
-        margin_A, margin_B = margins.tolist()
-        for omega in omega_0[:, 0].tolist():
-            theta, h, y, *_ = qpos.tolist()
-            omega_c, v_h, v_y, *_ = qvel.tolist()
-            wall[0], wall[3] = cos(theta / 2), sin(theta / 2)
-            orientation[:] = _UPRIGHT
-            drag[0], drag[1], drag[2] = -mc * (R - h) * (R - h) * (omega_c - omega), -mc * v_h, -mc * v_y
-            if gain:
-                if y < reach:
-                    margins[0] = margin_A = max(0.0, margin_A - gain * y)
-                if h < reach:
-                    margins[1] = margin_B = max(0.0, margin_B - gain * h)
-            if shift:
-                _, force_h, force_y, moment_x, moment_y, _ = constraint.tolist()
-                floor_slip[0], floor_slip[1] = -shift / r * moment_x, shift * (force_h - sensors[_NORMAL_B])
-                wall_slip[0], wall_slip[1] = shift * (force_y - sensors[_NORMAL_A]), shift / r * moment_y
-            step(model, data)
-
-
-class _Many(_Stepper):
-    """Many simulations in one batch; forces, walls and margins are array operations over all of them."""
-
-    def __init__(
-        self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
-        start: Sequence[tuple[Array, Array]],
-    ) -> None:  # fmt: skip
-        self._batch = batch = Batch(models[0], nsim=len(models), nthread=1)
-        _expand_differences(batch, models)
-        self._qpos, self._qvel, self._sensors = (batch.bind(name) for name in ("qpos", "qvel", "sensordata"))
-        self._qpos[:], self._qvel[:] = (np.stack(part) for part in zip(*start, strict=True))
-        self._drag, self._wall = batch.bind("qfrc_applied"), batch.bind("mocap_quat")[:, 0]
-        self._constraint = batch.bind("qfrc_constraint")
-        self.margins = batch.expand("pair_margin")
-        surface = batch.expand("geom_surfacevel")
-        self._floor_slip, self._wall_slip = (surface[:, models[0].geom(name).id, :2] for name in ("floor", "wall"))
-        self._minus_mc = np.array([[-p.m * p.c] for p in parameters])
-        self._R = np.array([p.R for p in parameters])
-        self._gain = settings.servo_gain
-        self._reach = settings.servo_reach(np.array([[p.g] for p in parameters]))
-        shift = np.array([settings.memory_gain(p.m) for p in parameters])
-        r = np.array([p.r for p in parameters])
-        self._shift, self._shift_r = shift, shift / r
-        self._remembers = settings.memory
-
-    def sample(self, omega_0: Array, row: Array) -> None:
-        split = recorder.NQ + recorder.NV
-        row[:, : recorder.NQ], row[:, recorder.NQ : split] = self._qpos, self._qvel
-        self.advance(omega_0[None])
-        row[:, split:] = self._sensors
-
-    def advance(self, omega_0: Array) -> None:
-        qpos, qvel, margins, wall = self._qpos, self._qvel, self.margins, self._wall
-        gaps = qpos[:, 2:0:-1]
-        velocity, drag = qvel[:, :3], self._drag[:, :3]
-        half, rho = np.empty(len(qpos)), np.empty(len(qpos))
-        for omega in omega_0:
-            np.multiply(qpos[:, 0], 0.5, out=half)
-            np.cos(half, out=wall[:, 0])
-            np.sin(half, out=wall[:, 3])
-            qpos[:, 3:7] = _UPRIGHT
-            np.multiply(velocity, self._minus_mc, out=drag)
-            np.subtract(self._R, qpos[:, 1], out=rho)
-            drag[:, 0] -= self._minus_mc[:, 0] * omega
-            drag[:, 0] *= rho * rho
-            if self._gain:
-                lower = margins - self._gain * gaps
-                np.maximum(lower, 0.0, out=margins, where=gaps < self._reach)
-            if self._remembers:
-                self._remember()
-            self._batch.step()
-
-    def _remember(self) -> None:
-        """Shift the surfaces by the last friction forces: A_z, A_x of the floor, B_y, B_z of the wall."""
-        force, sensors, shift = self._constraint, self._sensors, self._shift
-        np.multiply(force[:, 3], -self._shift_r, out=self._floor_slip[:, 0])
-        np.multiply(force[:, 1] - sensors[:, _NORMAL_B], shift, out=self._floor_slip[:, 1])
-        np.multiply(force[:, 2] - sensors[:, _NORMAL_A], shift, out=self._wall_slip[:, 0])
-        np.multiply(force[:, 4], self._shift_r, out=self._wall_slip[:, 1])
-
-
-def _expand_differences(batch: Batch, models: Sequence[Any]) -> None:
-    """Give each simulation its own value of every model field in which the models differ."""
-    for name in mujoco.batch.MODEL_FIELDS:
-        owner, _, field = name.rpartition(".")
-        values = [np.asarray(getattr(getattr(model, owner) if owner else model, field)) for model in models]
-        if any(not np.array_equal(values[0], value) for value in values[1:]):
-            batch.expand(name)[:] = np.stack(values)

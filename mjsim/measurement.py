@@ -92,8 +92,8 @@ def richardson(
 ) -> Extrapolated:
     """Extrapolate three values at decreasing time steps to step 0, by ``value + const step^order``.
 
-    The uncertainty is what the observed order changes against the nearest whole one, and the noise. Where the differences don't
-    shrink like a power of the step between 0.2 and 8 there is no order to go by: the value at the smallest step
+    The uncertainty is what the observed order changes against the nearest whole one, and the noise. Where differences
+    don't shrink like a power of the step between 0.2 and 8 there is no order to go by: the value at the smallest step
     stands, and the largest difference is its uncertainty. Raises `InputError` unless there are three falling steps.
     """
     if not len(steps) == len(values) == len(uncertainties) == 3 or not steps[0] > steps[1] > steps[2] > 0:

@@ -54,7 +54,7 @@ def samples(time: Array, qpos: Array, qvel: Array, sensors: Array, p: Parameters
         sensor = sensors[:, 14 * k : 14 * (k + 1)]
         found = sensor[:, _FOUND] > 0
         block[f"force_{contact}"] = np.einsum("nab,nb->na", axes, _world_force(sensor))
-        # Apart, the engine has no contact to report on: the coordinates say how far.
+        # Apart, the engine has no contact to report on: the coordinates say how far, and how fast.
         block[f"gap_{contact}"] = np.where(found, sensor[:, _DIST], distance)
         block[f"slip_speed_{contact}"] = np.where(found, np.hypot(*sensor[:, _SLIP].T), speeds[k])
     return block

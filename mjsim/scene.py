@@ -47,7 +47,7 @@ def build(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -
     except ValueError as error:
         raise InputError(f"MuJoCo cannot compile {scene}: {_one_line(error)}") from error
     # The engine looks at surface velocities only if one was there at compile time, or if told.
-    model.flg_surfacevel = settings.memory
+    model.flg_surfacevel = settings.shifts_surfaces
     return model
 
 
