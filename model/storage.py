@@ -12,6 +12,7 @@ import io
 import json
 import os
 import re
+import socket
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -29,9 +30,9 @@ from model.trajectory import AXES, SAMPLE, Events, Header, Trajectory, columns
 
 SCHEMA = "dualball-trajectory"
 SCHEMA_VERSION = 1
-TEMPORARY_SUFFIX = ".part"
 
 _CHUNK = 1024
+_TEMPORARY = ".part"
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
 
@@ -46,6 +47,17 @@ def save(trajectory: Trajectory, path: str | Path) -> None:
         writer.finish(trajectory.events, trajectory.header.failure)
 
 
+def check_writable(path: str | Path) -> None:
+    """Raise `StorageError` if a file of that name could not be written: better before a long run than after."""
+    folder = Path(path).parent
+    if not folder.is_dir():
+        raise StorageError(f"cannot write {path}: there is no directory {folder}")
+    if Path(path).is_dir():
+        raise StorageError(f"cannot write {path}: it is a directory")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise StorageError(f"cannot write {path}: Permission denied")
+
+
 class TrajectoryWriter:
     """Writes a trajectory block by block; use as a context manager and call `finish` at the end.
 
@@ -56,7 +68,7 @@ class TrajectoryWriter:
 
     def __init__(self, path: str | Path, header: Header) -> None:
         self.path = Path(path)
-        self._temporary = self.path.with_name(f".{self.path.name}.{os.getpid()}{TEMPORARY_SUFFIX}")
+        self._temporary = self.path.with_name(f".{self.path.name}.{_host()}.{os.getpid()}{_TEMPORARY}")
         self._finished = False
         try:
             self._disk = _Disk(self._temporary, "w+b")
@@ -196,6 +208,28 @@ def load(path: str | Path) -> Trajectory:
     if not np.isin(codes, list(Case)).all():
         raise StorageError(f"{path} holds a case that does not exist")
     return Trajectory(header=header, events=Events(**events), **samples)
+
+
+def remove_leftovers(directory: Path) -> None:
+    """Remove the temporary files that writers killed on this machine have left in a directory."""
+    for path in directory.glob(f".*{_TEMPORARY}"):
+        host, process = path.name.removesuffix(_TEMPORARY).split(".")[-2:]
+        if host == _host() and process.isdigit() and not _alive(int(process)):
+            path.unlink(missing_ok=True)
+
+
+def _host() -> str:
+    return socket.gethostname().replace(".", "-")
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # it lives, and is somebody else's
+        return True
+    return True
 
 
 def _header_attributes(header: Header) -> dict[str, str]:

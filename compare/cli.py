@@ -1,0 +1,183 @@
+"""The program ``dualball``: one command line for everything.
+
+Exit codes: 0 done and as expected, 1 a verdict failed or a run broke down, 2 a mistake in what was asked,
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+import compare
+from compare import benchmark, inspection, options, predict, report, results, tables
+from compare.claims import Level
+from compare.tasks import ENGINES, Task, carry_out
+from mjsim import ContactSettings
+from model import InputError, SimulationError, storage
+from model.trajectory import current_versions
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program with the given arguments, the process's own for None; return its exit code."""
+    args = _parser().parse_args(argv)
+    try:
+        return int(args.run(args))
+    except InputError as error:
+        print(f"dualball: error: {error}", file=sys.stderr)
+        return 2
+    except SimulationError as error:
+        print(f"dualball: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:  # the reader of our output has gone, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        print("dualball: interrupted; finished runs are kept, the same command goes on from there", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="dualball",
+        description="A physics engine on trial: the dual-point contact ball, in closed form and in MuJoCo.",
+    )
+    parser.add_argument("--version", action="version", version=f"dualball {current_versions()['dualball']}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    command = _add(commands, "predict", _predict, "stationary solutions, thresholds and operating range, from theory")
+    options.add_parameters(command)
+    command.add_argument("--json", action="store_true", help="print JSON instead of tables")
+
+    command = _add(commands, "simulate", _simulate, "one run with any engine, into an HDF5 file")
+    command.add_argument("--engine", choices=list(ENGINES), default="mujoco", metavar="NAME", help=", ".join(ENGINES))
+    options.add_parameters(command)
+    options.add_flow(command)
+    options.add_start(command)
+    command.add_argument("--time", type=options.number, default=10.0, metavar="s", help="duration (default 10)")
+    command.add_argument("--timestep", type=options.number, metavar="s", help="time step, for engines that have one")
+    command.add_argument(
+        "--sample-interval", type=options.number, metavar="s", help="default: a thousandth of the duration"
+    )
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HDF5 file to write")
+    command.add_argument("--json", action="store_true", help="print the last state as JSON")
+
+    command = _add(commands, "validate", _validate, "hold simulation against theory, claim by claim; the main job")
+    level = command.add_mutually_exclusive_group()
+    level.add_argument("--quick", dest="level", action="store_const", const=Level.QUICK, default=Level.QUICK)
+    level.add_argument("--full", dest="level", action="store_const", const=Level.FULL, help="everything")
+    command.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
+    command.add_argument("--list", action="store_true", help="list the claims and stop")
+    command.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR")
+    command.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (0: none)")
+    command.add_argument("--json", action="store_true", help="print the verdicts as JSON")
+    command.add_argument("--quiet", action="store_true", help="no progress")
+
+    command = _add(commands, "report", _report, "make report.html anew from stored results")
+    command.add_argument("directory", type=Path, nargs="?", default=Path("results"), metavar="DIR")
+
+    command = _add(commands, "inspect", _inspect, "what a trajectory file holds")
+    command.add_argument("file", type=Path, metavar="FILE")
+    command.add_argument("--plot", type=Path, metavar="FILE", help="draw it (png, svg or pdf)")
+    command.add_argument("--json", action="store_true", help="print JSON")
+
+    command = _add(commands, "benchmark", _benchmark, "cost of the loop round MuJoCo's step, as ratios within one run")
+    command.add_argument("--json", action="store_true", help="print JSON")
+    return parser
+
+
+def _add(commands: Any, name: str, run: Any, summary: str) -> argparse.ArgumentParser:
+    command: argparse.ArgumentParser = commands.add_parser(name, help=summary, description=summary)
+    command.set_defaults(run=run)
+    return command
+
+
+def _predict(args: argparse.Namespace) -> int:
+    prediction = predict.predict(options.parameters(args))
+    if args.json:
+        print(json.dumps(prediction.to_mapping(), indent=1))
+    else:
+        Console().print(*predict.tables(prediction), sep="\n")
+    return 0
+
+
+def _simulate(args: argparse.Namespace) -> int:
+    p = options.parameters(args)
+    task = Task(
+        engine=args.engine, parameters=p, x0=tuple(options.start(args).tolist()), t_end=args.time,
+        flow=options.flow(args), sample_interval=args.sample_interval, **_step(args),
+    )  # fmt: skip
+    if args.output:
+        storage.check_writable(args.output)
+    (trajectory,) = carry_out([task])
+    if args.output:
+        storage.save(trajectory, args.output)
+    if args.json:
+        print(json.dumps(inspection.describe(trajectory), indent=1))
+    else:
+        Console().print(inspection.table(trajectory))
+        if args.output:
+            print(f"written to {args.output}")
+    if not trajectory.complete:
+        raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)
+    return 0
+
+
+def _step(args: argparse.Namespace) -> dict[str, Any]:
+    if args.timestep is None:
+        return {}
+    if args.engine == "mujoco":
+        return {"settings": ContactSettings.at(args.timestep)}
+    return {"options": {"timestep": args.timestep}}
+
+
+def _validate(args: argparse.Namespace) -> int:
+    from compare import progress
+
+    if args.list:
+        Console().print(tables.claims(compare.CLAIMS))
+        return 0
+    with progress.shown(quiet=args.quiet or args.json) as show:
+        verdicts = compare.validate(
+            args.output, level=args.level, claims=args.claim, workers=args.workers, progress=show
+        )
+    if args.json:
+        print(json.dumps([results.describe(verdict) for verdict in verdicts], indent=1))
+    else:
+        console = Console()
+        for table in tables.verdicts(verdicts):
+            console.print(table)
+        console.print(f"report: {args.output / results.REPORT}")
+    return 0 if all(verdict.passed for verdict in verdicts) else 1
+
+
+def _benchmark(args: argparse.Namespace) -> int:
+    figures = benchmark.run()
+    if args.json:
+        print(json.dumps(figures.to_mapping(), indent=1))
+    else:
+        Console().print(benchmark.table(figures))
+    return 0
+
+
+def _report(args: argparse.Namespace) -> int:
+    print(report.write(args.directory))
+    return 0
+
+
+def _inspect(args: argparse.Namespace) -> int:
+    trajectory = storage.load(args.file)
+    if args.plot:
+        inspection.plot(trajectory, args.plot)
+    if args.json:
+        print(json.dumps(inspection.describe(trajectory), indent=1))
+    else:
+        Console().print(inspection.table(trajectory))
+    return 0

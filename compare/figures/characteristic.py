@@ -1,0 +1,86 @@
+"""Characteristic curves of the flowmeter (Fig. 13): theory as lines, measured stationary states as points."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import analytic
+from compare.results import Summary
+from model import Case, Parameters
+
+CAPTION = (
+    "Characteristic curves (Fig. 13 of the paper): orbital angular velocity of the ball over that of the fluid. Lines: "
+    "closed-form theory, dashed where unstable. Points: simulated stationary states, with error bars of three standard "
+    "uncertainties (smaller than the marks). Below: relative deviation of each point."
+)
+COLOURS = {Case.RR: "#0072B2", Case.SR: "#E69F00", Case.SS: "#D55E00", Case.NR: "#009E73"}
+"""Okabe and Ito's colours, told apart by colour-blind readers and in grey."""
+MARKERS = {Case.RR: "o", Case.SR: "s", Case.SS: "^", Case.NR: "D"}
+
+
+def draw(summary: Summary, sets: tuple[str, ...] = ("reference", "high-wall-friction")) -> Figure:
+    """Two columns, one a parameter set: the curve above, deviations below."""
+    figure = Figure(figsize=(10, 6), layout="constrained")
+    axes = figure.subplots(2, len(sets), sharex="col", squeeze=False, height_ratios=[3, 1])
+    for (curve, deviation), name in zip(axes.T, sets, strict=True):
+        p = Parameters.named(name)
+        _theory(curve, p)
+        _points(curve, deviation, summary, name)
+        relation = "<" if p.eta < p.j else ">"
+        curve.set_title(f"{name}: η = {p.eta:g} {relation} j = {p.j:g}", fontsize=11)
+        curve.set_ylabel("ω_c (rad/s)")
+        curve.legend(fontsize=8, frameon=False, loc="upper left")
+        deviation.set_xlabel("ω₀ (rad/s)")
+        deviation.set_ylabel("|Δω_c| / ω_c")
+        deviation.set_yscale("log")
+        deviation.set_ylim(1e-17, 1e-5)
+        deviation.grid(alpha=0.3)
+        curve.grid(alpha=0.3)
+    return figure
+
+
+def _theory(axes: Axes, p: Parameters) -> None:
+    """The branches of stationary solutions over omega_0."""
+    omega = np.linspace(0.5, 45, 400)
+    branches: dict[tuple[Case, bool, int], list[tuple[float, float]]] = {}
+    for omega_0 in omega:
+        seen: dict[Case, int] = {}
+        for solution in analytic.stationary_solutions(p.replace(omega_0=float(omega_0))):
+            if solution.case not in COLOURS or not solution.exists:
+                continue
+            index = seen[solution.case] = seen.get(solution.case, -1) + 1
+            key = (solution.case, solution.stable, index)
+            branches.setdefault(key, []).append((float(omega_0), float(solution.x[2])))
+    for (case, stable, _), points in branches.items():
+        x, y = np.transpose(points)
+        label = f"{case.name}{'' if stable else ', unstable'}"
+        axes.plot(x, y, color=COLOURS[case], lw=1.6, ls="-" if stable else "--", label=label, zorder=1)
+    thresholds = analytic.thresholds(p)
+    for k in range(1, 5):
+        value = getattr(thresholds, f"omega_0{k}")
+        if np.isfinite(value) and value < omega[-1]:
+            axes.axvline(value, color="0.6", lw=0.8, ls=":")
+            axes.annotate(
+                f"ω₀{'₁₂₃₄'[k - 1]}", (value, 0.02), xycoords=("data", "axes fraction"), fontsize=8, color="0.35"
+            )
+
+
+def _points(curve: Axes, deviation: Axes, summary: Summary, name: str) -> None:
+    for case, marker in MARKERS.items():
+        checks = [
+            check
+            for verdict in summary.verdicts.values()
+            for check in verdict["checks"]
+            if check["quantity"] == "ω_c" and check["parameters"] == name and check["case_found"] == case.name
+        ]
+        if not checks:
+            continue
+        x, y, u = (np.array([check[key] for check in checks]) for key in ("omega_0", "measured", "uncertainty"))
+        relative = np.array([abs(check["error"] / check["predicted"]) for check in checks])
+        curve.errorbar(
+            x, y, yerr=3 * u, label=f"{case.name}, MuJoCo", capsize=2, zorder=2,
+            color=COLOURS[case], marker=marker, ls="none", ms=6, mfc="none",
+        )  # fmt: skip
+        deviation.plot(x, np.maximum(relative, 1e-16), color=COLOURS[case], marker=marker, ls="none", mfc="none")

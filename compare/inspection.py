@@ -1,0 +1,147 @@
+"""What a trajectory holds, for a person: in words, as a table, as a plot."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from rich.table import Table
+
+from compare.figures.characteristic import COLOURS
+from model import Case, StorageError, Trajectory
+from model.kinematics import UNITS, VARIABLES
+
+
+def describe(trajectory: Trajectory) -> dict[str, Any]:
+    """Parameters, versions, cases over time, events and last state, JSON-able."""
+    header, events = trajectory.header, trajectory.events
+    return {
+        "engine": header.engine,
+        "complete": trajectory.complete,
+        "failure": header.failure,
+        "parameters": dataclasses.asdict(header.parameters),
+        "flow": header.flow.to_mapping(),
+        "settings": dict(header.settings),
+        "versions": dict(header.versions),
+        "commit": header.commit,
+        "created": header.created,
+        "samples": len(trajectory.time),
+        "duration": float(trajectory.time[-1]) if len(trajectory.time) else 0.0,
+        "cases": [{"case": case.name, "from": start, "to": end} for case, start, end in phases(trajectory)],
+        "events": [
+            {"time": float(t), "from": Case(a).name, "to": Case(b).name}
+            for t, a, b in zip(events.time, events.from_case, events.to_case, strict=True)
+        ],
+        "last": dict(zip(VARIABLES, trajectory.x[-1].tolist(), strict=True)) if len(trajectory.time) else {},
+    }
+
+
+def phases(trajectory: Trajectory) -> list[tuple[Case, float, float]]:
+    """Maximal stretches of samples in one case, with the times of their first and last sample."""
+    if len(trajectory.case) == 0:
+        return []
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(trajectory.case)) + 1])
+    ends = np.concatenate([starts[1:] - 1, [len(trajectory.case) - 1]])
+    return [
+        (Case(trajectory.case[a]), float(trajectory.time[a]), float(trajectory.time[b]))
+        for a, b in zip(starts, ends, strict=True)
+    ]
+
+
+def table(trajectory: Trajectory, most: int = 20) -> Table:
+    """The description as a table of two columns; at most so many phases and events are listed."""
+    told = describe(trajectory)
+    rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    rows.add_column(style="bold")
+    rows.add_column()
+    rows.add_row("engine", f"{told['engine']} (" + ", ".join(f"{k} {v}" for k, v in told["versions"].items()) + ")")
+    rows.add_row("made", f"{told['created']} {told['commit'][:12]}".strip())
+    fields = dataclasses.fields(trajectory.header.parameters)
+    values = (f"{f.name} = {told['parameters'][f.name]:g} {f.metadata['unit'].removesuffix('1') or ''}" for f in fields)
+    rows.add_row("parameters", ", ".join(value.strip() for value in values))
+    rows.add_row("flow", _flow(trajectory))
+    rows.add_row("settings", ", ".join(f"{k} = {_short(v)}" for k, v in told["settings"].items()))
+    rows.add_row("samples", f"{told['samples']} over {told['duration']:g} s")
+    shown = [f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in told["cases"]]
+    rows.add_row("cases", _listed(shown, most))
+    events = [f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in told["events"]]
+    rows.add_row("events", _listed(events, most))
+    last = (f"{name} = {told['last'][name]:.9g} {u}" for name, u in zip(VARIABLES, UNITS, strict=True) if told["last"])
+    rows.add_row("last state", "\n".join(last))
+    if told["failure"]:
+        rows.add_row("[red]failure", told["failure"])
+    return rows
+
+
+def plot(trajectory: Trajectory, path: Path) -> None:
+    """Draw omega_c, slip, gaps and forces over time, with the case as a band, to a file.
+
+    Raises `StorageError` if the file can't be written or its suffix names no format.
+    """
+    figure = draw(trajectory)
+    try:
+        figure.savefig(path, dpi=150)
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}") from error
+    except ValueError as error:
+        raise StorageError(f"cannot write {path}: {str(error).splitlines()[0]}") from error
+
+
+def draw(trajectory: Trajectory) -> Figure:
+    """The figure of `plot`."""
+    t, p = trajectory.time, trajectory.header.parameters
+    figure = Figure(figsize=(9, 9), layout="constrained")
+    orbit, slip, gap, force, band = figure.subplots(5, sharex=True, height_ratios=[3, 3, 2, 3, 0.6])
+    orbit.plot(t, trajectory.header.flow(t), color="0.6", ls="--", label="ω₀")
+    orbit.plot(t, trajectory.omega_c, color="#0072B2", label="ω_c")
+    orbit.set_ylabel("orbit (rad/s)")
+    for name, symbol, colour in (
+        ("slip_x", "ω̃ₓ", "#D55E00"),
+        ("slip_y", "ω̃ᵧ", "#009E73"),
+        ("slip_z", "ω̃_z", "#CC79A7"),
+    ):
+        slip.plot(t, getattr(trajectory, name), label=symbol, color=colour)
+    slip.set_ylabel("slip (rad/s)")
+    gap.plot(t, 1e3 * trajectory.y, color="#0072B2", label="y (floor)")
+    gap.plot(t, 1e3 * trajectory.h, color="#E69F00", ls="--", label="h (wall)")
+    gap.set_ylabel("gap (mm)")
+    force.plot(t, trajectory.force_A[:, 1], color="#0072B2", label="A_y")
+    force.plot(t, np.hypot(*trajectory.force_A[:, [0, 2]].T), color="#0072B2", ls=":", label="friction at A")
+    force.plot(t, trajectory.force_B[:, 0], color="#E69F00", label="B_x")
+    force.plot(t, np.hypot(*trajectory.force_B[:, [1, 2]].T), color="#E69F00", ls=":", label="friction at B")
+    force.set_ylabel("force (N)")
+    for case, start, end in phases(trajectory):
+        band.axvspan(start, end, color=COLOURS.get(case, "0.75"), lw=0)
+        if t[-1] > 0 and end - start > 0.04 * t[-1]:
+            band.text((start + end) / 2, 0.5, case.name, ha="center", va="center", fontsize=8, color="white")
+    band.set_yticks([])
+    band.set_ylabel("case", rotation=0, ha="right", va="center")
+    band.set_xlabel("time (s)")
+    for axes in (orbit, slip, gap, force):
+        axes.legend(fontsize=8, ncols=4, frameon=False)
+        axes.grid(alpha=0.3)
+    figure.suptitle(
+        f"{trajectory.header.engine}: μ = {p.mu:g}, η = {p.eta:g}, j = {p.j:g}, c = {p.c:g} 1/s", fontsize=11
+    )
+    return figure
+
+
+def _flow(trajectory: Trajectory) -> str:
+    flow = trajectory.header.flow
+    if flow.is_steady:
+        return f"steady, omega_0 = {flow.value[0]:g} rad/s"
+    return f"{flow.kind}, omega_0 from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within {flow.start[-1]:g} s"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(_short(v) for v in value) + "]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _listed(items: list[str], most: int) -> str:
+    more = f"\n… and {len(items) - most} more" if len(items) > most else ""
+    return ("\n".join(items[:most]) + more) or "none"

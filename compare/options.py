@@ -1,0 +1,97 @@
+"""Command-line options that several commands share, and what they mean."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from model import Flow, InputError, Parameters, StorageError
+from model.errors import suggestion
+from model.kinematics import UNITS, VARIABLES
+
+
+def add_parameters(parser: argparse.ArgumentParser) -> None:
+    """Options that choose a parameter set and change some of its values."""
+    group = parser.add_argument_group("parameters")
+    source = group.add_mutually_exclusive_group()
+    source.add_argument("--set", metavar="NAME", default="reference", help=f"one of {', '.join(Parameters.names())}")
+    source.add_argument("--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table")
+    for field in dataclasses.fields(Parameters):
+        meta = field.metadata
+        group.add_argument(
+            f"--{field.name.replace('_', '-')}", dest=f"parameter_{field.name}", metavar=meta["unit"],
+            type=number, help=f"{meta['meaning']} ({meta['allowed']})",
+        )  # fmt: skip
+
+
+def parameters(args: argparse.Namespace) -> Parameters:
+    """The parameters that the options of `add_parameters` name."""
+    chosen = Parameters.load(args.parameters) if args.parameters else Parameters.named(args.set)
+    given = {f.name: getattr(args, f"parameter_{f.name}") for f in dataclasses.fields(Parameters)}
+    return chosen.replace(**{name: value for name, value in given.items() if value is not None})
+
+
+def add_flow(parser: argparse.ArgumentParser) -> None:
+    """Options that let omega_0 change in time."""
+    group = parser.add_argument_group("flow", "omega_0 over time, in rad/s and s; steady if none is given")
+    choice = group.add_mutually_exclusive_group()
+    choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"))
+    choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help="each level held HOLD s")
+    choice.add_argument("--flow", metavar="FILE", help="samples as text: time, omega_0 on each line")
+
+
+def flow(args: argparse.Namespace) -> Flow | None:
+    """The flow that the options of `add_flow` describe; None for a steady one."""
+    if args.ramp:
+        return Flow.ramp(*args.ramp)
+    if args.staircase:
+        return Flow.staircase(args.staircase[1:], args.staircase[0])
+    if args.flow:
+        return _read_flow(Path(args.flow))
+    return None
+
+
+def add_start(parser: argparse.ArgumentParser) -> None:
+    """Option for the initial state."""
+    parser.add_argument(
+        "--start", nargs="*", default=[], metavar="NAME=VALUE",
+        help=f"initial state, zero (at rest against the wall) where not named; names: {', '.join(VARIABLES)}",
+    )  # fmt: skip
+
+
+def start(args: argparse.Namespace) -> np.ndarray:
+    """The initial state, shape (8,), of `add_start`."""
+    x = np.zeros(len(VARIABLES))
+    for item in args.start:
+        name, _, value = item.partition("=")
+        if name not in VARIABLES:
+            raise InputError(f"unknown state variable {name!r}{suggestion(name, VARIABLES)}")
+        k = VARIABLES.index(name)
+        try:
+            x[k] = float(value)
+        except ValueError as error:
+            raise InputError(f"{name} = {value!r} must be a number in {UNITS[k]}") from error
+    return x
+
+
+def number(text: str) -> float:
+    """A number of the command line, for argparse."""
+    try:
+        return float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from error
+
+
+def _read_flow(path: Path) -> Flow:
+    try:
+        table = np.loadtxt(path, delimiter="," if "," in path.read_text("utf-8") else None, ndmin=2)
+    except OSError as error:
+        raise StorageError(f"cannot read the flow from {path}: {error.strerror}") from error
+    except ValueError as error:
+        raise InputError(f"{path} is not a table of numbers, time and omega_0 on each line: {error}") from error
+    if table.shape[1] != 2:
+        raise InputError(f"{path} has {table.shape[1]} columns, but a flow has two, time and omega_0")
+    return Flow.sampled(table[:, 0].tolist(), table[:, 1].tolist())

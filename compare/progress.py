@@ -1,0 +1,60 @@
+"""How far a campaign is: one live line on a terminal, plain lines elsewhere, nothing when quiet."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+PLAIN_INTERVAL = 10.0
+"""Seconds between plain lines."""
+
+Show = Callable[[str, int, int, int], None]
+"""Called with what is being done, runs done, runs in all, runs failed."""
+
+
+@contextmanager
+def shown(quiet: bool = False) -> Iterator[Show]:
+    """A function to report progress to, on standard error."""
+    if quiet:
+        yield lambda what, done, total, failed: None
+    elif sys.stderr.isatty():
+        with _live() as show:
+            yield show
+    else:
+        yield _plain()
+
+
+@contextmanager
+def _live() -> Iterator[Show]:
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}"),
+        TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn(),
+    )  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        line = bar.add_task("", total=None, failed="")
+
+        def show(what: str, done: int, total: int, failed: int) -> None:
+            told = f"[red]{failed} failed" if failed else ""
+            bar.update(line, description=what, completed=done, total=total, failed=told)
+
+        yield show
+
+
+def _plain() -> Show:
+    start = last = time.monotonic()
+
+    def show(what: str, done: int, total: int, failed: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last < PLAIN_INTERVAL and done < total:
+            return
+        last = now
+        eta = f", about {(now - start) / done * (total - done):.0f} s to go" if 0 < done < total else ""
+        print(f"{what}: {done}/{total} runs{f', {failed} failed' if failed else ''}{eta}", file=sys.stderr)
+
+    return show

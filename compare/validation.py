@@ -1,0 +1,49 @@
+"""The main job: run the claims, keep the results, write the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from compare import report, results, stationary
+from compare.campaign import Campaign, Progress
+from compare.claims import Claim, Lab, Level, Verdict, judge, select
+from compare.progress import Show
+
+CLAIMS: tuple[Claim, ...] = (*stationary.CLAIMS,)
+"""Every claim there is, in the order of the paper."""
+
+
+def validate(
+    output: str | Path = "results", *, level: Level = Level.QUICK, claims: Sequence[str] | None = None,
+    workers: int = 1, progress: Show = lambda what, done, total, failed: None,
+) -> list[Verdict]:  # fmt: skip
+    """Judge claims, all of them if None, and store runs, summary and report in a directory.
+
+    What the directory holds already is not computed again. The summary is written after every claim, the report at
+    the end, whatever the verdicts.
+
+    Raises
+    ------
+    InputError
+        For an unknown claim.
+    StorageError
+        If the directory can't be written or holds results of another version.
+    """
+    output = Path(output)
+    chosen = select(CLAIMS, claims)
+    summary = results.open_directory(output)
+    verdicts: list[Verdict] = []
+    with Campaign(output / results.RUNS, workers) as campaign:
+        for k, claim in enumerate(chosen, start=1):
+            what = f"claim {k}/{len(chosen)} {claim.id}"
+
+            def tell(now: Progress, what: str = what) -> None:
+                progress(what, now.done, now.total, now.failed)
+
+            campaign.report = tell
+            verdicts.append(judge(claim, Lab(campaign, level)))
+            summary = summary.with_verdicts(level.name, verdicts[-1:])
+            results.save(summary, output)
+    report.write(output)
+    return verdicts
