@@ -32,7 +32,7 @@ from mjsim.contact_settings import ContactSettings
 from model import Parameters
 from model.arrays import Array
 
-_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+_UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 _NORMAL_A, _NORMAL_B = 1, 15
 """Where the sensors hold the normal forces."""
 _START = 40
@@ -64,7 +64,7 @@ class Single(Stepper):
         self._data.qpos[:], self._data.qvel[:] = start
         self._data.qpos[:3] += settings.lead * start[1][:3]
         self._floor, self._wall = (model.geom_surfacevel[model.geom(name).id] for name in ("floor", "wall"))
-        self._last = start[1].tolist()
+        self._remember(start[1])
         self.margins = model.pair_margin[None]
         self._settle(omega_0)
 
@@ -79,7 +79,11 @@ class Single(Stepper):
                 for contact, axis in enumerate((2, 1)):
                     if abs(data.qpos[axis]) < reach and abs(data.qvel[axis]) * timestep < reach:
                         model.pair_margin[contact] = max(0.0, model.pair_margin[contact] - data.qacc[axis] / stiffness)
-            self._last = (data.qvel - timestep * data.qacc).tolist()
+            self._remember(data.qvel - timestep * data.qacc)
+
+    def _remember(self, qvel: Array) -> None:
+        """Take these for the velocities of the last step, with rho omega_c as the seventh."""
+        self._last = [*qvel.tolist(), float((self._p.R - self._data.qpos[1]) * qvel[0])]
 
     def sample(self, omega_0: Array, row: Array) -> None:
         data, split = self._data, recorder.NQ + recorder.NV
@@ -96,50 +100,54 @@ class Single(Stepper):
         qpos, qvel, applied, turn, margins = (
             data.qpos, data.qvel, data.qfrc_applied, data.mocap_quat[0], model.pair_margin
         )  # fmt: skip
-        constraint, sensors, floor, wall, orientation = (
-            data.qfrc_constraint, data.sensordata, self._floor, self._wall, qpos[3:7]
+        constraint, normal, floor, wall, orientation = (
+            data.qfrc_constraint, data.sensordata.item, self._floor, self._wall, qpos[3:7]
         )  # fmt: skip
         m, R, r, mc, inertia = p.m, p.R, p.r, p.m * p.c, p.j * p.m * p.r**2
         ahead, shift, lag = settings.midpoint, settings.memory_gain(p.m), settings.friction_lag
-        gain, reach = settings.servo_gain if step is mujoco.mj_step else 0.0, float(settings.servo_reach(p.g))
+        spin_shift, shifts, gain = shift / r, settings.shifts_surfaces, settings.servo_gain
         cos, sin, slides = math.cos, math.sin, _SLIDES**2
-        u0, u1, u2, u3, u4, u5 = self._last
-        margin_A, margin_B = margins.tolist()
+        u0, u1, u2, u3, u4, u5, last_around = self._last
         for omega in omega_0:
             theta, h, y, *_ = qpos.tolist()
             v0, v1, v2, v3, v4, v5 = qvel.tolist()
-            turn[0], turn[3] = cos(theta / 2), sin(theta / 2)
-            orientation[:] = _UPRIGHT
+            half = theta / 2
+            turn[0], turn[3] = cos(half), sin(half)
+            orientation[0] = 1.0
+            orientation[1] = orientation[2] = orientation[3] = 0.0
             rho = R - h
             # Change over the last step, and the velocities expected in the middle of this one.
-            d0, d1, d2, d3, d4, d5 = v0 - u0, v1 - u1, v2 - u2, v3 - u3, v4 - u4, v5 - u5
-            w0, w1, w2, w3, w5 = v0 + ahead * d0, v1 + ahead * d1, v2 + ahead * d2, v3 + ahead * d3, v5 + ahead * d5
+            d0, d1, d2, d3, d5 = v0 - u0, v1 - u1, v2 - u2, v3 - u3, v5 - u5
+            around = rho * v0
+            its_change = around - last_around
+            w0, w1, middle = v0 + ahead * d0, v1 + ahead * d1, around + ahead * its_change
             # Drag (9), and what the inertial forces grow by till the middle.
-            applied[0] = -mc * rho * rho * (w0 - omega) + 2 * m * rho * (w1 * w0 - v1 * v0)
-            applied[1] = -mc * w1 - m * rho * (w0 * w0 - v0 * v0)
-            applied[2] = -mc * w2
-            applied[3] = -inertia * (w0 * w5 - v0 * v5)
-            applied[5] = inertia * (w0 * w3 - v0 * v3)
-            if shift or lag:
+            applied[0] = rho * (mc * (rho * omega - middle) + 2 * m * (w1 * w0 - v1 * v0))
+            applied[1] = -mc * w1 - m * (w0 * middle - v0 * around)
+            applied[2] = -mc * (v2 + ahead * d2)
+            applied[3] = inertia * (v0 * v5 - w0 * (v5 + ahead * d5))
+            applied[5] = inertia * (w0 * (v3 + ahead * d3) - v0 * v3)
+            if shifts:
                 _, force_h, force_y, moment_x, moment_y, _ = constraint.tolist()
-                s_x, s_z = shift * (force_h - sensors[_NORMAL_B]), -shift / r * moment_x
-                a_x, a_z = d1 + r * d5, rho * d0 - r * d3
-                if slides * (a_x * a_x + a_z * a_z) < (v1 + r * v5) ** 2 + (rho * v0 - r * v3) ** 2:
-                    s_x, s_z = s_x + lag * a_x, s_z + lag * a_z
-                floor[0], floor[1] = s_z, s_x
-                s_y, s_z = shift * (force_y - sensors[_NORMAL_A]), shift / r * moment_y
-                a_y, a_z = d2 - r * d5, rho * d0 + r * (d4 + d0)
-                if slides * (a_y * a_y + a_z * a_z) < (v2 - r * v5) ** 2 + (rho * v0 + r * (v4 + v0)) ** 2:
-                    s_y, s_z = s_y + lag * a_y, s_z + lag * a_z
-                wall[0], wall[1] = s_y, s_z
-            if gain:
-                if y < reach:
-                    margins[0] = margin_A = max(0.0, margin_A - gain * y)
-                if h < reach:
-                    margins[1] = margin_B = max(0.0, margin_B - gain * h)
+                turned, turned_change = r * v5, r * d5
+                x, z, a_x, a_z = v1 + turned, around - r * v3, d1 + turned_change, its_change - r * d3
+                on = lag if slides * (a_x * a_x + a_z * a_z) < x * x + z * z else 0.0
+                floor[0] = on * a_z - spin_shift * moment_x
+                floor[1] = on * a_x + shift * (force_h - normal(_NORMAL_B))
+                y_, z, a_y, a_z = (
+                    v2 - turned,
+                    around + r * (v4 + v0),
+                    d2 - turned_change,
+                    its_change + r * (v4 - u4 + d0),
+                )
+                on = lag if slides * (a_y * a_y + a_z * a_z) < y_ * y_ + z * z else 0.0
+                wall[0] = on * a_y + shift * (force_y - normal(_NORMAL_A))
+                wall[1] = on * a_z + spin_shift * moment_y
+            if gain and step is mujoco.mj_step:
+                margins[0], margins[1] = max(0.0, margins.item(0) - gain * y), max(0.0, margins.item(1) - gain * h)
             step(model, data)
-            u0, u1, u2, u3, u4, u5 = v0, v1, v2, v3, v4, v5
-        self._last = [u0, u1, u2, u3, u4, u5]
+            u0, u1, u2, u3, u4, u5, last_around = v0, v1, v2, v3, v4, v5, around
+        self._last = [u0, u1, u2, u3, u4, u5, last_around]
 
 
 class Many(Stepper):
@@ -155,17 +163,21 @@ class Many(Stepper):
         self._qpos, self._qvel, self._sensors = (batch.bind(name) for name in ("qpos", "qvel", "sensordata"))
         self._qpos[:], self._qvel[:] = (np.stack(part) for part in zip(*start, strict=True))
         self._qpos[:, :3] += settings.lead * self._qvel[:, :3]
+        self._orientation = self._qpos[:, 3:7]
         self._applied, self._turn = batch.bind("qfrc_applied"), batch.bind("mocap_quat")[:, 0]
         self._constraint, self._acceleration = batch.bind("qfrc_constraint"), batch.bind("qacc")
         self.margins = batch.expand("pair_margin")
         surface = batch.expand("geom_surfacevel")
         self._floor, self._wall = (surface[:, models[0].geom(name).id, :2].T for name in ("floor", "wall"))
-        column = {name: np.array([getattr(p, name) for p in parameters]) for name in ("m", "r", "R", "j", "c", "g")}
-        self._m, self._r, self._R = column["m"], column["r"], column["R"]
-        self._mc, self._inertia = column["m"] * column["c"], column["j"] * column["m"] * column["r"] ** 2
-        self._shift = np.array([settings.memory_gain(m) for m in column["m"]])
-        self._reach = settings.servo_reach(column["g"])[:, None]
-        self._last = self._qvel.T.copy()
+        m, r, R, j, c = (np.array([getattr(p, name) for p in parameters]) for name in ("m", "r", "R", "j", "c"))
+        self._R, self._mc = R, m * c
+        one, none = np.ones_like(m), np.zeros_like(m)
+        self._lengths = np.stack([R, one, one, r, r, r, r])
+        self._inertia = np.stack([2 * m / r, -m / r, none, -j * m, none, j * m])
+        shift = np.array([settings.memory_gain(mass) for mass in m])
+        self._shift = np.stack([-shift / r, shift, shift, shift / r])
+        self._reach = np.array([[settings.servo_reach(p.g)] for p in parameters])
+        self._last = self._velocities()
         self._settle(omega_0)
 
     def _settle(self, omega_0: Array) -> None:
@@ -178,7 +190,7 @@ class Many(Stepper):
             if self._settings.servo:
                 lower = self.margins - self._acceleration[:, 2:0:-1] / stiffness
                 np.maximum(lower, 0.0, out=self.margins, where=touching)
-            self._last = (self._qvel - self._settings.timestep * self._acceleration).T.copy()
+            self._last = self._velocities(self._qvel - self._settings.timestep * self._acceleration)
 
     def sample(self, omega_0: Array, row: Array) -> None:
         split = recorder.NQ + recorder.NV
@@ -188,57 +200,62 @@ class Many(Stepper):
         row[:, split:] = self._sensors
 
     def advance(self, omega_0: Array) -> None:
-        gain, gaps, margins, reach = self._settings.servo_gain, self._qpos[:, 2:0:-1], self.margins, self._reach
+        gain, gaps, margins = self._settings.servo_gain, self._qpos[:, 2:0:-1], self.margins
         for omega in omega_0:
-            velocity = self._prepare(omega)
+            velocities = self._prepare(omega)
             if gain:
-                np.maximum(margins - gain * gaps, 0.0, out=margins, where=gaps < reach)
+                np.maximum(margins - gain * gaps, 0.0, out=margins)
             self._batch.step()
-            self._last = velocity
+            self._last = velocities
+
+    def _velocities(self, qvel: Array | None = None) -> Array:
+        """(rho omega_c, v_h, v_y, r omega_c, r o_x, r (o_y - omega_c), r o_z), all in m s-1, shape (7, runs)."""
+        np.subtract(self._R, self._qpos[:, 1], out=self._lengths[0])
+        velocities: Array = (self._qvel if qvel is None else qvel).T.take(_VELOCITIES, axis=0)
+        velocities *= self._lengths
+        return velocities
 
     def _prepare(self, omega_0: Array) -> Array:
-        """Write wall, forces and surface velocities for the next step; return its velocities, shape (6, runs)."""
-        settings, qpos, r, turn = self._settings, self._qpos, self._r, self._turn
-        half = qpos[:, 0] / 2
+        """Write wall, forces and surface velocities for the next step; return its velocities."""
+        settings, qpos, turn = self._settings, self._qpos, self._turn
+        half = qpos[:, 0] * 0.5
         np.cos(half, out=turn[:, 0])
         np.sin(half, out=turn[:, 3])
-        qpos[:, 3:7] = _UPRIGHT
-        rho = self._R - qpos[:, 1]
-        v = self._qvel.T.copy()
+        np.copyto(self._orientation, _UPRIGHT)
+        v = self._velocities()
+        rho = self._lengths[0]
         change = v - self._last
-        w = v + settings.midpoint * change
-        growth = w[0] * w[_TURNED] - v[0] * v[_TURNED]
-        applied = self._applied.T
-        drag = -self._mc * w[:3]
-        drag[0] = self._mc * rho * rho * (omega_0 - w[0]) + 2 * self._m * rho * growth[1]
-        drag[1] -= self._m * rho * growth[0]
-        applied[:3] = drag
-        np.multiply(growth[3], -self._inertia, out=applied[3])
-        np.multiply(growth[2], self._inertia, out=applied[5])
+        middle = v + settings.midpoint * change
+        # Drag (9), and what the inertial forces grow by till the middle.
+        force = (middle[3] * middle - v[3] * v).take(_INERTIAL, axis=0)
+        force *= self._inertia
+        middle[0] -= rho * omega_0
+        force[:3] -= self._mc * middle[:3]
+        force[0] *= rho
+        self._applied.T[:] = force
         if settings.shifts_surfaces:
-            force, sensors, shift = self._constraint, self._sensors, self._shift
-            slip, slip_change = _slip(v, rho, r), _slip(change, rho, r)
-            both = settings.friction_lag * slip_change
-            for contact in (slice(0, 2), slice(2, 4)):
-                speed, its_change = slip[contact], slip_change[contact]
-                both[contact] *= _SLIDES**2 * (its_change * its_change).sum(axis=0) < (speed * speed).sum(axis=0)
-            both[0] -= shift / r * force[:, 3]
-            both[1] += shift * (force[:, 1] - sensors[:, _NORMAL_B])
-            both[2] += shift * (force[:, 2] - sensors[:, _NORMAL_A])
-            both[3] += shift / r * force[:, 4]
-            self._floor[:], self._wall[:] = both[:2], both[2:]
+            surface = self._constraint.T.take(_FRICTION, axis=0)
+            surface[1:3] -= self._sensors.T.take(_NORMALS, axis=0)
+            surface *= self._shift
+            slip, slip_change = _SLIP.dot(v), _SLIP.dot(change)
+            slides = _PAIRS.dot(slip * slip - _SLIDES**2 * slip_change * slip_change) > 0
+            surface += settings.friction_lag * slip_change * slides
+            self._floor[:], self._wall[:] = surface[:2], surface[2:]
         return v
 
 
-_TURNED = [0, 1, 3, 5]
-"""The velocities that enter inertial forces as products with omega_c."""
-
-
-def _slip(v: Array, rho: Array, r: Array) -> Array:
-    """Slip velocities (v_Az, v_Ax, v_By, v_Bz), in the order of the surfaces' axes, of joint velocities (6, runs)."""
-    around, turned = rho * v[0], r * v[5]
-    slip: Array = np.stack([around - r * v[3], v[1] + turned, v[2] - turned, around + r * (v[4] + v[0])])
-    return slip
+_VELOCITIES = np.array([0, 1, 2, 0, 3, 4, 5])
+"""Of the joints, in the order of `Many._velocities`."""
+_INERTIAL = np.array([1, 0, 2, 6, 5, 4])
+"""The velocity that, times omega_c, gives the inertial force of each joint; axial ones have none."""
+_FRICTION, _NORMALS = np.array([3, 1, 2, 4]), np.array([_NORMAL_B, _NORMAL_A])
+"""The joints' contact forces that hold A_z, A_x, B_y, B_z, and the normal forces in the second and third."""
+_SLIP = np.array([
+    [1.0, 0, 0, 0, -1, 0, 0], [0, 1, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0, -1], [1, 0, 0, 1, 0, 1, 0]
+])  # fmt: skip
+"""Slip velocities v_Az, v_Ax, v_By, v_Bz, in the order of the surfaces' axes, of `Many._velocities`."""
+_PAIRS = np.array([[1.0, 1, 0, 0], [1, 1, 0, 0], [0, 0, 1, 1], [0, 0, 1, 1]])
+"""Adds what belongs to one contact."""
 
 
 def _expand_differences(batch: Batch, models: Sequence[Any]) -> None:
