@@ -2,9 +2,11 @@
 
 from analytic.bifurcation import Thresholds, operating_range, thresholds
 from analytic.dynamics import contact_forces, vector_field
+from analytic.settings import Settings
+from analytic.simulation import simulate
 from analytic.stationary import Stability, StationarySolution, stationary_solutions
 
 __all__ = [
-    "Stability", "StationarySolution", "Thresholds", "contact_forces", "operating_range", "stationary_solutions",
-    "thresholds", "vector_field",
+    "Settings", "Stability", "StationarySolution", "Thresholds", "contact_forces", "operating_range", "simulate",
+    "stationary_solutions", "thresholds", "vector_field",
 ]  # fmt: skip

@@ -1,0 +1,317 @@
+"""Event-driven simulation: each case by its own equations, from one change of case to the next.
+
+Within a case LSODA integrates the coordinates of `charts` (RR is known in closed form); a guard that turns negative is
+located on the interpolant of the step, and `transitions` says how to go on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields, replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.integrate import BDF, LSODA
+from scipy.optimize import brentq
+
+from analytic import dynamics, rolling_forces, transitions, two_point_rolling
+from analytic.charts import Chart, Fluid, Guard, Moment, Path, chart
+from analytic.records import Event, Recorder
+from analytic.rigid_body import NOTHING, Six
+from analytic.settings import Settings
+from model import Case, Contact, Flow, Parameters
+from model.arrays import Array
+
+SMALL_SLIP = 1e-2
+"""Slip, in units of the spin of a ball that rolls at sqrt(g R), below which its direction may be stiff."""
+PATIENCE = 300
+"""Steps of LSODA with a small slip after which it gives way; a slip that dies out takes fewer."""
+MAX_EVENTS_AT_ONCE = 100
+"""Changes of case without any progress in time after which a run is given up."""
+
+
+class StalledError(ArithmeticError):
+    """The run makes no progress."""
+
+
+def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
+    """Simulate from state x0 and record; the contract of `simulation.simulate`.
+
+    Raises
+    ------
+    StalledError, NotConvergedError
+        If the integrator, the contact problem or the sequence of cases gets stuck.
+    """
+    t_end = float(recorder.times[-1])
+    knots = [0.0, *(t for t in flow.start.tolist() if 0 < t < t_end), t_end]
+    simulator = _Simulator(p, settings, recorder)
+    at, case = Moment(0.0, theta_0, x0), None
+    for start, end in pairwise(knots):
+        fluid = _piece(flow, start, end)
+        if case is None or flow(start) != flow(np.nextafter(start, -1.0)):
+            before, (case, at, impulse) = case, simulator.settle(at, fluid)
+            if before is not None and before is not case:
+                recorder.events.append(Event(start, before, case, impulse))
+        case, at = simulator.advance(case, at, end, fluid)
+
+
+def _piece(flow: Flow, start: float, end: float) -> Fluid:
+    """omega_0 between two knots of the flow, where it is linear, on plain floats."""
+    a, middle = float(flow(start)), (start + end) / 2
+    slope = (float(flow(middle)) - a) / (middle - start)
+    if slope == 0:
+        return lambda t: a
+    return lambda t: a + slope * (t - start)
+
+
+@dataclass
+class _Simulator:
+    p: Parameters
+    settings: Settings
+    recorder: Recorder
+    absolute: float = field(init=False)
+    shortest: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.absolute = self.settings.rtol / 1e3 if self.settings.atol is None else self.settings.atol
+        self.shortest = math.sqrt(self.absolute * self.p.R / self.p.g)
+
+    def advance(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[Case, Moment]:
+        """Go on through all events before `until`."""
+        at_once = 0
+        while at.time < until:
+            start = at.time
+            guard, at = self._roll(at, until, fluid) if case is Case.RR else self._follow(case, at, until, fluid)
+            if guard:
+                before = case
+                case, at, impulse = self._react(guard, case, at, fluid)
+                self.recorder.events.append(Event(at.time, before, case, impulse))
+            at_once = at_once + 1 if at.time - start <= 1e-14 * until else 0
+            if at_once > MAX_EVENTS_AT_ONCE:
+                raise StalledError(f"no way on from case {case.name} at state {at.x}")
+        return case, at
+
+    def settle(self, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Six]:
+        """Collide if the ball moves into something it touches, then find the case."""
+        x, impulse = at.x, NOTHING
+        if (x[0] == 0 and x[1] < 0) or (x[6] == 0 and x[7] < 0):
+            impact = transitions.collide(at, self.p, fluid(at.time), self.settings.restitution, self.shortest)
+            at, impulse = impact.after, impact.impulse
+        case, at = transitions.choose(at, self.p, fluid(at.time), self.settings.leave_rolling)
+        return case, at, impulse
+
+    def _react(self, guard: str, case: Case, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Six]:
+        """What follows when a guard has fired."""
+        x = list(at.x)
+        at = replace(at, x=x)
+        match guard:
+            case "A slips":
+                A_x, _, A_z = self._forces_at(case, at, fluid)[:3]
+                return Case.of(Contact.S, case.B), replace(at, alpha=math.atan2(A_z, -A_x)), NOTHING
+            case "B slips":
+                _, B_y, B_z = self._forces_at(case, at, fluid)[3:]
+                return Case.of(case.A, Contact.S), replace(at, beta=math.atan2(-B_z, B_y)), NOTHING
+            case "A lifts":
+                return Case.of(Contact.N, case.B), replace(at, alpha=math.nan), NOTHING
+            case "B opens":
+                return Case.of(case.A, Contact.N), replace(at, beta=math.nan), NOTHING
+            case "RR ends":
+                return *two_point_rolling.leave(at, self.p, fluid(at.time)), NOTHING
+            case "A sticks":
+                x[3], x[5] = 0.0, -(x[7] + x[1]) / self.p.r
+                if case.B is Contact.S and abs(x[4]) <= self._still:
+                    x[4] = 0.0
+            case "B sticks":
+                x[4] = x[5] = 0.0
+                if case.A is Contact.S and abs(x[3]) <= self._still:
+                    x[3] = 0.0
+            case "A lands":
+                x[0] = 0.0
+            case "B lands":
+                x[6] = 0.0
+        return self.settle(at, fluid)
+
+    @property
+    def _still(self) -> float:
+        """Slip in rad s-1 that counts as zero where the other contact has just stuck."""
+        return 10 * self.settings.rtol * math.sqrt(self.p.g * self.p.R) / self.p.r
+
+    def _forces_at(self, case: Case, at: Moment, fluid: Fluid) -> Six:
+        path = Path(*(np.array([v]) for v in (at.time, at.theta, at.x, at.alpha, at.beta, at.work)))
+        forces = path_forces(case, path, self.p, np.array([fluid(at.time)]))[0]
+        A_x, A_y, A_z, B_x, B_y, B_z = forces.tolist()
+        return A_x, A_y, A_z, B_x, B_y, B_z
+
+    def _roll(self, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
+        """RR up to its end or `until`."""
+        p = self.p
+        end = two_point_rolling.end(at, until, p, fluid, self.settings.leave_rolling)
+        stop = until if end is None else end
+        times = self._samples(at.time, stop)
+        path = two_point_rolling.path(np.append(times, stop), at, until, p, fluid)
+        self._record(Case.RR, path, np.append(np.full(len(times), True), False), fluid)
+        return None if end is None else "RR ends", _moment(path, -1)
+
+    def _follow(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
+        """One case up to the first guard or `until`; samples are recorded even if it is interrupted."""
+        motion = chart(case, at, self.p, fluid, self.settings.rtol)
+        lands, until = motion.landing <= until, min(until, motion.landing)
+        first = self.recorder.taken == 0
+        steps = [Steps(np.array([at.time]), np.array(motion.start)[:, None], np.array([first]), None)]
+        try:
+            steps.extend(self._integrate(motion, at.time, until, self._hop(case, at, fluid)))
+        finally:
+            t, z, wanted = (np.concatenate([step[k] for step in steps], axis=-1) for k in range(3))
+            path = motion.path(t, z)
+            self._record(case, path, wanted, fluid)
+        return steps[-1].guard or ("A lands" if lands else None), _moment(path, -1)
+
+    def _hop(self, case: Case, at: Moment, fluid: Fluid) -> float:
+        """About how long the ball will be off floor or wall if it is just rebounding from it, s; else inf."""
+        x = at.x
+        if not (x[0] == 0 < x[1] or x[6] == 0 < x[7]):
+            return math.inf
+        dx = dynamics.newton_euler(case, x, self._forces_at(case, at, fluid), self.p, fluid(at.time))
+        hops = [2 * v / -a for gap, v, a in ((x[0], x[1], dx[1]), (x[6], x[7], dx[7])) if gap == 0 < v and a < 0]
+        return min(hops, default=math.inf)
+
+    def _integrate(self, motion: Chart, start: float, until: float, hop: float) -> Iterator[Steps]:
+        """Steps of the integrator with the samples in them, the last of them ending at a guard or at `until`.
+
+        LSODA does the work, except where a slip sets in, or stays small: its direction is stiff then, which LSODA
+        doesn't notice where hardly anything else moves. A hop that may be short starts with a step that is shorter.
+        """
+        t, z, first_step = start, motion.start, hop / 20 if hop < until - start else None
+        small = motion.least_slip(z) < SMALL_SLIP
+        watch = [Watch(guard, guard.value(t, z), self.absolute, self.settings.rtol) for guard in motion.guards]
+        while t < until:
+            slow = 0
+            for steps in self._stage(motion, BDF if small else LSODA, t, z, until, first_step, watch):
+                yield steps
+                t, z, first_step = float(steps.time[-1]), steps.z[:, -1].tolist(), None
+                if steps.guard:
+                    return
+                grown = motion.least_slip(z) > SMALL_SLIP
+                slow = 0 if grown else slow + 1
+                if grown if small else slow > PATIENCE:
+                    small = not small
+                    break
+
+    def _stage(
+        self,
+        motion: Chart,
+        method: Any,
+        start: float,
+        z: list[float],
+        until: float,
+        first_step: float | None,
+        watch: list[Watch],
+    ) -> Iterator[Steps]:
+        """Steps of one solver; its time runs from zero, for directions settle in less than the round-off of `start`."""
+        solver = method(
+            lambda t, z: motion.rates(start + t, z.tolist()), 0.0, z, until - start,
+            rtol=self.settings.rtol, atol=self.absolute * np.array(motion.scale), first_step=first_step,
+        )  # fmt: skip
+        times = self.recorder.times
+        taken = int(np.searchsorted(times, start, side="right"))
+        while solver.status == "running":
+            message = solver.step()
+            if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
+                raise StalledError(f"{method.__name__} in case {motion.case.name}: {message}")
+            t = until if solver.t == solver.t_bound else start + float(solver.t)
+            now = solver.y.tolist()
+            fired = [w for w in watch if w.fires(t, now)]
+            due = int(np.searchsorted(times, t, side="right"))
+            if not fired and due == taken:
+                yield Steps(np.array([t]), solver.y[:, None].copy(), np.array([False]), None)
+                continue
+            between, name = solver.dense_output(), None
+            if fired:
+                span = float(solver.t_old), float(solver.t)
+                end, name = min((w.root(between, start, *span), w.guard.name) for w in fired)
+                t = start + end
+                due = int(np.searchsorted(times, t, side="right"))
+            at = np.append(times[taken:due] - start, end if fired else solver.t)
+            wanted = np.append(np.full(due - taken, True), False)
+            yield Steps(np.append(times[taken:due], t), between(at), wanted, name)
+            if fired:
+                return
+            taken = due
+
+    def _samples(self, start: float, stop: float) -> Array:
+        """Times to sample within (start, stop], and the very first."""
+        times = self.recorder.times
+        first = int(np.searchsorted(times, start, side="right")) if self.recorder.taken else 0
+        return times[first : int(np.searchsorted(times, stop, side="right"))]
+
+    def _record(self, case: Case, path: Path, wanted: npt.NDArray[np.bool_], fluid: Fluid) -> None:
+        path = Path(*(getattr(path, f.name)[wanted] for f in fields(Path)))
+        omega_0 = np.array([fluid(t) for t in path.time.tolist()])
+        forces = path_forces(case, path, self.p, omega_0)
+        self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
+
+
+class Steps(NamedTuple):
+    """Points of a motion: steps of the integrator and samples."""
+
+    time: Array
+    z: Array
+    wanted: npt.NDArray[np.bool_]
+    """Which of them are samples."""
+    guard: str | None
+    """The guard that fired at the last of them."""
+
+
+class Watch:
+    """A guard on duty: it fires when it falls below zero.
+
+    One that starts at zero, where round-off mustn't end the case, has to rise above `arm` first, or to fall below
+    -`slack`; a gap is armed by any height.
+    """
+
+    def __init__(self, guard: Guard, value: float, arm: float, slack: float) -> None:
+        self.guard = guard
+        self._arm = 0.0 if guard.is_gap else arm
+        self._level = 0.0 if value > self._arm else -slack
+
+    def fires(self, t: float, z: list[float]) -> bool:
+        value = self.guard.value(t, z)
+        if value > self._arm:
+            self._level = 0.0
+        return value < self._level
+
+    def root(self, between: Callable[[float], Array], origin: float, start: float, end: float) -> float:
+        """When within (start, end) after the origin it fell through its level.
+
+        The interpolant may differ from the step's ends by round-off.
+        """
+
+        def value(t: float) -> float:
+            return self.guard.value(origin + t, between(t).tolist()) - self._level
+
+        if value(start) <= 0:
+            return start
+        if value(end) >= 0:
+            return end
+        return float(brentq(value, start, end, xtol=1e-300, rtol=4 * float(np.finfo(float).eps)))
+
+
+def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:
+    """Contact forces along a path, shape (n, 6), N; in RR those of least friction utilisation."""
+    x = list(path.x.T)
+    if case is Case.RR:
+        B_y = rolling_forces.least_utilisation(x[2], p, omega_0).B_y
+        jammed = rolling_forces.admissible_interval(x[2], p, omega_0)[1]
+        f = dynamics.rolling_family(x[2], p, omega_0, np.where(np.isfinite(B_y), B_y, jammed))
+    else:
+        slip_A = (np.sin(path.alpha), np.cos(path.alpha)) if case.A is Contact.S else None
+        slip_B = (np.sin(path.beta), np.cos(path.beta)) if case.B is Contact.S else None
+        f = dynamics.forces(case, x, p, omega_0, slip_A, slip_B)
+    return np.stack(np.broadcast_arrays(*f, path.time)[:6], axis=-1)
+
+
+def _moment(path: Path, k: int) -> Moment:
+    return Moment(*(getattr(path, f.name)[k].tolist() for f in fields(Path)))

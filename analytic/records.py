@@ -1,0 +1,110 @@
+"""What a simulation leaves behind: samples, events and its energy balance, kept while it runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.rigid_body import NOTHING, Six
+from model import Case, Events, Header, Parameters, Trajectory
+from model.arrays import Array
+from model.kinematics import VARIABLES, angular_velocity, slip_speeds
+from model.trajectory import SAMPLE
+
+
+class Event(NamedTuple):
+    """A change of case or an impact."""
+
+    time: float
+    from_case: Case
+    to_case: Case
+    impulse: Six = NOTHING
+    """Impulses (A_x, A_y, A_z, B_x, B_y, B_z) in N s."""
+
+
+class Recorder:
+    """Collects a run; what it holds at any moment makes a `Trajectory`."""
+
+    def __init__(self, p: Parameters, times: Array, progress: Callable[[float], None] | None = None) -> None:
+        """`times` are those to sample at, s, increasing."""
+        self.p = p
+        self.times = times
+        self.events: list[Event] = []
+        self.time = 0.0
+        """How far the run has come, s."""
+        self.taken = 0
+        """Number of samples so far: ``times[taken]`` is the next one."""
+        self._blocks: list[npt.NDArray[np.void]] = []
+        self._progress = progress
+        self._energy = [math.nan, 0.0, 0.0]
+
+    def add(self, time: Array, theta: Array, x: Array, forces: Array, case: npt.ArrayLike, work: Array) -> None:
+        """Add samples.
+
+        Shapes: time, theta (n,), states x (n, 8), forces (n, 6) in the order A_x … B_z, case (n,) or a single one;
+        work is that of drag and contacts since the start (n,), J.
+        """
+        block = np.empty(len(time), SAMPLE)
+        block["time"], block["theta"], block["case"] = time, theta, case
+        for k, name in enumerate(VARIABLES):
+            block[name] = x[:, k]
+        block["force_A"], block["force_B"] = forces[:, :3], forces[:, 3:]
+        block["slip_speed_A"], block["slip_speed_B"] = slip_speeds(x, self.p)
+        block["gap_A"], block["gap_B"] = x[:, 0], x[:, 6]
+        self._blocks.append(block)
+        self.taken += len(block)
+        self._balance(energy(x, self.p), work)
+        if len(time):
+            self.reached(float(time[-1]))
+
+    def reached(self, time: float) -> None:
+        """Note how far the run has come."""
+        self.time = time
+        if self._progress:
+            self._progress(time / float(self.times[-1]))
+
+    def _balance(self, energy: Array, work: Array) -> None:
+        """Keep the largest of |E - E(0) - W| and of the energies in play."""
+        if len(energy):
+            first, residual, scale = self._energy
+            first = float(energy[0]) if math.isnan(first) else first
+            residual = max(residual, float(np.max(np.abs(energy - first - work))))
+            scale = max(scale, float(np.max(np.abs(energy))), float(np.max(np.abs(work))))
+            self._energy = [first, residual, scale]
+
+    def trajectory(self, header: Header) -> Trajectory:
+        """The run so far; adds ``energy_residual`` and ``energy_scale`` in J to the settings of the header.
+
+        The residual is the largest |change of energy - work of drag, friction and impacts| at a sample.
+        """
+        _, residual, scale = self._energy
+        settings = {**header.settings, "energy_residual": residual, "energy_scale": scale}
+        return Trajectory.from_blocks(_with_settings(header, settings), self._blocks, event_columns(self.events))
+
+
+def _with_settings(header: Header, settings: dict[str, object]) -> Header:
+    return Header(header.engine, header.parameters, header.flow, settings, header.mjcf, header.failure)
+
+
+def energy(x: Array, p: Parameters) -> Array:
+    """Kinetic and potential energy of states (..., 8), J; 0 at rest on the floor."""
+    y, v_y, omega_c, h, v_h = (x[..., k] for k in (0, 1, 2, 6, 7))
+    speed2 = v_h**2 + v_y**2 + ((p.R - h) * omega_c) ** 2
+    spin2 = np.sum(angular_velocity(x, p) ** 2, axis=-1)
+    return np.asarray(p.m * ((speed2 + p.j * p.r**2 * spin2) / 2 + p.g * y))
+
+
+def event_columns(events: Sequence[Event]) -> Events:
+    """Events as columns."""
+    impulse = np.array([event.impulse for event in events], dtype=float).reshape(-1, 6)
+    return Events(
+        time=np.array([event.time for event in events], dtype=float),
+        from_case=np.array([event.from_case for event in events], dtype=np.int8),
+        to_case=np.array([event.to_case for event in events], dtype=np.int8),
+        impulse_A=impulse[:, :3],
+        impulse_B=impulse[:, 3:],
+    )

@@ -1,0 +1,65 @@
+"""How to simulate: the settings of both methods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from model import InputError
+from model.errors import suggestion
+from model.parameters import check_number
+
+METHODS = ("event", "time-stepping")
+LEAVING = ("infeasible", "slip-stability")
+_EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How to simulate.
+
+    Raises
+    ------
+    InputError
+        If a value is out of range.
+    """
+
+    method: str = "event"
+    """``event``: integrate case by case and locate every change of case. ``time-stepping``: Moreau-Jean, see there."""
+    rtol: float = 1e-9
+    """Relative tolerance of the integrator (event)."""
+    atol: float | None = None
+    """Absolute tolerance of the integrator in natural units: lengths in R, times in sqrt(R/g), the ball's spin in
+    that of a ball that rolls at sqrt(g R); rtol/1000 if None (event)."""
+    step: float | None = None
+    """Longest time step, s; sqrt(R/g)/500 if None (time-stepping)."""
+    restitution: float = 0.0
+    """Newton's coefficient of restitution e of both contacts, 0 <= e <= 1."""
+    leave_rolling: str = "infeasible"
+    """When RR ends, whose forces are not determined (event). ``infeasible``: when no forces within both Coulomb
+    cones can hold it. ``slip-stability``: as soon as a slight slip, of A alone, of B alone, or of both along the limit
+    direction of (82), would grow. In a stationary orbit both agree; off it the second comes first, because
+    between the two bounds sticking and slipping are both consistent."""
+    initial_impact: bool = False
+    """Let a ball that starts with a speed into a closed contact collide at once, instead of refusing it."""
+
+    def __post_init__(self) -> None:
+        for name, known in (("method", METHODS), ("leave_rolling", LEAVING)):
+            if (value := getattr(self, name)) not in known:
+                raise InputError(
+                    f"{name} = {value!r} is unknown{suggestion(str(value), known)}; there are {', '.join(known)}"
+                )
+        if not isinstance(self.initial_impact, bool):
+            raise InputError(f"initial_impact = {self.initial_impact!r} must be true or false")
+        self._check("rtol", "1", self.rtol >= 100 * _EPS and self.rtol <= 1e-2, f">= {100 * _EPS:.3g} and <= 0.01")
+        if self.atol is not None:
+            self._check("atol", "1", self.atol >= _EPS**2 and self.atol <= 1e-2, f">= {_EPS**2:.3g} and <= 0.01")
+        if self.step is not None:
+            self._check("step", "s", self.step > 0, "> 0")
+        self._check("restitution", "1", 0 <= self.restitution <= 1, ">= 0 and <= 1")
+
+    def _check(self, name: str, unit: str, good: bool, allowed: str) -> None:
+        value = check_number(name, getattr(self, name), unit)
+        if not good:
+            raise InputError(f"{name} = {value:g} {unit} is out of range: must be {allowed}")

@@ -1,0 +1,129 @@
+"""Which case comes next: the rules by which the motion goes on from a moment at which a case ends.
+
+Uniqueness. Where Coulomb's law allows more than one continuation, rolling is preferred to slipping: a contact that
+rolls, or whose slip has just died out, rolls on if forces within its cone allow it. For RR, whose forces aren't
+determined, that means until no admissible forces exist (or until the bound that the settings name). Otherwise case and
+onset direction are those of the contact problem of the accelerations, found from zero forces.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from analytic import two_point_rolling
+from analytic.charts import Moment
+from analytic.contact_problem import Closed, solve
+from analytic.rigid_body import (
+    Place,
+    Six,
+    contact_work,
+    mean,
+    slip_at_A,
+    slip_at_B,
+    smooth_rates,
+    state,
+    velocities,
+)  # fmt: skip
+from model import Case, Contact, Parameters
+
+STILL = 1e-9
+"""Acceleration in units of g below which a contact point is at rest, well above what the contact problem leaves."""
+
+EPS = math.ulp(1.0)
+AT_REST = 1e-12
+"""Slip relative to the speeds before an impact that counts as none after it: the contact problem leaves less."""
+
+
+def choose(at: Moment, p: Parameters, omega_0: float, leave_rolling: str = "infeasible") -> tuple[Case, Moment]:
+    """The case in which a ball goes on, and the moment with the directions of slip filled in.
+
+    Contacts are closed where gap and normal speed are exactly zero, and still where the slip is.
+    """
+    x, u = at.x, velocities(at.x, p)
+    closed_A, closed_B = x[0] == 0 == x[1], x[6] == 0 == x[7]
+    slip_x = x[7] + x[1] + p.r * x[5]
+    if abs(slip_x) <= 4 * EPS * abs(x[7]):  # round-off of a ball that rolls on the floor away from the wall
+        slip_x = 0.0
+    slip_A, slip_B = (slip_x, -p.r * x[3]), (-p.r * x[5], p.r * x[4])
+    if closed_A and closed_B and not any(slip_A) and not any(slip_B):
+        if two_point_rolling.holds(x[2], p, omega_0, leave_rolling):
+            return Case.RR, replace(at, alpha=math.nan, beta=math.nan)
+        if directions := two_point_rolling.onset(x[2], p, omega_0):
+            return Case.SS, replace(at, alpha=directions[0], beta=directions[1])
+    A, B = _closed(closed_A, slip_A), _closed(closed_B, slip_B)
+    free = smooth_rates(u, Place(x[6] - p.R, 0.0, x[2]), omega_0, p)
+    rates, force = solve(free, A, B, p, tolerance=STILL / 1e4)
+    still = STILL * p.g
+    contact_A, new_A = _contact(A, force[1], rates[1], slip_at_A(rates, p), still)
+    contact_B, new_B = _contact(B, force[3], rates[0], slip_at_B(rates, p), still)
+    alpha = math.atan2(-new_A[1], new_A[0]) if contact_A is Contact.S else math.nan
+    beta = math.atan2(new_B[1], -new_B[0]) if contact_B is Contact.S else math.nan
+    return Case.of(contact_A, contact_B), replace(at, alpha=alpha, beta=beta)
+
+
+def _closed(closed: bool, slip: tuple[float, float]) -> Closed | None:
+    if not closed:
+        return None
+    speed = math.hypot(*slip)
+    return Closed(0.0, (slip[0] / speed, slip[1] / speed) if speed else None)
+
+
+def _contact(
+    contact: Closed | None, load: float, rise: float, slip_rate: tuple[float, float], still: float
+) -> tuple[Contact, tuple[float, float]]:
+    """State of a contact from its force and accelerations, and the direction in which it slips if it does."""
+    if contact is None or (load <= 0 and rise > still):
+        return Contact.N, (0.0, 0.0)
+    if contact.slip:
+        return Contact.S, contact.slip
+    return (Contact.S, slip_rate) if math.hypot(*slip_rate) > still else (Contact.R, (0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Impact:
+    """What an impact makes of a moment."""
+
+    after: Moment
+    impulse: Six
+
+
+def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, shortest: float) -> Impact:
+    """Impact of all contacts that touch, at once, with Newton's restitution; friction opposes the slip that is left.
+
+    A single contact of a sphere obeys p_n = (1+e) m |v_n| and p_t = min(friction p_n, m_t |slip|) against the slip;
+    two contacts are solved together. A rebound after which the ball would come back, again and again, to rest within
+    `shortest` seconds (the sum of the geometric series 2 v_n/a/(1 - e)) stays in contact.
+    """
+    x, before = at.x, velocities(at.x, p)
+    A = Closed(max(0.0, -restitution * x[1])) if x[0] == 0 else None
+    B = Closed(max(0.0, -restitution * x[7])) if x[6] == 0 else None
+    u, P = solve(before, A, B, p)
+    work = at.work + contact_work(mean(before, u), P, p)
+    v_h, v_y = u[0], u[1]
+    if A and P[1] > 0:
+        v_y = A.target if A.target > 0 and not _settles("A", x, u, A, p, omega_0, restitution, shortest) else 0.0
+    if B and P[3] > 0:
+        v_h = B.target if B.target > 0 and not _settles("B", x, u, B, p, omega_0, restitution, shortest) else 0.0
+    y = state(x[0], x[6], (v_h, v_y, *u[2:]), p)
+    still = AT_REST * math.hypot(*before[:3], *(p.r * o for o in before[3:]))
+    if A and P[1] > 0 and math.hypot(*slip_at_A(u, p)) <= still:
+        y[3], y[5] = 0.0, -(v_h + v_y) / p.r
+    if B and P[3] > 0 and math.hypot(*slip_at_B(u, p)) <= still:
+        y[4], y[5] = 0.0, 0.0
+    return Impact(replace(at, x=y, alpha=math.nan, beta=math.nan, work=work), P)
+
+
+def _settles(
+    point: str, x: list[float], u: Six, contact: Closed, p: Parameters, omega_0: float, restitution: float,
+    shortest: float,
+) -> bool:  # fmt: skip
+    """Whether the bounces at a contact come to rest within `shortest` seconds."""
+    if restitution == 1:
+        return False
+    rates = smooth_rates(u, Place(x[6] - p.R, 0.0, u[2] / (p.R - x[6])), omega_0, p)
+    if point == "A":
+        back = -solve(rates, None, Closed() if x[6] == 0 == u[0] else None, p)[0][1]
+    else:
+        back = -solve(rates, Closed() if x[0] == 0 == u[1] else None, None, p)[0][0]
+    return back > 0 and 2 * contact.target <= shortest * back * (1 - restitution)
