@@ -138,12 +138,18 @@ def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters)
 
 
 def extrema(
-    inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters, metric: Metric = Metric.EUCLID
+    inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters, metric: Metric = Metric.EUCLID, closed: bool = False
 ) -> tuple[Push, Push]:
-    """The directions of least and of greatest gamma over all of W, whatever the sign of the normal forces there."""
+    """The directions of least and of greatest gamma over all of W; an extremum on an edge to a degree or so.
+
+    With `closed` only over directions along which both contacts press (A_y, B_x >= 0): elsewhere the ball would lift
+    instead of slipping that way.
+    """
     dimension = len(normals(inner, outer))
     M = np.eye(dimension) if metric is Metric.EUCLID else slip_mass(inner, outer, p)
     grid = _directions(dimension)
+    if closed:
+        grid = grid[_press(inner, outer, x, grid, p)]
     values = gamma(inner, outer, x, grid, p, metric)
     found = []
     for sign, start in ((1.0, np.argmin(values)), (-1.0, np.argmax(values))):
@@ -153,11 +159,17 @@ def extrema(
             def scaled(n: Array, factor: float = sign / scale) -> float:
                 return factor * float(gamma(inner, outer, x, n, p, metric))
 
-            polished = minimize(scaled, best, method="BFGS")
-            if sign * scale * polished.fun < sign * value:
+            polished = minimize(scaled, best, method="BFGS", options={"gtol": 1e-9})
+            better = scale * polished.fun < sign * value
+            if better and (not closed or _press(inner, outer, x, polished.x, p)):
                 best, value = polished.x, sign * scale * polished.fun
         found.append(Push(best / np.sqrt(best @ M @ best), float(value)))
     return found[0], found[1]
+
+
+def _press(inner: Case, outer: Case, x: npt.ArrayLike, n: Array, p: Parameters) -> npt.NDArray[np.bool_]:
+    _, A_y, B_x = slip_rates(inner, outer, x, n, p)
+    return (A_y >= 0) & (B_x >= 0)
 
 
 def limit_directions(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> list[Push]:

@@ -1,0 +1,245 @@
+"""Thresholds, the fold and the maps of Figs. 7 and 8, against arithmetic of 50 digits and against the solutions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from analytic import operating_range, stationary_solutions, thresholds
+from analytic import slipping_branch as sb
+from analytic.bifurcation import (
+    TABLE_5,
+    Exists,
+    case_map,
+    double_points,
+    double_points_of_equal_friction,
+    fold_without_drag,
+    special_points,
+    threshold_curves,
+    wall_spin,
+)
+from model import Case, InputError, Parameters
+from model.cases import codimension
+
+P = Parameters.named("reference")
+EPS = np.finfo(float).eps
+KAPPAS = [1e-6, 1e-3, 0.07, 1.0, 30.0]
+
+
+def exact_fold(j: float, mu: float, eta: float, kappa: float) -> tuple[sp.Float, sp.Float]:
+    """alpha and Omega_0 of the fold with 50 digits: the root of d Omega_0/d alpha of (41), differentiated by sympy."""
+    a = sp.Symbol("a")
+    J, M, E, K = (sp.Rational(v) for v in (j, mu, eta, kappa))
+    den = (1 + J * sp.cos(a) ** 2) * M * E + (J - E) * sp.cos(a)
+    Omega_c = sp.sqrt(M) * sp.sqrt((1 + E * sp.cos(a) ** 2) / den)
+    Omega_0 = Omega_c - M / K * sp.cos(a) * sp.sin(a) * (J - E) / den
+    guess = -sp.atan(sp.exp(sp.Float(float(sb.fold(j, mu, eta, kappa)), 50)))
+    alpha = sp.nsolve(sp.diff(Omega_0, a), a, guess, prec=50, maxsteps=100)
+    return alpha, Omega_0.evalf(50, subs={a: alpha})
+
+
+CASES = [
+    (mu, eta, kappa)
+    for kappa in KAPPAS
+    for mu in (0.05, 0.2, 1.0)
+    for eta in (0.01, 0.2, 0.39, 0.4 * (1 - 1e-9))
+    if eta > kappa**2 / (4 * mu**2)
+]
+
+
+@pytest.mark.parametrize(("mu", "eta", "kappa"), CASES)
+def test_fold_to_1e_12(mu: float, eta: float, kappa: float) -> None:
+    alpha, Omega_0 = exact_fold(0.4, mu, eta, kappa)
+    p = P.replace(mu=mu, eta=eta, c=kappa * np.sqrt(P.g / P.R))
+    assert abs(thresholds(p).omega_04 / np.sqrt(p.g / p.R) / float(Omega_0) - 1) <= 1e-12
+    found = -float(sp.atan(sp.exp(sp.Float(float(sb.fold(0.4, mu, eta, p.kappa)), 30))))
+    assert abs(found / float(alpha) - 1) <= 1e-10
+
+
+@pytest.mark.parametrize("mu", [0.2, 1.0, 100.0])
+@pytest.mark.parametrize("kappa", [1e-4, 0.07, 0.2, 30.0])
+def test_fold_is_born_at_eta_cr_in_sr(mu: float, kappa: float) -> None:
+    """Just above eta_cr the fold is next to alpha = -pi/2, at omega_02; just below there is none."""
+    eta_cr = float(sb.eta_critical(mu, kappa))
+    if not 0 < eta_cr < 0.4:
+        pytest.skip("the fold doesn't exist for any eta")
+    assert np.isnan(sb.fold(0.4, mu, eta_cr * (1 - 1e-9), kappa))
+    last = np.inf
+    for excess in (1e-3, 1e-6, 1e-9):
+        s = float(sb.fold(0.4, mu, eta_cr * (1 + excess), kappa))
+        Omega_04 = float(sb.branch(s, 0.4, mu, eta_cr * (1 + excess), kappa).Omega_0)
+        gap = Omega_04 * np.sqrt(eta_cr * (1 + excess)) - 1
+        assert -4 * EPS <= gap < last
+        last = gap
+        assert np.exp(-s) <= 100 * excess * (1 + mu), "cos alpha goes to 0 like the excess"
+
+
+@pytest.mark.parametrize("kappa", KAPPAS[:4])
+def test_all_curves_meet_at_eta_equal_j(kappa: float) -> None:
+    p = P.replace(eta=P.j * (1 - 1e-12), mu=2.0, c=kappa * np.sqrt(P.g / P.R))
+    limits = thresholds(p)
+    for name in ("omega_01", "omega_02", "omega_04"):
+        # Beyond it the fold is off by (j - eta) mu/kappa.
+        assert abs(getattr(limits, name) / limits.omega_03 - 1) <= 1e-11 * (1 + 1 / kappa), name
+    at_j = thresholds(p.replace(eta=p.j))
+    np.testing.assert_allclose([at_j.omega_01, at_j.omega_02], at_j.omega_03, rtol=4 * EPS)
+    assert np.isnan(at_j.omega_04)
+
+
+@pytest.mark.parametrize("name", Parameters.names())
+def test_order_of_the_thresholds(name: str) -> None:
+    p = Parameters.named(name)
+    t = thresholds(p)
+    if p.eta < p.j:
+        assert t.omega_01 < t.omega_02
+        assert np.isnan(t.omega_04) or t.omega_04 > t.omega_02
+    else:
+        assert np.isnan(t.omega_01)
+        assert t.omega_02 < t.omega_03
+    assert t.eta_cr == pytest.approx(p.c**2 * p.R / (4 * p.g * p.mu**2), rel=8 * EPS)
+
+
+def test_thresholds_that_do_not_exist() -> None:
+    def names(**change: float) -> set[str]:
+        t = thresholds(P.replace(**change))
+        return {n for n in ("omega_01", "omega_02", "omega_03", "omega_04", "eta_cr") if np.isnan(getattr(t, n))}
+
+    assert names() == set()
+    assert names(eta=0.6) == {"omega_01", "omega_04"}
+    assert names(eta=0.0) == {"omega_02", "omega_04"}
+    assert names(eta=0.02) == {"omega_04"}  # below eta_cr
+    assert names(c=0.0) == {"omega_04"}
+    assert names(mu=0.0) == {"omega_04"}
+    assert names(mu=0.0, c=0.0) == {"omega_04", "eta_cr"}
+    assert thresholds(P.replace(mu=0.0)).omega_01 == 0
+    assert thresholds(P.replace(mu=0.0)).eta_cr == np.inf
+    assert thresholds(P.replace(c=0.0)).eta_cr == 0
+
+
+def test_fold_without_drag() -> None:
+    """omega_04 ~ K/c: the difference vanishes linearly with c (omega_c adds to the lag)."""
+    K = fold_without_drag(P)
+    errors = [abs(thresholds(P.replace(c=c)).omega_04 * c / K - 1) for c in (1e-2, 1e-4, 1e-6)]
+    np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 100, rtol=0.02)
+    with pytest.raises(InputError, match=r"eta = 0.6 is out of range"):
+        fold_without_drag(P.replace(eta=0.6))
+
+
+def test_slope_is_the_derivative() -> None:
+    """`slope` times mu |j-eta| sin^2/(kappa den^2) is d Omega_0/d|alpha| by differences, on both sides of j."""
+    for mu, eta in ((0.2, 0.2), (0.2, 0.45), (1.0, 0.05)):
+        angle, h, kappa = np.linspace(0.2, 1.4, 7), 1e-6, 0.3
+        places = [np.log(np.tan(angle + k * h)) for k in (-1, 0, 1)]
+        low, mid, high = (sb.branch(s, 0.4, mu, eta, kappa) for s in places)
+        numeric = (high.Omega_0 - low.Omega_0) / (2 * h)
+        den = (1 + 0.4 * mid.cos**2) * mu * eta + (0.4 - eta) * mid.cos
+        factor = mu * abs(0.4 - eta) * mid.sin**2 / (kappa * den**2)
+        exact = factor * sb.slope(places[1], 0.4, mu, eta, kappa)
+        np.testing.assert_allclose(numeric, exact, rtol=1e-7, atol=1e-8)
+
+
+@pytest.mark.parametrize("eta", [0.2, 0.02, 0.6])
+def test_solutions_appear_and_vanish_at_the_thresholds(eta: float) -> None:
+    """What `stationary_solutions` finds changes exactly at the special points (relative 1e-9 on either side)."""
+    p = P.replace(eta=eta)
+
+    def count(omega_0: float) -> dict[str, int]:
+        found = [s for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.exists]
+        return {case.name: sum(s.case is case for s in found) for case in Case}
+
+    def change(omega_0: float) -> dict[str, int]:
+        low, high = count(omega_0 * (1 - 1e-9)), count(omega_0 * (1 + 1e-9))
+        return {name: high[name] - low[name] for name in low if high[name] != low[name]}
+
+    t = thresholds(p)
+    if eta == 0.2:
+        assert change(t.omega_01) == {"RR": -1, "SS": 1}
+        assert change(t.omega_02) == {"SS": 1, "SR": 1, "NR": 1, "NS": -1}
+        assert change(t.omega_04) == {"SS": -2}
+    elif eta == 0.02:
+        assert change(t.omega_01) == {"RR": -1, "SS": 1}
+        assert change(t.omega_02) == {"SS": -1, "SR": 1, "NR": 1, "NS": -1}
+    else:
+        assert change(t.omega_02) == {"SR": 1, "NR": 1, "NS": -1}
+        assert change(t.omega_03) == {"RR": -1}
+
+
+def test_table_5() -> None:
+    assert [(b.threshold, b.abbreviation, b.codimension) for b in TABLE_5] == [
+        ("omega_01", "P3", 3), ("omega_02", "NF2", 2), ("omega_02", "P2", 2), ("omega_03", "NT1", 1),
+        ("omega_04", "F", None),
+    ]  # fmt: skip
+    for b in TABLE_5:
+        if b.codimension is not None:
+            dimensions = sorted(b.cases, key=lambda case: codimension(case, Case.NN))
+            assert b.codimension == abs(codimension(dimensions[1], dimensions[0])), b.abbreviation
+
+
+@pytest.mark.parametrize(
+    ("eta", "expected"),
+    [(0.2, ["P3", "NF2", "P2", "F"]), (0.02, ["P3", "P2"]), (0.6, ["P2", "NT1"])],
+)
+def test_special_points(eta: float, expected: list[str]) -> None:
+    points = special_points(P.replace(eta=eta))
+    assert [point.bifurcation.abbreviation for point in points] == expected
+    for point in points:
+        assert point.precision <= 1e-12
+        assert point.bifurcation.abbreviation in str(point)
+
+
+def test_hopf_is_reported() -> None:
+    points = [q for q in special_points(P.replace(mu=3.0, eta=0.35)) if q.bifurcation.name == "Hopf"]
+    assert len(points) == 2
+
+
+@pytest.mark.parametrize("equal", [False, True])
+def test_double_points(equal: bool) -> None:
+    """There the curves that are said to meet do meet."""
+    points = double_points_of_equal_friction(P) if equal else double_points(P)
+    assert len(points) == 2
+    for point in points:
+        for near in (1 + 1e-8, 1 - 1e-8):
+            eta = point.eta * near
+            curves = threshold_curves(P, eta if equal else P.mu, eta)
+            for name in point.meets:
+                value = float(curves[name]) * np.sqrt(P.g / P.R)
+                assert np.isnan(value) or abs(value / point.omega_0 - 1) <= 1e-6
+
+
+@pytest.mark.parametrize("mu", [0.2, None])
+def test_map_against_the_solutions(mu: float | None) -> None:
+    """A coarse map agrees with `stationary_solutions` at every point (None: mu = eta, Fig. 8)."""
+    eta, omega_0 = np.linspace(0.0, 0.7, 8), np.linspace(-60.0, 60.0, 13)
+    plane = case_map(P, eta if mu is None else mu, eta, omega_0)
+    assert plane.shape == (8, 13)
+    wrong = []
+    for row, e in zip(plane, eta, strict=True):
+        for flags, w in zip(row, omega_0, strict=True):
+            p = P.replace(eta=float(e), mu=float(e) if mu is None else mu, omega_0=float(w))
+            found = Exists(0)
+            for s in stationary_solutions(p):
+                if s.exists and s.case is not Case.RS and not (p.mu == 0 and s.case in (Case.SR, Case.SS)):
+                    found |= Exists.SS_BEYOND_FOLD if s.case is Case.SS and not s.stable else Exists[s.case.name]
+            if found != Exists(int(flags)):
+                wrong.append((e, w, found, Exists(int(flags))))
+    assert not wrong
+
+
+def test_operating_range() -> None:
+    assert operating_range(P) == thresholds(P).omega_01
+    assert operating_range(P.replace(eta=0.6)) == np.inf
+    assert operating_range(P.replace(mu=0.0)) == np.inf
+    assert operating_range(P.replace(c=0.0)) == 0
+    for omega_0, holds in ((operating_range(P) * 0.999, True), (operating_range(P) * 1.001, False)):
+        found = [s for s in stationary_solutions(P.replace(omega_0=omega_0)) if s.exists and s.slip_stable]
+        assert all(np.isclose(s.x[2], omega_0, rtol=1e-12) for s in found) == holds
+
+
+def test_wall_spin() -> None:
+    """(91) is the first coordinate of (4): g/(j omega_0 r) in SR, omega_0 R/r in RR."""
+    for s in stationary_solutions(P.replace(omega_0=35.0)):
+        if s.case is Case.SR:
+            assert wall_spin(s, P) == pytest.approx(P.g / (P.j * 35.0 * P.r), rel=1e-12)
+        if s.case is Case.RR:
+            assert wall_spin(s, P) == pytest.approx(35.0 * P.R / P.r, rel=1e-12)

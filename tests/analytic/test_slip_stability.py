@@ -1,0 +1,334 @@
+"""Stability with respect to slipping: the paper's formulas, the other two routes, and where the paper's claim fails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, minimize
+
+from analytic import dynamics, rolling_forces, stationary_solutions, thresholds, vector_field
+from analytic import slip_stability as slip
+from analytic.slip_stability import Metric
+from model import Case, InputError, Parameters
+from model.cases import codimension
+from model.kinematics import angular_velocity
+
+P = Parameters.named("reference")
+RNG = np.random.default_rng(3)
+
+
+def rolling(omega_c: float) -> list[float]:
+    return [0.0, 0.0, omega_c, 0.0, 0.0, 0.0]
+
+
+# --- the formulas of the paper ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("trial", range(5))
+def test_gamma_of_nr_to_ns(trial: int) -> None:
+    """(56) and its extrema (58)."""
+    rng = np.random.default_rng(trial)
+    v_y, omega_c, w_x = rng.normal(0, [0.1, 15, 50])
+    p = P.replace(omega_0=float(rng.uniform(5, 40)))
+    x = [0.1, v_y, omega_c, w_x, 0.0, 0.0]
+    beta = np.linspace(0, 2 * np.pi, 25)
+    n = np.stack([np.sin(beta), np.cos(beta)], axis=-1)
+    a = p.g / p.r + p.c * v_y / p.r + omega_c * w_x + p.R / p.r * omega_c**2
+    b = p.c * p.R / p.r * (p.omega_0 - omega_c)
+    friction = p.eta * p.R * (p.j + 1) / (p.r * p.j) * omega_c**2
+    expected = a * np.cos(beta) + b * np.sin(beta) - friction
+    scale = abs(a) + abs(b) + friction
+    np.testing.assert_allclose(slip.gamma(Case.NR, Case.NS, x, n, p), expected, atol=1e-13 * scale)
+    least, greatest = slip.extrema(Case.NR, Case.NS, x, p)
+    beta_1 = np.arctan2(b, a)
+    np.testing.assert_allclose(greatest.gamma, np.hypot(a, b) - friction, rtol=1e-9, atol=1e-9 * scale)
+    np.testing.assert_allclose(least.gamma, -np.hypot(a, b) - friction, rtol=1e-9)
+    np.testing.assert_allclose(greatest.n, [np.sin(beta_1), np.cos(beta_1)], atol=1e-5)  # flat at its top
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_stationary_nr(factor: float) -> None:
+    """(60), (61)."""
+    p = P.replace(omega_0=factor * float(np.sqrt(P.g / (P.eta * P.R))))
+    (x,) = (s.x for s in stationary_solutions(p) if s.case is Case.NR)
+    least, greatest = slip.extrema(Case.NR, Case.NS, x, p)
+    u = p.eta * p.R * p.omega_0**2
+    np.testing.assert_allclose(greatest.gamma, -(p.j + 1) / (p.r * p.j) * (u - p.g), rtol=1e-9)
+    np.testing.assert_allclose(least.gamma, -(p.j + 1) / (p.r * p.j) * (u + p.g), rtol=1e-9)
+
+
+def test_gamma_of_rr_to_rs() -> None:
+    """(66) with eta for its mu: both directions at once."""
+    for omega_c, lag in ((12.0, 3.0), (5.0, -40.0), (9.0, 150.0)):
+        p = P.replace(omega_0=omega_c - lag)
+        _, greatest = slip.extrema(Case.RR, Case.RS, rolling(omega_c), p)
+        printed = abs(lag) - p.eta / (p.j * p.c) * (1 + p.j) * (1 + 2 * p.j) * omega_c**2
+        scale = p.c * p.R / ((1 + p.j) * p.r)
+        np.testing.assert_allclose(greatest.gamma, printed * scale, rtol=1e-12)
+
+
+def test_gamma_of_rr_to_sr() -> None:
+    """(73); at the stationary point it changes sign at omega_03 (74)."""
+    for omega_c, lag in ((12.0, 3.0), (5.0, -40.0), (30.0, 1.0)):
+        p = P.replace(omega_0=omega_c - lag)
+        _, greatest = slip.extrema(Case.RR, Case.SR, rolling(omega_c), p)
+        printed = abs(lag) - (1 + 2 * p.j) * p.mu / (p.j * p.R * p.c) * (p.g - p.j * p.R * omega_c**2)
+        scale = p.c * p.R / ((1 + p.j) * p.r)
+        np.testing.assert_allclose(greatest.gamma, printed * scale, rtol=1e-12)
+
+
+@pytest.mark.parametrize("eta", [0.05, 0.2, 0.39])
+@pytest.mark.parametrize("mu", [0.1, 0.9])
+def test_thresholds_from_gamma_at_the_quoted_directions(mu: float, eta: float) -> None:
+    """(82) at (0, 0); (83) at (pi, pi), which for eta < 1 no flow reaches."""
+    p = P.replace(mu=mu, eta=eta)
+
+    def at(angle: float, omega: float) -> float:
+        n = slip.direction(angle, angle)
+        return float(slip.gamma(Case.RR, Case.SS, rolling(omega), n, p.replace(omega_0=omega)))
+
+    omega_01 = brentq(lambda w: at(0.0, w), 1.0, 100.0, xtol=1e-13)
+    assert abs(omega_01 / thresholds(p).omega_01 - 1) <= 1e-12
+    assert all(at(np.pi, w) < 0 for w in np.linspace(0.1, 60, 20))
+
+
+def test_direction_of_75() -> None:
+    """Unit length, slip directions alpha and beta as asked, on both sheets of (76)."""
+    for half in (0.0, np.pi):
+        alpha, beta = RNG.uniform(-1.5, 1.5, (2, 50)) + half
+        n = slip.direction(alpha, beta)
+        np.testing.assert_allclose(np.linalg.norm(n, axis=-1), 1, rtol=1e-14)
+        np.testing.assert_allclose(np.tan(np.arctan2(n[:, 0], n[:, 2])), np.tan(alpha), rtol=1e-9)
+        np.testing.assert_allclose(np.cos(np.arctan2(n[:, 0], n[:, 2]) - alpha), 1, rtol=1e-9)
+        np.testing.assert_allclose(np.cos(np.arctan2(n[:, 1], n[:, 2]) - beta), 1, rtol=1e-9)
+
+
+def test_limit_is_the_limit() -> None:
+    """(53) as printed: f_Z at x* + eps n for shrinking eps tends to the value taken at once."""
+    p = P.replace(omega_0=10.0)
+    n = slip.direction(0.4, -0.7)
+    rates, A_y, B_x = slip.slip_rates(Case.RR, Case.SS, rolling(9.0), n, p)
+    errors = []
+    for eps in (1e-2, 1e-4, 1e-6):
+        x = np.array(rolling(9.0))
+        x[3:6] = eps * n
+        errors.append(np.abs(vector_field(Case.SS, x, p)[3:6] - rates).max())
+    np.testing.assert_allclose(np.array(errors[:2]) / errors[1:], 100, rtol=1e-3)
+    assert A_y > 0
+    assert B_x > 0
+
+
+# --- kinetic energy --------------------------------------------------------------------------------------------
+
+
+def test_slip_mass() -> None:
+    j = P.j
+    expected = j / (1 + 2 * j) * np.array([[1 + j, j, 0], [j, 1 + j, 0], [0, 0, 1 + 2 * j]])
+    np.testing.assert_allclose(slip.slip_mass(Case.RR, Case.SS, P), expected, atol=1e-16)
+    np.testing.assert_allclose(slip.slip_mass(Case.NR, Case.NS, P), j / (1 + j) * np.eye(2), atol=1e-16)
+
+
+def test_slip_mass_is_the_reduced_energy() -> None:
+    """Least kinetic energy, over what else moves, of a ball with given slip: by brute minimisation."""
+    for inner, outer, free in ((Case.RR, Case.SR, [2]), (Case.RS, Case.SS, [2, 4]), (Case.NR, Case.NS, [1, 2, 3])):
+        names = slip.normals(inner, outer)
+        n = RNG.normal(size=len(names))
+
+        def energy(
+            values: np.ndarray, names: tuple[str, ...] = names, n: np.ndarray = n, free: list[int] = free
+        ) -> float:
+            x = np.zeros(8)
+            x[free] = values
+            x[[3 + ("slip_x", "slip_y", "slip_z").index(name) for name in names]] = n
+            spin = angular_velocity(x, P)
+            return float((x[1] ** 2 + (P.R * x[2]) ** 2 + P.j * P.r**2 * spin @ spin) / P.r**2)
+
+        least = minimize(energy, np.zeros(len(free)), method="BFGS", options={"gtol": 1e-12}).fun
+        np.testing.assert_allclose(n @ slip.slip_mass(inner, outer, P) @ n, least, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("mu", "eta"), [(0.2, 0.2), (0.1, 0.39), (0.9, 0.05), (0.5, 0.3)])
+def test_energy_and_forces_agree_on_omega_01(mu: float, eta: float) -> None:
+    """gamma_M < 0 in all directions, and admissible forces, exactly up to (84)."""
+    p = P.replace(mu=mu, eta=eta)
+    omega_01 = thresholds(p).omega_01
+    for factor, holds in ((0.05, True), (0.5, True), (1 - 1e-6, True), (1 + 1e-6, False)):
+        omega = factor * omega_01
+        q = p.replace(omega_0=omega)
+        _, greatest = slip.extrema(Case.RR, Case.SS, rolling(omega), q, Metric.ENERGY, closed=True)
+        assert (greatest.gamma < 0) == holds
+        assert (slip.stick_margin(Case.RR, rolling(omega), q) > 0) == holds
+        assert slip.is_stable(Case.RR, q) == holds
+        if factor > 0.9:  # the direction in which it ends
+            np.testing.assert_allclose(np.abs(greatest.n / np.linalg.norm(greatest.n)), [0, 0, 1], atol=1e-3)
+
+
+@pytest.mark.parametrize("eta", [0.45, 0.8])
+def test_gamma_and_forces_agree_on_omega_03(eta: float) -> None:
+    """For eta > j rolling ends by slip at A in every direction at once (74), and in no other way before."""
+    p = P.replace(eta=eta)
+    for factor, holds in ((0.5, True), (1 - 1e-9, True), (1 + 1e-9, False)):
+        omega = factor * thresholds(p).omega_03
+        q = p.replace(omega_0=omega)
+        assert (slip.extrema(Case.RR, Case.SR, rolling(omega), q)[1].gamma < 0) == holds
+        assert (slip.stick_margin(Case.RR, rolling(omega), q) > 0) == holds
+        assert slip.is_stable(Case.RR, q) == holds
+        if omega < thresholds(p).omega_02:
+            assert slip.extrema(Case.RR, Case.SS, rolling(omega), q, Metric.ENERGY, closed=True)[1].gamma < 0
+
+
+@pytest.mark.parametrize("case", [Case.SR, Case.NR])
+def test_three_routes_agree_on_omega_02(case: Case) -> None:
+    outer = Case.SS if case is Case.SR else Case.NS
+    for factor, holds in ((1 - 1e-6, False), (1 + 1e-6, True)):
+        p = P.replace(omega_0=factor * thresholds(P).omega_02)
+        (x,) = (s.x for s in stationary_solutions(p) if s.case is case)
+        assert (slip.stick_margin(case, x, p) > 0) == holds
+        assert slip.is_stable(case, p) == holds
+        if case is Case.NR:
+            for metric in Metric:
+                assert (slip.extrema(case, outer, x, p, metric)[1].gamma < 0) == holds
+        else:
+            # Once the wall carries, slip along (0, 1) would pull at the floor (A_y < 0): look at limit directions.
+            growing = [push for push in slip.limit_directions(case, outer, x, p) if push.gamma > 0]
+            assert bool(growing) == (not holds)
+
+
+# --- where the paper's Euclidean claim fails -------------------------------------------------------------------
+
+
+def test_counter_example_to_the_claim_after_80() -> None:
+    """With the normal of (75), (0, 0) is not the global maximum of gamma, and gamma > 0 somewhere though RR is stable.
+
+    mu = eta = 0.2 at half of omega_01: gamma(0, 0) < 0, forces exist, gamma_M < 0 for all n, and every limit direction
+    decays, yet the greatest Euclidean gamma is positive.
+    """
+    omega = 0.5 * thresholds(P).omega_01
+    p = P.replace(omega_0=omega)
+    at_zero = float(slip.gamma(Case.RR, Case.SS, rolling(omega), slip.direction(0.0, 0.0), p))
+    _, greatest = slip.extrema(Case.RR, Case.SS, rolling(omega), p, Metric.EUCLID)
+    assert at_zero < 0 < greatest.gamma
+    assert slip.extrema(Case.RR, Case.SS, rolling(omega), p, Metric.ENERGY, closed=True)[1].gamma < 0
+    assert rolling_forces.margin(omega, p, omega) > 0
+    directions = slip.limit_directions(Case.RR, Case.SS, rolling(omega), p)
+    assert directions
+    assert all(push.gamma < 0 for push in directions)
+    # The direction of growth keeps both contacts closed: it isn't excluded by (12).
+    _, A_y, B_x = slip.slip_rates(Case.RR, Case.SS, rolling(omega), greatest.n, p)
+    assert A_y > 0
+    assert B_x > 0
+
+
+def test_range_of_the_counter_example() -> None:
+    """For mu = eta = 0.2 the Euclidean maximum is positive up to 0.61 omega_01."""
+    omega_01 = thresholds(P).omega_01
+
+    def greatest(factor: float) -> float:
+        omega = factor * omega_01
+        return slip.extrema(Case.RR, Case.SS, rolling(omega), P.replace(omega_0=omega))[1].gamma
+
+    assert abs(brentq(greatest, 0.4, 0.8, xtol=1e-4) - 0.61) < 0.005
+
+
+def test_a_perturbed_ball_returns_all_the_same() -> None:
+    """The slip pushed along the growing direction turns and dies out: the vector field of SS leads back to RR."""
+    omega = 0.5 * thresholds(P).omega_01
+    p = P.replace(omega_0=omega)
+    _, greatest = slip.extrema(Case.RR, Case.SS, rolling(omega), p, Metric.EUCLID)
+    start = np.zeros(8)
+    start[2], start[3:6] = omega, 1e-3 * greatest.n
+
+    def field(t: float, x: np.ndarray) -> list[float]:
+        return dynamics.rates(Case.SS, x.tolist(), p, omega)
+
+    assert np.array(field(0.0, start))[3:6] @ greatest.n > 0, "it grows at first"
+
+    def gone(t: float, x: np.ndarray) -> float:
+        return float(np.linalg.norm(x[3:6]) - 1e-4)
+
+    gone.terminal = True
+    # The slip decays at some hundred rad/s^2: microseconds. Steps of a hundredth resolve it before it stiffens.
+    run = solve_ivp(field, (0, 2e-5), start, events=gone, max_step=2e-8)
+    assert run.status == 1
+
+
+# --- arrows, limit directions, margins -------------------------------------------------------------------------
+
+
+def test_arrows_of_figure_6() -> None:
+    for inner, outer in slip.SLIP_ARROWS:
+        assert len(slip.normals(inner, outer)) == codimension(inner, outer)
+    for inner, outer in slip.LIFT_ARROWS:
+        assert inner.B is outer.B
+        assert outer.A.name == "N"
+
+
+def test_lift_conditions() -> None:
+    """RR and SR lift when j R omega_c^2 + j r omega_c slip_x > g, SS when eta R omega_c^2 cos beta > g, RS never."""
+    edge = np.sqrt(P.g / (P.j * P.R))
+    for factor, lifts in ((1 - 1e-9, False), (1 + 1e-9, True)):
+        assert (slip.lift_acceleration(Case.RR, Case.NR, rolling(factor * edge), P) > 0) == lifts
+        w_x = factor * (P.g / (P.j * P.r * 10.0) - 10.0 * P.R / P.r)
+        assert (slip.lift_acceleration(Case.SR, Case.NR, [0, 0, 10.0, w_x, 0, 0], P) > 0) == lifts
+        omega = factor * np.sqrt(P.g / (P.eta * P.R * np.cos(0.3)))
+        x = [0, 0, omega, 1.0, np.sin(0.3), np.cos(0.3)]
+        assert (slip.lift_acceleration(Case.SS, Case.NS, x, P) > 0) == lifts
+    for omega in (1.0, 100.0):
+        assert slip.lift_acceleration(Case.RS, Case.NS, [0, 0, omega, 0, 1.0, 0], P) == pytest.approx(-P.g)
+
+
+def test_limit_directions_of_nr_to_ns() -> None:
+    """Linear less isotropic friction: the two limit directions are those of the extrema (58)."""
+    x, p = [0.0, 0.02, 20.0, -30.0, 0.0, 0.0], P.replace(omega_0=25.0)
+    found = slip.limit_directions(Case.NR, Case.NS, x, p)
+    least, greatest = slip.extrema(Case.NR, Case.NS, x, p)
+    assert len(found) == 2
+    for push, extreme in zip(found, (greatest, least), strict=True):
+        np.testing.assert_allclose(push.gamma, extreme.gamma, rtol=1e-8)
+
+
+def test_onset_direction_is_a_limit_direction_at_the_threshold() -> None:
+    """Where NR reaches its cone, slip begins against the friction: along the greatest gamma, which is 0 there."""
+    p = P.replace(omega_0=30.0, eta=0.5)
+
+    def margin(omega_c: float) -> float:
+        return slip.stick_margin(Case.NR, [0, 0, omega_c, 20.0, 0, 0], p)
+
+    omega_c = brentq(margin, 5.0, 80.0, xtol=1e-13)
+    x = [0, 0, omega_c, 20.0, 0, 0]
+    beta = slip.onset_direction(Case.NR, x, p)["beta"]
+    _, greatest = slip.extrema(Case.NR, Case.NS, x, p)
+    np.testing.assert_allclose(greatest.n, [np.sin(beta), np.cos(beta)], atol=1e-5)
+    assert abs(greatest.gamma) < 1e-8 * p.g / (p.j * p.r)
+
+
+def test_onset_from_two_point_rolling() -> None:
+    """At omega_01 both contacts are at their limit and slip along slip_z > 0: alpha = beta = 0."""
+    omega = thresholds(P).omega_01 * (1 - 1e-12)
+    angles = slip.onset_direction(Case.RR, rolling(omega), P.replace(omega_0=omega))
+    np.testing.assert_allclose([angles["alpha"], angles["beta"]], 0, atol=1e-6)
+
+
+def test_stick_margins_of_one_rolling_contact() -> None:
+    """RS at speed: friction j u at A against mu m g. SS has nothing that rolls."""
+    omega = float(np.sqrt(P.mu * P.g / (P.j * P.R)))
+    smooth = P.replace(eta=0.0)
+    assert abs(slip.stick_margin(Case.RS, [0, 0, omega, 0, 1.0, 0], smooth.replace(omega_0=omega))) < 1e-15
+    assert slip.stick_margin(Case.SS, [0, 0, omega, 1.0, 1.0, 0], P) == np.inf
+
+
+def test_both_consistent_between_73_and_the_cone() -> None:
+    """Off the stationary point the floor's cone allows more drag than gamma of (73), by 1/sqrt(1 - mu^2)."""
+    p, omega_c = P.replace(mu=0.9, eta=1e6), 9.0
+    T = p.mu * (1 - p.j * p.R * omega_c**2 / p.g)
+    lag = T * (1 + 2 * p.j) * p.g / (p.j * p.c * p.R)
+    for factor, slips, sticks in ((0.99, False, True), (1.01, True, True), (1.01 / np.sqrt(1 - p.mu**2), True, False)):
+        q = p.replace(omega_0=omega_c + factor * lag)
+        assert (slip.extrema(Case.RR, Case.SR, rolling(omega_c), q)[1].gamma > 0) == slips
+        assert (rolling_forces.margin(omega_c, q) >= 0) == sticks
+
+
+def test_a_state_of_another_case_is_refused() -> None:
+    with pytest.raises(InputError, match="slip_x = 1 rad s-1 must be 0 in case RR"):
+        slip.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P)
