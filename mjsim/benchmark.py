@@ -48,7 +48,7 @@ def cost(
     for _ in range(repeats):
         loop = Run(
             [p] * runs, [x0] * runs, steps * settings.timestep, [Flow.steady(p.omega_0)] * runs, settings,
-            sample_interval=100 * settings.timestep,
+            sample_interval=100 * settings.timestep, batched=runs > 1,
         )  # fmt: skip
         start = time.process_time()
         last = [blocks[0][-1] for blocks in loop][-1]

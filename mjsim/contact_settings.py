@@ -1,9 +1,19 @@
 """Settings of MuJoCo's contact model, and the theory of what they do to a ball that slides and rolls.
 
-MuJoCo makes the contact force f of a row obey ``a + R f = a_ref = -b v - k (gap - margin)``, where a is the
-acceleration of the contact point, ``A`` the inverse mass the row sees, ``R = (1 - d)/d A`` its softness, d the
-impedance (`solimp`), and ``b = 2/(d tc)``, ``k = 1/(d tc^2 dr^2)`` follow from ``solref = (tc, dr)``. Friction rows
-have no k, a damping of their own, ``b_f = 2/(d tc_f)`` (`solreffriction`), and the softness ``R / impratio``.
+A row of a contact between ball and vessel sees the inverse mass ``A`` (1/m for a normal row). MuJoCo makes its force f
+and acceleration a obey ``a + R f = a_ref`` as long as f is inside the friction cone. Here ``R = (1 - d)/d A`` is the
+softness and d the impedance (`solimp`), ``R_t = R / impratio`` that of the friction rows; and
+
+    normal row:    a_ref = -b v - k (gap - margin),   b = 2/(d tc),   k = 1/(d tc^2 dr^2),   solref = (tc, dr)
+    friction rows: a_ref = -b_f v,                    b_f = 2/(d tc_f),                      solreffriction = tc_f
+
+On the cone the complementarity of the convex problem couples slip into the normal row. With ``w = a - a_ref + R f`` of
+the friction rows, the normal row becomes ``a + R f = a_ref + mu |w|``, and in steady motion
+
+    k (margin - gap) = R f - mu |w|,   |w| = b_f v_slip (with memory),   b_f v_slip - mu R_t f (without).
+
+The left side must be positive, or there is no contact: sliding is continuous only while ``mu |w| < R f``. Beyond, the
+contact switches on and off from step to step, hovering over the wall. Everything below follows from these lines.
 """
 
 from __future__ import annotations
@@ -122,9 +132,29 @@ class ContactSettings:
         """R/A of the normal rows, (1 - d)/d."""
         return (1 - self.solimp) / self.solimp
 
-    def penetration(self, load: float) -> float:
-        """Steady depth (m) of a contact whose force over the ball's mass is `load` (m s-2): R f/k."""
-        return self.softness * load / self.k
+    def margin(self, load: float, friction: float = 0.0, slip_speed: float = 0.0) -> float:
+        """Margin less gap (m) of a steady contact: the margin that leaves no gap, or else how deep the ball sinks.
+
+        `load` is the normal force over the mass (m s-2), `friction` the coefficient, `slip_speed` in m s-1. The value
+        is negative where the contact can't be continuous.
+        """
+        return (self.softness * load - friction * self._cone_excess(load, friction, slip_speed)) / self.k
+
+    def hover_number(self, load: float, friction: float, slip_speed: float) -> float:
+        """mu |w| / (R f): sliding contact is continuous below 1."""
+        return friction * self._cone_excess(load, friction, slip_speed) / (self.softness * load)
+
+    def fastest_slip(self, load: float, friction: float) -> float:
+        """Slip speed (m s-1) up to which contact is continuous, where `hover_number` is 1."""
+        if friction == 0:
+            return math.inf
+        kept = 0.0 if self.memory else friction**2 / self.impratio
+        return self.softness * load * (1 + kept) / (friction * self.b_f)
+
+    def _cone_excess(self, load: float, friction: float, slip_speed: float) -> float:
+        """|w| of a sliding contact, m s-2."""
+        kept = 0.0 if self.memory else friction * self.softness / self.impratio * load
+        return max(0.0, self.b_f * slip_speed - kept)
 
     def regularisation_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) below which one step can't build up the friction force m `load`: R_t f_t / b_f."""
@@ -168,10 +198,9 @@ class ContactSettings:
         """Whether floor and wall get surface velocities."""
         return self.memory or self.friction_lag != 0
 
-    def servo_reach(self, g: npt.ArrayLike) -> Array:
-        """Gap (m) within which the servo works: as far as twice the depth under gravity g, so that a margin stays
-        what it was while the ball is away."""
-        return np.asarray(2 * self.softness * np.asarray(g, dtype=float) / self.k)
+    def touching(self, g: float) -> float:
+        """Gap (m) within which a ball at the start counts as touching: twice the depth to which gravity presses it."""
+        return 2 * self.margin(g)
 
     def to_mapping(self) -> dict[str, Any]:
         """All values, JSON-able."""
@@ -205,6 +234,30 @@ class ContactSettings:
         return cls.from_mapping(scaled | changes)
 
     @classmethod
-    def for_problem(cls, p: Parameters, timestep: float = 1e-3, max_slip_speed: float = 0.5) -> Self:
-        """Settings for a ball that slips at up to `max_slip_speed` (m s-1); see the module's docstring."""
-        return cls.at(timestep)
+    def for_problem(
+        cls, p: Parameters, timestep: float = 1e-3, max_slip_speed: float | None = None, **changes: Any
+    ) -> Self:
+        """Settings whose sliding contact is continuous with something to spare.
+
+        `max_slip_speed` (m s-1) is the fastest slip to expect under the load of gravity; by default that of the fluid,
+        R omega_0. The impedance is lowered, where need be, until the hover number is at most 1/2, and impratio is
+        raised with the softness, so that friction keeps its own: R_t = 0.32 A.
+        """
+        settings = cls.at(timestep, **changes)
+        speed = (
+            abs(p.R * p.omega_0) if max_slip_speed is None else check_number("max_slip_speed", max_slip_speed, "m/s")
+        )
+        hover = settings.hover_number(p.g, max(p.mu, p.eta), speed)
+        if hover <= 0.5 or "solimp" in changes:
+            return settings
+        # Softness in proportion; b_f stays what it is, so tc_f goes with 1/d.
+        solimp = 1 / (1 + settings.softness * hover / 0.5)
+        return cls.from_mapping(
+            settings.to_mapping()
+            | {
+                "solimp": solimp,
+                "solreffriction": settings.solreffriction * settings.solimp / solimp,
+                "impratio": settings.impratio * hover / 0.5,
+            }
+            | changes
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -14,7 +15,7 @@ from mjsim.contact_settings import ContactSettings
 from mjsim.stepping import Many, Single, Stepper
 from model import Flow, Header, InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
-from model.kinematics import UNITS, VARIABLES, full_state
+from model.kinematics import UNITS, VARIABLES, full_state, slip_speeds
 from model.parameters import check_number
 
 BLOCK = 256
@@ -33,6 +34,8 @@ class Run:
     settings : shared by all runs
     sample_interval : s; rounded to a whole number of steps, t_end/1000 if None
     theta_0 : azimuth at the start, rad
+    batched : whether to use MuJoCo's batch even for one run. Its results don't depend on how many runs share it,
+        to the bit; a single run outside is faster and rounds differently.
 
     Each iteration yields one block per run, structured arrays of dtype `model.trajectory.SAMPLE`. A run that diverges
     yields what it has, then empty blocks, and its header says why.
@@ -46,6 +49,7 @@ class Run:
     def __init__(
         self, parameters: Sequence[Parameters], x0s: Sequence[npt.ArrayLike], t_end: float,
         flows: Sequence[Flow], settings: ContactSettings, *, sample_interval: float | None = None, theta_0: float = 0.0,
+        batched: bool = True,
     ) -> None:  # fmt: skip
         if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
             raise InputError(
@@ -56,11 +60,13 @@ class Run:
         self._interval, self._count = _sampling(t_end, settings.timestep, sample_interval)
         states = [full_state(np.asarray(x0, dtype=float)) for x0 in x0s]
         theta_0 = check_number("theta_0", theta_0, "rad")
+        for x, p in zip(states, parameters, strict=True):
+            _warn_of_hovering(x, p, settings)
         start = [recorder.joint_state(x, theta_0, p) for x, p in zip(states, parameters, strict=True)]
         models = [scene.build(p, settings) for p in parameters]
         self._stepper: Stepper = (
             Single(models[0], parameters[0], settings, start[0], float(self._omega_0(0, 1)[0, 0]))
-            if len(models) == 1
+            if len(models) == 1 and not batched
             else Many(models, parameters, settings, start, self._omega_0(0, 1)[0])
         )
         shown = settings.to_mapping() | {
@@ -148,9 +154,11 @@ def simulate(
     SimulationError
         If the run diverges; it carries the samples so far.
     """
-    trajectory = simulate_many(
-        [p], [x0], t_end, flow, settings, sample_interval=sample_interval, theta_0=theta_0, progress=progress
-    )[0]
+    run = Run(
+        [p], [x0], t_end, [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p),
+        sample_interval=sample_interval, theta_0=theta_0, batched=False,
+    )  # fmt: skip
+    (trajectory,) = _collected(run, progress)
     if not trajectory.complete:
         raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)
     return trajectory
@@ -171,9 +179,15 @@ def simulate_many(
         flows = [Flow.steady(p.omega_0) for p in parameters]
     else:
         flows = [flow] * len(parameters) if isinstance(flow, Flow) else flow
-    settings = settings or ContactSettings()
+    # The softest settings that any of the runs asks for.
+    settings = settings or min((ContactSettings.for_problem(p) for p in parameters), key=lambda s: s.solimp)
     run = Run(parameters, x0s, t_end, flows, settings, sample_interval=sample_interval, theta_0=theta_0)
-    blocks: list[list[npt.NDArray[np.void]]] = [[] for _ in parameters]
+    return _collected(run, progress)
+
+
+def _collected(run: Run, progress: Callable[[float], None] | None) -> list[Trajectory]:
+    """Let all runs come to their ends and join their blocks."""
+    blocks: list[list[npt.NDArray[np.void]]] = [[] for _ in run.headers]
     done = 0
     for parts in run:
         for kept, part in zip(blocks, parts, strict=True):
@@ -185,6 +199,18 @@ def simulate_many(
         Trajectory.from_blocks(header, kept, changes.events)
         for header, kept, changes in zip(run.headers, blocks, run.changes, strict=True)
     ]
+
+
+def _warn_of_hovering(x: Array, p: Parameters, settings: ContactSettings) -> None:
+    """Warn if contact can't be continuous at the slip speeds of the start x, taking the load of gravity for both."""
+    for contact, friction, speed, gap in zip("AB", (p.mu, p.eta), slip_speeds(x, p), (x[0], x[6]), strict=True):
+        fastest = settings.fastest_slip(p.g, friction)
+        if abs(gap) < settings.touching(p.g) and speed > fastest:
+            warnings.warn(
+                f"the ball slips at {speed:.3g} m s-1 at {contact} at the start, but with these settings contact "
+                f"is continuous only up to {fastest:.3g} m s-1; ContactSettings.for_problem finds softer ones",
+                stacklevel=3,
+            )
 
 
 def _sampling(t_end: float, timestep: float, sample_interval: float | None) -> tuple[int, int]:

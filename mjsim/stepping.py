@@ -72,7 +72,7 @@ class Single(Stepper):
         """Find the margins, friction forces and accelerations that belong to the first state, at rest in time."""
         model, data, timestep = self._model, self._data, self._settings.timestep
         stiffness = self._settings.solimp * self._settings.k
-        reach = float(self._settings.servo_reach(self._p.g))
+        reach = self._settings.touching(self._p.g)
         for _ in range(_START):
             self._steps([omega_0], mujoco.mj_forward)
             if self._settings.servo:
@@ -176,7 +176,7 @@ class Many(Stepper):
         self._inertia = np.stack([2 * m / r, -m / r, none, -j * m, none, j * m])
         shift = np.array([settings.memory_gain(mass) for mass in m])
         self._shift = np.stack([-shift / r, shift, shift, shift / r])
-        self._reach = np.array([[settings.servo_reach(p.g)] for p in parameters])
+        self._reach = np.array([[settings.touching(p.g)] for p in parameters])
         self._last = self._velocities()
         self._settle(omega_0)
 
@@ -209,10 +209,11 @@ class Many(Stepper):
             self._last = velocities
 
     def _velocities(self, qvel: Array | None = None) -> Array:
-        """(rho omega_c, v_h, v_y, r omega_c, r o_x, r (o_y - omega_c), r o_z), all in m s-1, shape (7, runs)."""
+        """(rho omega_c, v_h, v_y, r omega_c, r o_x, r o_y, r o_z), all in m s-1, shape (7, runs)."""
         np.subtract(self._R, self._qpos[:, 1], out=self._lengths[0])
         velocities: Array = (self._qvel if qvel is None else qvel).T.take(_VELOCITIES, axis=0)
         velocities *= self._lengths
+        velocities[5] += velocities[3]
         return velocities
 
     def _prepare(self, omega_0: Array) -> Array:
@@ -251,9 +252,10 @@ _INERTIAL = np.array([1, 0, 2, 6, 5, 4])
 _FRICTION, _NORMALS = np.array([3, 1, 2, 4]), np.array([_NORMAL_B, _NORMAL_A])
 """The joints' contact forces that hold A_z, A_x, B_y, B_z, and the normal forces in the second and third."""
 _SLIP = np.array([
-    [1.0, 0, 0, 0, -1, 0, 0], [0, 1, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0, -1], [1, 0, 0, 1, 0, 1, 0]
+    [1.0, 0, 0, 0, -1, 0, 0], [0, 1, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0, -1], [1, 0, 0, 0, 0, 1, 0]
 ])  # fmt: skip
-"""Slip velocities v_Az, v_Ax, v_By, v_Bz, in the order of the surfaces' axes, of `Many._velocities`."""
+"""Slip velocities v_Az, v_Ax, v_By, v_Bz, in the order of the surfaces' axes, of `Many._velocities`; sums of no more
+than two terms, which no order of summation can change: a run doesn't depend on how many others share its batch."""
 _PAIRS = np.array([[1.0, 1, 0, 0], [1, 1, 0, 0], [0, 0, 1, 1], [0, 0, 1, 1]])
 """Adds what belongs to one contact."""
 

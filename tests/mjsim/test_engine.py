@@ -42,9 +42,10 @@ def test_batch_is_the_single_run() -> None:
     sets = [P.replace(omega_0=25.0), Parameters.named("high-wall-friction").replace(omega_0=20.0, r=0.02, m=0.1)]
     x0 = [0, 0, 12.0, -2, 1, 6]
     ramp = Flow.ramp(20.0, 25.0, 0.2)
-    many = mjsim.simulate_many(sets, [x0, x0], 0.3, ramp, sample_interval=0.01)
+    settings = ContactSettings()
+    many = mjsim.simulate_many(sets, [x0, x0], 0.3, ramp, settings, sample_interval=0.01)
     for p, run in zip(sets, many, strict=True):
-        alone = mjsim.simulate(p, x0, 0.3, ramp, sample_interval=0.01)
+        alone = mjsim.simulate(p, x0, 0.3, ramp, settings, sample_interval=0.01)
         np.testing.assert_allclose(run.x, alone.x, rtol=0, atol=1e-9)
         np.testing.assert_array_equal(run.case, alone.case)
 
@@ -65,6 +66,14 @@ def test_divergence_stops_a_run_and_keeps_what_there_is() -> None:
     assert not failed.complete
     assert sound.complete
     assert len(sound.time) == 101
+
+
+def test_slip_too_fast_for_continuous_contact_is_said() -> None:
+    """A contact hovers where mu b_f v > (1 - d)/d g; a spin of 700 rad/s slips at 7 m/s, the default allows 3."""
+    settings = ContactSettings()
+    allowed = (1 - settings.solimp) / settings.solimp * P.g / (P.mu * settings.b_f)
+    with pytest.warns(UserWarning, match=rf"slips at 7 m s-1 at A .* only up to {allowed:.3g} m s-1"):
+        mjsim.simulate(P, [0, 0, 1, 700, 0, 0], 0.01, settings=settings)
 
 
 @pytest.mark.parametrize(
