@@ -22,6 +22,7 @@ from typing import Self
 
 from compare.tasks import Task, carry_out
 from model import InputError, SimulationError, StorageError, Trajectory, storage
+from model.hdf5 import remove_leftovers
 
 BATCH = 64
 """Runs in one MuJoCo batch: where the engine's cost a step stops falling."""
@@ -78,7 +79,7 @@ class Campaign:
         if not os.access(self.directory, os.W_OK | os.X_OK):
             raise StorageError(f"cannot write to {self.directory}: Permission denied")
         self._pool: Executor | None = None
-        storage.remove_leftovers(self.directory)
+        remove_leftovers(self.directory)
 
     def __enter__(self) -> Self:
         return self
@@ -87,7 +88,7 @@ class Campaign:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self._stop(at_once=kind is not None)
-        storage.remove_leftovers(self.directory)
+        remove_leftovers(self.directory)
 
     def path(self, task: Task) -> Path:
         """Where the task's run is, or will be."""

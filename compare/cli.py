@@ -17,11 +17,25 @@ from typing import Any
 from rich.console import Console
 
 import compare
-from compare import benchmark, inspection, options, predict, report, results, tables
+from compare import (
+    benchmark,
+    campaign,
+    collection,
+    inspection,
+    options,
+    predict,
+    progress,
+    report,
+    results,
+    sweep,
+    tables,
+)
+from compare.campaign import Campaign
 from compare.claims import Level
 from compare.tasks import ENGINES, Task, carry_out
 from mjsim import ContactSettings
 from model import InputError, SimulationError, storage
+from model.hdf5 import check_writable
 from model.trajectory import current_versions
 
 
@@ -80,6 +94,35 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--json", action="store_true", help="print the verdicts as JSON")
     command.add_argument("--quiet", action="store_true", help="no progress")
 
+    command = _add(commands, "sweep", _sweep, "many runs over ranges of parameters, resumable")
+    options.add_parameters(command)
+    options.add_start(command)
+    command.add_argument(
+        "--vary", action="append", required=True, metavar="NAME=FROM:TO:COUNT",
+        help="a range, or NAME=A,B,C; several make a grid",
+    )  # fmt: skip
+    command.add_argument("--random", type=int, metavar="N", help="N points that fill the ranges NAME=FROM:TO instead")
+    command.add_argument("--seed", type=int, default=0)
+    command.add_argument(
+        "--direction", choices=sweep.DIRECTIONS, default="held",
+        help="held: a run for each point; up, down, both: omega_0 in steps within one run (shows hysteresis)",
+    )  # fmt: skip
+    command.add_argument(
+        "--hold", type=options.number, default=20.0, metavar="s", help="time at each step (default 20)"
+    )
+    command.add_argument("--engine", choices=list(ENGINES), default="mujoco", metavar="NAME", help=", ".join(ENGINES))
+    command.add_argument("--time", type=options.number, default=30.0, metavar="s", help="duration (default 30)")
+    command.add_argument("--timestep", type=options.number, metavar="s", help="time step, for engines that have one")
+    command.add_argument("-o", "--output", type=Path, default=Path("sweep"), metavar="DIR")
+    command.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (0: none)")
+    command.add_argument("--batch", type=int, default=campaign.BATCH, metavar="N", help="runs in one MuJoCo batch")
+    command.add_argument("--json", action="store_true", help="print a summary as JSON")
+    command.add_argument("--quiet", action="store_true", help="no progress")
+
+    command = _add(commands, "collect", _collect, "gather the runs of a directory into one file for xarray")
+    command.add_argument("directory", type=Path, metavar="DIR")
+    command.add_argument("-o", "--output", type=Path, default=Path("sweep.h5"), metavar="FILE")
+
     command = _add(commands, "report", _report, "make report.html anew from stored results")
     command.add_argument("directory", type=Path, nargs="?", default=Path("results"), metavar="DIR")
 
@@ -115,7 +158,7 @@ def _simulate(args: argparse.Namespace) -> int:
         flow=options.flow(args), sample_interval=args.sample_interval, **_step(args),
     )  # fmt: skip
     if args.output:
-        storage.check_writable(args.output)
+        check_writable(args.output)
     (trajectory,) = carry_out([task])
     if args.output:
         storage.save(trajectory, args.output)
@@ -139,8 +182,6 @@ def _step(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _validate(args: argparse.Namespace) -> int:
-    from compare import progress
-
     if args.list:
         Console().print(tables.claims(compare.CLAIMS))
         return 0
@@ -156,6 +197,44 @@ def _validate(args: argparse.Namespace) -> int:
             console.print(table)
         console.print(f"report: {args.output / results.REPORT}")
     return 0 if all(verdict.passed for verdict in verdicts) else 1
+
+
+def _sweep(args: argparse.Namespace) -> int:
+    axes = [sweep.Axis.parse(text) for text in args.vary]
+    p = options.parameters(args)
+    template = Task(
+        engine=args.engine, parameters=p, x0=tuple(options.start(args).tolist()), t_end=args.time, **_step(args)
+    )
+    if args.direction != "held":
+        tasks = [sweep.staircase(template, sweep.levels(axes, args.direction), args.hold)]
+    elif args.random is not None:
+        tasks = sweep.held(template, sweep.random(p, axes, args.random, args.seed))
+    else:
+        tasks = sweep.held(template, sweep.grid(p, axes))
+    with (
+        progress.shown(quiet=args.quiet or args.json) as show,
+        Campaign(args.output, args.workers, args.batch) as work,
+    ):
+        work.report = lambda now: show("sweep", now.done, now.total, now.failed)
+        failures = work.complete(tasks)
+    told = {
+        "directory": str(args.output), "runs": len(tasks), "whole": len(tasks) - len(failures),
+        "failures": [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures],
+    }  # fmt: skip
+    if args.json:
+        print(json.dumps(told, indent=1))
+    else:
+        print(f"{told['whole']} of {len(tasks)} runs are whole, in {args.output}; gather them with: ", end="")
+        print(f"dualball collect {args.output}")
+        for failure in failures:
+            print(f"failed: {failure.task.key}: {failure.reason}", file=sys.stderr)
+    return 1 if failures else 0
+
+
+def _collect(args: argparse.Namespace) -> int:
+    count = collection.collect(args.directory, args.output)
+    print(f"{count} runs gathered into {args.output}")
+    return 0
 
 
 def _benchmark(args: argparse.Namespace) -> int:

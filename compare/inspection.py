@@ -60,7 +60,8 @@ def table(trajectory: Trajectory, most: int = 20) -> Table:
     rows.add_row("engine", f"{told['engine']} (" + ", ".join(f"{k} {v}" for k, v in told["versions"].items()) + ")")
     rows.add_row("made", f"{told['created']} {told['commit'][:12]}".strip())
     fields = dataclasses.fields(trajectory.header.parameters)
-    values = (f"{f.name} = {told['parameters'][f.name]:g} {f.metadata['unit'].removesuffix('1') or ''}" for f in fields)
+    units = {f.name: "" if f.metadata["unit"] == "1" else f.metadata["unit"] for f in fields}
+    values = (f"{name} = {told['parameters'][name]:g} {unit}" for name, unit in units.items())
     rows.add_row("parameters", ", ".join(value.strip() for value in values))
     rows.add_row("flow", _flow(trajectory))
     rows.add_row("settings", ", ".join(f"{k} = {_short(v)}" for k, v in told["settings"].items()))

@@ -8,11 +8,9 @@ a file that is cut short, foreign, or written by a newer version.
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 import os
 import re
-import socket
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -25,6 +23,7 @@ import numpy.typing as npt
 from model.cases import Case
 from model.errors import InputError, StorageError
 from model.flow import Flow
+from model.hdf5 import WholeFile
 from model.parameters import Parameters
 from model.trajectory import AXES, SAMPLE, Events, Header, Trajectory, columns
 
@@ -32,7 +31,6 @@ SCHEMA = "dualball-trajectory"
 SCHEMA_VERSION = 1
 
 _CHUNK = 1024
-_TEMPORARY = ".part"
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
 
@@ -47,17 +45,6 @@ def save(trajectory: Trajectory, path: str | Path) -> None:
         writer.finish(trajectory.events, trajectory.header.failure)
 
 
-def check_writable(path: str | Path) -> None:
-    """Raise `StorageError` if a file of that name could not be written: better before a long run than after."""
-    folder = Path(path).parent
-    if not folder.is_dir():
-        raise StorageError(f"cannot write {path}: there is no directory {folder}")
-    if Path(path).is_dir():
-        raise StorageError(f"cannot write {path}: it is a directory")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise StorageError(f"cannot write {path}: Permission denied")
-
-
 class TrajectoryWriter:
     """Writes a trajectory block by block; use as a context manager and call `finish` at the end.
 
@@ -67,20 +54,13 @@ class TrajectoryWriter:
     """
 
     def __init__(self, path: str | Path, header: Header) -> None:
-        self.path = Path(path)
-        self._temporary = self.path.with_name(f".{self.path.name}.{_host()}.{os.getpid()}{_TEMPORARY}")
-        self._finished = False
-        try:
-            self._disk = _Disk(self._temporary, "w+b")
-        except OSError as error:
-            raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
-        self._file = h5py.File(self._disk, "w", track_order=True)
+        self._whole = WholeFile(path)
+        self._file = self._whole.file
         try:
             self._create(header)
-            self._file.flush()
-            self._check_disk()
-        except BaseException:
-            self._discard()
+            self._whole.flush()
+        except BaseException as error:
+            self.__exit__(type(error), error, error.__traceback__)
             raise
 
     def __enter__(self) -> Self:
@@ -89,8 +69,7 @@ class TrajectoryWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        if not self._finished:
-            self._discard()
+        self._whole.__exit__(kind, error, traceback)
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
         """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush it."""
@@ -99,8 +78,7 @@ class TrajectoryWriter:
             n = dataset.shape[0]
             dataset.resize(n + len(samples), axis=0)
             dataset[n:] = samples[name]
-        self._file.flush()
-        self._check_disk()
+        self._whole.flush()
 
     def finish(self, events: Events, failure: str = "") -> None:
         """Write the events and why the run stopped early, if it did; then give the file its name."""
@@ -110,15 +88,7 @@ class TrajectoryWriter:
             dataset.resize(len(values), axis=0)
             dataset[...] = values
         self._file.attrs["failure"] = failure
-        self._file.close()
-        self._check_disk()
-        try:
-            os.fsync(self._disk.fileno())
-            self._disk.close()
-            self._temporary.replace(self.path)
-        except OSError as error:
-            raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
-        self._finished = True
+        self._whole.finish()
 
     def _create(self, header: Header) -> None:
         self._file.attrs["schema"] = SCHEMA
@@ -148,42 +118,6 @@ class TrajectoryWriter:
         _describe(dataset, meta)
         return dataset
 
-    def _discard(self) -> None:
-        self._file.close()
-        self._disk.close()
-        self._temporary.unlink(missing_ok=True)
-
-    def _check_disk(self) -> None:
-        if self._disk.refusal:
-            raise StorageError(f"cannot write {self.path}: {self._disk.refusal.strerror}") from self._disk.refusal
-
-
-class _Disk(io.FileIO):
-    """A file that remembers the first refusal of the operating system instead of raising it.
-
-    HDF5 can't close a file that it could not write: it crashes the process (HDF5 1.14, disk full). So it never
-    hears of the refusal; the writer asks for it after each flush.
-    """
-
-    refusal: OSError | None = None
-
-    def write(self, data: Any) -> int:
-        view = memoryview(data).cast("B")
-        done = 0
-        try:
-            while self.refusal is None and done < len(view):
-                done += super().write(view[done:])
-        except OSError as error:
-            self.refusal = error
-        return len(view)
-
-    def truncate(self, size: int | None = None) -> int:
-        try:
-            return super().truncate(size)
-        except OSError as error:
-            self.refusal = self.refusal or error
-            return size or 0
-
 
 def load(path: str | Path) -> Trajectory:
     """Read a trajectory; raises `StorageError`, in one line, for a file that isn't one or isn't whole."""
@@ -208,28 +142,6 @@ def load(path: str | Path) -> Trajectory:
     if not np.isin(codes, list(Case)).all():
         raise StorageError(f"{path} holds a case that does not exist")
     return Trajectory(header=header, events=Events(**events), **samples)
-
-
-def remove_leftovers(directory: Path) -> None:
-    """Remove the temporary files that writers killed on this machine have left in a directory."""
-    for path in directory.glob(f".*{_TEMPORARY}"):
-        host, process = path.name.removesuffix(_TEMPORARY).split(".")[-2:]
-        if host == _host() and process.isdigit() and not _alive(int(process)):
-            path.unlink(missing_ok=True)
-
-
-def _host() -> str:
-    return socket.gethostname().replace(".", "-")
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # it lives, and is somebody else's
-        return True
-    return True
 
 
 def _header_attributes(header: Header) -> dict[str, str]:

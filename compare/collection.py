@@ -1,0 +1,93 @@
+"""Many runs in one file: what each settled to, over the parameters it ran with.
+
+``collect`` writes one row a run: parameters as coordinates, and the mean, uncertainty and case over the last part of
+the run. The file opens in xarray with the dimension ``run``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from mjsim.measurement import window_mean
+from model import InputError, Parameters, StorageError, Trajectory, storage
+from model.hdf5 import WholeFile, check_writable
+from model.kinematics import UNITS, VARIABLES
+
+SCHEMA = "dualball-collection"
+SCHEMA_VERSION = 1
+WINDOW = 0.1
+"""Last part of a run that is averaged."""
+
+
+def collect(directory: Path, output: Path, progress: Callable[[int, int], None] = lambda done, total: None) -> int:
+    """Gather all runs of a directory, whole ones and failed ones, in the order of their names; return their number.
+
+    Raises `StorageError` if there are none, one can't be read, or the output can't be written.
+    """
+    check_writable(output)
+    if not directory.is_dir():
+        raise StorageError(f"cannot read {directory}: there is no such directory")
+    files = sorted(directory.rglob("*.h5"))
+    if not files:
+        raise StorageError(f"there are no runs in {directory}")
+    rows = []
+    for k, file in enumerate(files, start=1):
+        rows.append(_row(file, directory))
+        progress(k, len(files))
+    _write(rows, output)
+    return len(rows)
+
+
+def _row(file: Path, directory: Path) -> dict[str, Any]:
+    trajectory = storage.load(file)
+    row: dict[str, Any] = {"run": str(file.relative_to(directory)), "engine": trajectory.header.engine}
+    row |= dataclasses.asdict(trajectory.header.parameters)
+    row |= {"duration": float(trajectory.time[-1]) if len(trajectory.time) else 0.0}
+    row |= {"failure": trajectory.header.failure}
+    return row | settled(trajectory)
+
+
+def settled(trajectory: Trajectory, window: float = WINDOW) -> dict[str, Any]:
+    """Mean, standard uncertainty and prevailing case over the last part of a run; nan for a run too short for it."""
+    last = slice(int((1 - window) * len(trajectory.time)), None)
+    row: dict[str, Any] = {}
+    for name in VARIABLES:
+        try:
+            mean = window_mean(trajectory.time[last], getattr(trajectory, name)[last])
+        except InputError:  # too few samples for a mean
+            row |= {name: np.nan, f"{name}_uncertainty": np.nan}
+        else:
+            row |= {name: mean.value, f"{name}_uncertainty": mean.uncertainty}
+    cases = trajectory.case[last]
+    return row | {"case": int(np.bincount(cases).argmax()) if len(cases) else -1}
+
+
+def _write(rows: list[dict[str, Any]], output: Path) -> None:
+    units = {f.name: f.metadata["unit"] for f in dataclasses.fields(Parameters)}
+    units |= dict(zip(VARIABLES, UNITS, strict=True)) | {"duration": "s"}
+    units |= {f"{name}_uncertainty": unit for name, unit in zip(VARIABLES, UNITS, strict=True)}
+    with WholeFile(output) as whole:
+        whole.file.attrs["schema"], whole.file.attrs["schema_version"] = SCHEMA, SCHEMA_VERSION
+        for name in rows[0]:
+            _column(whole.file, name, [row[name] for row in rows], units.get(name, ""))
+        whole.finish()
+
+
+def _column(file: h5py.File, name: str, values: Iterable[Any], units: str) -> None:
+    values = list(values)
+    if isinstance(values[0], str):
+        dataset = file.create_dataset(name, data=np.array(values, dtype=object), dtype=h5py.string_dtype())
+    else:
+        dataset = file.create_dataset(name, data=np.array(values))
+    if units:
+        dataset.attrs["units"] = units
+    if name == "run":
+        dataset.make_scale("run")
+    else:
+        dataset.dims[0].attach_scale(file["run"])

@@ -1,0 +1,143 @@
+"""The command line: right answers for right questions, one clear line for the others."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from compare import cli
+from compare.sweep import FIELDS
+from model import Parameters, storage
+
+
+def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
+    """The one line in which a command refuses its arguments."""
+    code = cli.main([str(arg) for arg in argv])
+    captured = capsys.readouterr()
+    assert code == 2
+    assert captured.out == ""
+    assert captured.err.startswith("dualball: error: ")
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+def test_predict_as_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["predict", "--omega-0", "25"]) == 0
+    assert "the ball slips (SS)" in capsys.readouterr().out
+
+
+def test_predict_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["predict", "--set", "steel-in-water", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["parameters"]["c"] == Parameters.named("steel-in-water").c
+    assert {s["case"] for s in told["solutions"]} >= {"RR", "NS"}
+
+
+def test_simulate_inspect_and_xarray(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = tmp_path / "run.h5"
+    argv = ["simulate", "--omega-0", "25", "--start", "omega_c=13.8", "--time", "0.5", "-o", str(run), "--json"]
+    assert cli.main(argv) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["complete"]
+    assert cli.main(["inspect", str(run), "--plot", str(tmp_path / "run.png")]) == 0
+    assert "omega_0 = 25" in capsys.readouterr().out
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+    with xarray.open_dataset(run, engine="h5netcdf") as data:
+        assert data.time[-1] == pytest.approx(0.5)
+        assert float(data.omega_c[-1]) == told["last"]["omega_c"]
+
+
+@pytest.mark.parametrize(
+    ("flow", "last"),
+    [(["--ramp", "10", "20", "0.2"], 20), (["--staircase", "0.1", "10", "12", "14"], 14), (["--flow", "flow.txt"], 9)],
+)
+def test_flows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flow: list[str], last: float) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("flow.txt").write_text("0, 3\n0.1, 9\n")
+    assert cli.main(["simulate", "--time", "0.3", *flow, "-o", "run.h5"]) == 0
+    trajectory = storage.load("run.h5")
+    assert trajectory.header.flow(0.3) == last
+
+
+def test_sweep_and_collect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    where = ["-o", str(tmp_path / "runs"), "--workers", "0", "--time", "0.2"]
+    assert cli.main(["sweep", "--vary", "omega_0=5:10:3", "--vary", "eta=0.1,0.3", *where]) == 0
+    assert cli.main(["collect", str(tmp_path / "runs"), "-o", str(tmp_path / "all.h5")]) == 0
+    with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
+        assert data.sizes["run"] == 6
+        assert sorted(set(data.omega_0.values)) == [5.0, 7.5, 10.0]
+        assert np.isfinite(data.omega_c).all()
+        assert data.omega_c.units == "rad s-1"
+    capsys.readouterr()
+    assert cli.main(["sweep", "--vary", "eta=0.1:0.5", "--random", "3", "--json", *where]) == 0
+    assert json.loads(capsys.readouterr().out)["whole"] == 3
+
+
+def test_a_run_that_diverges_is_kept_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = tmp_path / "run.h5"
+    assert cli.main(["simulate", "--start", "omega_c=1e9", "--time", "0.1", "-o", str(run)]) == 1
+    assert "diverged by t =" in capsys.readouterr().err
+    assert not storage.load(run).complete
+
+
+@pytest.mark.parametrize("name", ["prop-1", "prop-4"])
+def test_claims_are_listed(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert cli.main(["validate", "--list"]) == 0
+    assert name in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("argv", "says"),
+    [
+        ("predict --parameters absent.toml", "cannot read parameters from absent.toml: No such file or directory"),
+        ("predict --parameters broken.toml", "broken.toml is not valid TOML"),
+        ("predict --parameters unknown.toml", "unknown.toml: unknown parameter 'muu' (did you mean 'mu'?)"),
+        ("predict --parameters text.toml", "text.toml: m = 'heavy' must be a number in kg"),
+        ("predict --set referense", "no parameter set is named 'referense' (did you mean 'reference'?)"),
+        ("predict --j 0.7", "j = 0.7 1 is out of range: dimensionless moment of inertia must be > 0 and <= 2/3"),
+        ("predict --c=-1", "c = -1 s-1 is out of range"),
+        ("simulate --start slip=3", "unknown state variable 'slip' (did you mean 'slip_z'?)"),
+        ("simulate --start omega_c=fast", "omega_c = 'fast' must be a number in rad s-1"),
+        ("simulate --start omega_c=nan", "omega_c = nan rad s-1 must be finite"),
+        ("simulate --time=-1", "t_end = -1 s is out of range"),
+        ("simulate --timestep=-1", "timestep"),
+        ("simulate --sample-interval=1e-9", "sample_interval = 1e-09 s is out of range"),
+        ("simulate --flow absent.txt", "cannot read the flow from absent.txt"),
+        ("simulate --flow broken.toml", "broken.toml is not a table of numbers"),
+        ("simulate --ramp 1 2 0", "duration = 0 s is out of range"),
+        ("simulate -o absent/run.h5", "cannot write absent/run.h5: there is no directory absent"),
+        ("sweep --vary omega_0=30:10:5", "omega_0 = 30:10 rad s-1 is in the wrong order"),
+        ("sweep --vary omega0=10:30:5", "unknown parameter 'omega0' (did you mean 'omega_0'?)"),
+        ("sweep --vary omega_0=10:30:1", "count = 1 of omega_0 is out of range"),
+        ("sweep --vary omega_0=a:b:3", "omega_0 = 'a' must be a number in rad s-1"),
+        ("sweep --vary eta=0.1:0.2:3 --direction up", "vary omega_0 and nothing else"),
+        ("sweep --vary eta=0.1,0.2,0.3 --random 4", "a random design needs a range for eta"),
+        ("collect absent", "cannot read absent: there is no such directory"),
+        ("inspect absent.h5", "cannot read absent.h5: there is no such file"),
+        ("inspect broken.toml", "broken.toml is not a whole HDF5 file"),
+        ("validate --claim prop1", "no claim is called 'prop1'"),
+        ("validate -o broken.toml", "cannot write to broken.toml"),
+        ("report absent", "cannot read absent/summary.json: No such file or directory"),
+    ],
+)
+def test_mistakes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], argv: str, says: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("broken.toml").write_text("m = ")
+    Path("unknown.toml").write_text("muu = 0.2")
+    Path("text.toml").write_text("m = 'heavy'\n" + "".join(f"{k} = 0.1\n" for k in FIELDS[1:]))
+    before = sorted(Path().iterdir())
+    assert says in refused(capsys, *argv.split())
+    assert sorted(Path().iterdir()) == before  # and nothing is left half written
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_directory_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tmp_path.chmod(0o500)
+    assert "Permission denied" in refused(capsys, "validate", "-o", tmp_path)
