@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -46,7 +47,7 @@ def draw_figure_10(p: Parameters | None = None) -> Figure:
     style.mark(axes, t.omega_02, float(_lifted(np.array(t.omega_02), p)), "NF2", (2, 8))
     fold = _state_of_fold(p)
     style.mark(axes, t.omega_04, float(fold[3] + fold[2] * p.R / p.r), "F", (6, 0))
-    _finish(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in (1, 2, 4)}, top)
+    _finish(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in (1, 2, 4)}, top, legend="center")
     return figure
 
 
@@ -79,13 +80,14 @@ def draw_figure_12(p: Parameters | None = None) -> Figure:
     _slipping(axes, p, _spin(p))
     _lifting(axes, p, t.omega_02, t.omega_03, style.UNSTABLE)
     _lifting(axes, p, t.omega_03, top, style.STABLE)
-    style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-4, 8))
-    style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (-8, 6))
-    style.mark(axes, t.omega_02, float(_lifted(np.array(t.omega_02), p)), "NF2", (-4, 6))
+    style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (0, 6))
+    style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (-6, -2))
+    style.mark(axes, t.omega_02, float(_lifted(np.array(t.omega_02), p)), "NF2", (-4, 4))
     fold = _state_of_fold(p, released=True)
     style.mark(axes, omega_04, float(fold[3] + fold[2] * p.R / p.r), "F", (6, 0))
     names = {"omega_01": omega_01, "omega_02": t.omega_02, "omega_03": t.omega_03, "omega_04": omega_04}
-    _finish(axes, names, top, bottom)
+    axes.set_ylim(top=1.3 * released["omega_01"] * p.R / p.r)
+    _finish(axes, names, top, bottom, "upper right")
     return figure
 
 
@@ -111,14 +113,15 @@ def draw_figure_13(p: Parameters | None = None, q: Parameters | None = None) -> 
             arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2},
         )
     _finish(left, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in (1, 2, 4)}, top)
-    left.set_title(f"$\\eta$ = {p.eta:g} < $j$", fontsize=10, pad=34)
+    left.set_title(f"$\\eta$ = {p.eta:g} < $j$", fontsize=10)
     t = thresholds(q)
     top = 1.6 * t.omega_03
     _orbit(right, Case.RR, 0.0, t.omega_03)
     # The curves of SR and NR lie on the same line; each is shown beside it, joined by dots where it begins.
     shift = 0.04 * top
     for case, steps, begin, line in (
-        (Case.SR, 1, t.omega_02, style.UNSTABLE), (Case.SR, 1, t.omega_03, style.STABLE), (Case.NR, 2, t.omega_02, style.STABLE),
+        (Case.SR, 1, t.omega_02, style.UNSTABLE), (Case.SR, 1, t.omega_03, style.STABLE),
+        (Case.NR, 2, t.omega_02, style.STABLE),
     ):  # fmt: skip
         end = t.omega_03 if line is style.UNSTABLE else top
         label = f"{case.name}{', unstable' if line is style.UNSTABLE else ''}"
@@ -134,7 +137,7 @@ def draw_figure_13(p: Parameters | None = None, q: Parameters | None = None) -> 
         right.plot([begin, begin], [begin, begin + 2 * shift], color="black", ls=":", lw=1)
     right.plot([t.omega_02], [t.omega_02 + 2 * shift], **style.POINT)
     _finish(right, {"omega_02": t.omega_02, "omega_03": t.omega_03}, top)
-    right.set_title(f"$\\eta$ = {q.eta:g} > $j$   (SR, NR: same line, set apart)", fontsize=10, pad=34)
+    right.set_title(f"$\\eta$ = {q.eta:g} > $j$   (SR, NR: same line, set apart)", fontsize=10)
     for axes, of in ((left, p), (right, q)):
         axes.set_ylabel(style.OMEGA_C)
         style.dimensionless_x(axes, of)
@@ -151,19 +154,26 @@ def _diagram(p: Parameters) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def _finish(axes: Axes, values: dict[str, float], top: float, bottom: float = 0.0) -> None:
-    for name, value in values.items():
+def _finish(axes: Axes, values: dict[str, float], top: float, bottom: float = 0.0, legend: str = "upper left") -> None:
+    last, step = -np.inf, 0
+    for name, value in sorted(values.items(), key=lambda item: item[1]):
+        step = 1 - step if value - last < 0.08 * (top - bottom) else 0  # names side by side would overlap
+        last = value
         axes.axvline(value, **style.GUIDE)
         axes.annotate(
-            style.THRESHOLD_LABELS[name], (value, 0.02), xycoords=("data", "axes fraction"), xytext=(2, 0),
-            textcoords="offset points", fontsize=9, color="0.25",
+            style.THRESHOLD_LABELS[name], (value, 0.02 + 0.06 * step), xycoords=("data", "axes fraction"),
+            xytext=(2, 0), textcoords="offset points", fontsize=9, color="0.25",
         )  # fmt: skip
     axes.set_xlim(bottom, top)
     if bottom == 0:
-        axes.set_ylim(bottom=0)
+        axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
     axes.set_xlabel(style.OMEGA_0)
-    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    axes.legend(handles.values(), handles.keys(), fontsize=8.5, loc="upper left", framealpha=0.95)
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    place: Any = legend
+    axes.legend(
+        list(once.values()), list(once), fontsize=8.5, loc=place, framealpha=0.95, ncols=2 if len(once) > 4 else 1
+    )
 
 
 def _lifted(omega_0: Array, p: Parameters) -> Array:

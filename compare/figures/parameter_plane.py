@@ -23,8 +23,11 @@ from model.arrays import Array
 
 ETA_MAX, OMEGA_MAX = 0.8, 90.0
 _LINES = {
-    "omega_01": ("#0072B2", "-"), "omega_02": ("#009E73", "--"), "omega_03": ("#E69F00", "-."), "omega_04": ("#D55E00", "-"),
+    "omega_01": ("#0072B2", "-"), "omega_02": ("#009E73", "--"), "omega_03": ("#E69F00", "-."),
+    "omega_04": ("#D55E00", "-"),
 }  # fmt: skip
+_TINTS = ["#e8f1f8", "#fdf3df", "#e3f3ec", "#fbe6dc", "#f4e6ef", "#eeeeee"]
+"""Pale grounds of the regions; lines and names tell them apart without colour."""
 
 
 def draw_figure_7(p: Parameters | None = None) -> Figure:
@@ -57,7 +60,7 @@ def _plane(axes: Axes, p: Parameters, mu: Array, eta: Array, points: list[Double
     omega_0 = np.linspace(0.0, OMEGA_MAX, 901)
     plane = case_map(p, mu, eta, omega_0).T
     kinds = np.unique(plane)
-    shades = ListedColormap([f"{0.99 - 0.035 * k:.3f}" for k in range(len(kinds))])
+    shades = ListedColormap([_TINTS[k % len(_TINTS)] for k in range(len(kinds))])
     index = np.searchsorted(kinds, plane)
     axes.pcolormesh(eta, omega_0, index, cmap=shades, shading="nearest", rasterized=True, vmin=0, vmax=len(kinds) - 1)
     unit = np.sqrt(p.g / p.R)
@@ -78,7 +81,7 @@ def _plane(axes: Axes, p: Parameters, mu: Array, eta: Array, points: list[Double
     axes.set_ylabel(style.OMEGA_0)
     axes.set_xlim(0, ETA_MAX)
     axes.set_ylim(0, OMEGA_MAX)
-    axes.legend(loc="upper right", framealpha=0.95, fontsize=9)
+    axes.legend(loc="upper right", framealpha=0.95, fontsize=9, title="SS*: unstable", title_fontsize=8)
     style.dimensionless_y(axes, p, "$\\Omega_0 = \\omega_0\\sqrt{R/g}$")
 
 

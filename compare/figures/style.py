@@ -1,8 +1,9 @@
-"""How every figure looks: one colour and mark a case, solid for stable, dashed for unstable, SI and dimensionless axes."""
+"""How every figure looks: a colour and a mark for each case, solid for stable, dashed for unstable, two scales."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -20,9 +21,9 @@ MARKERS = {
 }  # fmt: skip
 STABLE, UNSTABLE = "-", (0, (5, 2.5))
 """Line styles."""
-GUIDE = {"color": "0.55", "lw": 0.8, "ls": ":", "zorder": 0}
+GUIDE: dict[str, Any] = {"color": "0.55", "lw": 0.8, "ls": ":", "zorder": 0}
 """Lines that only help the eye."""
-POINT = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none", "zorder": 5}
+POINT: dict[str, Any] = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none", "zorder": 5}
 """A special point."""
 OMEGA_0, OMEGA_C, OMEGA_X = "$\\omega_0$ (rad/s)", "$\\omega_c$ (rad/s)", "$\\omega_x^0$ (rad/s)"
 THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
@@ -35,14 +36,17 @@ def figure(width: float = 5.0, height: float = 3.6) -> Figure:
 
 def dimensionless_x(axes: Axes, p: Parameters, label: str = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$") -> None:
     """A second scale at the top: angular velocity in units of sqrt(g/R)."""
-    unit = math.sqrt(p.g / p.R)
-    axes.secondary_xaxis("top", functions=(lambda w: w / unit, lambda W: W * unit)).set_xlabel(label)
+    axes.secondary_xaxis("top", functions=_scale(p)).set_xlabel(label)
 
 
 def dimensionless_y(axes: Axes, p: Parameters, label: str) -> None:
     """A second scale on the right: angular velocity in units of sqrt(g/R)."""
+    axes.secondary_yaxis("right", functions=_scale(p)).set_ylabel(label)
+
+
+def _scale(p: Parameters) -> tuple[Any, Any]:
     unit = math.sqrt(p.g / p.R)
-    axes.secondary_yaxis("right", functions=(lambda w: w / unit, lambda W: W * unit)).set_ylabel(label)
+    return lambda w: w / unit, lambda W: W * unit
 
 
 def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (6, 6)) -> None:
