@@ -1,4 +1,9 @@
-"""Which kinematic case is it? Told from slip speed and force."""
+"""Which kinematic case is it? Told from slip speed and force over several samples, with hysteresis.
+
+A contact is open where it carries no force. A closed one slips where it uses the whole of the friction and moves faster
+than a dead band; it rolls where either is clearly not so; in between it is what it was. A state counts only if it
+lasts for `PERSISTENCE` samples: single samples of a contact that hovers or rebounds change nothing.
+"""
 
 from __future__ import annotations
 
@@ -9,53 +14,120 @@ from mjsim.contact_settings import ContactSettings
 from model import Case, Contact, Events, Parameters
 from model.arrays import Array
 
+PERSISTENCE = 3
+"""Samples a contact must stay in a state for it to count."""
+
 _LETTERS = (Contact.R, Contact.S, Contact.N)
+_R, _S, _N, _AS_BEFORE = 0, 1, 2, 3
 _CODES = np.array([[Case.of(A, B) for B in _LETTERS] for A in _LETTERS], dtype=np.int8)
+_SATURATED, _FREE = 1e-6, 1e-4
+"""How far from its Coulomb value friction may be for slipping, and must be for rolling, relative."""
 
 
-def classify(block: npt.NDArray[np.void], p: Parameters, settings: ContactSettings) -> npt.NDArray[np.int8]:
-    """Case codes, shape (n,), of samples of dtype `model.trajectory.SAMPLE`."""
-    normal_A, friction_A = block["force_A"][:, 1], np.hypot(block["force_A"][:, 0], block["force_A"][:, 2])
-    normal_B, friction_B = block["force_B"][:, 0], np.hypot(block["force_B"][:, 1], block["force_B"][:, 2])
-    A = _contact(normal_A, friction_A, block["slip_speed_A"], p.mu, p, settings)
-    B = _contact(normal_B, friction_B, block["slip_speed_B"], p.eta, p, settings)
-    return _CODES[A, B]
+class Classifier:
+    """Classifies one run, block by block; samples too recent to judge wait for the next block."""
 
-
-def _contact(
-    normal: Array, friction: Array, speed: Array, coefficient: float, p: Parameters, settings: ContactSettings
-) -> npt.NDArray[np.intp]:
-    """Index into `_LETTERS` for one contact: slipping takes both a speed beyond creep and the whole of the friction."""
-    closed = normal > 0
-    regular = settings.regularisation_speed(coefficient * np.maximum(normal / p.m, p.g))
-    # With memory a force that changes little from step to step leaves no more than that share of the speed.
-    fast = speed > regular * (1e-3 if settings.memory else 10)
-    slips = fast & (friction >= (1 - 1e-6) * coefficient * normal)
-    return np.where(closed, np.where(slips, 1, 0), 2)
-
-
-class Changes:
-    """Collects the changes of case of one run, block by block."""
-
-    def __init__(self) -> None:
+    def __init__(self, p: Parameters, settings: ContactSettings) -> None:
+        self._p, self._settings = p, settings
+        self._waiting: list[npt.NDArray[np.void]] = []
+        self._A, self._B = _Persistent(), _Persistent()
+        self._changes: list[tuple[float, int, int]] = []
         self._last: int | None = None
-        self._parts: list[tuple[Array, npt.NDArray[np.int8], npt.NDArray[np.int8]]] = []
 
-    def add(self, block: npt.NDArray[np.void]) -> None:
-        """Take in the next samples, with their cases."""
-        case = block["case"]
+    def add(self, block: npt.NDArray[np.void], last: bool) -> npt.NDArray[np.void]:
+        """Take in the next samples, dtype `model.trajectory.SAMPLE`; return those that are decided, with their case.
+
+        With `last` all are, since no more will come.
+        """
+        if len(block):
+            self._waiting.append(block)
+        p, A, B = self._p, block["force_A"], block["force_B"]
+        normal = A[:, 1], B[:, 0]
+        friction = np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])
+        self._A.add(self._letters(normal[0], friction[0], block["slip_speed_A"], p.mu))
+        self._B.add(self._letters(normal[1], friction[1], block["slip_speed_B"], p.eta))
+        count = min(self._A.decide(last), self._B.decide(last))
+        waiting = np.concatenate(self._waiting) if self._waiting else block
+        done, self._waiting = waiting[:count], [waiting[count:]]
+        done["case"] = _CODES[self._A.take(count), self._B.take(count)]
+        self._note_changes(done)
+        return done
+
+    def _letters(self, normal: Array, friction: Array, speed: Array, coefficient: float) -> npt.NDArray[np.intp]:
+        """What each sample by itself says of one contact."""
+        # A friction force of which one step can build up only a part leaves, while it changes slowly, a creep far
+        # below the speed that belongs to all of it.
+        load = coefficient * np.maximum(normal / self._p.m, self._p.g)
+        band = self._settings.regularisation_speed(load) * (1e-3 if self._settings.memory else 3.0)
+        limit = coefficient * normal
+        slips = (friction >= (1 - _SATURATED) * limit) & (speed > 3 * band)
+        rolls = (friction < (1 - _FREE) * limit) | (speed < band)
+        letters: npt.NDArray[np.intp] = np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
+        return letters
+
+    def _note_changes(self, done: npt.NDArray[np.void]) -> None:
+        case = done["case"].astype(int)
         if len(case) == 0:
             return
-        before = np.concatenate([[case[0] if self._last is None else self._last], case[:-1]]).astype(np.int8)
-        at = before != case
-        self._parts.append((block["time"][at], before[at], case[at]))
+        before = np.concatenate([[case[0] if self._last is None else self._last], case[:-1]])
+        for k in np.flatnonzero(before != case):
+            self._changes.append((float(done["time"][k]), int(before[k]), int(case[k])))
         self._last = int(case[-1])
 
     @property
     def events(self) -> Events:
-        """What was found so far, timed at the first sample of the new case."""
-        if not self._parts:
+        """Changes of case so far, timed at the first sample of the new case."""
+        if not self._changes:
             return Events()
-        time, before, after = (np.concatenate(column) for column in zip(*self._parts, strict=True))
+        time, before, after = zip(*self._changes, strict=True)
         none = np.zeros((len(time), 3))
-        return Events(time=time, from_case=before, to_case=after, impulse_A=none, impulse_B=none)
+        return Events(
+            time=np.array(time), from_case=np.array(before, np.int8), to_case=np.array(after, np.int8),
+            impulse_A=none, impulse_B=none,
+        )  # fmt: skip
+
+
+class _Persistent:
+    """Letters of one contact, where what doesn't last is replaced by what was before (or, at the start, comes next)."""
+
+    def __init__(self) -> None:
+        self._letters = np.empty(0, dtype=np.intp)
+        self._decided = 0
+        self._newest, self._state = _R, -1
+
+    def add(self, letters: npt.NDArray[np.intp]) -> None:
+        """Append letters; one that says "as before" becomes the one before."""
+        known = np.maximum.accumulate(np.where(letters == _AS_BEFORE, -1, np.arange(len(letters))))
+        letters = np.where(known < 0, self._newest, letters[known])
+        self._newest = int(letters[-1]) if len(letters) else self._newest
+        self._letters = np.concatenate([self._letters, letters])
+
+    def decide(self, last: bool) -> int:
+        """Replace what doesn't last; return how many letters, from the first, are final."""
+        letters = self._letters
+        bounds = self._decided + np.flatnonzero(np.diff(letters[self._decided :])) + 1
+        starts, stops = [self._decided, *bounds.tolist()], [*bounds.tolist(), len(letters)]
+        for start, stop in zip(starts, stops, strict=True):
+            letter = int(letters[start]) if start < stop else self._state
+            if stop - start >= PERSISTENCE:
+                self._state = letter
+            elif letter != self._state and stop == len(letters) and not last:
+                break  # it may yet last
+            elif self._state < 0:
+                self._state = self._first(start, letter)
+            letters[start:stop] = self._state
+            self._decided = stop
+        return self._decided
+
+    def _first(self, start: int, otherwise: int) -> int:
+        """The first letter from `start` on that lasts."""
+        for k in range(start, len(self._letters) - PERSISTENCE + 1):
+            if np.all(self._letters[k : k + PERSISTENCE] == self._letters[k]):
+                return int(self._letters[k])
+        return otherwise
+
+    def take(self, count: int) -> npt.NDArray[np.intp]:
+        """Hand out the first letters, which must be final."""
+        taken, self._letters = self._letters[:count], self._letters[count:]
+        self._decided -= count
+        return taken

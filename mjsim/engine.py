@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjsim import recorder, scene
-from mjsim.classify import Changes, classify
+from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
 from mjsim.stepping import Many, Single, Stepper
 from model import Flow, Header, InputError, Parameters, SimulationError, Trajectory
@@ -78,8 +78,8 @@ class Run:
             for p, flow, x in zip(parameters, flows, states, strict=True)
         ]
         """Where each trajectory comes from; a failure appears here."""
-        self.changes = [Changes() for _ in parameters]
-        """Changes of case, growing while the runs advance."""
+        self.classifiers = [Classifier(p, settings) for p in parameters]
+        """They hold the changes of case so far, as `events`."""
 
     @property
     def samples(self) -> int:
@@ -101,7 +101,7 @@ class Run:
                 self._stepper.sample(omega_0[0], raw[k])
                 self._stepper.advance(omega_0[1:])
             time = np.arange(rows.start, rows.stop, dtype=np.float64) * (self._interval * self._settings.timestep)
-            yield [self._finish(i, time, raw[:, i]) for i in range(n)]
+            yield [self._finish(i, time, raw[:, i], last=rows.stop == self._count) for i in range(n)]
             if all(header.failure for header in self.headers):
                 return
 
@@ -110,19 +110,17 @@ class Run:
         time = (np.arange(first, first + count) + 0.5) * self._settings.timestep
         return np.stack([flow(time) for flow in self._flows], axis=-1)
 
-    def _finish(self, i: int, time: Array, raw: Array) -> npt.NDArray[np.void]:
+    def _finish(self, i: int, time: Array, raw: Array, last: bool) -> npt.NDArray[np.void]:
         """Samples of run i from raw rows, cut where they diverge."""
         p = self._parameters[i]
         qpos, qvel, sensors = np.split(raw, [recorder.NQ, recorder.NQ + recorder.NV], axis=1)
         good = np.logical_and.accumulate((np.abs(raw) < _HUGE).all(axis=1))
         sound = 0 if self.headers[i].failure else int(good.sum())
         block = recorder.samples(time[:sound], qpos[:sound], qvel[:sound], sensors[:sound], p)
-        block["case"] = classify(block, p, self._settings)
-        self.changes[i].add(block)
         if not self.headers[i].failure and sound < len(time):
-            last = recorder.state(qpos[sound - 1], qvel[sound - 1], p) if sound else None
-            self._fail(i, float(time[sound]), last)
-        return block
+            state = recorder.state(qpos[sound - 1], qvel[sound - 1], p) if sound else None
+            self._fail(i, float(time[sound]), state)
+        return self.classifiers[i].add(block, last or bool(self.headers[i].failure))
 
     def _fail(self, i: int, time: float, last: Array | None) -> None:
         where = "" if last is None else " after " + ", ".join(
@@ -196,8 +194,8 @@ def _collected(run: Run, progress: Callable[[float], None] | None) -> list[Traje
         if progress:
             progress(min(1.0, done / run.samples))
     return [
-        Trajectory.from_blocks(header, kept, changes.events)
-        for header, kept, changes in zip(run.headers, blocks, run.changes, strict=True)
+        Trajectory.from_blocks(header, kept, classifier.events)
+        for header, kept, classifier in zip(run.headers, blocks, run.classifiers, strict=True)
     ]
 
 
@@ -209,7 +207,7 @@ def _warn_of_hovering(x: Array, p: Parameters, settings: ContactSettings) -> Non
             warnings.warn(
                 f"the ball slips at {speed:.3g} m s-1 at {contact} at the start, but with these settings contact "
                 f"is continuous only up to {fastest:.3g} m s-1; ContactSettings.for_problem finds softer ones",
-                stacklevel=3,
+                stacklevel=4,
             )
 
 
