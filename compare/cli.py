@@ -16,6 +16,7 @@ from typing import Any
 
 from rich.console import Console
 
+import analytic
 import compare
 from compare import (
     benchmark,
@@ -32,7 +33,7 @@ from compare import (
 )
 from compare.campaign import Campaign
 from compare.claims import Level
-from compare.tasks import ENGINES, Task, carry_out
+from compare.tasks import Task, carry_out
 from mjsim import ContactSettings
 from model import InputError, SimulationError, storage
 from model.hdf5 import check_writable
@@ -71,12 +72,11 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--json", action="store_true", help="print JSON instead of tables")
 
     command = _add(commands, "simulate", _simulate, "one run with any engine, into an HDF5 file")
-    command.add_argument("--engine", choices=list(ENGINES), default="mujoco", metavar="NAME", help=", ".join(ENGINES))
+    options.add_engine(command)
     options.add_parameters(command)
     options.add_flow(command)
     options.add_start(command)
     command.add_argument("--time", type=options.number, default=10.0, metavar="s", help="duration (default 10)")
-    command.add_argument("--timestep", type=options.number, metavar="s", help="time step, for engines that have one")
     command.add_argument(
         "--sample-interval", type=options.number, metavar="s", help="default: a thousandth of the duration"
     )
@@ -110,9 +110,8 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--hold", type=options.number, default=20.0, metavar="s", help="time at each step (default 20)"
     )
-    command.add_argument("--engine", choices=list(ENGINES), default="mujoco", metavar="NAME", help=", ".join(ENGINES))
+    options.add_engine(command)
     command.add_argument("--time", type=options.number, default=30.0, metavar="s", help="duration (default 30)")
-    command.add_argument("--timestep", type=options.number, metavar="s", help="time step, for engines that have one")
     command.add_argument("-o", "--output", type=Path, default=Path("sweep"), metavar="DIR")
     command.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (0: none)")
     command.add_argument("--batch", type=int, default=campaign.BATCH, metavar="N", help="runs in one MuJoCo batch")
@@ -155,7 +154,7 @@ def _simulate(args: argparse.Namespace) -> int:
     p = options.parameters(args)
     task = Task(
         engine=args.engine, parameters=p, x0=tuple(options.start(args).tolist()), t_end=args.time,
-        flow=options.flow(args), sample_interval=args.sample_interval, **_step(args),
+        flow=options.flow(args), sample_interval=args.sample_interval, settings=_settings(args),
     )  # fmt: skip
     if args.output:
         check_writable(args.output)
@@ -173,12 +172,17 @@ def _simulate(args: argparse.Namespace) -> int:
     return 0
 
 
-def _step(args: argparse.Namespace) -> dict[str, Any]:
-    if args.timestep is None:
-        return {}
+def _settings(args: argparse.Namespace) -> ContactSettings | analytic.Settings:
+    """Numerical settings of the engine that was chosen, from the options of `options.add_engine`."""
     if args.engine == "mujoco":
-        return {"settings": ContactSettings.at(args.timestep)}
-    return {"options": {"timestep": args.timestep}}
+        for name in ("rtol", "restitution"):
+            if getattr(args, name) is not None:
+                raise InputError(f"--{name} is for the engines event and time-stepping, not for mujoco")
+        return ContactSettings() if args.timestep is None else ContactSettings.at(args.timestep)
+    if args.timestep is not None and args.engine == "event":
+        raise InputError("--timestep is for the engines mujoco and time-stepping: event has a tolerance, --rtol")
+    given = {"step": args.timestep, "rtol": args.rtol, "restitution": args.restitution}
+    return analytic.Settings(method=args.engine, **{k: v for k, v in given.items() if v is not None})
 
 
 def _validate(args: argparse.Namespace) -> int:
@@ -203,7 +207,11 @@ def _sweep(args: argparse.Namespace) -> int:
     axes = [sweep.Axis.parse(text) for text in args.vary]
     p = options.parameters(args)
     template = Task(
-        engine=args.engine, parameters=p, x0=tuple(options.start(args).tolist()), t_end=args.time, **_step(args)
+        engine=args.engine,
+        parameters=p,
+        x0=tuple(options.start(args).tolist()),
+        t_end=args.time,
+        settings=_settings(args),
     )
     if args.direction != "held":
         tasks = [sweep.staircase(template, sweep.levels(axes, args.direction), args.hold)]

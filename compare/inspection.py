@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from compare.figures.characteristic import COLOURS
+from compare.figures import style
 from model import Case, StorageError, Trajectory
 from model.kinematics import UNITS, VARIABLES
 
@@ -94,7 +94,7 @@ def plot(trajectory: Trajectory, path: Path) -> None:
 def draw(trajectory: Trajectory) -> Figure:
     """The figure of `plot`."""
     t, p = trajectory.time, trajectory.header.parameters
-    figure = Figure(figsize=(9, 9), layout="constrained")
+    figure = style.figure(9, 9)
     orbit, slip, gap, force, band = figure.subplots(5, sharex=True, height_ratios=[3, 3, 2, 3, 0.6])
     orbit.plot(t, trajectory.header.flow(t), color="0.6", ls="--", label="ω₀")
     orbit.plot(t, trajectory.omega_c, color="#0072B2", label="ω_c")
@@ -115,7 +115,7 @@ def draw(trajectory: Trajectory) -> Figure:
     force.plot(t, np.hypot(*trajectory.force_B[:, [1, 2]].T), color="#E69F00", ls=":", label="friction at B")
     force.set_ylabel("force (N)")
     for case, start, end in phases(trajectory):
-        band.axvspan(start, end, color=COLOURS.get(case, "0.75"), lw=0)
+        band.axvspan(start, end, color=style.COLOURS[case], lw=0)
         if t[-1] > 0 and end - start > 0.04 * t[-1]:
             band.text((start + end) / 2, 0.5, case.name, ha="center", va="center", fontsize=8, color="white")
     band.set_yticks([])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from compare.tasks import ENGINES
 from model import Flow, InputError, Parameters, StorageError
 from model.errors import suggestion
 from model.kinematics import UNITS, VARIABLES
@@ -52,6 +53,15 @@ def flow(args: argparse.Namespace) -> Flow | None:
     if args.flow:
         return _read_flow(Path(args.flow))
     return None
+
+
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """Options that choose an engine and its accuracy."""
+    group = parser.add_argument_group("engine")
+    group.add_argument("--engine", choices=list(ENGINES), default="mujoco", metavar="NAME", help=", ".join(ENGINES))
+    group.add_argument("--timestep", type=number, metavar="s", help="time step of mujoco and time-stepping")
+    group.add_argument("--rtol", type=number, help="relative tolerance of event")
+    group.add_argument("--restitution", type=number, help="coefficient of restitution of event and time-stepping")
 
 
 def add_start(parser: argparse.ArgumentParser) -> None:

@@ -46,15 +46,18 @@ def _live() -> Iterator[Show]:
 
 
 def _plain() -> Show:
-    start = last = time.monotonic()
+    doing, start, first, last = "", 0.0, 0, 0.0
 
     def show(what: str, done: int, total: int, failed: int) -> None:
-        nonlocal last
+        nonlocal doing, start, first, last
         now = time.monotonic()
+        if what != doing:  # the rate is that of what is being done now, and of this session
+            doing, start, first, last = what, now, done, now
+            return
         if now - last < PLAIN_INTERVAL and done < total:
             return
         last = now
-        eta = f", about {(now - start) / done * (total - done):.0f} s to go" if 0 < done < total else ""
+        eta = f", about {(now - start) / (done - first) * (total - done):.0f} s to go" if first < done < total else ""
         print(f"{what}: {done}/{total} runs{f', {failed} failed' if failed else ''}{eta}", file=sys.stderr)
 
     return show

@@ -43,13 +43,16 @@ ROUGH: Omegas = {Level.QUICK: (8, 14, 17, 21, 24, 27, 31, 35), Level.DEFAULT: ra
 
 @dataclass(frozen=True)
 class Point:
-    """A stationary state to be approached."""
+    """A stationary state to be approached from a start."""
 
     name: str
     """Parameter set."""
+    p: Parameters
     target: StationarySolution
     start: str
-    task: Task
+    x0: Array
+    settles: float
+    """Time it takes, s."""
 
 
 def attractors(p: Parameters) -> list[StationarySolution]:
@@ -73,10 +76,10 @@ def points(name: str, omegas: Sequence[float], cases: Sequence[Case]) -> list[Po
             near = target.x.copy()
             near[2] *= OFFSET
             near[0] = HEIGHT * p.R if target.case is Case.NR else 0.0
-            t_end = TIME_CONSTANTS * _slowest(target)
-            found.append(Point(name, target, "2 % off", _task(p, near, t_end)))
+            settles = TIME_CONSTANTS * _slowest(target)
+            found.append(Point(name, p, target, "2 % off", near, settles))
             if len({_family(t.case) for t in targets}) == 1:  # from rest, only where there is one place to go
-                found.append(Point(name, target, "from rest", _task(p, np.zeros(8), t_end + SPIN_UP / p.c)))
+                found.append(Point(name, p, target, "from rest", np.zeros(8), settles + SPIN_UP / p.c))
     return found
 
 
@@ -104,17 +107,16 @@ def check(point: Point, trajectory: Trajectory, run: str) -> list[Check]:
 
 def _study(name: str, omegas: Omegas, cases: Sequence[Case], lab: Lab) -> list[Check]:
     chosen = points(name, omegas[min(lab.level, Level.DEFAULT)], cases)
-    trajectories = lab.run([point.task for point in chosen])
+    t_end = math.ceil(max(point.settles for point in chosen))  # one for all: they share a batch
+    tasks = [
+        Task(engine="mujoco", parameters=point.p, x0=tuple(point.x0.tolist()), t_end=t_end, settings=ContactSettings())
+        for point in chosen
+    ]
     return [
         number
-        for point, trajectory in zip(chosen, trajectories, strict=True)
-        for number in check(point, trajectory, lab.file(point.task))
+        for point, task, trajectory in zip(chosen, tasks, lab.run(tasks), strict=True)
+        for number in check(point, trajectory, lab.file(task))
     ]
-
-
-def _task(p: Parameters, x0: Array, t_end: float) -> Task:
-    t_end = math.ceil(t_end / 5) * 5.0  # few different lengths: runs of one length share a batch
-    return Task(engine="mujoco", parameters=p, x0=tuple(x0.tolist()), t_end=t_end, settings=ContactSettings())
 
 
 def _slowest(target: StationarySolution) -> float:

@@ -6,15 +6,15 @@ import dataclasses
 import functools
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
 import analytic
 import mjsim
 from mjsim import ContactSettings
-from model import Flow, InputError, Parameters, Trajectory
+from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
 from model.trajectory import current_versions
 
@@ -32,10 +32,8 @@ class Task:
     """s"""
     flow: Flow | None = None
     """omega_0 over time; None for a steady ``parameters.omega_0``."""
-    settings: ContactSettings | None = None
-    """Contact settings of MuJoCo; None for its defaults in this study and for the other engines."""
-    options: Mapping[str, float] = field(default_factory=dict)
-    """Numerical options of the other engines (rtol, atol, timestep, restitution)."""
+    settings: ContactSettings | analytic.Settings | None = None
+    """Numerical settings of the engine; None for its defaults."""
     sample_interval: float | None = None
     """s; None for a thousandth of t_end."""
 
@@ -44,6 +42,8 @@ class Task:
             raise InputError(
                 f"no engine is called {self.engine!r}{suggestion(self.engine, ENGINES)}; there are {', '.join(ENGINES)}"
             )
+        if self.settings is not None and isinstance(self.settings, ContactSettings) != (self.engine == "mujoco"):
+            raise InputError(f"settings of another engine were given to {self.engine!r}")
 
     @property
     def fluid(self) -> Flow:
@@ -65,7 +65,6 @@ class Task:
             "t_end": self.t_end,
             "flow": self.fluid.to_mapping(),
             "settings": dataclasses.asdict(self.settings) if self.settings else None,
-            "options": dict(self.options),
             "sample_interval": self.sample_interval,
         }
 
@@ -88,25 +87,30 @@ def _mujoco(tasks: Sequence[Task]) -> list[Trajectory]:
         [task.x0 for task in tasks],
         first.t_end,
         flow=[task.fluid for task in tasks],
-        settings=first.settings,
+        settings=first.settings if isinstance(first.settings, ContactSettings) else None,
         sample_interval=first.sample_interval,
     )
 
 
-def _analytic(method: str, tasks: Sequence[Task]) -> list[Trajectory]:
-    return [
-        analytic.simulate(
-            task.parameters, task.x0, task.t_end, flow=task.fluid, method=method,
-            sample_interval=task.sample_interval, **task.options,
-        )
-        for task in tasks
-    ]  # fmt: skip
+def _analytic(tasks: Sequence[Task]) -> list[Trajectory]:
+    found = []
+    for task in tasks:
+        settings = task.settings if isinstance(task.settings, analytic.Settings) else analytic.Settings()
+        settings = dataclasses.replace(settings, method=task.engine)
+        try:
+            trajectory = analytic.simulate(
+                task.parameters, task.x0, task.t_end, task.fluid, settings, sample_interval=task.sample_interval
+            )
+        except SimulationError as error:
+            trajectory = error.trajectory
+        found.append(trajectory)
+    return found
 
 
 ENGINES: dict[str, Callable[[Sequence[Task]], list[Trajectory]]] = {
     "mujoco": _mujoco,
-    "event": functools.partial(_analytic, "event"),
-    "time-stepping": functools.partial(_analytic, "time-stepping"),
+    "event": _analytic,
+    "time-stepping": _analytic,
 }
 
 

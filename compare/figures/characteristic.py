@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import analytic
+from compare.figures import style
 from compare.results import Summary
 from model import Case, Parameters
 
@@ -15,14 +16,13 @@ CAPTION = (
     "closed-form theory, dashed where unstable. Points: simulated stationary states, with error bars of three standard "
     "uncertainties (smaller than the marks). Below: relative deviation of each point."
 )
-COLOURS = {Case.RR: "#0072B2", Case.SR: "#E69F00", Case.SS: "#D55E00", Case.NR: "#009E73"}
-"""Okabe and Ito's colours, told apart by colour-blind readers and in grey."""
-MARKERS = {Case.RR: "o", Case.SR: "s", Case.SS: "^", Case.NR: "D"}
+_SHOWN = (Case.RR, Case.SR, Case.SS, Case.NR)
+"""Cases whose stationary states a flowmeter may be in."""
 
 
 def draw(summary: Summary, sets: tuple[str, ...] = ("reference", "high-wall-friction")) -> Figure:
     """Two columns, one a parameter set: the curve above, deviations below."""
-    figure = Figure(figsize=(10, 6), layout="constrained")
+    figure = style.figure(10, 6)
     axes = figure.subplots(2, len(sets), sharex="col", squeeze=False, height_ratios=[3, 1])
     for (curve, deviation), name in zip(axes.T, sets, strict=True):
         p = Parameters.named(name)
@@ -30,10 +30,10 @@ def draw(summary: Summary, sets: tuple[str, ...] = ("reference", "high-wall-fric
         _points(curve, deviation, summary, name)
         relation = "<" if p.eta < p.j else ">"
         curve.set_title(f"{name}: η = {p.eta:g} {relation} j = {p.j:g}", fontsize=11)
-        curve.set_ylabel("ω_c (rad/s)")
+        curve.set_ylabel(style.OMEGA_C)
         curve.legend(fontsize=8, frameon=False, loc="upper left")
-        deviation.set_xlabel("ω₀ (rad/s)")
-        deviation.set_ylabel("|Δω_c| / ω_c")
+        deviation.set_xlabel(style.OMEGA_0)
+        deviation.set_ylabel("$|\\Delta\\omega_c| / \\omega_c$")
         deviation.set_yscale("log")
         deviation.set_ylim(1e-17, 1e-5)
         deviation.grid(alpha=0.3)
@@ -48,7 +48,7 @@ def _theory(axes: Axes, p: Parameters) -> None:
     for omega_0 in omega:
         seen: dict[Case, int] = {}
         for solution in analytic.stationary_solutions(p.replace(omega_0=float(omega_0))):
-            if solution.case not in COLOURS or not solution.exists:
+            if solution.case not in _SHOWN or not solution.exists:
                 continue
             index = seen[solution.case] = seen.get(solution.case, -1) + 1
             key = (solution.case, solution.stable, index)
@@ -56,7 +56,8 @@ def _theory(axes: Axes, p: Parameters) -> None:
     for (case, stable, _), points in branches.items():
         x, y = np.transpose(points)
         label = f"{case.name}{'' if stable else ', unstable'}"
-        axes.plot(x, y, color=COLOURS[case], lw=1.6, ls="-" if stable else "--", label=label, zorder=1)
+        line = (0, (1, 1.5)) if case is Case.NR else style.STABLE if stable else style.UNSTABLE  # NR lies upon SR
+        axes.plot(x, y, color=style.COLOURS[case], lw=1.8, ls=line, label=label, zorder=2 if case is Case.NR else 1)
     thresholds = analytic.thresholds(p)
     for k in range(1, 5):
         value = getattr(thresholds, f"omega_0{k}")
@@ -68,7 +69,7 @@ def _theory(axes: Axes, p: Parameters) -> None:
 
 
 def _points(curve: Axes, deviation: Axes, summary: Summary, name: str) -> None:
-    for case, marker in MARKERS.items():
+    for case in _SHOWN:
         checks = [
             check
             for verdict in summary.verdicts.values()
@@ -81,6 +82,8 @@ def _points(curve: Axes, deviation: Axes, summary: Summary, name: str) -> None:
         relative = np.array([abs(check["error"] / check["predicted"]) for check in checks])
         curve.errorbar(
             x, y, yerr=3 * u, label=f"{case.name}, MuJoCo", capsize=2, zorder=2,
-            color=COLOURS[case], marker=marker, ls="none", ms=6, mfc="none",
+            color=style.COLOURS[case], marker=style.MARKERS[case], ls="none", ms=6, mfc="none",
         )  # fmt: skip
-        deviation.plot(x, np.maximum(relative, 1e-16), color=COLOURS[case], marker=marker, ls="none", mfc="none")
+        deviation.plot(
+            x, np.maximum(relative, 1e-16), color=style.COLOURS[case], marker=style.MARKERS[case], ls="none", mfc="none"
+        )
