@@ -26,7 +26,13 @@ _LINES = {
     "omega_01": ("#0072B2", "-"), "omega_02": ("#009E73", "--"), "omega_03": ("#E69F00", "-."),
     "omega_04": ("#D55E00", "-"),
 }  # fmt: skip
-_TINTS = ["#e8f1f8", "#fdf3df", "#e3f3ec", "#fbe6dc", "#f4e6ef", "#eeeeee"]
+_TINTS = {
+    Exists.RR | Exists.NS: "#e8f1f8",
+    Exists.SS | Exists.NS: "#fbe6dc",
+    Exists.SS | Exists.SS_BEYOND_FOLD | Exists.SR | Exists.NR: "#f4e6ef",
+    Exists.RR | Exists.SR | Exists.NR: "#fdf3df",
+    Exists.SR | Exists.NR: "#e3f3ec",
+}
 """Pale grounds of the regions; lines and names tell them apart without colour."""
 
 
@@ -60,7 +66,7 @@ def _plane(axes: Axes, p: Parameters, mu: Array, eta: Array, points: list[Double
     omega_0 = np.linspace(0.0, OMEGA_MAX, 901)
     plane = case_map(p, mu, eta, omega_0).T
     kinds = np.unique(plane)
-    shades = ListedColormap([_TINTS[k % len(_TINTS)] for k in range(len(kinds))])
+    shades = ListedColormap([_TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
     index = np.searchsorted(kinds, plane)
     axes.pcolormesh(eta, omega_0, index, cmap=shades, shading="nearest", rasterized=True, vmin=0, vmax=len(kinds) - 1)
     unit = np.sqrt(p.g / p.R)

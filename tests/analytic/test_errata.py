@@ -1,0 +1,168 @@
+"""The errors of the paper that docs/errata.md lists: the printed form fails, the corrected one holds."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analytic import contact_forces, stationary_solutions, thresholds, vector_field
+from model import Case, Parameters
+from model.cases import TRAITS
+from model.kinematics import slip_velocities
+
+P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
+RNG = np.random.default_rng(11)
+N = 100
+
+
+def states(**zero: bool) -> np.ndarray:
+    x = RNG.normal(size=(N, 8)) * [0.0, 0.3, 15.0, 20.0, 20.0, 20.0, 0.0, 0.0]
+    return x * [1, not zero.get("v_y"), 1, 1, 1, 1, 1, 1]
+
+
+def agrees(formula: np.ndarray, truth: np.ndarray) -> bool:
+    return bool(np.all(np.abs(formula - truth) <= 1e-11 * np.abs(truth).max()))
+
+
+def test_table_1_drag() -> None:
+    """m c multiplies a velocity to a force: kg/s."""
+    assert Parameters.__dataclass_fields__["c"].metadata["unit"] == "s-1"
+
+
+def test_equation_6() -> None:
+    x = states()
+    v_A, _ = slip_velocities(x, P)
+    printed = np.stack([P.r * x[:, 5], 0 * x[:, 0], -P.r * x[:, 3]], axis=-1)
+    corrected = printed + np.stack([x[:, 1], x[:, 1], 0 * x[:, 0]], axis=-1)
+    assert agrees(corrected, v_A)
+    assert not agrees(printed, v_A)
+    np.testing.assert_allclose(v_A[:, 1], x[:, 1], err_msg="A moves up with the centre")
+
+
+def test_equation_26_row_6() -> None:
+    x = states(v_y=True)
+    _, _, omega_c, w_x, w_y, w_z, _, _ = x.T
+    F_A, F_B = contact_forces(Case.SS, x, P)
+    truth = vector_field(Case.SS, x, P)[:, 5]
+    jmr = P.j * P.m * P.r
+    base = P.R / P.r * omega_c**2 + omega_c * w_x + w_z * F_B[:, 2] / (w_y * jmr)
+    assert agrees(base - w_z * F_A[:, 2] / (w_x * jmr), truth)
+    assert not agrees(base + w_z * F_A[:, 2] / (w_x * jmr), truth)
+
+
+def test_equation_28() -> None:
+    x = states()
+    _, v_y, omega_c, w_x, w_y, w_z, _, _ = x.T
+    B_z = contact_forces(Case.NS, x, P)[1][:, 2]
+    truth = vector_field(Case.NS, x, P)
+    row_2 = {name: -P.c * v_y - P.g - w_z * B_z / (w * P.m) for name, w in (("printed", w_x), ("corrected", w_y))}
+    assert agrees(row_2["corrected"], truth[:, 1])
+    assert not agrees(row_2["printed"], truth[:, 1])
+
+    def row_6(sign: float, w: np.ndarray) -> np.ndarray:
+        turning = P.R / P.r * omega_c**2 + omega_c * w_x
+        return turning + sign * (P.c * v_y + P.g) / P.r + w_z * (1 + P.j) * B_z / (w * P.j * P.m * P.r)
+
+    assert agrees(row_6(1, w_y), truth[:, 5])
+    for sign, w in ((-1, w_x), (-1, w_y), (1, w_x)):
+        assert not agrees(row_6(sign, w), truth[:, 5])
+
+
+def test_equation_29() -> None:
+    """What the damaged lines for A_z and B_z in SS must have said."""
+    x = states(v_y=True)
+    _, _, omega_c, w_x, w_y, w_z, _, _ = x.T
+    qA, qB = np.hypot(w_z, w_x), np.hypot(w_z, w_y)
+    den = 1 + P.mu * P.eta * w_z**2 / (qA * qB)
+    F_A, F_B = contact_forces(Case.SS, x, P)
+    u, G = P.m * P.R * omega_c**2, P.m * P.g
+    assert agrees((G - P.eta * u * w_z / qB) / den * P.mu * w_x / qA, F_A[:, 2])
+    assert agrees(-(u + P.mu * G * w_z / qA) / den * P.eta * w_y / qB, F_B[:, 2])
+
+
+def test_equation_35() -> None:
+    """SR carries the weight by friction at the wall from omega_0 = sqrt(g/(eta R)) upwards, not downwards."""
+    edge = thresholds(P).omega_02
+    exists = {}
+    for factor in (0.9, 1.1):
+        (s,) = (s for s in stationary_solutions(P.replace(omega_0=factor * edge)) if s.case is Case.SR)
+        friction, normal = abs(s.force_B[1]), s.force_B[0]
+        exists[factor] = friction <= P.eta * normal
+    assert exists == {0.9: False, 1.1: True}
+
+
+def test_equation_49() -> None:
+    """Five unknowns, four printed rows: omega_c = omega_0 is the one that is missing."""
+    (s,) = (s for s in stationary_solutions(P.replace(omega_0=9.0)) if s.case is Case.NS)
+    assert s.x[2] == 9.0
+
+
+def test_table_4() -> None:
+    printed = {Case.RS: "slip_x", Case.SR: "slip_y", Case.NR: "slip_y"}
+    for case, name in printed.items():
+        assert name not in TRAITS[case].active
+        assert name in TRAITS[case].constraints
+
+
+def test_equation_62() -> None:
+    """A state of RR has omega_c third (19): first, it would be a height."""
+    rate = vector_field(Case.RR, [0, 0, 12.0, 0, 0, 0], P)
+    np.testing.assert_allclose(rate[2], -P.c * (12.0 - P.omega_0) / (1 + 2 * P.j))
+
+
+def test_equation_66() -> None:
+    """Slip at B is held by the friction of the wall: the limit moves with eta and not with mu."""
+    omega_c = 8.0
+
+    def limit(p: Parameters) -> float:
+        factor = p.j * p.c / ((1 + p.j) * (1 + 2 * p.j) * omega_c**2)
+        lags = np.linspace(0.0, 500.0, 200_001)
+        rates = vector_field(Case.RS, [[0, 0, omega_c, 0, 1e-9, 0]], p, omega_c + lags[:, None])[:, 0, 4]
+        backwards = vector_field(Case.RS, [[0, 0, omega_c, 0, -1e-9, 0]], p, omega_c + lags[:, None])[:, 0, 4]
+        holds = (rates < 0) & (backwards > 0)
+        return float(lags[holds].max() * factor)
+
+    step = 500.0 / 200_000
+    for mu, eta in ((0.3, 0.45), (0.6, 0.45), (0.3, 0.2)):
+        found = limit(P.replace(mu=mu, eta=eta))
+        tolerance = 2 * step * P.j * P.c / ((1 + P.j) * (1 + 2 * P.j) * omega_c**2)
+        assert abs(found - eta) <= tolerance
+
+
+def test_section_5_3() -> None:
+    """Between omega_02 and omega_04 a stable SS lags behind: omega_c = omega_0 is unique again beyond omega_04 only."""
+    p = Parameters.named("reference")
+    t = thresholds(p)
+    for omega_0, unique in ((0.5 * (t.omega_02 + t.omega_04), False), (1.01 * t.omega_04, True)):
+        stable = [s for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.exists and s.stable]
+        assert all(s.x[2] == omega_0 for s in stable) == unique
+
+
+def test_proposition_3() -> None:
+    """A_y = 0: the stationary solution of SR is one of NR too, for which y is neutral."""
+    p = Parameters.named("reference").replace(omega_0=35.0)
+    found = {s.case: s for s in stationary_solutions(p)}
+    np.testing.assert_array_equal(found[Case.SR].x, found[Case.NR].x)
+    assert abs(found[Case.SR].force_A[1]) <= 1e-14 * p.m * p.g * (1 + p.j * p.R * p.omega_0**2 / p.g)
+    assert "y" in found[Case.NR].family
+
+
+@pytest.mark.parametrize("document", ["errata.md", "theory.md"])
+def test_documents_name_what_exists(document: str) -> None:
+    """Every test, function and module the documents point to is there."""
+    root = Path(__file__).parents[2]
+    text = (root / "docs" / document).read_text("utf-8")
+    sources = {path: path.read_text("utf-8") for path in [*root.glob("*/*.py"), *root.glob("tests/*/*.py")]}
+    for path in re.findall(r"\]\(\.\./([\w/]+\.py)\)", text):
+        assert (root / path).exists(), path
+    everything = "\n".join(sources.values())
+    for name in re.findall(r"`(test_\w+)`", text):
+        assert f"def {name}(" in everything, name
+    for module, name in re.findall(r"`(\w+)\.(?!py`)(\w+)`", text):
+        source = next(
+            (s for path, s in sources.items() if path.name == f"{module}.py" and "tests" not in path.parts), ""
+        )
+        assert re.search(rf"^(def |class )?{name}\b", source, re.MULTILINE), f"{module}.{name}"
