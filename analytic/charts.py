@@ -17,12 +17,12 @@ import cmath
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from analytic.dynamics import Forces, forces, newton_euler
+from analytic.dynamics import FORCES, Forces, newton_euler
 from model import Case, Parameters
 from model.arrays import Array
 
@@ -30,12 +30,8 @@ Fluid = Callable[[float], float]
 """omega_0 in rad s-1 at a time in s."""
 
 
-class Guard(NamedTuple):
-    """A quantity that is positive while the case lasts, in natural units."""
-
-    name: str
-    value: Callable[[float, Sequence[float]], float]
-    is_gap: bool = False
+GAPS = ("A lands", "B lands")
+"""Names of the guards that are distances."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +71,10 @@ class Chart:
     scale: list[float]
     """Natural size of each coordinate, for absolute tolerances."""
     rates: Callable[[float, list[float]], list[float]]
-    guards: tuple[Guard, ...]
+    ends: tuple[str, ...]
+    """What can end the case."""
+    guards: Callable[[float, Sequence[float]], tuple[float, ...]]
+    """A quantity for each of `ends` that is positive while the case lasts, in natural units."""
     path: Callable[[Array, Array], Path]
     """States from times (n,) and coordinates (k, n)."""
     landing: float = math.inf
@@ -116,7 +115,7 @@ def _signed(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
     """RS and SR: slip along k alone, (theta, omega_c, speed, work) with a fixed sign."""
     A_slips = case is Case.SR
     sign = math.copysign(1.0, math.sin(at.alpha if A_slips else at.beta))
-    index, direction = (3 if A_slips else 4), (sign, 0.0)
+    forces, index, direction = FORCES[case], (3 if A_slips else 4), (sign, 0.0)
     T, _, w, E = _natural(p)
     G = p.m * p.g
 
@@ -126,7 +125,7 @@ def _signed(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
         return x
 
     def loads(t: float, z: Sequence[float]) -> Forces:
-        return forces(case, state(z), p, omega_0(t), **{"slip_A" if A_slips else "slip_B": direction})
+        return forces(state(z), p, omega_0(t), direction)
 
     def rates(t: float, z: list[float]) -> list[float]:
         x, fluid = state(z), omega_0(t)
@@ -134,13 +133,11 @@ def _signed(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
         dx = newton_euler(case, x, f, p, fluid)
         return [x[2], dx[2], sign * dx[index], _friction_power(x, f, p, fluid)]
 
-    def grip_A(t: float, z: Sequence[float]) -> float:
+    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
         f = loads(t, z)
-        return float(p.mu * f[1] - math.hypot(f[0], f[2])) / G
-
-    def grip_B(t: float, z: Sequence[float]) -> float:
-        f = loads(t, z)
-        return float(p.eta * f[3] - math.hypot(f[4], f[5])) / G
+        if A_slips:
+            return z[2] / w, float(p.eta * f[3] - math.hypot(f[4], f[5])) / G, f[1] / G
+        return z[2] / w, float(p.mu * f[1] - math.hypot(f[0], f[2])) / G
 
     def path(t: Array, z: Array) -> Path:
         x = np.zeros((len(t), 8))
@@ -148,20 +145,15 @@ def _signed(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
         turn, none = np.full_like(t, sign * math.pi / 2), np.full_like(t, math.nan)
         return Path(t, z[0], x, turn if A_slips else none, none if A_slips else turn, z[3])
 
-    stick = Guard("A sticks" if A_slips else "B sticks", lambda t, z: z[2] / w)
-    others = (
-        (Guard("B slips", grip_B), Guard("A lifts", lambda t, z: loads(t, z)[1] / G))
-        if A_slips
-        else (Guard("A slips", grip_A),)
-    )
     start = [at.theta, at.x[2], sign * at.x[index], at.work]
-    return Chart(case, start, [1.0, 1 / T, w, E], rates, (stick, *others), path)
+    ends = ("A sticks", "B slips", "A lifts") if A_slips else ("B sticks", "A slips")
+    return Chart(case, start, [1.0, 1 / T, w, E], rates, ends, guards, path)
 
 
 def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """SS: (theta, omega_c, q_A, alpha, q_B, beta, work)."""
     T, _, w, E = _natural(p)
-    G, least, damping = p.m * p.g, floor * w, 1 / T
+    forces, G, least, damping = FORCES[case], p.m * p.g, floor * w, 1 / T
 
     def state(z: Sequence[float]) -> tuple[list[float], tuple[float, float], tuple[float, float]]:
         _, omega_c, q_A, alpha, q_B, beta = z[:6]
@@ -171,7 +163,7 @@ def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
     def rates(t: float, z: list[float]) -> list[float]:
         x, (sA, cA), (sB, cB) = state(z)
         fluid = omega_0(t)
-        f = forces(case, x, p, fluid, (sA, cA), (sB, cB))
+        f = forces(x, p, fluid, (sA, cA), (sB, cB))
         dx = newton_euler(case, x, f, p, fluid)
         d_x, d_y, d_z = dx[3], dx[4], dx[5]
         bond = damping * (z[4] * cB - z[2] * cA)
@@ -182,12 +174,10 @@ def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
             _friction_power(x, f, p, fluid),
         ]  # fmt: skip
 
-    def normal(k: int) -> Callable[[float, Sequence[float]], float]:
-        def load(t: float, z: Sequence[float]) -> float:
-            x, slip_A, slip_B = state(z)
-            return float(forces(case, x, p, omega_0(t), slip_A, slip_B)[k]) / G
-
-        return load
+    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
+        x, slip_A, slip_B = state(z)
+        f = forces(x, p, omega_0(t), slip_A, slip_B)
+        return z[2] / w, z[4] / w, f[1] / G, f[3] / G
 
     def path(t: Array, z: Array) -> Path:
         zero = np.zeros_like(t)
@@ -198,30 +188,27 @@ def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
 
     x = at.x
     start = [at.theta, x[2], math.hypot(x[3], x[5]), at.alpha, math.hypot(x[4], x[5]), at.beta, at.work]
-    guards = (
-        Guard("A sticks", lambda t, z: z[2] / w), Guard("B sticks", lambda t, z: z[4] / w),
-        Guard("A lifts", normal(1)), Guard("B opens", normal(3)),
-    )  # fmt: skip
-    return Chart(case, start, [1.0, 1 / T, w, 1.0, w, 1.0, E], rates, guards, path, slips=(2, 4))
+    ends = ("A sticks", "B sticks", "A lifts", "B opens")
+    return Chart(case, start, [1.0, 1 / T, w, 1.0, w, 1.0, E], rates, ends, guards, path, slips=(2, 4))
 
 
 def _nr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """NR: (theta, y, v_y, omega_c, w_x, work)."""
     T, v, w, E = _natural(p)
-    G = p.m * p.g
+    forces, G = FORCES[case], p.m * p.g
 
     def state(z: Sequence[float]) -> list[float]:
         return [z[1], z[2], z[3], z[4], 0.0, 0.0, 0.0, 0.0]
 
     def rates(t: float, z: list[float]) -> list[float]:
         x, fluid = state(z), omega_0(t)
-        f = forces(case, x, p, fluid)
+        f = forces(x, p, fluid)
         dx = newton_euler(case, x, f, p, fluid)
         return [x[2], dx[0], dx[1], dx[2], dx[3], _friction_power(x, f, p, fluid)]
 
-    def grip(t: float, z: Sequence[float]) -> float:
-        f = forces(case, state(z), p, omega_0(t))
-        return float(p.eta * f[3] - math.hypot(f[4], f[5])) / G
+    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
+        f = forces(state(z), p, omega_0(t))
+        return float(p.eta * f[3] - math.hypot(f[4], f[5])) / G, z[1] / p.R
 
     def path(t: Array, z: Array) -> Path:
         zero, none = np.zeros_like(t), np.full_like(t, math.nan)
@@ -229,21 +216,20 @@ def _nr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
         return Path(t, z[0], x, none, none, z[5])
 
     x = at.x
-    guards = (Guard("B slips", grip), Guard("A lands", lambda t, z: z[1] / p.R, is_gap=True))
     start = [at.theta, x[0], x[1], x[2], x[3], at.work]
-    return Chart(case, start, [1.0, p.R, v, 1 / T, w, E], rates, guards, path)
+    return Chart(case, start, [1.0, p.R, v, 1 / T, w, E], rates, ("B slips", "A lands"), guards, path)
 
 
 def _ns(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """NS: (theta, y, v_y, omega_c, w_x, q_B, beta, work)."""
     T, v, w, E = _natural(p)
-    least = floor * w
+    forces, least = FORCES[case], floor * w
 
     def rates(t: float, z: list[float]) -> list[float]:
         _, y, v_y, omega_c, w_x, q, beta, _ = z
         s, c = math.sin(beta), math.cos(beta)
         x, fluid = [y, v_y, omega_c, w_x, q * s, q * c, 0.0, 0.0], omega_0(t)
-        f = forces(case, x, p, fluid, slip_B=(s, c))
+        f = forces(x, p, fluid, (s, c))
         dx = newton_euler(case, x, f, p, fluid)
         return [
             omega_c, v_y, dx[1], dx[2], dx[3],
@@ -257,9 +243,18 @@ def _ns(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
         return Path(t, z[0], x, none, z[6], z[7])
 
     x = at.x
-    guards = (Guard("B sticks", lambda t, z: z[5] / w), Guard("A lands", lambda t, z: z[1] / p.R, is_gap=True))
+    ends = ("B sticks", "A lands")
     start = [at.theta, x[0], x[1], x[2], x[3], math.hypot(x[4], x[5]), at.beta, at.work]
-    return Chart(case, start, [1.0, p.R, v, 1 / T, w, w, 1.0, E], rates, guards, path, slips=(5,))
+    return Chart(
+        case,
+        start,
+        [1.0, p.R, v, 1 / T, w, w, 1.0, E],
+        rates,
+        ends,
+        lambda t, z: (z[5] / w, z[1] / p.R),
+        path,
+        slips=(5,),
+    )
 
 
 def _off_wall(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
@@ -324,19 +319,28 @@ def _off_wall(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: floa
         alpha = np.arctan2(-slide.imag, -slide.real) if case is Case.SN else np.full_like(t, math.nan)
         return Path(t, angle, x, alpha, np.full_like(t, math.nan), z[-1])
 
-    wall = Guard("B lands", lambda t, z: 1 - math.hypot(z[0], z[1]) / p.R, is_gap=True)
+    def gap(z: Sequence[float]) -> float:
+        return 1 - math.hypot(z[0], z[1]) / p.R
+
     start, scale = [Z.real, Z.imag, V.real, V.imag], [p.R, p.R, v, v]
     if case is Case.RN:
-        grip = Guard("A slips", lambda t, z: p.mu - p.j * roll_share * abs(drag(t, z)) / p.g)
-        return Chart(case, [*start, at.work], [*scale, E], rates_rolling, (grip, wall), path)
+
+        def grip(t: float, z: Sequence[float]) -> tuple[float, ...]:
+            return p.mu - p.j * roll_share * abs(drag(t, z)) / p.g, gap(z)
+
+        return Chart(case, [*start, at.work], [*scale, E], rates_rolling, ("A slips", "B lands"), grip, path)
     if case is Case.SN:
         # At the onset the slip is zero and only alpha tells its direction.
         phase = cmath.phase(turn * complex(-math.cos(at.alpha), -math.sin(at.alpha)))
-        stick = Guard("A sticks", lambda t, z: z[4] / v)
+        ends = ("A sticks", "B lands")
         start = [*start, abs(slip), phase, at.work]
-        return Chart(case, start, [*scale, v, 1.0, E], rates_slipping, (stick, wall), path, slips=(4,))
+        return Chart(
+            case, start, [*scale, v, 1.0, E], rates_slipping, ends, lambda t, z: (z[4] / v, gap(z)), path, slips=(4,)
+        )
     landing = at.time + fall_time(y, v_y, p)
-    return Chart(case, [*start, at.work], [*scale, E], rates_flying, (wall,), path, landing)
+    return Chart(
+        case, [*start, at.work], [*scale, E], rates_flying, ("B lands",), lambda t, z: (gap(z),), path, landing
+    )
 
 
 def fall(t: Any, y: float, v_y: float, p: Parameters) -> tuple[Any, Any]:

@@ -166,7 +166,7 @@ def forces(
         slip_A = _direction(*slide_A)
     if case.B is Contact.S and slip_B is None:
         slip_B = _direction(*slide_B)
-    return _FORCES[case](x, p, omega_0, *(s for s in (slip_A, slip_B) if s is not None))
+    return FORCES[case](x, p, omega_0, *(s for s in (slip_A, slip_B) if s is not None))
 
 
 def rolling_family(omega_c: Real, p: Parameters, omega_0: Real, B_y: Real) -> Forces:
@@ -238,9 +238,10 @@ def _nn(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
     return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
-_FORCES: dict[Case, Callable[..., Forces]] = {
+FORCES: dict[Case, Callable[..., Forces]] = {
     Case.RS: _rs, Case.SR: _sr, Case.SS: _ss, Case.NR: _nr, Case.NS: _ns, Case.RN: _rn, Case.SN: _sn, Case.NN: _nn,
 }  # fmt: skip
+"""The forces of each case but RR, as `forces`, from x, p, omega_0 and the directions of its slips, A before B."""
 
 _HELD = {
     case: [VARIABLES.index(name) for name in traits.constraints if name in VARIABLES] for case, traits in TRAITS.items()

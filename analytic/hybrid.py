@@ -7,7 +7,7 @@ located on the interpolant of the step, and `transitions` says how to go on.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -18,17 +18,20 @@ from scipy.integrate import BDF, LSODA
 from scipy.optimize import brentq
 
 from analytic import dynamics, rolling_forces, transitions, two_point_rolling
-from analytic.charts import Chart, Fluid, Guard, Moment, Path, chart
+from analytic.charts import GAPS, Chart, Fluid, Moment, Path, chart
 from analytic.records import Event, Recorder
 from analytic.rigid_body import NOTHING, Six
 from analytic.settings import Settings
 from model import Case, Contact, Flow, Parameters
 from model.arrays import Array
 
-SMALL_SLIP = 1e-2
-"""Slip, in units of the spin of a ball that rolls at sqrt(g R), below which its direction may be stiff."""
+ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
+"""Slips, in units of the spin of a ball that rolls at sqrt(g R): one that has just set in, and one whose direction may
+be stiff."""
 PATIENCE = 300
 """Steps of LSODA with a small slip after which it gives way; a slip that dies out takes fewer."""
+LOCAL = 0.1
+"""Tolerance of a step of the integrator relative to that asked for: errors of many steps add up."""
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
 
@@ -73,11 +76,13 @@ class _Simulator:
     settings: Settings
     recorder: Recorder
     absolute: float = field(init=False)
-    shortest: float = field(init=False)
+    shortest: tuple[float, float] = field(init=False)
 
     def __post_init__(self) -> None:
         self.absolute = self.settings.rtol / 1e3 if self.settings.atol is None else self.settings.atol
-        self.shortest = math.sqrt(self.absolute * self.p.R / self.p.g)
+        # A hop that lasts T rises by g T^2/8, which must be well above the tolerance of lengths where it is integrated.
+        unit = math.sqrt(self.p.R / self.p.g)
+        self.shortest = self.settings.rtol * unit, math.sqrt(8 * self.absolute) * unit
 
     def advance(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[Case, Moment]:
         """Go on through all events before `until`."""
@@ -159,40 +164,43 @@ class _Simulator:
         """One case up to the first guard or `until`; samples are recorded even if it is interrupted."""
         motion = chart(case, at, self.p, fluid, self.settings.rtol)
         lands, until = motion.landing <= until, min(until, motion.landing)
-        first = self.recorder.taken == 0
-        steps = [Steps(np.array([at.time]), np.array(motion.start)[:, None], np.array([first]), None)]
+        times, states = [at.time], [motion.start]
+        sampled, guard = [self.recorder.taken == 0], None
         try:
-            steps.extend(self._integrate(motion, at.time, until, self._hop(case, at, fluid)))
+            for step in self._integrate(motion, at.time, until, self._hop(case, at, fluid)):
+                times += [*step.sample_times, step.time]
+                states += [*step.samples, step.z]
+                sampled += [True] * len(step.samples) + [False]
+                guard = step.guard
         finally:
-            t, z, wanted = (np.concatenate([step[k] for step in steps], axis=-1) for k in range(3))
-            path = motion.path(t, z)
-            self._record(case, path, wanted, fluid)
-        return steps[-1].guard or ("A lands" if lands else None), _moment(path, -1)
+            path = motion.path(np.array(times), np.array(states).T)
+            self._record(case, path, np.array(sampled), fluid)
+        return guard or ("A lands" if lands else None), _moment(path, -1)
 
     def _hop(self, case: Case, at: Moment, fluid: Fluid) -> float:
         """About how long the ball will be off floor or wall if it is just rebounding from it, s; else inf."""
         x = at.x
-        if not (x[0] == 0 < x[1] or x[6] == 0 < x[7]):
+        if not ((x[0] == 0 < x[1] and case is not Case.NN) or x[6] == 0 < x[7]):
             return math.inf
         dx = dynamics.newton_euler(case, x, self._forces_at(case, at, fluid), self.p, fluid(at.time))
         hops = [2 * v / -a for gap, v, a in ((x[0], x[1], dx[1]), (x[6], x[7], dx[7])) if gap == 0 < v and a < 0]
         return min(hops, default=math.inf)
 
-    def _integrate(self, motion: Chart, start: float, until: float, hop: float) -> Iterator[Steps]:
+    def _integrate(self, motion: Chart, start: float, until: float, hop: float) -> Iterator[Step]:
         """Steps of the integrator with the samples in them, the last of them ending at a guard or at `until`.
 
         LSODA does the work, except where a slip sets in, or stays small: its direction is stiff then, which LSODA
         doesn't notice where hardly anything else moves. A hop that may be short starts with a step that is shorter.
         """
         t, z, first_step = start, motion.start, hop / 20 if hop < until - start else None
-        small = motion.least_slip(z) < SMALL_SLIP
-        watch = [Watch(guard, guard.value(t, z), self.absolute, self.settings.rtol) for guard in motion.guards]
+        small = motion.least_slip(z) < ONSET_SLIP
+        watch = Watch(motion, start, self.absolute, self.settings.rtol)
         while t < until:
             slow = 0
-            for steps in self._stage(motion, BDF if small else LSODA, t, z, until, first_step, watch):
-                yield steps
-                t, z, first_step = float(steps.time[-1]), steps.z[:, -1].tolist(), None
-                if steps.guard:
+            for step in self._stage(motion, BDF if small else LSODA, t, z, until, first_step, watch):
+                yield step
+                t, z, first_step = step.time, step.z, None
+                if step.guard:
                     return
                 grown = motion.least_slip(z) > SMALL_SLIP
                 slow = 0 if grown else slow + 1
@@ -208,36 +216,34 @@ class _Simulator:
         z: list[float],
         until: float,
         first_step: float | None,
-        watch: list[Watch],
-    ) -> Iterator[Steps]:
+        watch: Watch,
+    ) -> Iterator[Step]:
         """Steps of one solver; its time runs from zero, for directions settle in less than the round-off of `start`."""
         solver = method(
             lambda t, z: motion.rates(start + t, z.tolist()), 0.0, z, until - start,
-            rtol=self.settings.rtol, atol=self.absolute * np.array(motion.scale), first_step=first_step,
+            rtol=LOCAL * self.settings.rtol, atol=LOCAL * self.absolute * np.array(motion.scale), first_step=first_step,
         )  # fmt: skip
         times = self.recorder.times
         taken = int(np.searchsorted(times, start, side="right"))
         while solver.status == "running":
             message = solver.step()
-            if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
+            z = solver.y.tolist()
+            if solver.status == "failed" or not math.isfinite(sum(z)):
                 raise StalledError(f"{method.__name__} in case {motion.case.name}: {message}")
             t = until if solver.t == solver.t_bound else start + float(solver.t)
-            now = solver.y.tolist()
-            fired = [w for w in watch if w.fires(t, now)]
-            due = int(np.searchsorted(times, t, side="right"))
-            if not fired and due == taken:
-                yield Steps(np.array([t]), solver.y[:, None].copy(), np.array([False]), None)
+            fired = watch.fired(t, z)
+            if not fired and (taken == len(times) or times[taken] > t):
+                yield Step(t, z)
                 continue
-            between, name = solver.dense_output(), None
+            between, guard = solver.dense_output(), None
             if fired:
                 span = float(solver.t_old), float(solver.t)
-                end, name = min((w.root(between, start, *span), w.guard.name) for w in fired)
-                t = start + end
-                due = int(np.searchsorted(times, t, side="right"))
-            at = np.append(times[taken:due] - start, end if fired else solver.t)
-            wanted = np.append(np.full(due - taken, True), False)
-            yield Steps(np.append(times[taken:due], t), between(at), wanted, name)
-            if fired:
+                end, guard = min((watch.root(k, between, start, *span), motion.ends[k]) for k in fired)
+                t, z = start + end, between(end).tolist()
+            due = int(np.searchsorted(times, t, side="right"))
+            samples = between(times[taken:due] - start).T.tolist() if due > taken else []
+            yield Step(t, z, times[taken:due].tolist(), samples, guard)
+            if guard:
                 return
             taken = due
 
@@ -248,49 +254,59 @@ class _Simulator:
         return times[first : int(np.searchsorted(times, stop, side="right"))]
 
     def _record(self, case: Case, path: Path, wanted: npt.NDArray[np.bool_], fluid: Fluid) -> None:
+        if not np.any(wanted):
+            self.recorder.reached(float(path.time[-1]))
+            return
         path = Path(*(getattr(path, f.name)[wanted] for f in fields(Path)))
         omega_0 = np.array([fluid(t) for t in path.time.tolist()])
         forces = path_forces(case, path, self.p, omega_0)
         self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
 
 
-class Steps(NamedTuple):
-    """Points of a motion: steps of the integrator and samples."""
+class Step(NamedTuple):
+    """A step of an integrator."""
 
-    time: Array
-    z: Array
-    wanted: npt.NDArray[np.bool_]
-    """Which of them are samples."""
-    guard: str | None
-    """The guard that fired at the last of them."""
+    time: float
+    z: list[float]
+    sample_times: Sequence[float] = ()
+    """Times to sample within the step."""
+    samples: Sequence[list[float]] = ()
+    """Coordinates then."""
+    guard: str | None = None
+    """The guard that fired at its end."""
 
 
 class Watch:
-    """A guard on duty: it fires when it falls below zero.
+    """The guards of a case on duty: one fires when it falls below zero.
 
-    One that starts at zero, where round-off mustn't end the case, has to rise above `arm` first, or to fall below
+    A guard that starts at zero, where round-off mustn't end the case, has to rise above `arm` first, or to fall below
     -`slack`; a gap is armed by any height.
     """
 
-    def __init__(self, guard: Guard, value: float, arm: float, slack: float) -> None:
-        self.guard = guard
-        self._arm = 0.0 if guard.is_gap else arm
-        self._level = 0.0 if value > self._arm else -slack
+    def __init__(self, motion: Chart, start: float, arm: float, slack: float) -> None:
+        self._motion = motion
+        self._arm = [0.0 if name in GAPS else arm for name in motion.ends]
+        values = motion.guards(start, motion.start)
+        self._level = [0.0 if value > arm else -slack for value, arm in zip(values, self._arm, strict=True)]
 
-    def fires(self, t: float, z: list[float]) -> bool:
-        value = self.guard.value(t, z)
-        if value > self._arm:
-            self._level = 0.0
-        return value < self._level
+    def fired(self, t: float, z: list[float]) -> list[int]:
+        """Which guards are below their level."""
+        fired = []
+        for k, value in enumerate(self._motion.guards(t, z)):
+            if value > self._arm[k]:
+                self._level[k] = 0.0
+            elif value < self._level[k]:
+                fired.append(k)
+        return fired
 
-    def root(self, between: Callable[[float], Array], origin: float, start: float, end: float) -> float:
-        """When within (start, end) after the origin it fell through its level.
+    def root(self, k: int, between: Callable[[float], Array], origin: float, start: float, end: float) -> float:
+        """When within (start, end) after the origin guard k fell through its level.
 
         The interpolant may differ from the step's ends by round-off.
         """
 
         def value(t: float) -> float:
-            return self.guard.value(origin + t, between(t).tolist()) - self._level
+            return self._motion.guards(origin + t, between(t).tolist())[k] - self._level[k]
 
         if value(start) <= 0:
             return start

@@ -88,24 +88,26 @@ class Impact:
     impulse: Six
 
 
-def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, shortest: float) -> Impact:
+def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, shortest: tuple[float, float]) -> Impact:
     """Impact of all contacts that touch, at once, with Newton's restitution; friction opposes the slip that is left.
 
     A single contact of a sphere obeys p_n = (1+e) m |v_n| and p_t = min(friction p_n, m_t |slip|) against the slip;
-    two contacts are solved together. A rebound after which the ball would come back, again and again, to rest within
-    `shortest` seconds (the sum of the geometric series 2 v_n/a/(1 - e)) stays in contact.
+    two contacts are solved together. Bounces accumulate: a rebound whose hops would come to rest within `shortest`
+    seconds (by the geometric series 2 v_n/a/(1 - e)) stays in contact. The first of the two times is for a ball that
+    touches the floor only, whose hops are known in closed form, the second for all others.
     """
     x, before = at.x, velocities(at.x, p)
     A = Closed(max(0.0, -restitution * x[1])) if x[0] == 0 else None
     B = Closed(max(0.0, -restitution * x[7])) if x[6] == 0 else None
     u, P = solve(before, A, B, p)
     work = at.work + contact_work(mean(before, u), P, p)
-    v_h, v_y = u[0], u[1]
-    if A and P[1] > 0:
-        v_y = A.target if A.target > 0 and not _settles("A", x, u, A, p, omega_0, restitution, shortest) else 0.0
-    if B and P[3] > 0:
-        v_h = B.target if B.target > 0 and not _settles("B", x, u, B, p, omega_0, restitution, shortest) else 0.0
-    y = state(x[0], x[6], (v_h, v_y, *u[2:]), p)
+    v_h, v_y = B.target if B and P[3] > 0 else u[0], A.target if A and P[1] > 0 else u[1]
+    fall, fly_in = _returns(x, u, A is not None, B is not None, p, omega_0)
+    if A and 2 * v_y <= shortest[0 if B is None else 1] * fall * (1 - restitution):
+        v_y = 0.0
+    if B and 2 * v_h <= shortest[1] * fly_in * (1 - restitution):
+        v_h = 0.0
+    y = state(x[0], x[6], (v_h, v_y, u[2], u[3], u[4], u[5]), p)
     still = AT_REST * math.hypot(*before[:3], *(p.r * o for o in before[3:]))
     if A and P[1] > 0 and math.hypot(*slip_at_A(u, p)) <= still:
         y[3], y[5] = 0.0, -(v_h + v_y) / p.r
@@ -114,16 +116,11 @@ def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, short
     return Impact(replace(at, x=y, alpha=math.nan, beta=math.nan, work=work), P)
 
 
-def _settles(
-    point: str, x: list[float], u: Six, contact: Closed, p: Parameters, omega_0: float, restitution: float,
-    shortest: float,
-) -> bool:  # fmt: skip
-    """Whether the bounces at a contact come to rest within `shortest` seconds."""
-    if restitution == 1:
-        return False
-    rates = smooth_rates(u, Place(x[6] - p.R, 0.0, u[2] / (p.R - x[6])), omega_0, p)
-    if point == "A":
-        back = -solve(rates, None, Closed() if x[6] == 0 == u[0] else None, p)[0][1]
-    else:
-        back = -solve(rates, Closed() if x[0] == 0 == u[1] else None, None, p)[0][0]
-    return back > 0 and 2 * contact.target <= shortest * back * (1 - restitution)
+def _returns(
+    x: list[float], u: Six, touches_A: bool, touches_B: bool, p: Parameters, omega_0: float
+) -> tuple[float, float]:
+    """Accelerations that bring a ball back to floor and wall if it leaves them, each while it stays on the other."""
+    free = smooth_rates(u, Place(x[6] - p.R, 0.0, u[2] / (p.R - x[6])), omega_0, p)
+    on_B, _ = solve(free, None, Closed() if touches_B and u[0] <= 0 else None, p)
+    on_A, _ = solve(free, Closed() if touches_A and u[1] <= 0 else None, None, p)
+    return -on_B[1], -on_A[0]
