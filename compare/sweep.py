@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from compare.tasks import Task
 from model import Flow, InputError, Parameters
@@ -62,6 +61,8 @@ def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
 
 def random(p: Parameters, axes: Sequence[Axis], count: int, seed: int) -> Iterator[Parameters]:
     """`count` points that fill the box of the axes' ranges evenly (scrambled Sobol sequence)."""
+    from scipy.stats import qmc  # slow to import, and only needed here
+
     if count < 1:
         raise InputError(f"count = {count} of random points is out of range: must be >= 1")
     for axis in axes:

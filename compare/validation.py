@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare import report, results, stationary
+from compare import results, stationary
 from compare.campaign import Campaign, Progress
 from compare.claims import Claim, Lab, Level, Verdict, judge, select
 from compare.progress import Show
@@ -30,6 +30,8 @@ def validate(
     StorageError
         If the directory can't be written or holds results of another version.
     """
+    from compare import report  # here, because it draws: workers that import this package never need matplotlib
+
     output = Path(output)
     chosen = select(CLAIMS, claims)
     summary = results.open_directory(output)
