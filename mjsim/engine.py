@@ -116,7 +116,8 @@ class Run:
         qpos, qvel, sensors = np.split(raw, [recorder.NQ, recorder.NQ + recorder.NV], axis=1)
         good = np.logical_and.accumulate((np.abs(raw) < _HUGE).all(axis=1))
         sound = 0 if self.headers[i].failure else int(good.sum())
-        block = recorder.samples(time[:sound], qpos[:sound], qvel[:sound], sensors[:sound], p)
+        lead = self._settings.lead
+        block = recorder.samples(time[:sound], qpos[:sound], qvel[:sound], sensors[:sound], p, lead)
         if not self.headers[i].failure and sound < len(time):
             state = recorder.state(qpos[sound - 1], qvel[sound - 1], p) if sound else None
             self._fail(i, float(time[sound]), state)

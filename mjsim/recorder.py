@@ -41,14 +41,18 @@ def state(qpos: Array, qvel: Array, p: Parameters) -> Array:
     return np.stack([y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h], axis=-1)
 
 
-def samples(time: Array, qpos: Array, qvel: Array, sensors: Array, p: Parameters) -> npt.NDArray[np.void]:
-    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), qpos (n, 7), qvel (n, 6), sensors (n, 28)."""
+def samples(time: Array, qpos: Array, qvel: Array, sensors: Array, p: Parameters, lead: float) -> npt.NDArray[np.void]:
+    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), qpos (n, 7), qvel (n, 6), sensors (n, 28).
+
+    Positions and sensors belong to a moment `lead` seconds after that of the velocities.
+    """
+    axes = frame(qpos[:, 0])
+    qpos = np.concatenate([qpos[:, :3] - lead * qvel[:, :3], qpos[:, 3:]], axis=1)
     block = np.zeros(len(time), SAMPLE)
     x = state(qpos, qvel, p)
     block["time"], block["theta"] = time, qpos[:, 0]
     for k, name in enumerate(("y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")):
         block[name] = x[:, k]
-    axes = frame(qpos[:, 0])
     speeds = slip_speeds(x, p)
     for k, (contact, distance) in enumerate((("A", x[:, 0]), ("B", x[:, 6]))):
         sensor = sensors[:, 14 * k : 14 * (k + 1)]

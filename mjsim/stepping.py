@@ -88,7 +88,6 @@ class Single(Stepper):
     def sample(self, omega_0: Array, row: Array) -> None:
         data, split = self._data, recorder.NQ + recorder.NV
         row[0, : recorder.NQ], row[0, recorder.NQ : split] = data.qpos, data.qvel
-        row[0, :3] -= self._settings.lead * data.qvel[:3]
         self.advance(omega_0[None])
         row[0, split:] = data.sensordata
 
@@ -159,7 +158,7 @@ class Many(Stepper):
     ) -> None:  # fmt: skip
         self._batch = batch = Batch(models[0], nsim=len(models), nthread=1)
         _expand_differences(batch, models)
-        self._settings, self._lead = settings, settings.lead
+        self._settings = settings
         self._qpos, self._qvel, self._sensors = (batch.bind(name) for name in ("qpos", "qvel", "sensordata"))
         self._qpos[:], self._qvel[:] = (np.stack(part) for part in zip(*start, strict=True))
         self._qpos[:, :3] += settings.lead * self._qvel[:, :3]
@@ -195,7 +194,6 @@ class Many(Stepper):
     def sample(self, omega_0: Array, row: Array) -> None:
         split = recorder.NQ + recorder.NV
         row[:, : recorder.NQ], row[:, recorder.NQ : split] = self._qpos, self._qvel
-        row[:, :3] -= self._lead * self._qvel[:, :3]
         self.advance(omega_0[None])
         row[:, split:] = self._sensors
 
