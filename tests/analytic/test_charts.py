@@ -1,0 +1,119 @@
+"""The coordinates of each case against the vector field in the paper's: the chain rule, by central differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from analytic import charts, contact_forces, two_point_rolling, vector_field
+from analytic.rigid_body import energy, velocities
+from model import Case, Contact, Parameters
+from model.cases import TRAITS
+from model.kinematics import VARIABLES, slip_directions, slip_velocities
+
+P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
+FLOOR = 1e-9
+
+
+def ramp(t: float) -> float:
+    return P.omega_0 + 3.0 * t
+
+
+def moment(case: Case, seed: int) -> charts.Moment:
+    """A random state of the case."""
+    rng = np.random.default_rng(seed)
+    values = dict(zip(VARIABLES, rng.normal(size=8) * [0.1, 0.3, 10, 20, 20, 20, 0, 0.3], strict=True))
+    values |= {"y": abs(values["y"]), "h": P.R * rng.uniform(0.1, 0.9)}
+    x = [values[name] if name in TRAITS[case].active else 0.0 for name in VARIABLES]
+    if case is Case.RN:
+        x[5] = -x[7] / P.r
+    alpha, beta = slip_directions(np.array(x), P)
+    return charts.Moment(
+        0.3, 1.1, x, float(alpha) if case.A is Contact.S else math.nan, float(beta) if case.B is Contact.S else math.nan
+    )
+
+
+@pytest.mark.parametrize("case", [case for case in Case if case is not Case.RR])
+def test_rates_are_those_of_the_vector_field(case):
+    for seed in range(20):
+        at = moment(case, seed)
+        chart = charts.chart(case, at, P, ramp, FLOOR)
+        rate = np.array(chart.rates(at.time, chart.start))
+        step = 1e-7
+        t, z = at.time + step * np.array([-1.0, 0, 1]), np.array(chart.start)[:, None]
+        path = chart.path(t, z + step * rate[:, None] * np.array([-1.0, 0, 1]))
+        np.testing.assert_allclose(path.x[1], at.x, rtol=0, atol=1e-14 * np.max(np.abs(at.x)))
+        slope = (path.x[2] - path.x[0]) / (2 * step)
+        expected = vector_field(case, path.x[1], P, ramp(at.time))
+        # Differences err by round-off/step, and by step^2 times third derivatives; angles turn at some 1e3 rad/s.
+        np.testing.assert_allclose(slope, expected, rtol=1e-6, atol=1e-6 * np.max(np.abs(expected)))
+        assert (path.theta[2] - path.theta[0]) / (2 * step) == pytest.approx(at.x[2], rel=1e-6)
+        change = energy(0.0, velocities(path.x[2], P), P) - energy(0.0, velocities(path.x[0], P), P)
+        change += P.m * P.g * (path.x[2][0] - path.x[0][0])
+        force_A, force_B = contact_forces(case, path.x[1], P, ramp(at.time))
+        power = sum(
+            float(np.sum(f * v)) for f, v in zip((force_A, force_B), slip_velocities(path.x[1], P), strict=True)
+        )
+        rho, (_, v_y, omega_c, *_, v_h) = P.R - at.x[6], at.x
+        power -= P.m * P.c * (v_h**2 + v_y**2 + rho**2 * omega_c * (omega_c - ramp(at.time)))
+        largest = max(abs(power), P.m * P.g * P.R * 10)
+        assert (path.work[2] - path.work[0]) / (2 * step) == pytest.approx(power, abs=1e-6 * largest)
+        assert change / (2 * step) == pytest.approx(power, abs=1e-6 * largest)
+
+
+@pytest.mark.parametrize("case", [Case.SS, Case.NS, Case.SN])
+def test_vanishing_slip_has_a_direction(case):
+    """At the onset the state has no slip; the chart starts with the direction given, and its slip grows from zero."""
+    at = moment(case, 3)
+    x = list(at.x)
+    if case.A is Contact.S:
+        x[3], x[5] = 0.0, -(x[7] + x[1]) / P.r
+    if case.B is Contact.S:
+        x[4] = x[5] = 0.0
+    at = charts.Moment(at.time, at.theta, x, at.alpha, at.beta)
+    chart = charts.chart(case, at, P, ramp, FLOOR)
+    assert chart.least_slip(chart.start) == pytest.approx(0.0, abs=1e-15)
+    path = chart.path(np.array([at.time]), np.array(chart.start)[:, None])
+    for given, found in ((at.alpha, path.alpha[0]), (at.beta, path.beta[0])):
+        if not math.isnan(given):
+            assert math.cos(given - found) == pytest.approx(1.0, abs=1e-14)
+    assert np.all(np.isfinite(chart.rates(at.time, chart.start)))
+
+
+@pytest.mark.parametrize("c", [0.0, 1e-6, 0.3, 4.0, 50.0])
+@pytest.mark.parametrize(("y", "v_y"), [(0.1, 0.0), (0.0, 2.0), (0.05, -1.0), (0.0, 1e-9), (0.2, 3.0)])
+def test_fall_ends_on_the_floor(c, y, v_y):
+    """y'' = -g - c y' by its textbook solution, in a form that needs no small-c care: the work-energy of the fall."""
+    p = P.replace(c=c)
+    t = charts.fall_time(y, v_y, p)
+    height, speed = charts.fall(t, y, v_y, p)
+    scale = y + v_y**2 / p.g
+    assert t > 0
+    assert abs(height) <= 1e-14 * scale
+    assert speed < 0
+    # Momentum: v(t) - v(0) = -g t - c (y(t) - y(0)).
+    assert speed - v_y == pytest.approx(-p.g * t - c * (0 - y), rel=1e-12)
+    # And the height is the integral of the velocity.
+    drop = quad(lambda s: charts.fall(s, y, v_y, p)[1], 0.0, t, epsabs=1e-12 * scale, epsrel=1e-12)[0]
+    assert drop == pytest.approx(-y, abs=2e-12 * scale)
+
+
+@pytest.mark.parametrize("c", [0.0, 1e-8, 1.0, 30.0])
+def test_two_point_rolling_solves_its_equation(c):
+    """Along a ramp: omega_c' = -c (omega_c - omega_0)/(1+2j), azimuth and work by their definitions."""
+    p = P.replace(c=c)
+    at, until = charts.Moment(0.3, 1.1, [0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0]), 4.0
+    t = np.linspace(0.3, until, 50)[1:]
+    path = two_point_rolling.path(t, at, until, p, ramp)
+    k = c / (1 + 2 * p.j)
+    for t1, omega_c, theta, work in zip(t, path.x[:, 2], path.theta, path.work, strict=True):
+        # Variation of constants, by quadrature.
+        fluid = quad(lambda s, t1=t1: math.exp(-k * (t1 - s)) * k * ramp(s), 0.3, t1, epsabs=1e-13, epsrel=1e-13)[0]
+        assert omega_c == pytest.approx(5.0 * math.exp(-k * (t1 - 0.3)) + fluid, rel=1e-12)
+        turned = quad(lambda s: float(two_point_rolling.omega_c(s, at, until, p, ramp)), 0.3, t1, epsrel=1e-12)[0]
+        assert theta - 1.1 == pytest.approx(turned, rel=1e-11)
+        kinetic = p.m * p.R**2 * (1 + 2 * p.j) * (omega_c**2 - 25.0) / 2
+        assert work == pytest.approx(kinetic, abs=1e-13 * p.m * p.R**2 * omega_c**2 + 1e-16)
