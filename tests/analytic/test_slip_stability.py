@@ -119,6 +119,37 @@ def test_limit_is_the_limit() -> None:
     assert B_x > 0
 
 
+INNER = {
+    Case.RR: [0, 0, 9.0, 0, 0, 0], Case.RS: [0, 0, 9.0, 0, 4.0, 0], Case.SR: [0, 0, 9.0, -6.0, 0, 0],
+    Case.NR: [0.1, 0.2, 9.0, -6.0, 0, 0],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("inner", "outer"), slip.SLIP_ARROWS)
+def test_gamma_of_every_arrow(inner: Case, outer: Case) -> None:
+    """(53) from the vector field itself at x* + eps n, in random directions: the error is linear in eps."""
+    p, x = P.replace(omega_0=10.0), np.array(INNER[inner], dtype=float)
+    W = [3 + ("slip_x", "slip_y", "slip_z").index(name) for name in slip.normals(inner, outer)]
+    for n in RNG.normal(size=(5, len(W))):
+        unit = n / np.linalg.norm(n)
+        near = x.copy()
+        near[W] += 1e-9 * unit
+        expected = vector_field(outer, near, p)[W] @ unit
+        np.testing.assert_allclose(slip.gamma(inner, outer, x, n, p), expected, rtol=1e-6, atol=1e-5)
+
+
+def test_gamma_and_cone_agree_all_over_nr() -> None:
+    """What the paper says after (61): gamma < 0 in all directions exactly where the friction cone holds."""
+    p = P.replace(omega_0=20.0, eta=0.5)
+    signs = []
+    for v_y, omega_c, w_x in RNG.normal(0, [0.5, 20, 60], (40, 3)):
+        x = [0.1, v_y, omega_c, w_x, 0, 0]
+        holds = slip.stick_margin(Case.NR, x, p) > 0
+        assert (slip.extrema(Case.NR, Case.NS, x, p)[1].gamma < 0) == holds
+        signs.append(holds)
+    assert 5 < sum(signs) < 35
+
+
 # --- kinetic energy --------------------------------------------------------------------------------------------
 
 
