@@ -12,6 +12,7 @@ import numpy.typing as npt
 from mjsim import recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
+from mjsim.journal import Journal
 from mjsim.stepping import Many, Single, Stepper
 from model import Flow, Header, InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
@@ -36,6 +37,7 @@ class Run:
     theta_0 : azimuth at the start, rad
     batched : whether to use MuJoCo's batch even for one run. Its results don't depend on how many runs share it,
         to the bit; a single run outside is faster and rounds differently.
+    journal : keeps what was done, and knows what an earlier process did; for runs in a batch
 
     Each iteration yields one block per run, structured arrays of dtype `model.trajectory.SAMPLE`. A run that diverges
     yields what it has, then empty blocks, and its header says why.
@@ -49,7 +51,7 @@ class Run:
     def __init__(
         self, parameters: Sequence[Parameters], x0s: Sequence[npt.ArrayLike], t_end: float,
         flows: Sequence[Flow], settings: ContactSettings, *, sample_interval: float | None = None, theta_0: float = 0.0,
-        batched: bool = True,
+        batched: bool = True, journal: Journal | None = None,
     ) -> None:  # fmt: skip
         if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
             raise InputError(
@@ -57,6 +59,7 @@ class Run:
                 f"{len(x0s)} starts and {len(flows)} flows"
             )
         self._parameters, self._flows, self._settings = list(parameters), list(flows), settings
+        self._journal = journal
         self._interval, self._count = _sampling(t_end, settings.timestep, sample_interval)
         states = [full_state(np.asarray(x0, dtype=float)) for x0 in x0s]
         theta_0 = check_number("theta_0", theta_0, "rad")
@@ -92,18 +95,35 @@ class Run:
         return self._stepper.margins
 
     def __iter__(self) -> Iterator[list[npt.NDArray[np.void]]]:
-        n = len(self._parameters)
-        for first in range(0, self._count, BLOCK):
-            rows = range(first, min(first + BLOCK, self._count))
-            raw = np.empty((len(rows), n, recorder.NQ + recorder.NV + recorder.NSENSOR))
+        first = 0
+        for raw in self._raw_blocks():
+            last = first + len(raw)
+            time = np.arange(first, last, dtype=np.float64) * (self._interval * self._settings.timestep)
+            yield [self._finish(i, time, raw[:, i], last == self._count) for i in range(len(self._parameters))]
+            if all(header.failure for header in self.headers):
+                return
+            first = last
+
+    def _raw_blocks(self) -> Iterator[Array]:
+        """Raw samples (samples, runs, columns): those the journal knows, then new ones."""
+        first = 0
+        if self._journal:
+            blocks, state = self._journal.recall()
+            if state:
+                self._stepper.restore(state)
+            for raw in blocks:
+                yield raw
+                first += len(raw)
+        for start in range(first, self._count, BLOCK):
+            rows = range(start, min(start + BLOCK, self._count))
+            raw = np.empty((len(rows), len(self._parameters), recorder.NQ + recorder.NV + recorder.NSENSOR))
             for k, row in enumerate(rows):
                 omega_0 = self._omega_0(row * self._interval, self._interval if row + 1 < self._count else 1)
                 self._stepper.sample(omega_0[0], raw[k])
                 self._stepper.advance(omega_0[1:])
-            time = np.arange(rows.start, rows.stop, dtype=np.float64) * (self._interval * self._settings.timestep)
-            yield [self._finish(i, time, raw[:, i], last=rows.stop == self._count) for i in range(n)]
-            if all(header.failure for header in self.headers):
-                return
+            if self._journal:
+                self._journal.note(raw, self._stepper.state())
+            yield raw
 
     def _omega_0(self, first: int, count: int) -> Array:
         """omega_0 in the middle of each step, shape (count, runs)."""

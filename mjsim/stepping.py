@@ -53,6 +53,12 @@ class Stepper(Protocol):
     def advance(self, omega_0: Array) -> None:
         """Take a step for every row of omega_0 (steps, runs)."""
 
+    def state(self) -> dict[str, Array]:
+        """Copies of all that is carried from one step to the next."""
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Go on from such a state."""
+
 
 class Single(Stepper):
     """One simulation in plain floats, which beat arrays of one."""
@@ -93,6 +99,12 @@ class Single(Stepper):
 
     def advance(self, omega_0: Array) -> None:
         self._steps(omega_0[:, 0].tolist(), mujoco.mj_step)
+
+    def state(self) -> dict[str, Array]:
+        raise NotImplementedError("only runs in a batch can be taken up again")
+
+    def restore(self, state: dict[str, Array]) -> None:
+        raise NotImplementedError("only runs in a batch can be taken up again")
 
     def _steps(self, omega_0: list[float], step: Callable[[Any, Any], None]) -> None:
         model, data, p, settings = self._model, self._data, self._p, self._settings
@@ -164,7 +176,8 @@ class Many(Stepper):
         self._qpos[:, :3] += settings.lead * self._qvel[:, :3]
         self._orientation = self._qpos[:, 3:7]
         self._applied, self._turn = batch.bind("qfrc_applied"), batch.bind("mocap_quat")[:, 0]
-        self._constraint, self._acceleration = batch.bind("qfrc_constraint"), batch.bind("qacc")
+        self._acceleration = batch.bind("qacc")
+        self._contact = self._outputs = batch.bind("qfrc_constraint"), self._sensors
         self.margins = batch.expand("pair_margin")
         surface = batch.expand("geom_surfacevel")
         self._floor, self._wall = (surface[:, models[0].geom(name).id, :2].T for name in ("floor", "wall"))
@@ -204,7 +217,24 @@ class Many(Stepper):
             if gain:
                 np.maximum(margins - gain * gaps, 0.0, out=margins)
             self._batch.step()
-            self._last = velocities
+            self._last, self._contact = velocities, self._outputs
+
+    def state(self) -> dict[str, Array]:
+        constraint, sensors = self._contact
+        carried = self._carried() | {"qfrc_constraint": constraint, "sensordata": sensors, "last": self._last}
+        return {name: values.copy() for name, values in carried.items()}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        for name, values in self._carried().items():
+            values[...] = state[name]
+        # What the engine puts out can't be written back: until its next step, the copies stand in for it.
+        self._contact = state["qfrc_constraint"], state["sensordata"]
+        self._last = state["last"]
+
+    def _carried(self) -> dict[str, Array]:
+        """The arrays that can be written and of which the next step depends on the values."""
+        inner = {name: self._batch.bind(name) for name in ("qpos", "qvel", "qacc_warmstart")}
+        return inner | {"margins": self.margins, "floor": self._floor, "wall": self._wall}
 
     def _velocities(self, qvel: Array | None = None) -> Array:
         """(rho omega_c, v_h, v_y, r omega_c, r o_x, r o_y, r o_z), all in m s-1, shape (7, runs)."""
@@ -233,8 +263,9 @@ class Many(Stepper):
         force[0] *= rho
         self._applied.T[:] = force
         if settings.shifts_surfaces:
-            surface = self._constraint.T.take(_FRICTION, axis=0)
-            surface[1:3] -= self._sensors.T.take(_NORMALS, axis=0)
+            constraint, sensors = self._contact
+            surface = constraint.T.take(_FRICTION, axis=0)
+            surface[1:3] -= sensors.T.take(_NORMALS, axis=0)
             surface *= self._shift
             slip, slip_change = _SLIP.dot(v), _SLIP.dot(change)
             slides = _PAIRS.dot(slip * slip - _SLIDES**2 * slip_change * slip_change) > 0

@@ -1,0 +1,75 @@
+"""What a long run has done so far, on disk: killed at any moment, it goes on from there, to the bit.
+
+A journal is a directory of segments. Each holds the raw samples since the one before and everything the stepper carries
+from one step to the next; it is a whole HDF5 file or not there at all.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from model.arrays import Array
+from model.errors import StorageError
+from model.hdf5 import WholeFile, remove_leftovers
+
+
+class Journal:
+    """The segments of one run.
+
+    Parameters
+    ----------
+    directory : where they are; made if it doesn't exist
+    interval : least time between two segments, s of real time
+
+    Raises `StorageError` if it can't be read or written.
+    """
+
+    def __init__(self, directory: Path, interval: float = 30.0) -> None:
+        self._directory, self._interval = directory, interval
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StorageError(f"cannot write {directory}: {error.strerror}") from error
+        remove_leftovers(directory)
+        self._count = len(list(directory.glob("*.h5")))
+        self._waiting: list[Array] = []
+        self._last = time.monotonic()
+
+    def recall(self) -> tuple[list[Array], dict[str, Array]]:
+        """Blocks of raw samples (samples, runs, columns) so far, and the stepper's state after them; empty if none."""
+        blocks, state = [], {}
+        for k in range(self._count):
+            path = self._path(k)
+            try:
+                with h5py.File(path, "r") as file:
+                    blocks.append(file["samples"][...])
+                    state = {name: dataset[...] for name, dataset in file["state"].items()}
+            except (OSError, KeyError) as error:
+                raise StorageError(f"cannot read {path}: {error}; remove {self._directory} to start anew") from error
+        return blocks, state
+
+    def note(self, samples: Array, state: dict[str, Array]) -> None:
+        """Keep a block of raw samples and the state after it; written once the interval has passed."""
+        self._waiting.append(samples)
+        if time.monotonic() - self._last < self._interval:
+            return
+        with WholeFile(self._path(self._count)) as whole:
+            whole.file["samples"] = np.concatenate(self._waiting)
+            for name, values in state.items():
+                whole.file[f"state/{name}"] = values
+            whole.finish()
+        self._count += 1
+        self._waiting = []
+        self._last = time.monotonic()
+
+    def discard(self) -> None:
+        """Remove all segments, when the run itself is stored."""
+        shutil.rmtree(self._directory)
+
+    def _path(self, k: int) -> Path:
+        return self._directory / f"{k:06d}.h5"

@@ -1,0 +1,50 @@
+"""A run that is taken up again gives the bits of one that was never interrupted."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mjsim import ContactSettings, Run
+from mjsim.journal import Journal
+from model import Flow, Parameters, StorageError
+
+P = Parameters.named("reference").replace(omega_0=25.0)
+
+
+def run(directory: Path | None) -> Run:
+    """Spin-up from rest through rolling into slipping: about four blocks of samples."""
+    journal = Journal(directory, interval=0.0) if directory else None
+    return Run([P], [np.zeros(8)], 4.5, [Flow.steady(25.0)], ContactSettings(), sample_interval=5e-3, journal=journal)
+
+
+def joined(part: Run) -> np.ndarray:
+    return np.concatenate([blocks[0] for blocks in part])
+
+
+@pytest.fixture(scope="module")
+def uninterrupted() -> np.ndarray:
+    return joined(run(None))
+
+
+@pytest.mark.parametrize("blocks", [0, 1, 2, 3])
+def test_taken_up_after_some_blocks(tmp_path: Path, uninterrupted: np.ndarray, blocks: int) -> None:
+    list(islice(run(tmp_path / "journal"), blocks))
+    again = run(tmp_path / "journal")
+    np.testing.assert_array_equal(joined(again), uninterrupted)
+
+
+def test_a_damaged_journal_says_what_to_do(tmp_path: Path) -> None:
+    list(islice(run(tmp_path / "journal"), 2))
+    (tmp_path / "journal" / "000000.h5").write_bytes(b"no HDF5")
+    with pytest.raises(StorageError, match="remove .*journal to start anew"):
+        joined(run(tmp_path / "journal"))
+
+
+def test_it_is_gone_when_it_is_discarded(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "journal")
+    journal.discard()
+    assert not (tmp_path / "journal").exists()
