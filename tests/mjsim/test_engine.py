@@ -57,6 +57,20 @@ def test_contact_force_is_the_weight_at_rest() -> None:
     assert abs(run.gap_A[-1]) < 1e-12
 
 
+def test_forces_of_rolling_on_the_wall_alone() -> None:
+    """Carried by the wall alone at the fluid's speed: it turns the path, B_x = m R omega_0^2, and bears the weight.
+
+    The axial oscillation about that state decays with 2(1 + j)/c = 2.8 s, so that 1e-9 is left of it after 60 s.
+    """
+    p = Parameters.named("high-wall-friction").replace(omega_0=25.0)
+    settings = ContactSettings.at(4e-3)
+    slip_x = (p.g / p.j - p.R * p.omega_0**2) / (p.r * p.omega_0)  # B_y = m g carries no moment about the centre's path
+    run = mjsim.simulate(p, [0, 0, p.omega_0, slip_x, 0, 0], 60.0, settings=settings)
+    np.testing.assert_allclose(run.force_B[-1], [p.m * p.R * p.omega_0**2, p.m * p.g, 0], atol=1e-8 * p.m * p.g)
+    assert run.cases[-1].name == "NR"
+    assert run.omega_c[-1] == pytest.approx(p.omega_0, rel=1e-12)
+
+
 def test_divergence_stops_a_run_and_keeps_what_there_is() -> None:
     wild = [0, 0, 1e9, 0, 0, 0]
     with pytest.raises(SimulationError, match=r"diverged by t = .* s") as caught:
