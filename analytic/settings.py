@@ -38,9 +38,9 @@ class Settings:
     """Newton's coefficient of restitution e of both contacts, 0 <= e <= 1."""
     leave_rolling: str = "infeasible"
     """When RR ends, whose forces are not determined (event). ``infeasible``: when no forces within both Coulomb
-    cones can hold it. ``slip-stability``: as soon as a slight slip, of A alone, of B alone, or of both along the limit
-    direction of (82), would grow. In a stationary orbit both agree; off it the second comes first, because
-    between the two bounds sticking and slipping are both consistent."""
+    cones can hold it. ``slip-stability``: already when a slight slip, of A alone, of B alone, or of both along (0, 0)
+    as in (82), would grow. In a stationary orbit both agree; off it the second may come earlier: between the bounds
+    (73) or (66) and the cones sticking and slipping are both consistent."""
     initial_impact: bool = False
     """Let a ball that starts with a speed into a closed contact collide at once, instead of refusing it."""
 

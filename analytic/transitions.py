@@ -49,8 +49,8 @@ def choose(at: Moment, p: Parameters, omega_0: float, leave_rolling: str = "infe
     if closed_A and closed_B and not any(slip_A) and not any(slip_B):
         if two_point_rolling.holds(x[2], p, omega_0, leave_rolling):
             return Case.RR, replace(at, alpha=math.nan, beta=math.nan)
-        if directions := two_point_rolling.onset(x[2], p, omega_0):
-            return Case.SS, replace(at, alpha=directions[0], beta=directions[1])
+        if two_point_rolling.holds(x[2], p, omega_0, "infeasible") or two_point_rolling.onset(x[2], p, omega_0):
+            return two_point_rolling.leave(at, p, omega_0)
     A, B = _closed(closed_A, slip_A), _closed(closed_B, slip_B)
     free = smooth_rates(u, Place(x[6] - p.R, 0.0, x[2]), omega_0, p)
     rates, force = solve(free, A, B, p, tolerance=STILL / 1e4)

@@ -119,8 +119,8 @@ def _infeasible(omega_c: float, p: Parameters, omega_0: float) -> float:
 
 
 def _slip_growth(omega_c: float, p: Parameters, omega_0: float) -> float:
-    """Minus the growth of the fastest slip, in units of g/r."""
-    return -_fastest_slip(omega_c, p, omega_0)[2] * p.r / p.g
+    """Minus the growth of the fastest slip, in units of g/r, but no more than the margin of the forces."""
+    return min(-_fastest_slip(omega_c, p, omega_0)[2] * p.r / p.g, _infeasible(omega_c, p, omega_0))
 
 
 def _fastest_slip(omega_c: float, p: Parameters, omega_0: float) -> tuple[Case, tuple[float, float, float], float]:

@@ -1,0 +1,239 @@
+"""Event-driven simulation against closed forms, plain integration, and the stationary solutions.
+
+Event times are compared at 1e-9 relative, the default tolerance of the integrator.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from analytic import rolling_forces, simulate, stationary_solutions, two_point_rolling, vector_field
+from model import Case, Flow, Parameters
+
+P = Parameters.named("reference")
+RTOL = 1e-9
+OFFSET = np.array([0, 0, 0.5, 3, 2, -3])
+
+
+def states_of(trajectory):
+    """(from, to) of every event."""
+    events = trajectory.events
+    return [(Case(a), Case(b)) for a, b in zip(events.from_case, events.to_case, strict=True)]
+
+
+def balance(trajectory):
+    return trajectory.header.settings["energy_residual"] / trajectory.header.settings["energy_scale"]
+
+
+def stationary(case, p):
+    (solution,) = [s for s in stationary_solutions(p) if s.case is case and s.exists]
+    return np.asarray(solution.x)[:6]
+
+
+# Closed forms -------------------------------------------------------------------------------------------------------
+
+
+def test_sliding_ball_on_the_floor():
+    """Without fluid a ball that slides with v rolls with v/(1+j) after v/(mu g (1 + 1/j)) seconds."""
+    p, v, h = P.replace(c=0.0), 0.05, 0.03
+    x0 = [0, 0, v / (p.R - h), -v / p.r, v / p.r, 0, h, 0]  # no spin at all, along k
+    run = simulate(p, x0, 0.2, sample_interval=0.01)
+    assert states_of(run)[0] == (Case.SN, Case.RN)
+    assert run.events.time[0] == pytest.approx(v / (p.mu * p.g * (1 + 1 / p.j)), rel=RTOL)
+    after = run.time > run.events.time[0]
+    speed = np.hypot((p.R - run.h) * run.omega_c, run.v_h)
+    np.testing.assert_allclose(speed[after], v / (1 + p.j), rtol=RTOL)
+    assert balance(run) < RTOL
+
+
+def test_bounces_come_to_rest():
+    """Bounces on the spot without drag: t_k = t_0 (1 + 2 e + … + 2 e^k), and rest at t_0 (1+e)/(1-e)."""
+    p, y, e = P.replace(c=0.0, omega_0=0.0), 0.04, 0.6
+    run = simulate(p, [y, 0, 0, 0, 0, 0, 0.02, 0], 1.0, restitution=e, sample_interval=0.1)
+    t_0, m_v = math.sqrt(2 * y / p.g), p.m * math.sqrt(2 * p.g * y)
+    count = len(run.events)
+    expected = t_0 * (1 + 2 * np.cumsum(np.append(0.0, e ** np.arange(1, count))))
+    np.testing.assert_allclose(run.events.time, expected, rtol=RTOL)
+    np.testing.assert_allclose(run.events.impulse_A[:, 1], m_v * (1 + e) * e ** np.arange(count), rtol=1e-6, atol=1e-12)
+    assert run.events.time[-1] == pytest.approx(t_0 * (1 + e) / (1 - e), rel=RTOL)
+    assert states_of(run)[-1] == (Case.NN, Case.RN)
+    assert balance(run) < RTOL
+
+
+def test_fall_along_a_smooth_wall():
+    """NS with eta = 0: only drag resists, y = y_0 + (v_0 + g/c)(1 - exp(-c t))/c - g t/c."""
+    p, y, v = P.replace(eta=0.0, omega_0=5.0), 0.1, 0.3
+
+    def height(t):
+        return y + (v + p.g / p.c) * (1 - math.exp(-p.c * t)) / p.c - p.g * t / p.c
+
+    run = simulate(p, [y, v, 5.0, 1.0, 2.0, 3.0], 0.5, sample_interval=0.01)
+    landing = brentq(height, 0.1, 1.0, xtol=1e-15)
+    assert run.cases[0] is Case.NS
+    assert run.events.time[0] == pytest.approx(landing, rel=RTOL)
+    before = run.time < landing
+    np.testing.assert_allclose(run.y[before], [height(t) for t in run.time[before]], atol=RTOL * y)
+
+
+def test_spin_up_from_rest():
+    """From rest the ball slips at the wall while it rolls on the floor; (24) is a Riccati equation.
+
+    With a = c/(1+j): omega_c = phi'/(eta phi), phi = exp(-a t/2)(cosh(q t/2) + a/q sinh(q t/2)), q^2 = a^2 +
+    4 eta a omega_0; w_y = R/r (omega_c - eta (1+j)/j int omega_c^2), eta omega_c^2 = a (omega_0 - omega_c) - omega_c'.
+    """
+    p = P.replace(omega_0=12.0)
+    a = p.c / (1 + p.j)
+    q = math.sqrt(a**2 + 4 * p.eta * a * p.omega_0)
+
+    def omega_c(t):
+        return 2 * a * p.omega_0 * math.tanh(q * t / 2) / (q + a * math.tanh(q * t / 2))
+
+    def w_y(t):
+        log_phi = -a * t / 2 + math.log(math.cosh(q * t / 2) + a / q * math.sinh(q * t / 2))
+        eta_square = a * (p.omega_0 * t - log_phi / p.eta) - omega_c(t)
+        return p.R / p.r * (omega_c(t) - (1 + p.j) / p.j * eta_square)
+
+    run = simulate(p, np.zeros(6), 1.5, sample_interval=0.01)
+    assert states_of(run) == [(Case.RS, Case.RR)]
+    end = brentq(w_y, 0.3, 2.0, xtol=1e-15)
+    assert run.events.time[0] == pytest.approx(end, rel=RTOL)
+    slipping = run.time < end
+    np.testing.assert_allclose(run.omega_c[slipping], [omega_c(t) for t in run.time[slipping]], atol=RTOL * 12)
+    np.testing.assert_allclose(run.slip_y[slipping], [w_y(t) for t in run.time[slipping]], atol=RTOL * 60)
+    assert balance(run) < RTOL
+
+
+def test_rolling_ends_where_no_forces_are_left():
+    """RR: omega_c by its exponential up to the event, where the margin of the cones is zero; SS sets in smoothly."""
+    p = P.replace(omega_0=25.0)
+    run = simulate(p, [0, 0, 9.0, 0, 0, 0], 1.0, sample_interval=0.01)
+    assert states_of(run) == [(Case.RR, Case.SS)]
+    end = run.events.time[0]
+    omega_c = 25.0 - 16.0 * math.exp(-p.c * end / (1 + 2 * p.j))
+    assert rolling_forces.margin(omega_c, p) == pytest.approx(0.0, abs=1e-13)
+    before = run.time < end
+    np.testing.assert_allclose(run.omega_c[before], 25 - 16 * np.exp(-run.time[before] / 1.8), rtol=1e-13)
+    # Just after the end slip grows from zero: its second derivative is finite, so w_z is of order (t - end)^2.
+    soon = simulate(p, [0, 0, 9.0, 0, 0, 0], end + 2e-3, sample_interval=1e-3).slip_z[-1]
+    sooner = simulate(p, [0, 0, 9.0, 0, 0, 0], end + 1e-3, sample_interval=1e-3).slip_z[-1]
+    assert soon / sooner == pytest.approx(4.0, rel=0.05)
+
+
+def test_rolling_left_at_the_slip_stability_bound():
+    """Off the stationary orbit a slip can grow before the forces run out: one option leaves RR, the other stays."""
+    p, omega_c = P.replace(mu=0.6, eta=0.6, c=5.0), 3.0
+    fluids = np.linspace(3.0, 15.0, 100)
+    both = [
+        fluid for fluid in fluids
+        if two_point_rolling.holds(omega_c, p, fluid, "infeasible")
+        and not two_point_rolling.holds(omega_c, p, fluid, "slip-stability")
+    ]  # fmt: skip
+    assert both
+    q = p.replace(omega_0=both[len(both) // 2])
+    stays = simulate(q, [0, 0, omega_c, 0, 0, 0], 1e-3)
+    leaves = simulate(q, [0, 0, omega_c, 0, 0, 0], 1e-3, leave_rolling="slip-stability")
+    assert stays.cases[0] is Case.RR
+    assert leaves.cases[0] is Case.RS  # (66): the wall gives way first
+    assert leaves.slip_speed_B[-1] > 0
+
+
+# Against plain integration and stationary solutions -----------------------------------------------------------------
+
+
+def f_ss(p):
+    """f_SS of (26) in (omega_c, w_x, w_y, w_z) for a plain integrator."""
+
+    def rhs(_, z):
+        return vector_field(Case.SS, [0, 0, *z], p)[2:]
+
+    return rhs
+
+
+def test_two_point_slipping_against_plain_integration():
+    p = P.replace(omega_0=25.0)
+    x0 = stationary(Case.SS, p) + OFFSET
+    run = simulate(p, x0, 10.0, sample_interval=0.1)
+    plain = solve_ivp(f_ss(p), (0, 10), x0[2:], method="DOP853", rtol=1e-13, atol=1e-13, t_eval=run.time)
+    np.testing.assert_allclose(run.x[:, 2:6], plain.y.T, rtol=1e-8, atol=1e-8)
+    assert not len(run.events)
+    assert balance(run) < RTOL
+
+
+def test_sticking_on_the_way_to_two_point_slipping():
+    """Where slip vanishes on the way, plain integration fails; the ball sticks for a while and goes on."""
+    p = P.replace(omega_0=14.5)
+    settled = stationary(Case.SS, p)
+    run = simulate(p, settled + OFFSET, 70.0, sample_interval=1.0)
+    assert (Case.RR, Case.SS) in states_of(run)
+    # What is left decays as exp(-t c/(2 (1+2j))).
+    left = math.exp(-70.0 * p.c / (2 * (1 + 2 * p.j)))
+    np.testing.assert_allclose(run.x[-1, 2:6], settled[2:], atol=1e-8 + 10 * left)
+
+
+@pytest.mark.parametrize(
+    ("name", "omega_0", "case"),
+    [("reference", 12.0, Case.RR), ("reference", 25.0, Case.SS), ("high-wall-friction", 25.0, Case.NR)],
+)
+def test_stationary_solutions_stay(name, omega_0, case):
+    p = Parameters.named(name).replace(omega_0=omega_0)
+    x0 = stationary(case, p)
+    x0[0] = 0.01 if case is Case.NR else 0.0  # where y is neutral
+    run = simulate(p, x0, 3.0, sample_interval=0.1)
+    assert not len(run.events)
+    assert run.cases[-1] is case
+    np.testing.assert_allclose(run.x[-1, :6], x0, atol=1e-7)
+    assert run.theta[-1] == pytest.approx(3.0 * x0[2], rel=1e-9)
+
+
+def test_flow_that_jumps_and_ramps():
+    """Two levels and a ramp at RR: omega_c follows its linear equation through each piece."""
+    p = P.replace(omega_0=0.0)
+    flow = Flow.sampled([0.0, 1.0, 2.0], [8.0, 12.0, 10.0])
+    run = simulate(p, [0, 0, 8.0, 0, 0, 0], 3.0, flow, sample_interval=0.05)
+    plain = solve_ivp(
+        lambda t, w: -p.c * (w - flow(t)) / (1 + 2 * p.j), (0, 3), [8.0], rtol=1e-11, atol=1e-12, max_step=0.01,
+        t_eval=run.time,
+    )  # fmt: skip
+    np.testing.assert_allclose(run.omega_c, plain.y[0], rtol=1e-8)
+    stairs = simulate(p, [0, 0, 10.0, 0, 0, 0], 3.0, Flow.staircase([10.0, 25.0], 1.0), sample_interval=0.05)
+    assert np.all(stairs.omega_c[stairs.time <= 1] == 10.0)
+    assert stairs.omega_c[-1] > 12
+
+
+def test_a_jump_of_the_flow_ends_rolling_at_once():
+    """When the fluid jumps so far that no forces can hold RR, slip sets in at the jump itself."""
+    p = P.replace(c=5.0, omega_0=10.0)
+    run = simulate(p, [0, 0, 10.0, 0, 0, 0], 1.0, Flow.staircase([10.0, 60.0], 0.5), sample_interval=0.01)
+    assert rolling_forces.margin(10.0, p, 60.0) < 0
+    assert run.events.time[0] == 0.5
+    assert run.events.from_case[0] == Case.RR
+
+
+def test_a_ball_lifts_off_the_floor_and_rides_the_wall():
+    """Beyond the tip of the cone at omega_03 a rough wall carries the ball: NR or SR take over, A_y never negative."""
+    p = Parameters.named("high-wall-friction").replace(omega_0=25.0)
+    run = simulate(p, [0, 0, 12.0, 0, 0, 0], 20.0, sample_interval=0.05)
+    assert Case.RR in run.cases
+    assert run.cases[-1] in (Case.NR, Case.SR)
+    assert run.omega_c[-1] == pytest.approx(25.0, abs=25 * math.exp(-(20 - 2) / (1 + 2 * p.j)))
+    assert run.force_A[:, 1].min() >= -RTOL * p.m * p.g
+    assert balance(run) < 10 * RTOL
+
+
+def test_near_the_axis_is_an_ordinary_place():
+    """A flight that passes 1e-7 m from the axis is a straight line (no drag), though omega_c is huge there."""
+    p = P.replace(c=0.0)
+    miss, v = 1e-7, 0.2
+    rho = 0.02
+    radial, along = v * math.sqrt(1 - (miss / rho) ** 2), v * miss / rho
+    x0 = [0.03, 0, along / rho, 0, 0, 0, p.R - rho, radial]
+    run = simulate(p, x0, 0.07, sample_interval=0.001, theta_0=0.4)
+    place = (p.R - run.h) * np.exp(1j * run.theta)
+    start = rho * np.exp(0.4j)
+    velocity = np.exp(0.4j) * (-radial + 1j * along)
+    np.testing.assert_allclose(place, start + velocity * run.time, atol=1e-11)
