@@ -64,6 +64,12 @@ class ContactSettings:
     """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
     order: int = 2
     """2: forces are taken in the middle of a step; 1: at its beginning, as MuJoCo does by itself."""
+    coordinates: str = "polar"
+    """``polar``: azimuth, radius and height as joints; ``free``: a free joint, for comparison (`mjsim.free`)."""
+    wall: str = "tangent"
+    """``tangent``: one plane turned to the ball's azimuth; ``prism``: `facets` fixed planes."""
+    facets: int = 90
+    """Number of planes of the prism."""
     cone: str = "elliptic"
     integrator: str = "Euler"
     iterations: int = 100
@@ -83,11 +89,25 @@ class ContactSettings:
         self._check_range("tolerance", self.tolerance, "1", ">= 0", 0.0)
         self._check_range("iterations", self.iterations, "1", ">= 1", 1)
         self._check_range("noslip_iterations", self.noslip_iterations, "1", ">= 0", 0)
-        for name, value, known in (("cone", self.cone, CONES), ("integrator", self.integrator, INTEGRATORS)):
+        self._check_range("facets", self.facets, "1", ">= 3 and <= 2000", 3, 2000)
+        for name, value, known in (
+            ("cone", self.cone, CONES), ("integrator", self.integrator, INTEGRATORS),
+            ("coordinates", self.coordinates, ("polar", "free")), ("wall", self.wall, ("tangent", "prism")),
+        ):  # fmt: skip
             if value not in known:
                 raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(str(value), known)}")
         if self.order not in (1, 2):
             raise InputError(f"order = {self.order!r} must be 1 or 2")
+        if self.wall == "prism" and self.coordinates != "free":
+            raise InputError("wall = 'prism' needs coordinates = 'free'")
+        if self.wall == "prism" and self.servo:
+            raise InputError(
+                f"wall = 'prism' needs servo = 0, not {self.servo:g} s: at an edge two facets share the ball"
+            )
+        if self.coordinates == "free" and (self.memory or self.order != 1):
+            raise InputError(
+                "coordinates = 'free' needs memory = False and order = 1: the corrections are for the joints"
+            )
         if self.memory and self.cone != "elliptic":
             raise InputError(
                 f"memory needs the elliptic cone, not cone = {self.cone!r}: its rows mix normal and friction"
@@ -163,6 +183,13 @@ class ContactSettings:
     def creep_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory."""
         return self.regularisation_speed(load) * (0.0 if self.memory else 1.0)
+
+    def free_joint_creep(self, R: float, omega_c: float) -> float:
+        """Slip speed (m s-1) at B, up the wall, of a rolling ball on a free joint: R omega_c^2/b_f.
+
+        The contact frame turns, and MuJoCo drives J v' where it should drive J v' + J' v.
+        """
+        return R * omega_c**2 / self.b_f
 
     @property
     def servo_gain(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +13,10 @@ import numpy.typing as npt
 from mjsim import recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
+from mjsim.free import Free
 from mjsim.journal import Journal
 from mjsim.stepping import Many, Single, Stepper
-from model import Flow, Header, InputError, Parameters, SimulationError, Trajectory
+from model import Events, Flow, Header, InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
 from model.kinematics import UNITS, VARIABLES, full_state, slip_speeds
 from model.parameters import check_number
@@ -65,13 +67,8 @@ class Run:
         theta_0 = check_number("theta_0", theta_0, "rad")
         for x, p in zip(states, parameters, strict=True):
             _warn_of_hovering(x, p, settings)
-        start = [recorder.joint_state(x, theta_0, p) for x, p in zip(states, parameters, strict=True)]
         models = [scene.build(p, settings) for p in parameters]
-        self._stepper: Stepper = (
-            Single(models[0], parameters[0], settings, start[0], float(self._omega_0(0, 1)[0, 0]))
-            if len(models) == 1 and not batched
-            else Many(models, parameters, settings, start, self._omega_0(0, 1)[0])
-        )
+        self._stepper = self._start(models, states, theta_0, batched)
         shown = settings.to_mapping() | {
             "t_end": float(t_end), "sample_interval": self._interval * settings.timestep,
             "x0": None, "theta_0": theta_0,
@@ -81,8 +78,22 @@ class Run:
             for p, flow, x in zip(parameters, flows, states, strict=True)
         ]
         """Where each trajectory comes from; a failure appears here."""
-        self.classifiers = [Classifier(p, settings) for p in parameters]
+        self._classifiers = [Classifier(p, settings) for p in parameters]
         """They hold the changes of case so far, as `events`."""
+
+    def _start(self, models: Sequence[Any], states: Sequence[Array], theta_0: float, batched: bool) -> Stepper:
+        parameters, settings, omega_0 = self._parameters, self._settings, self._omega_0(0, 1)[0]
+        if settings.coordinates == "free":
+            return Free(models, parameters, settings, states, theta_0)
+        start = [recorder.joint_state(x, theta_0, p) for x, p in zip(states, parameters, strict=True)]
+        if len(models) == 1 and not batched:
+            return Single(models[0], parameters[0], settings, start[0], float(omega_0[0]))
+        return Many(models, parameters, settings, start, omega_0)
+
+    @property
+    def events(self) -> list[Events]:
+        """Changes of case of each run so far."""
+        return [classifier.events for classifier in self._classifiers]
 
     @property
     def samples(self) -> int:
@@ -141,7 +152,7 @@ class Run:
         if not self.headers[i].failure and sound < len(time):
             state = recorder.state(qpos[sound - 1], qvel[sound - 1], p) if sound else None
             self._fail(i, float(time[sound]), state)
-        return self.classifiers[i].add(block, last or bool(self.headers[i].failure))
+        return self._classifiers[i].add(block, last or bool(self.headers[i].failure))
 
     def _fail(self, i: int, time: float, last: Array | None) -> None:
         where = "" if last is None else " after " + ", ".join(
@@ -215,8 +226,8 @@ def _collected(run: Run, progress: Callable[[float], None] | None) -> list[Traje
         if progress:
             progress(min(1.0, done / run.samples))
     return [
-        Trajectory.from_blocks(header, kept, classifier.events)
-        for header, kept, classifier in zip(run.headers, blocks, run.classifiers, strict=True)
+        Trajectory.from_blocks(header, kept, events)
+        for header, kept, events in zip(run.headers, blocks, run.events, strict=True)
     ]
 
 

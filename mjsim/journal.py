@@ -15,7 +15,7 @@ import numpy as np
 
 from model.arrays import Array
 from model.errors import StorageError
-from model.hdf5 import WholeFile, remove_leftovers
+from model.files import WholeFile, remove_leftovers
 
 
 class Journal:

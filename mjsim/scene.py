@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from mjsim.contact_settings import ContactSettings
 from model import InputError, Parameters
@@ -16,6 +18,8 @@ _ELEMENTS = {
     "body": ("ball", "tangent"), "geom": ("ball", "floor", "wall", "vessel"), "pair": ("A", "B"), "sensor": ("A", "B"),
     "joint": ("azimuth", "inward", "upward", "spin"),
 }  # fmt: skip
+_MAXFORCE = 2
+"""Code of reduce="maxforce" in a contact sensor."""
 _INTEGRATORS = {
     "Euler": mujoco.mjtIntegrator.mjINT_EULER,
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
@@ -36,6 +40,12 @@ def spec(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) ->
     _set_geometry(found["body"], found["geom"], found["joint"], p)
     for name, friction in (("A", p.mu), ("B", p.eta)):
         _set_pair(found["pair"][name], friction, settings)
+    if settings.coordinates == "free":
+        for joint in found["joint"].values():
+            spec.delete(joint)
+        found["body"]["ball"].add_freejoint(name="free")
+    if settings.wall == "prism":
+        _replace_wall(spec, found, p, settings)
     return spec
 
 
@@ -101,6 +111,26 @@ def _set_geometry(body: dict[str, Any], geom: dict[str, Any], joint: dict[str, A
     geom["floor"].size = (4 * p.R, 4 * p.R, p.r)
     geom["vessel"].pos = (0.0, 0.0, height * 1.005)
     geom["vessel"].size = (p.R + p.r, height, 0.0)
+
+
+def _replace_wall(spec: Any, found: dict[str, dict[str, Any]], p: Parameters, settings: ContactSettings) -> None:
+    """Put a regular prism of fixed planes, tangent to the vessel's cylinder, in the place of the wall."""
+    wall = found["geom"]["wall"]
+    for facet in range(settings.facets):
+        azimuth = 2 * math.pi * facet / settings.facets
+        outwards = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        geom = spec.worldbody.add_geom(
+            name=f"facet{facet}", type=mujoco.mjtGeom.mjGEOM_PLANE, size=wall.size, rgba=wall.rgba,
+            pos=(p.R + p.r) * outwards + [0.0, 0.0, 2 * p.r], contype=0, conaffinity=0,
+        )  # fmt: skip
+        geom.alt.type, geom.alt.zaxis = mujoco.mjtOrientation.mjORIENTATION_ZAXIS, -outwards
+        _set_pair(spec.add_pair(name=f"B{facet}", geomname1=geom.name, geomname2="ball"), p.eta, settings)
+    # Where two facets meet, the one that carries more is reported.
+    sensor = found["sensor"]["B"]
+    sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_BODY, "world"
+    sensor.intprm[1] = _MAXFORCE
+    spec.delete(found["pair"]["B"])
+    spec.delete(wall)
 
 
 def _set_pair(pair: Any, friction: float, settings: ContactSettings) -> None:

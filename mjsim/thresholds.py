@@ -175,21 +175,22 @@ def _tail(run: Trajectory, values: Array) -> Measured:
 def _root(omegas: Array, parameter: Sequence[Measured]) -> Measured:
     """Where the order parameter, as polynomials in omega_0 of rising degree, vanishes nearest to the first point."""
     values = np.array([m.value for m in parameter])
-    noise = parameter[0].uncertainty * float(abs((omegas[1] - omegas[0]) / (values[1] - values[0])))
+    noise = parameter[0].uncertainty * abs(float(omegas[1] - omegas[0]) / float(values[1] - values[0]))
     best = _best([_nearest_root(omegas[:n], values[:n], n - 2) for n in range(3, len(omegas) + 1)])
     return dataclasses.replace(best, uncertainty=math.hypot(best.uncertainty, noise))
 
 
 def _nearest_root(omegas: Array, values: Array, degree: int) -> float:
     fit = np.polynomial.Polynomial.fit(omegas, values, degree)
-    roots = [float(root.real) for root in fit.roots() if abs(root.imag) <= 1e-9 * abs(root)]
-    return min(roots, key=lambda root: abs(root - omegas[0])) if roots else math.nan
+    roots = fit.roots()
+    real = roots.real[np.abs(roots.imag) <= 1e-9 * np.abs(roots)]
+    return float(real[np.argmin(np.abs(real - omegas[0]))]) if len(real) else math.nan
 
 
 def _best(estimates: Sequence[float]) -> Measured:
-    """Of estimates of rising order the one that differs least from the one before; that is its uncertainty."""
+    """Of estimates of rising order the one that differs least from the one before; its neighbours say how certain."""
     changes = np.abs(np.diff(estimates))
     if np.all(np.isnan(changes)):
         return _ABSENT
     k = int(np.nanargmin(changes))
-    return Measured(float(estimates[k + 1]), float(changes[k]))
+    return Measured(float(estimates[k + 1]), float(np.nansum(changes[max(0, k - 1) : k + 2])))

@@ -1,0 +1,55 @@
+"""Variants of the scene, for comparison: what each gets wrong is as predicted."""
+
+import numpy as np
+import pytest
+
+import mjsim
+from mjsim import ContactSettings
+from model import InputError, Parameters
+
+P = Parameters.named("reference").replace(omega_0=12.0)
+ROLLING = [0, 0, 12.0, 0, 0, 0]
+
+
+def free(**changes):
+    return ContactSettings.at(1e-3, coordinates="free", memory=False, order=1, **changes)
+
+
+def test_free_joint_creeps_up_the_wall() -> None:
+    """J' v is left out of the contact rows: B slips at R omega_c^2 / b_f; regularisation adds a part in impratio."""
+    settings = free(impratio=1e4)
+    run = mjsim.simulate(P, ROLLING, 6.0, settings=settings)
+    assert {case.B.name for case in run.cases[10:]} == {"R"}
+    predicted = settings.free_joint_creep(P.R, run.omega_c[-1])
+    assert P.r * run.slip_z[-1] == pytest.approx(predicted, rel=0.01)
+    assert np.all(np.diff(run.theta) > 0)
+
+
+def test_free_ball_crosses_the_axis() -> None:
+    """Still fluid, no drag, no friction: a straight line through the axis, at constant speed."""
+    p = P.replace(omega_0=0.0, c=0.0, mu=0.0, eta=0.0)
+    run = mjsim.simulate(p, [0, 0, 0, 0, 0, 0, 0.01, 0.1], 0.6, settings=free(), sample_interval=0.01)
+    across = np.where(run.time < 0.4, 1, -1) * (p.R - run.h)
+    np.testing.assert_allclose(across, 0.04 - 0.1 * run.time, atol=1e-6)
+
+
+def test_prism_judders() -> None:
+    """The edges of 36 facets turn the path by 10 degrees each: the ball is not held on the wall."""
+    run = mjsim.simulate(P, ROLLING, 3.0, settings=free(wall="prism", facets=36, servo=0.0))
+    assert np.mean(run.force_B[:, 0] > 0) < 0.9
+    assert abs(run.omega_c[-100:].mean() / 12.0 - 1) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"coordinates": "free"}, "needs memory = False and order = 1"),
+        ({"wall": "prism"}, "needs coordinates = 'free'"),
+        ({"coordinates": "free", "memory": False, "order": 1, "wall": "prism"}, "needs servo = 0"),
+        ({"coordinates": "cartesian"}, "must be one of polar, free"),
+        ({"facets": 2}, "facets = 2"),
+    ],
+)
+def test_refused(changes, words) -> None:
+    with pytest.raises(InputError, match=words):
+        ContactSettings(**changes)
