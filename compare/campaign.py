@@ -7,27 +7,27 @@ rest. A run that broke down is stored as ``KEY.failed.h5`` with the samples it h
 
 from __future__ import annotations
 
+import json
 import math
 import os
-import signal
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from compare.tasks import Task, carry_out
+from compare.executors import Workers, processes
+from compare.tasks import OutOfTimeError, Task, failed_path, store
 from model import InputError, SimulationError, StorageError, Trajectory, storage
-from model.hdf5 import remove_leftovers
+from model.files import remove_leftovers, write_text
 
 BATCH = 64
 """Runs in one MuJoCo batch: where the engine's cost a step stops falling."""
 ATTEMPTS = 2
-"""How often a task may take its worker down with it before it is given up."""
+"""How often a task alone may take its worker down with it before it is given up."""
+FAILURES = "failures.json"
 
 
 @dataclass(frozen=True)
@@ -54,31 +54,36 @@ class Campaign:
     Parameters
     ----------
     directory : where the run files go; made if it doesn't exist
-    workers : number of processes; 0 runs everything in this one
-    executor : makes the executor instead (Dask's client has one of the same shape)
+    workers : number of processes, or `Workers` of another kind; 0 runs everything in this process
+    batch : most runs in one MuJoCo batch
+    limit : longest time a run may take, s; a run that takes longer is reported as failed
     report : called with a `Progress` after every batch
     """
 
     directory: Path
-    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
+    workers: int | Workers = field(default_factory=lambda: os.cpu_count() or 1)
     batch: int = BATCH
-    executor: Callable[[], Executor] | None = None
+    limit: float = math.inf
     report: Callable[[Progress], None] = lambda progress: None
     failures: list[Failure] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        if self.workers < 0:
-            raise InputError(f"workers = {self.workers} is out of range: must be >= 0")
+        if isinstance(self.workers, int):
+            self._workers = None if self.workers == 0 else processes(self.workers)
+        else:
+            self._workers = self.workers
         if self.batch < 1:
             raise InputError(f"batch = {self.batch} is out of range: must be >= 1")
-        self.directory = Path(self.directory)
+        if not self.limit > 0:
+            raise InputError(f"limit = {self.limit:g} s is out of range: must be > 0")
+        self.directory = Path(self.directory).resolve()
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise StorageError(f"cannot write to {self.directory}: {error.strerror}") from error
         if not os.access(self.directory, os.W_OK | os.X_OK):
             raise StorageError(f"cannot write to {self.directory}: Permission denied")
-        self._pool: Executor | None = None
+        self._executor: Executor | None = None
         remove_leftovers(self.directory)
 
     def __enter__(self) -> Self:
@@ -97,124 +102,123 @@ class Campaign:
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
 
-        Raises `SimulationError` for the first task that failed: use `complete` where failures are expected.
+        Raises `SimulationError` or `StorageError` for the first task that failed: use `complete` where failures are
+        expected.
         """
-        self.complete(tasks)
+        failed = {failure.task.key: failure.reason for failure in self.complete(tasks)}
         for task in tasks:
-            if not self.path(task).exists():
-                reason = next((f.reason for f in self.failures if f.task.key == task.key), "not computed")
-                partial = self._failed_path(task)
-                if partial.exists():
-                    raise SimulationError(reason, storage.load(partial))
-                raise StorageError(f"the run {task.key} failed: {reason}")
+            if task.key in failed:
+                kept = failed_path(self.path(task))
+                if kept.exists():
+                    raise SimulationError(f"the run {task.key} {failed[task.key]}", storage.load(kept))
+                raise StorageError(f"the run {task.key} failed: {failed[task.key]}")
         return [storage.load(self.path(task)) for task in tasks]
 
     def complete(self, tasks: Iterable[Task]) -> list[Failure]:
-        """Carry out every task that has no file yet; return those that failed, now or earlier."""
-        tasks = list({task.key: task for task in tasks}.values())
+        """Carry out every task that has no file yet; return those that failed, now or earlier.
+
+        The directory's `FAILURES` lists them for programs.
+        """
+        unique = list({task.key: task for task in tasks}.values())
         there = {entry.name for entry in os.scandir(self.directory)}
-        failures = [
-            Failure(task, storage.load(self._failed_path(task)).header.failure)
-            for task in tasks
-            if self._failed_path(task).name in there
-        ]
-        given_up = {failure.task.key for failure in failures}
-        todo = [task for task in tasks if self.path(task).name not in there and task.key not in given_up]
-        done = len(tasks) - len(todo) - len(failures)
-        self.report(Progress(done, len(tasks), len(failures)))
-        for finished, failed in self._carry_out(_batches(todo, self.batch, self.workers)):
+        todo, failures = [], []
+        for task in unique:
+            kept = failed_path(self.path(task))
+            if kept.name in there:
+                failures.append(Failure(task, storage.load(kept).header.failure))
+            elif self.path(task).name not in there:
+                todo.append(task)
+        done = len(unique) - len(todo) - len(failures)
+        self.report(Progress(done, len(unique), len(failures)))
+        for finished, failed in self._carry_out(_batches(todo, self.batch, self._workers)):
             done += finished
             failures += failed
-            self.report(Progress(done, len(tasks), len(failures)))
+            self.report(Progress(done, len(unique), len(failures)))
         known = {failure.task.key for failure in self.failures}
         self.failures += [failure for failure in failures if failure.task.key not in known]
+        if self.failures or (self.directory / FAILURES).exists():
+            self._list_failures()
         return failures
 
-    def _failed_path(self, task: Task) -> Path:
-        return self.directory / f"{task.key}.failed.h5"
+    def _list_failures(self) -> None:
+        listed = [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in self.failures]
+        write_text(self.directory / FAILURES, json.dumps(listed, indent=1))
 
-    def _carry_out(self, batches: Iterator[tuple[Task, ...]]) -> Iterator[tuple[int, list[Failure]]]:
+    def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[int, list[Failure]]]:
         """Yield, for each batch that ends, how many of its runs are whole and those that failed."""
-        if self.workers == 0 and self.executor is None:
-            for batch in batches:
-                yield _tally(batch, run_batch(batch, self.directory))
+        if self._workers is None:
+            for batch in fresh:
+                yield _tally(batch, run_batch(batch, self.directory, self.limit))
             return
-        retries: deque[tuple[tuple[Task, ...], int]] = deque()
-        pending: dict[Future[list[str]], tuple[tuple[Task, ...], int]] = {}
+        pending: dict[Future[list[str]], tuple[Task, ...]] = {}
+        # A worker that dies takes other batches down with it. Those are tried again one by one, alone, so that it
+        # shows which is to blame; a batch to blame is taken apart.
+        suspects: deque[tuple[Task, ...]] = deque()
+        blamed: Counter[str] = Counter()
         while True:
             # No more than a few batches wait at the executor, so that memory stays flat however long the list.
-            while len(pending) < 2 * max(self.workers, 1):
-                batch, attempt = retries.popleft() if retries else (next(batches, ()), 0)
-                if not batch:
-                    break
-                pending[self._submit(batch)] = (batch, attempt)
-            if not pending:
-                return
+            while len(pending) < 2 * self._workers.count and (batch := next(fresh, ())):
+                pending[self._submit(batch)] = batch
+            alone = not pending
+            if alone:
+                if not suspects:
+                    return
+                batch = suspects.popleft()
+                pending[self._submit(batch)] = batch
             ended, _ = wait(pending, return_when=FIRST_COMPLETED)
             for future in ended:
-                batch, attempt = pending.pop(future)
+                batch = pending.pop(future)
                 error = future.exception()
                 if error is None:
                     yield _tally(batch, future.result())
-                elif isinstance(error, BrokenProcessPool):
-                    self._stop(at_once=True)
-                    if len(batch) > 1:  # find the one that takes its worker down
-                        retries.extend(((task,), attempt) for task in batch)
-                    elif attempt + 1 < ATTEMPTS:
-                        retries.append((batch, attempt + 1))
-                    else:
-                        yield 0, [Failure(batch[0], "its worker process died (killed, or out of memory)")]
-                else:
+                elif not isinstance(error, self._workers.lost):
                     raise error
+                else:
+                    self._stop(at_once=True)
+                    if alone and len(batch) > 1:
+                        suspects.extend((task,) for task in batch)
+                    elif alone and (blamed.update([batch[0].key]) or blamed[batch[0].key]) >= ATTEMPTS:
+                        yield 0, [Failure(batch[0], "its worker died (killed, or out of memory)")]
+                    else:
+                        suspects.append(batch)
 
     def _submit(self, batch: tuple[Task, ...]) -> Future[list[str]]:
+        assert self._workers is not None
         for _ in range(2):
-            if self._pool is None:
-                self._pool = self.executor() if self.executor else _processes(self.workers)
+            if self._executor is None:
+                self._executor = self._workers.start()
             try:
-                return self._pool.submit(run_batch, batch, self.directory)
-            except BrokenProcessPool:
+                return self._executor.submit(run_batch, batch, self.directory, self.limit)
+            except self._workers.lost:
                 self._stop(at_once=True)
-        raise StorageError("worker processes die as soon as they are started")
+        raise StorageError("workers die as soon as they are started")
 
     def _stop(self, at_once: bool) -> None:
-        if self._pool is None:
-            return
-        if at_once and isinstance(self._pool, ProcessPoolExecutor):
-            for process in list((self._pool._processes or {}).values()):
-                process.terminate()
-        self._pool.shutdown(wait=True, cancel_futures=True)
-        self._pool = None
+        if self._executor is not None and self._workers is not None:
+            self._workers.stop(self._executor, at_once)
+            self._executor = None
 
 
-def run_batch(tasks: Sequence[Task], directory: Path) -> list[str]:
-    """Carry out tasks and store each; return, per task, why it failed (empty if it is whole)."""
-    reasons = []
-    for task, trajectory in zip(tasks, carry_out(tasks), strict=True):
-        suffix = ".h5" if trajectory.complete else ".failed.h5"
-        try:
-            storage.save(trajectory, directory / f"{task.key}{suffix}")
-            reasons.append(trajectory.header.failure)
-        except StorageError as error:
-            reasons.append(str(error))
-    return reasons
+def run_batch(tasks: Sequence[Task], directory: Path, limit: float) -> list[str]:
+    """Carry out tasks and store each; return, per task, why it failed (empty if it is whole).
+
+    Where a batch can't be carried out as a whole, its tasks are tried one by one.
+    """
+    try:
+        return store(tasks, [directory / f"{task.key}.h5" for task in tasks], limit)
+    except (InputError, OutOfTimeError, MemoryError) as error:  # StorageError, a full disk, is an InputError
+        if len(tasks) > 1:
+            return [reason for task in tasks for reason in run_batch([task], directory, limit)]
+        return [str(error) or "out of memory"]
 
 
-def _processes(workers: int) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker)
-
-
-def _start_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
-
-
-def _batches(tasks: Iterable[Task], size: int, workers: int) -> Iterator[tuple[Task, ...]]:
+def _batches(tasks: Iterable[Task], size: int, workers: Workers | None) -> Iterator[tuple[Task, ...]]:
     """Tasks that can run together, in the order of their first appearance, shared out evenly among the workers."""
     groups: dict[str, list[Task]] = {}
     for task in tasks:
         groups.setdefault(task.batch_key, []).append(task)
     for group in groups.values():
-        share = min(size, math.ceil(len(group) / max(workers, 1)))
+        share = min(size, math.ceil(len(group) / (workers.count if workers else 1)))
         for start in range(0, len(group), share):
             yield tuple(group[start : start + share])
 

@@ -36,7 +36,7 @@ from compare.claims import Level
 from compare.tasks import Task, carry_out
 from mjsim import ContactSettings
 from model import InputError, SimulationError, storage
-from model.hdf5 import check_writable
+from model.files import check_writable
 from model.trajectory import current_versions
 
 

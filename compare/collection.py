@@ -16,7 +16,7 @@ import numpy as np
 
 from mjsim.measurement import window_mean
 from model import InputError, Parameters, StorageError, Trajectory, storage
-from model.hdf5 import WholeFile, check_writable
+from model.files import WholeFile, check_writable
 from model.kinematics import UNITS, VARIABLES
 
 SCHEMA = "dualball-collection"

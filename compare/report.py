@@ -17,6 +17,7 @@ from compare import results
 from compare.claims import Outcome
 from compare.figures import characteristic
 from compare.results import Summary
+from model.files import write_text
 
 _SYMBOLS = {Outcome.CONFIRMED: "✓", Outcome.CORRECTED: "✓", Outcome.REFUTED: "✗", Outcome.FORMAL: "○"}
 
@@ -27,7 +28,7 @@ def write(directory: Path) -> Path:
     Raises `model.StorageError` if there is no summary or the page can't be written.
     """
     path = directory / results.REPORT
-    results.write(path, render(results.load(directory)))
+    write_text(path, render(results.load(directory)))
     return path
 
 

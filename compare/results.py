@@ -14,6 +14,7 @@ from typing import Any
 
 from compare.claims import Verdict
 from model.errors import StorageError
+from model.files import write_text
 from model.trajectory import current_commit, current_versions
 
 SUMMARY = "summary.json"
@@ -90,18 +91,7 @@ def load(directory: Path) -> Summary:
 def save(summary: Summary, directory: Path) -> None:
     """Write the summary, whole or not at all."""
     content = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **dataclasses.asdict(summary)}
-    write(directory / SUMMARY, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=True))
-
-
-def write(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all; raises `StorageError`."""
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        temporary.write_text(text, "utf-8")
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise StorageError(f"cannot write {path}: {error.strerror}") from error
+    write_text(directory / SUMMARY, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=True))
 
 
 def _provenance() -> dict[str, Any]:

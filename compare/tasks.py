@@ -6,17 +6,26 @@ import dataclasses
 import functools
 import hashlib
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import math
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import analytic
 import mjsim
 from mjsim import ContactSettings
-from model import Flow, InputError, Parameters, SimulationError, Trajectory
+from mjsim.journal import Journal
+from model import Flow, InputError, Parameters, SimulationError, Trajectory, storage
 from model.errors import suggestion
 from model.trajectory import current_versions
+
+ENGINES = ("mujoco", "event", "time-stepping")
+LONG = 1e6
+"""Steps from which on a MuJoCo run keeps a journal and has a worker of its own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,49 +78,118 @@ class Task:
         }
 
     @property
+    def contact_settings(self) -> ContactSettings:
+        """The settings of a MuJoCo run."""
+        return self.settings if isinstance(self.settings, ContactSettings) else ContactSettings()
+
+    @property
+    def steps(self) -> float:
+        """Steps of a MuJoCo run."""
+        return self.t_end / self.contact_settings.timestep
+
+    @property
     def batch_key(self) -> str:
         """Tasks of equal batch key can be carried out together."""
-        shared = {k: v for k, v in self.describe().items() if k not in ("parameters", "x0", "flow")}
+        apart = () if self.engine == "mujoco" and self.steps > LONG else ("parameters", "x0", "flow")
+        shared = {k: v for k, v in self.describe().items() if k not in apart}
         return json.dumps(shared, sort_keys=True)
+
+
+class OutOfTimeError(RuntimeError):
+    """A run took longer than it may."""
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """How long something may take, in s of real time from its creation."""
+
+    limit: float = math.inf
+    start: float = field(default_factory=time.monotonic)
+
+    def check(self, _: float = 0.0) -> None:
+        """Raise `OutOfTimeError` if it is over; takes an argument so that it can serve as a progress callback."""
+        if time.monotonic() - self.start > self.limit:
+            raise OutOfTimeError(f"it took longer than {self.limit:g} s")
 
 
 def carry_out(tasks: Sequence[Task]) -> list[Trajectory]:
     """Run tasks of one `Task.batch_key`; a run that breaks down comes back with its failure in the header."""
-    return ENGINES[tasks[0].engine](tasks)
+    if tasks[0].engine != "mujoco":
+        return [_analytic(task, Deadline()) for task in tasks]
+    run = _mujoco(tasks)
+    blocks = list(run)
+    return [
+        Trajectory.from_blocks(header, parts, events)
+        for header, parts, events in zip(run.headers, zip(*blocks, strict=True), run.events, strict=True)
+    ]
 
 
-def _mujoco(tasks: Sequence[Task]) -> list[Trajectory]:
+def store(tasks: Sequence[Task], paths: Sequence[Path], limit: float = math.inf) -> list[str]:
+    """Run tasks of one `Task.batch_key` into files; return, per task, why it failed (empty if it is whole).
+
+    A run that breaks down is kept under the suffix ``.failed.h5``. MuJoCo's samples go to their files as they come, and
+    a run of more than `LONG` steps keeps a journal, from which it goes on after having been killed.
+
+    Raises
+    ------
+    StorageError
+        If a file can't be written.
+    OutOfTimeError
+        If the batch takes longer than `limit` s for each of its runs.
+    """
+    deadline = Deadline(limit * len(tasks))
+    if tasks[0].engine == "mujoco":
+        return _stream(tasks, paths, deadline)
+    reasons = []
+    for task, path in zip(tasks, paths, strict=True):
+        trajectory = _analytic(task, deadline)
+        storage.save(trajectory, path if trajectory.complete else failed_path(path))
+        reasons.append(trajectory.header.failure)
+    return reasons
+
+
+def failed_path(path: Path) -> Path:
+    """Where a run that broke down is kept."""
+    return path.with_suffix(".failed.h5")
+
+
+def _stream(tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline) -> list[str]:
+    journal = Journal(paths[0].with_suffix(".journal")) if len(tasks) == 1 and tasks[0].steps > LONG else None
+    run = _mujoco(tasks, journal)
+    with ExitStack() as stack:
+        writers = [
+            stack.enter_context(storage.TrajectoryWriter(path, header))
+            for path, header in zip(paths, run.headers, strict=True)
+        ]
+        for blocks in run:
+            deadline.check()
+            for writer, block in zip(writers, blocks, strict=True):
+                writer.append(block)
+        for writer, header, events, path in zip(writers, run.headers, run.events, paths, strict=True):
+            writer.finish(events, header.failure, failed_path(path) if header.failure else path)
+    if journal:
+        journal.discard()
+    return [header.failure for header in run.headers]
+
+
+def _mujoco(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
     first = tasks[0]
-    return mjsim.simulate_many(
-        [task.parameters for task in tasks],
-        [task.x0 for task in tasks],
-        first.t_end,
-        flow=[task.fluid for task in tasks],
-        settings=first.settings if isinstance(first.settings, ContactSettings) else None,
-        sample_interval=first.sample_interval,
-    )
+    return mjsim.Run(
+        [task.parameters for task in tasks], [task.x0 for task in tasks], first.t_end, [task.fluid for task in tasks],
+        first.contact_settings, sample_interval=first.sample_interval, journal=journal,
+    )  # fmt: skip
 
 
-def _analytic(tasks: Sequence[Task]) -> list[Trajectory]:
-    found = []
-    for task in tasks:
-        settings = task.settings if isinstance(task.settings, analytic.Settings) else analytic.Settings()
-        settings = dataclasses.replace(settings, method=task.engine)
-        try:
-            trajectory = analytic.simulate(
-                task.parameters, task.x0, task.t_end, task.fluid, settings, sample_interval=task.sample_interval
-            )
-        except SimulationError as error:
-            trajectory = error.trajectory
-        found.append(trajectory)
-    return found
-
-
-ENGINES: dict[str, Callable[[Sequence[Task]], list[Trajectory]]] = {
-    "mujoco": _mujoco,
-    "event": _analytic,
-    "time-stepping": _analytic,
-}
+def _analytic(task: Task, deadline: Deadline) -> Trajectory:
+    settings = task.settings if isinstance(task.settings, analytic.Settings) else analytic.Settings()
+    settings = dataclasses.replace(settings, method=task.engine)
+    try:
+        return analytic.simulate(
+            task.parameters, task.x0, task.t_end, task.fluid, settings,
+            sample_interval=task.sample_interval, progress=deadline.check,
+        )  # fmt: skip
+    except SimulationError as error:
+        return error.trajectory
 
 
 @functools.cache

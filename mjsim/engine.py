@@ -22,7 +22,9 @@ from model.kinematics import UNITS, VARIABLES, full_state, slip_speeds
 from model.parameters import check_number
 
 BLOCK = 256
-"""Samples a run keeps before it hands them out."""
+"""Most samples a run keeps before it hands them out."""
+BLOCK_STEPS = 20_000
+"""Most steps it takes before that, if one sample doesn't need more."""
 _HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 
@@ -125,8 +127,9 @@ class Run:
             for raw in blocks:
                 yield raw
                 first += len(raw)
-        for start in range(first, self._count, BLOCK):
-            rows = range(start, min(start + BLOCK, self._count))
+        size = max(1, min(BLOCK, BLOCK_STEPS // self._interval))
+        for start in range(first, self._count, size):
+            rows = range(start, min(start + size, self._count))
             raw = np.empty((len(rows), len(self._parameters), recorder.NQ + recorder.NV + recorder.NSENSOR))
             for k, row in enumerate(rows):
                 omega_0 = self._omega_0(row * self._interval, self._interval if row + 1 < self._count else 1)
@@ -222,9 +225,9 @@ def _collected(run: Run, progress: Callable[[float], None] | None) -> list[Traje
     for parts in run:
         for kept, part in zip(blocks, parts, strict=True):
             kept.append(part)
-        done += BLOCK
+        done += len(parts[0])
         if progress:
-            progress(min(1.0, done / run.samples))
+            progress(done / run.samples)
     return [
         Trajectory.from_blocks(header, kept, events)
         for header, kept, events in zip(run.headers, blocks, run.events, strict=True)

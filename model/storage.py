@@ -22,8 +22,8 @@ import numpy.typing as npt
 
 from model.cases import Case
 from model.errors import InputError, StorageError
+from model.files import WholeFile
 from model.flow import Flow
-from model.hdf5 import WholeFile
 from model.parameters import Parameters
 from model.trajectory import AXES, SAMPLE, Events, Header, Trajectory, columns
 
@@ -80,15 +80,15 @@ class TrajectoryWriter:
             dataset[n:] = samples[name]
         self._whole.flush()
 
-    def finish(self, events: Events, failure: str = "") -> None:
-        """Write the events and why the run stopped early, if it did; then give the file its name."""
+    def finish(self, events: Events, failure: str = "", path: str | Path | None = None) -> None:
+        """Write the events and why the run stopped early, if it did; then give the file its name, or `path`."""
         for name in columns(Events):
             values = getattr(events, name)
             dataset = self._file[_event_name(name)]
             dataset.resize(len(values), axis=0)
             dataset[...] = values
         self._file.attrs["failure"] = failure
-        self._whole.finish()
+        self._whole.finish(path)
 
     def _create(self, header: Header) -> None:
         self._file.attrs["schema"] = SCHEMA

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from compare.campaign import Campaign, Progress
+from compare.campaign import FAILURES, Campaign, Failure, Progress, run_batch
+from compare.executors import dask
 from compare.tasks import Task
 from model import InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
@@ -82,7 +85,8 @@ def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path: Path) ->
         failures = campaign.complete([*tasks(2), wild])
         assert [failure.task for failure in failures] == [wild]
         assert "diverged" in failures[0].reason
-        assert sorted(path.suffixes for path in tmp_path.iterdir()) == [[".failed", ".h5"], [".h5"], [".h5"]]
+        assert sorted(path.suffixes for path in tmp_path.glob("*.h5")) == [[".failed", ".h5"], [".h5"], [".h5"]]
+        assert [entry["key"] for entry in json.loads((tmp_path / FAILURES).read_text())] == [wild.key]
         with pytest.raises(SimulationError, match="diverged"):
             campaign.run([wild])
     with Campaign(tmp_path, workers=0) as again:  # it is not tried again, but told again
@@ -94,7 +98,7 @@ def test_a_killed_worker_costs_its_runs_in_flight_only(tmp_path: Path, undisturb
 
     def kill_one(now: Progress) -> None:
         if not killed and now.done:
-            processes = list(campaign._pool._processes)
+            processes = list(campaign._executor._processes)
             killed.append(processes[0])
             os.kill(processes[0], signal.SIGKILL)
 
@@ -137,6 +141,104 @@ def test_kill_minus_nine_loses_nothing_that_was_done(tmp_path: Path, undisturbed
     kill_until_done(directory, kills, seed=kills)
     assert data(directory) == undisturbed
     assert not list(directory.glob(".*"))
+
+
+def test_a_run_that_takes_too_long_is_reported(tmp_path: Path) -> None:
+    endless = Task(engine="mujoco", parameters=Parameters.named("reference"), x0=REST, t_end=6000.0)
+    slow = Task(engine="time-stepping", parameters=Parameters.named("reference"), x0=REST, t_end=6000.0)
+    with Campaign(tmp_path, workers=0, limit=4) as campaign:
+        failures = campaign.complete([endless, *tasks(1, t_end=0.01), slow])
+    assert [failure.task for failure in failures] == [endless, slow]
+    assert {failure.reason for failure in failures} == {"it took longer than 4 s"}
+    assert len(list(tmp_path.glob("*.h5"))) == 1
+
+
+def deadly(tasks, directory, limit):
+    """Stands in for `run_batch`: the run at omega_0 = 7 takes its worker down with it."""
+    if any(task.parameters.omega_0 == 7.0 for task in tasks):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return run_batch(tasks, directory, limit)
+
+
+def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
+    tmp_path: Path, undisturbed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("compare.campaign.run_batch", deadly)
+    with Campaign(tmp_path, workers=2, batch=3) as campaign:
+        failures = campaign.complete(tasks())
+    assert failures == [Failure(tasks()[2], "its worker died (killed, or out of memory)")]
+    found = data(tmp_path)
+    assert len(found) == 8
+    assert found.items() <= undisturbed.items()
+
+
+def test_a_full_disk_is_reported_for_each_task(tmp_path: Path) -> None:
+    """A limit on the size of files, in a process of its own, plays the disk that is full."""
+    program = f"""
+import resource, sys
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+import test_campaign
+resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
+with test_campaign.Campaign({str(tmp_path)!r}, workers=0) as campaign:
+    for failure in campaign.complete(test_campaign.tasks(2)):
+        print(failure.reason)
+"""
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True)
+    assert [line.rsplit(": ", 1)[1] for line in answer.stdout.splitlines()] == ["File too large"] * 2
+    assert not list(tmp_path.glob("*.h5")) + list(tmp_path.glob(".*"))
+
+
+def test_the_parent_stays_small(tmp_path: Path) -> None:
+    """Ten thousand tasks: what the parent keeps is the list of tasks and a few batches, not results."""
+    many = tasks(10_000)
+    for task in many:
+        (tmp_path / f"{task.key}.h5").touch()
+    tracemalloc.start()
+    with Campaign(tmp_path, workers=0) as campaign:
+        assert campaign.complete(many) == []
+        _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 10_000 * 4_000  # bytes: a path, a key and two entries of a table for each
+
+
+@pytest.fixture(scope="module")
+def scheduler():
+    """A Dask scheduler with two worker processes of one thread, on loopback."""
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
+        ) as cluster,
+    ):
+        yield cluster
+
+
+@pytest.mark.filterwarnings("ignore")  # Dask's own, on shutting down
+def test_dask_gives_the_same_bits(tmp_path: Path, undisturbed, scheduler) -> None:
+    with Campaign(tmp_path, dask(scheduler.scheduler_address), batch=2) as campaign:
+        assert campaign.complete(tasks()) == []
+    assert data(tmp_path) == undisturbed
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_killed_dask_worker_does_not_stop_the_campaign(tmp_path: Path, undisturbed, scheduler) -> None:
+    killed = []
+
+    def kill_one(now: Progress) -> None:
+        if not killed and now.done:
+            killed.append(next(iter(scheduler.workers.values())).pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    with Campaign(tmp_path, dask(scheduler.scheduler_address), batch=1, report=kill_one) as campaign:
+        assert campaign.complete(tasks()) == []
+    assert killed
+    assert data(tmp_path) == undisturbed
+
+
+def test_a_scheduler_that_does_not_answer() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1"):
+        dask("tcp://127.0.0.1:1")
 
 
 def test_bad_campaigns(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""HDF5 files that are whole or not there at all."""
+"""Files that are whole or not there at all."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import h5py
 
 from model.errors import StorageError
 
-_TEMPORARY = ".part"
+_SUFFIX = ".part"
 
 
 class WholeFile:
@@ -25,7 +25,7 @@ class WholeFile:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._temporary = self.path.with_name(f".{self.path.name}.{_host()}.{os.getpid()}{_TEMPORARY}")
+        self._temporary = _temporary(self.path)
         try:
             self._disk = _Disk(self._temporary, "w+b")
         except OSError as error:
@@ -49,14 +49,14 @@ class WholeFile:
         self.file.flush()
         self._check()
 
-    def finish(self) -> None:
-        """Close the file and give it its name."""
+    def finish(self, path: str | Path | None = None) -> None:
+        """Close the file and give it its name, or another in the same directory."""
         self.file.close()
         self._check()
         try:
             os.fsync(self._disk.fileno())
             self._disk.close()
-            self._temporary.replace(self.path)
+            self._temporary.replace(path or self.path)
         except OSError as error:
             raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
         self._finished = True
@@ -104,12 +104,28 @@ def check_writable(path: str | Path) -> None:
         raise StorageError(f"cannot write {path}: Permission denied")
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all; raises `StorageError`."""
+    temporary = _temporary(path)
+    try:
+        temporary.write_text(text, "utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise StorageError(f"cannot write {path}: {error.strerror}") from error
+
+
 def remove_leftovers(directory: Path) -> None:
     """Remove the temporary files that writers killed on this machine have left in a directory."""
-    for path in directory.glob(f".*{_TEMPORARY}"):
-        host, process = path.name.removesuffix(_TEMPORARY).split(".")[-2:]
+    for path in directory.glob(f".*{_SUFFIX}"):
+        host, process = path.name.removesuffix(_SUFFIX).split(".")[-2:]
         if host == _host() and process.isdigit() and not _alive(int(process)):
             path.unlink(missing_ok=True)
+
+
+def _temporary(path: Path) -> Path:
+    """A name beside a file's that tells whose it is."""
+    return path.with_name(f".{path.name}.{_host()}.{os.getpid()}{_SUFFIX}")
 
 
 def _host() -> str:

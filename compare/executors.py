@@ -1,0 +1,82 @@
+"""Where tasks run: processes of this machine, or the workers of a Dask scheduler.
+
+Both come as executors of the shape of `concurrent.futures`, with what a campaign must know beside: how many tasks they
+run at once, which errors mean that a worker is lost, and how to stop them.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import Any
+
+from model import InputError
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Workers:
+    """A kind of executor."""
+
+    count: int
+    """Tasks at once."""
+    start: Callable[[], Executor]
+    stop: Callable[[Executor, bool], None]
+    """Called with the executor and whether to give up what is under way."""
+    lost: tuple[type[BaseException], ...]
+    """Errors of a future that mean: the worker died."""
+
+
+def processes(count: int) -> Workers:
+    """`count` processes of this machine, one BLAS thread each; raises `InputError` for a bad count."""
+    if count < 1:
+        raise InputError(f"workers = {count} is out of range: must be >= 1")
+
+    def start() -> Executor:
+        for name in _THREADS:  # inherited by the workers; numpy reads it when they import it
+            os.environ.setdefault(name, "1")
+        return ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+
+    def stop(executor: Executor, at_once: bool) -> None:
+        assert isinstance(executor, ProcessPoolExecutor)
+        if at_once:
+            for process in list((executor._processes or {}).values()):
+                process.kill()
+        executor.shutdown(wait=True, cancel_futures=True)
+
+    return Workers(count, start, stop, (BrokenProcessPool,))
+
+
+def dask(address: str) -> Workers:
+    """The workers of a Dask scheduler, which must see the campaign's directory under the same path.
+
+    Raises `InputError` if Dask isn't installed or no scheduler with workers answers.
+    """
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError as error:
+        raise InputError("--scheduler needs Dask: pip install 'dualball[cluster]'") from error
+    try:
+        client: Any = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
+    count = sum(client.nthreads().values())
+    if count == 0:
+        client.close()
+        raise InputError(f"the Dask scheduler at {address} has no workers")
+
+    def stop(executor: Executor, at_once: bool) -> None:
+        executor.shutdown(wait=not at_once)
+        client.close()
+
+    return Workers(count, lambda: client.get_executor(pure=False), stop, (KilledWorker,))
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
