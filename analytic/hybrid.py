@@ -56,8 +56,8 @@ def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Se
         fluid = _piece(flow, start, end)
         if case is None or flow(start) != flow(np.nextafter(start, -1.0)):
             before, (case, at, impulse) = case, simulator.settle(at, fluid)
-            if before is not None and before is not case:
-                recorder.events.append(Event(start, before, case, impulse))
+            if (before is not None and before is not case) or impulse is not NOTHING:
+                recorder.events.append(Event(start, case if before is None else before, case, impulse))
         case, at = simulator.advance(case, at, end, fluid)
 
 

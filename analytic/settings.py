@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,14 +53,14 @@ class Settings:
                 )
         if not isinstance(self.initial_impact, bool):
             raise InputError(f"initial_impact = {self.initial_impact!r} must be true or false")
-        self._check("rtol", "1", self.rtol >= 100 * _EPS and self.rtol <= 1e-2, f">= {100 * _EPS:.3g} and <= 0.01")
-        if self.atol is not None:
-            self._check("atol", "1", self.atol >= _EPS**2 and self.atol <= 1e-2, f">= {_EPS**2:.3g} and <= 0.01")
-        if self.step is not None:
-            self._check("step", "s", self.step > 0, "> 0")
-        self._check("restitution", "1", 0 <= self.restitution <= 1, ">= 0 and <= 1")
+        self._check("rtol", "1", 100 * _EPS, 1e-2, f">= {100 * _EPS:.3g} and <= 0.01")
+        self._check("atol", "1", _EPS**2, 1e-2, f">= {_EPS**2:.3g} and <= 0.01")
+        self._check("step", "s", math.ulp(0.0), math.inf, "> 0")
+        self._check("restitution", "1", 0.0, 1.0, ">= 0 and <= 1")
 
-    def _check(self, name: str, unit: str, good: bool, allowed: str) -> None:
+    def _check(self, name: str, unit: str, low: float, high: float, allowed: str) -> None:
+        if getattr(self, name) is None and name in ("atol", "step"):
+            return
         value = check_number(name, getattr(self, name), unit)
-        if not good:
+        if not low <= value <= high:
             raise InputError(f"{name} = {value:g} {unit} is out of range: must be {allowed}")

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -75,26 +76,30 @@ def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Se
     """
     longest = settings.step or math.sqrt(p.R / p.g) / 500
     times = recorder.times
-    knots = np.union1d(times, flow.breakpoints[(flow.breakpoints > 0) & (flow.breakpoints < times[-1])])
+    knots = np.union1d(times, flow.start[(flow.start > 0) & (flow.start < times[-1])])
     ball = Ball(theta_0, x0[0], x0[6], velocities(x0, p))
     samples: list[tuple[float, Ball, float]] = []
-    for start, end in zip(knots[:-1].tolist(), knots[1:].tolist(), strict=True):
-        count = math.ceil((end - start) / longest * (1 - 1e-12))
-        dt = (end - start) / count
-        for k in range(count):
-            time = start + (k + 0.5) * dt
-            after = step(ball, dt, float(flow(time)), p, settings.restitution)
-            if time == dt / 2:
-                ball = replace(ball, P=after.P, case=after.case)
-                samples.append((0.0, ball, dt))
-            elif after.case is not ball.case:
-                recorder.events.append(Event(start + (k + 1) * dt, ball.case, after.case, _impact(ball, after)))
-            ball = after
-        if end in times:
-            samples.append((end, ball, dt))
-        if len(samples) >= BLOCK or end == knots[-1]:
+    try:
+        for start, end in pairwise(knots.tolist()):
+            count = math.ceil((end - start) / longest * (1 - 1e-12))
+            dt = (end - start) / count
+            for k in range(count):
+                time = start + (k + 0.5) * dt
+                after = step(ball, dt, float(flow(time)), p, settings.restitution)
+                if time == dt / 2:
+                    ball = replace(ball, P=after.P, case=after.case)
+                    samples.append((0.0, ball, dt))
+                elif after.case is not ball.case:
+                    recorder.events.append(Event(start + (k + 1) * dt, ball.case, after.case, _impact(ball, after)))
+                ball = after
+            if end in times:
+                samples.append((end, ball, dt))
+            if len(samples) >= BLOCK:
+                _record(samples, p, recorder)
+                samples = []
+    finally:
+        if samples:
             _record(samples, p, recorder)
-            samples.clear()
 
 
 def _impact(before: Ball, after: Ball) -> Six:

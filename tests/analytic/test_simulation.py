@@ -1,0 +1,212 @@
+"""Both simulators through their common door: laws that hold at every sample, input that is refused, interruption."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from analytic import Settings, simulate
+from model import Case, Contact, Flow, InputError, Parameters
+
+P = Parameters.named("reference")
+METHODS = ("event", "time-stepping")
+RTOL = 1e-9
+
+
+def random_run(seed):
+    """Parameters and a state, reference ranges: any friction up to 1.2, any drag, slips, on or off floor and wall."""
+    rng = np.random.default_rng(seed)
+    p = P.replace(
+        mu=rng.uniform(0.02, 1.2), eta=rng.uniform(0.02, 1.2), c=10 ** rng.uniform(-2, 1), j=rng.uniform(0.1, 2 / 3),
+        omega_0=rng.uniform(-40, 40),
+    )  # fmt: skip
+    orbit = math.sqrt(p.g / p.R)
+    x = np.zeros(8)
+    x[2] = rng.normal() * orbit
+    x[3:6] = rng.normal(size=3) * orbit * p.R / p.r * 10 ** rng.uniform(-2, 0.3)
+    if rng.random() < 0.5:
+        x[:2] = rng.uniform(0, 0.1), rng.normal() * 0.5
+    if rng.random() < 0.5:
+        x[6:] = rng.uniform(0, p.R), rng.normal() * 0.5
+    return p, x
+
+
+def assert_lawful(run, tolerance):
+    """Coulomb's inequality, signs of normal forces, gaps, energy: each up to `tolerance` of the natural unit."""
+    p = run.header.parameters
+    weight = p.m * p.g * (1 + np.abs(p.R * run.omega_c**2 / p.g))
+    A_x, A_y, A_z = run.force_A.T
+    B_x, B_y, B_z = run.force_B.T
+    assert np.all(np.isfinite(run.x))
+    assert np.all(A_y >= -tolerance * weight)
+    assert np.all(B_x >= -tolerance * weight)
+    assert np.all(np.hypot(A_x, A_z) <= p.mu * A_y + tolerance * weight)
+    assert np.all(np.hypot(B_y, B_z) <= p.eta * B_x + tolerance * weight)
+    assert np.all(run.gap_A >= -tolerance * p.R)
+    assert np.all(run.gap_B >= -tolerance * p.R)
+    for contact, gap, slip, force in (
+        ("A", run.gap_A, run.slip_speed_A, run.force_A), ("B", run.gap_B, run.slip_speed_B, run.force_B)
+    ):  # fmt: skip
+        state = np.array([getattr(case, contact) for case in run.cases])
+        assert np.all(np.abs(gap[state != Contact.N]) == 0)
+        assert np.all(force[state == Contact.N] == 0)
+        assert np.all(slip[state == Contact.R] <= 1e-12 * math.sqrt(p.g * p.R) * (1 + weight[state == Contact.R]))
+    assert run.header.settings["energy_residual"] <= tolerance * run.header.settings["energy_scale"]
+
+
+@pytest.mark.parametrize("seed", range(0, 200, 4))
+def test_random_states_end_lawfully(seed):
+    """Part of the robustness run (below, slow): no exception, no stall, no law violated."""
+    p, x = random_run(seed)
+    run = simulate(p, x, 0.5, initial_impact=True, sample_interval=0.01)
+    assert run.complete
+    assert_lawful(run, 100 * RTOL)
+
+
+@pytest.mark.slow
+def test_ten_thousand_random_runs():
+    for seed in range(10_000):
+        p, x = random_run(seed)
+        run = simulate(p, x, 5.0, initial_impact=True, sample_interval=0.01)
+        assert run.complete, seed
+        assert_lawful(run, 100 * RTOL)
+
+
+@given(
+    mu=st.floats(0, 1), eta=st.floats(0, 1), omega_0=st.floats(-40, 40), c=st.floats(0, 5), omega_c=st.floats(-20, 20),
+    slips=st.tuples(*[st.floats(-60, 60)] * 3), e=st.sampled_from([0.0, 0.5]),
+)  # fmt: skip
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_laws_hold_for_any_parameters(mu, eta, omega_0, c, omega_c, slips, e):
+    """From states at both contacts, the edges mu = 0, eta = 0, c = 0 and zero slips among them."""
+    p = P.replace(mu=mu, eta=eta, omega_0=omega_0, c=c)
+    run = simulate(p, [0, 0, omega_c, *slips], 0.1, restitution=e, sample_interval=2e-3)
+    assert_lawful(run, 100 * RTOL)
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_time_stepping_obeys_coulomb_too(seed):
+    p, x = random_run(seed)
+    run = simulate(p, x, 0.05, method="time-stepping", step=2e-4, initial_impact=True, sample_interval=1e-3)
+    friction_A = np.hypot(run.force_A[:, 0], run.force_A[:, 2]) - p.mu * run.force_A[:, 1]
+    friction_B = np.hypot(run.force_B[:, 1], run.force_B[:, 2]) - p.eta * run.force_B[:, 0]
+    largest = max(np.abs(run.force_A).max(), np.abs(run.force_B).max(), p.m * p.g)
+    assert max(friction_A.max(), friction_B.max()) <= 1e-14 * largest
+    assert min(run.force_A[:, 1].min(), run.force_B[:, 0].min()) >= 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_trajectory_describes_itself(method):
+    x0 = [0.02, 0.0, 8.0, 1.0, 2.0, 3.0, 0.01, -0.2]
+    run = simulate(P, x0, 0.3, method=method, restitution=0.3, sample_interval=0.04, theta_0=2.0)
+    assert run.header.engine == method
+    np.testing.assert_allclose(run.time, [0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.24, 0.28, 0.3], rtol=1e-14)
+    np.testing.assert_allclose(run.x[0], x0, rtol=1e-13)
+    assert run.theta[0] == pytest.approx(2.0, rel=1e-14)
+    shown = json.loads(json.dumps(dict(run.header.settings)))
+    assert shown["restitution"] == 0.3
+    assert shown["x0"] == x0
+    assert shown["energy_residual"] >= 0
+    assert np.any(run.events.impulse_A != 0)
+    assert Case(run.events.from_case[0]) is run.cases[0]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_default_sampling_and_progress(method):
+    seen = []
+    run = simulate(P, [0, 0, 11, 0, 0, 0], 0.2, method=method, progress=seen.append)
+    assert len(run.time) == 1001
+    assert seen[-1] == 1.0
+    assert seen == sorted(seen)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_settings_object_and_keywords_agree(method):
+    x0 = [0, 0, 10, 1, 2, 3]
+    one = simulate(P, x0, 0.1, settings=Settings(method=method, step=1e-3, rtol=1e-7), sample_interval=0.01)
+    two = simulate(P, x0, 0.1, method=method, step=1e-3, rtol=1e-7, sample_interval=0.01)
+    np.testing.assert_array_equal(one.x, two.x)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_speed_into_a_closed_contact(method):
+    x0 = [0, -0.1, 10, 0, 0, 0]
+    with pytest.raises(InputError, match=r"v_y = -0.1 m s-1 .* floor .* initial_impact"):
+        simulate(P, x0, 0.1, method=method)
+    run = simulate(P, x0, 0.1, method=method, initial_impact=True, restitution=0.5, step=1e-4)
+    assert run.v_y[1] > 0 or run.cases[1].A is not Contact.N
+
+
+def test_the_first_impact_is_an_event():
+    """A collision at the very start changes the state before the first sample, and is written down."""
+    run = simulate(P, [0, -0.1, 10, 0, 0, 0], 0.1, initial_impact=True, restitution=0.5)
+    assert run.events.time[0] == 0.0
+    assert run.events.impulse_A[0, 1] == pytest.approx(1.5 * P.m * 0.1, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"x0": [-1e-3, 0, 0, 0, 0, 0]}, "y = -0.001 m .* inside the floor"),
+        ({"x0": [0, 0, 0, 0, 0, 0, -1e-3, 0]}, "h = -0.001 m .* inside the wall"),
+        ({"x0": [0, 0, 0, 0, 0, 0, 0.05, 0]}, "h = 0.05 m .* < R = 0.05 m"),
+        ({"x0": [0, 0, 0, 0, 0, 0, 0, -0.2]}, "v_h = -0.2 m s-1 .* wall"),
+        ({"x0": [0, 0, math.nan, 0, 0, 0]}, "omega_c = nan"),
+        ({"x0": [0, 0, 0]}, "6 entries"),
+        ({"x0": np.zeros((2, 6))}, r"one state, not .* \(2, "),
+        ({"t_end": 0.0}, "t_end = 0 s"),
+        ({"t_end": -1.0}, "t_end = -1 s"),
+        ({"t_end": math.inf}, "t_end = inf"),
+        ({"sample_interval": 0.0}, "sample_interval = 0 s"),
+        ({"sample_interval": 1e-12}, "sample_interval = 1e-12 s .* samples"),
+        ({"theta_0": math.nan}, "theta_0 = nan"),
+        ({"rtol": 1e-16}, "rtol = 1e-16 .* >= 2.22e-14"),
+        ({"atol": 1e-40}, "atol = 1e-40"),
+        ({"restitution": 1.5}, "restitution = 1.5 .* <= 1"),
+        ({"restitution": -0.1}, "restitution = -0.1"),
+        ({"step": 0.0}, "step = 0 s"),
+        ({"step": "fast"}, "step = 'fast' must be a number"),
+        ({"method": "events"}, "method = 'events' .*did you mean 'event'"),
+        ({"leave_rolling": "never"}, "leave_rolling = 'never'"),
+        ({"initial_impact": 1}, "initial_impact = 1"),
+        ({"restituton": 0.5}, "unknown setting 'restituton' .*did you mean 'restitution'"),
+    ],
+)
+def test_bad_input_is_refused(arguments, message):
+    good = {"x0": [0, 0, 10.0, 0, 0, 0], "t_end": 0.1}
+    with pytest.raises(InputError, match=message):
+        simulate(P, **(good | arguments))
+
+
+def test_flow_with_a_sample_that_is_not_finite_is_refused():
+    with pytest.raises(InputError, match="omega_0 of flow sample 1 = nan"):
+        simulate(P, np.zeros(6), 1.0, Flow.sampled([0, 1], [1.0, math.nan]))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_interruption_keeps_what_there_is(method, monkeypatch):
+    """Ctrl-C in the middle of the equations: the samples so far, and a header that says where it stopped."""
+    name = {"event": "analytic.charts.newton_euler", "time-stepping": "analytic.time_stepping.smooth_rates"}[method]
+    calls = iter(range(10**9))
+
+    def stop(*args):
+        if next(calls) == 500:
+            raise KeyboardInterrupt
+        return wrapped(*args)
+
+    module, attribute = name.rsplit(".", 1)
+    wrapped = getattr(importlib.import_module(module), attribute)
+    monkeypatch.setattr(name, stop)
+    p = P.replace(omega_0=25.0)
+    run = simulate(p, [0, 0, 13.8, -4, 0.5, 10], 4.0, method=method, step=1e-3, sample_interval=1e-3)
+    assert not run.complete
+    assert run.header.failure.startswith("interrupted at t = ")
+    assert 0 < len(run.time) < 4001
+    assert np.all(np.diff(run.time) > 0)

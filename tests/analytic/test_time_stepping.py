@@ -1,0 +1,171 @@
+"""Time stepping: exact where it should be, of first order elsewhere, and in the end the event-driven result."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from analytic import simulate, stationary_solutions, thresholds
+from analytic.contact_problem import NotConvergedError
+from analytic.rigid_body import velocities
+from analytic.time_stepping import Ball, step
+from model import Case, Flow, Parameters, SimulationError
+
+P = Parameters.named("reference")
+SPEED, SPIN = math.sqrt(P.g * P.R), math.sqrt(P.g * P.R) / P.r
+SCALE = np.array([P.R, SPEED, SPEED / P.R, SPIN, SPIN, SPIN, P.R, SPEED])
+"""Natural sizes of the state variables."""
+
+
+def order(steps, errors):
+    """Order of convergence by a fit in logarithms."""
+    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+
+
+@pytest.mark.parametrize(("name", "omega_0", "case"), [
+    ("reference", 12.0, Case.RR), ("reference", 20.0, Case.SS), ("reference", 25.0, Case.SS),
+    ("high-wall-friction", 25.0, Case.NR),
+])  # fmt: skip
+def test_stationary_orbits_are_exact_at_large_steps(name, omega_0, case):
+    """Axes that turn with the ball make a stationary orbit a fixed point of the scheme, to what the solver leaves."""
+    p = Parameters.named(name).replace(omega_0=omega_0)
+    (solution,) = [s for s in stationary_solutions(p) if s.case is case and s.exists]
+    x0 = np.asarray(solution.x)[:6].copy()
+    x0[0] = 0.01 if case is Case.NR else 0.0
+    run = simulate(p, x0, 0.5, method="time-stepping", step=2e-3)
+    # 1e-13 an iteration and step; slow modes amplify by their number, stiff ones not.
+    np.testing.assert_allclose(run.x[:, :6], np.tile(x0, (len(run.time), 1)), atol=1e-9)
+    assert set(run.cases) == {case}
+    np.testing.assert_allclose(run.force_A[-1], solution.force_A, atol=1e-8 * p.m * p.g) if case is Case.SS else None
+
+
+def test_no_drift_at_the_wall():
+    """Held by the wall the ball stays at it exactly, whatever the step."""
+    run = simulate(P.replace(omega_0=14.0), [0, 0, 10.0, 20, 30, 10], 1.0, method="time-stepping", step=5e-3)
+    assert np.all(run.h == 0.0)
+    assert np.all(run.y >= 0.0)
+
+
+def test_sliding_ball_on_the_floor():
+    """Rolls with v/(1+j) after the exact time, to within a step."""
+    p, v, h, dt = P.replace(c=0.0), 0.05, 0.03, 1e-4
+    x0 = [0, 0, v / (p.R - h), -v / p.r, v / p.r, 0, h, 0]
+    run = simulate(p, x0, 0.1, method="time-stepping", step=dt, sample_interval=1e-3)
+    speed = np.hypot((p.R - run.h) * run.omega_c, run.v_h)
+    np.testing.assert_allclose(speed[-1], v / (1 + p.j), rtol=1e-11)
+    assert run.events.time[0] == pytest.approx(v / (p.mu * p.g * (1 + 1 / p.j)), abs=1.01 * dt)
+
+
+def test_flight_is_of_second_order():
+    """Fall with drag, theta = 1/2: against y(t) in closed form."""
+    p, y, t = P.replace(c=3.0), 0.3, 0.2
+    exact = y + (p.g / p.c) * (1 - math.exp(-p.c * t)) / p.c - p.g * t / p.c
+    steps = np.array([2e-2, 1e-2, 5e-3])
+    errors = [
+        abs(
+            simulate(p, [y, 0, 0, 0, 0, 0, 0.02, 0], t, method="time-stepping", step=s, sample_interval=t).y[-1] - exact
+        )
+        for s in steps
+    ]
+    assert order(steps, errors) == pytest.approx(2.0, abs=0.1)
+
+
+def test_restitution():
+    """Heights of bounces shrink by e^2, up to what a step moves the ball at impact."""
+    p, y, e, dt = P.replace(c=0.0, omega_0=0.0), 0.05, 0.8, 2e-5
+    run = simulate(
+        p, [y, 0, 0, 0, 0, 0, 0.02, 0], 0.7, method="time-stepping", step=dt, restitution=e, sample_interval=1e-3
+    )
+    t_0 = math.sqrt(2 * y / p.g)
+    top = run.y[(run.time > t_0) & (run.time < t_0 * (1 + 2 * e))].max()
+    assert top == pytest.approx(e**2 * y, abs=2 * dt * math.sqrt(2 * p.g * y) + p.g * 1e-6)
+
+
+@pytest.mark.parametrize("side", [0.97, 1.03])
+def test_finds_the_end_of_two_point_rolling_by_itself(side):
+    """Below omega_01 the ball ends up in RR, above it in SS; nothing told the scheme."""
+    omega_0 = side * thresholds(P).omega_01
+    run = simulate(
+        P.replace(omega_0=omega_0), [0, 0, 0.9 * omega_0, 0, 0, 0], 8.0, method="time-stepping", step=2e-3,
+        sample_interval=0.1,
+    )  # fmt: skip
+    assert run.cases[-1] is (Case.RR if side < 1 else Case.SS)
+
+
+ALL_NINE = [
+    # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
+    (P.replace(omega_0=12.0, eta=0.6), [0.022, 0.042, 33.0, 39.6, 8.5, 1.5, 0.034, 0.178],
+     ["NN", "SN", "RN", "NS", "SS", "RS", "RR"]),
+    # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
+    (P.replace(omega_0=14.5, eta=0.6), [0.0, 0.0, -22.669, -0.266, 27.136, -7.88, 0.015, -0.085],
+     ["SN", "RN", "NR", "NS", "SS", "SR", "RR"]),
+]  # fmt: skip
+
+
+def test_the_sequences_below_visit_all_nine_cases():
+    assert {name for _, _, visited in ALL_NINE for name in visited} == {case.name for case in Case}
+
+
+@pytest.mark.parametrize(("p", "x0", "visited"), ALL_NINE)
+def test_converges_to_the_event_driven_result(p, x0, visited):
+    """First order in the step, in the mean over the run, through every kind of transition and impact."""
+    events = simulate(p, x0, 0.4, sample_interval=2e-3)
+    seen = {Case(code).name for code in (*events.events.from_case, *events.events.to_case)}
+    assert seen >= set(visited)
+    steps = np.array([4e-4, 2e-4, 1e-4, 5e-5])
+    errors = []
+    for s in steps:
+        run = simulate(p, x0, 0.4, method="time-stepping", step=s, sample_interval=2e-3)
+        errors.append(np.mean(np.abs(run.x - events.x) / SCALE))
+    # Single steps may be lucky or not with the moment of an impact within them.
+    assert order(steps, errors) > 0.8
+    assert errors[-1] < steps[-1] * SPEED / P.R * 0.1
+
+
+def test_converges_through_bounces_and_a_ramp():
+    p, flow = P.replace(c=2.0), Flow.ramp(5.0, 25.0, 0.2, 0.1)
+    x0, t_end = [0.01, 0.1, 8.0, 1.0, 2.0, 30.0, 0.01, 0.0], 0.4
+    events = simulate(p, x0, t_end, flow, restitution=0.5, sample_interval=4e-3)
+    steps, errors = np.array([4e-4, 2e-4, 1e-4]), []
+    for s in steps:
+        run = simulate(p, x0, t_end, flow, method="time-stepping", step=s, restitution=0.5, sample_interval=4e-3)
+        errors.append(np.mean(np.abs(run.x - events.x) / SCALE))
+    assert order(steps, errors) > 0.7
+    assert errors[-1] < 1e-3
+
+
+def test_energy_balance_is_exact_but_for_the_place_of_landing():
+    """Work at mean velocities balances kinetic energy to round-off; only a landing moves the ball, by half a step."""
+    run = simulate(P.replace(omega_0=25.0), [0, 0, 9.0, 1, 2, 3], 0.5, method="time-stepping", step=1e-3)
+    assert run.header.settings["energy_residual"] < 1e-12 * run.header.settings["energy_scale"]
+
+
+def test_no_convergence_keeps_the_samples(monkeypatch):
+    calls = iter(range(100))
+
+    def fail(*args, **keywords):
+        if next(calls) > 20:
+            raise NotConvergedError("as asked")
+        return step(*args, **keywords)
+
+    monkeypatch.setattr("analytic.time_stepping.step", fail)
+    with pytest.raises(SimulationError, match="as asked") as caught:
+        simulate(P, [0, 0, 11, 0, 0, 0], 1.0, method="time-stepping", step=0.01, sample_interval=0.01)
+    assert not caught.value.trajectory.complete
+
+
+def test_one_step_of_free_rolling_by_hand():
+    """RR at rest in the fluid's frame: one step leaves everything as it is, and the forces are those of (23)."""
+    p = P.replace(omega_0=10.0)
+    x = [0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    ball = step(Ball(0.0, 0.0, 0.0, velocities(x, p)), 1e-3, 10.0, p, 0.0)
+    u = p.m * p.R * 100.0
+    A_x, A_y, A_z, B_x, B_y, B_z = (impulse / 1e-3 for impulse in ball.P)
+    assert ball.case is Case.RR
+    assert A_y + B_y == pytest.approx(p.m * p.g, rel=1e-9)
+    assert A_x + B_x == pytest.approx(u, rel=1e-9)
+    assert B_y - A_x == pytest.approx(p.j * u, rel=1e-9)
+    assert A_z == pytest.approx(0, abs=1e-9)
+    assert B_z == pytest.approx(0, abs=1e-9)
