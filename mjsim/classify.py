@@ -41,11 +41,12 @@ class Classifier:
         """
         if len(block):
             self._waiting.append(block)
-        p, A, B = self._p, block["force_A"], block["force_B"]
-        normal = A[:, 1], B[:, 0]
-        friction = np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])
-        self._A.add(self._letters(normal[0], friction[0], block["slip_speed_A"], p.mu))
-        self._B.add(self._letters(normal[1], friction[1], block["slip_speed_B"], p.eta))
+        A, B = block["force_A"], block["force_B"]
+        normal = np.stack([A[:, 1], B[:, 0]])
+        friction = np.stack([np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])])
+        letters = self._letters(normal, friction, np.stack([block["slip_speed_A"], block["slip_speed_B"]]))
+        self._A.add(letters[0])
+        self._B.add(letters[1])
         count = min(self._A.decide(last), self._B.decide(last))
         waiting = np.concatenate(self._waiting) if self._waiting else block
         done, self._waiting = waiting[:count], [waiting[count:]]
@@ -53,15 +54,20 @@ class Classifier:
         self._note_changes(done)
         return done
 
-    def _letters(self, normal: Array, friction: Array, speed: Array, coefficient: float) -> npt.NDArray[np.intp]:
-        """What each sample by itself says of one contact."""
+    def _letters(self, normal: Array, friction: Array, speed: Array) -> npt.NDArray[np.intp]:
+        """What each sample by itself says of the contacts; all arrays of shape (2, n), A before B."""
+        p, settings = self._p, self._settings
+        limit = np.array([[p.mu], [p.eta]]) * normal
         # A friction force of which one step can build up only a part leaves, while it changes slowly, a creep far
         # below the speed that belongs to all of it.
-        load = coefficient * np.maximum(normal / self._p.m, self._p.g)
-        band = self._settings.regularisation_speed(load) * (1e-3 if self._settings.memory else 3.0)
-        limit = coefficient * normal
-        slips = (friction >= (1 - _SATURATED) * limit) & (speed > 3 * band)
-        rolls = (friction < (1 - _FREE) * limit) | (speed < band)
+        load = np.array([[p.mu], [p.eta]]) * np.maximum(normal / p.m, p.g)
+        band = settings.regularisation_speed(load) * (1e-3 if settings.memory else 3.0)
+        saturated = friction >= (1 - _SATURATED) * limit
+        # A rotation that slips at both contacts alike while one of them holds is creep, too: the load moves from one
+        # to the other, as it may where both roll, and slip would be stopped by the one that holds.
+        held = ((normal > 0) & ~saturated)[::-1] & (speed < 3 * speed[::-1])
+        slips = saturated & (speed > 3 * band) & ~held
+        rolls = (friction < (1 - _FREE) * limit) | (speed < band) | held
         letters: npt.NDArray[np.intp] = np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
         return letters
 

@@ -52,11 +52,11 @@ class ContactSettings:
     """Time step, s."""
     solref: tuple[float, float] = (2e-3, 1.0)
     """Time constant (s) and damping ratio of the normal rows."""
-    solreffriction: float = 0.4 / 3
+    solreffriction: float = 2.0
     """Time constant tc_f of the friction rows, s."""
-    solimp: float = 0.03
+    solimp: float = 1e-3
     """Impedance d, one value at every depth."""
-    impratio: float = 1e2
+    impratio: float = 3e3
     """How much stiffer the friction rows are than the normal row."""
     memory: bool = True
     """Whether the friction force of the last step shifts the surface velocity, so that rolling doesn't creep."""
@@ -267,24 +267,25 @@ class ContactSettings:
         """Settings whose sliding contact is continuous with something to spare.
 
         `max_slip_speed` (m s-1) is the fastest slip to expect under the load of gravity; by default that of the fluid,
-        R omega_0. The impedance is lowered, where need be, until the hover number is at most 1/2, and impratio is
-        raised with the softness, so that friction keeps its own: R_t = 0.32 A.
+        R omega_0. The impedance is lowered, where need be, until the hover number is at most 1/20 (a contact about
+        to lift off carries little, and shall lift off on its own), and impratio is raised with the softness, so that
+        friction keeps its own. The engine's least impedance, 1e-4, may stop that short.
         """
         settings = cls.at(timestep, **changes)
         speed = (
             abs(p.R * p.omega_0) if max_slip_speed is None else check_number("max_slip_speed", max_slip_speed, "m/s")
         )
         hover = settings.hover_number(p.g, max(p.mu, p.eta), speed)
-        if hover <= 0.5 or "solimp" in changes:
+        if hover <= 0.05 or "solimp" in changes:
             return settings
         # Softness in proportion; b_f stays what it is, so tc_f goes with 1/d.
-        solimp = 1 / (1 + settings.softness * hover / 0.5)
+        solimp = max(1 / (1 + settings.softness * hover / 0.05), 1e-4)
         return cls.from_mapping(
             settings.to_mapping()
             | {
                 "solimp": solimp,
                 "solreffriction": settings.solreffriction * settings.solimp / solimp,
-                "impratio": settings.impratio * hover / 0.5,
+                "impratio": settings.impratio * settings.solimp / solimp,
             }
             | changes
         )

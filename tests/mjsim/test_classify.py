@@ -65,3 +65,9 @@ def test_between_the_bands_a_contact_is_what_it_was() -> None:
     assert [Case(c).name for c in classified(block, [100])[0][[0, 7, 14]]] == ["RR", "SS", "SS"]
     block["slip_speed_A"][10:] = 0.5 * band
     assert Case(classified(block, [100])[0][14]).name == "RS"
+
+
+def test_creep_that_a_rolling_contact_shares_is_no_slip() -> None:
+    block = made([Case.SR] * 5)
+    block["slip_speed_B"] = block["slip_speed_A"] / 2
+    assert Case(classified(block, [100])[0][2]).name == "RR"

@@ -47,6 +47,6 @@ def test_for_problem_keeps_slipping_continuous(timestep, name) -> None:
     p = Parameters.named(name).replace(omega_0=60.0)
     settings = ContactSettings.for_problem(p, timestep)
     for friction in (p.mu, p.eta):
-        assert settings.hover_number(p.g, friction, p.R * p.omega_0) <= 0.5 * (1 + 1e-12)
-        assert settings.fastest_slip(p.g, friction) >= 2 * p.R * p.omega_0 * (1 - 1e-12)
+        assert settings.hover_number(p.g, friction, p.R * p.omega_0) <= 0.5
+        assert settings.fastest_slip(p.g, friction) >= 2 * p.R * p.omega_0
     assert settings.largest_timestep >= timestep * (1 - 1e-12)

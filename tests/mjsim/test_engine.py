@@ -5,6 +5,7 @@ import pytest
 
 import mjsim
 from mjsim import ContactSettings, recorder
+from mjsim.measurement import richardson
 from model import Flow, InputError, Parameters, SimulationError
 
 P = Parameters.named("reference")
@@ -83,8 +84,8 @@ def test_divergence_stops_a_run_and_keeps_what_there_is() -> None:
 
 
 def test_slip_too_fast_for_continuous_contact_is_said() -> None:
-    """A contact hovers where mu b_f v > (1 - d)/d g; a spin of 700 rad/s slips at 7 m/s, the default allows 3."""
-    settings = ContactSettings()
+    """A contact hovers where mu b_f v > (1 - d)/d g; a spin of 700 rad/s slips at 7 m/s, this allows 1.6."""
+    settings = ContactSettings(solimp=0.03, solreffriction=2e-3 / 0.03)
     allowed = (1 - settings.solimp) / settings.solimp * P.g / (P.mu * settings.b_f)
     with pytest.warns(UserWarning, match=rf"slips at 7 m s-1 at A .* only up to {allowed:.3g} m s-1"):
         mjsim.simulate(P, [0, 0, 1, 700, 0, 0], 0.01, settings=settings)
@@ -101,3 +102,17 @@ def test_slip_too_fast_for_continuous_contact_is_said() -> None:
 def test_bad_arguments(arguments, words) -> None:
     with pytest.raises(InputError, match=words):
         mjsim.simulate(P, [0, 0, 1, 0, 0, 0], **arguments)
+
+
+def test_slipping_converges_at_second_order() -> None:
+    """Each halving of the step divides the change of the result by four; the limit is then certain to 1e-7."""
+    p = P.replace(omega_0=25.0)
+    steps = [1e-3, 5e-4, 2.5e-4]
+    ends = [
+        mjsim.simulate(p, [0, 0, 14.3, -1, 2, 7], 0.5, settings=ContactSettings.at(h), sample_interval=0.1).omega_c[-1]
+        for h in steps
+    ]
+    limit = richardson(steps, ends)
+    # The next term of the error is smaller by about b_f h = 1 times the lag of the margins: a tenth of the order.
+    assert limit.order > 1.8
+    assert abs(limit.value - ends[2]) < 1e-6 * limit.value
