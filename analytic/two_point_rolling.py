@@ -94,9 +94,10 @@ def onset(omega_c: float, p: Parameters, omega_0: float) -> tuple[float, float] 
     if not np.isfinite(best.B_y) or not best.utilisation > 1 - _TOGETHER:
         return None
     A_x, A_y, A_z, B_x, B_y, B_z = dynamics.rolling_family(omega_c, p, omega_0, float(best.B_y))
-    if A_x * B_y >= 0:
+    limit_A, limit_B = p.mu * A_y, p.eta * B_x
+    if A_x * B_y >= 0 or limit_A <= 0 or limit_B <= 0:
         return None
-    use_A, use_B = math.hypot(A_x, A_z) / (p.mu * A_y), math.hypot(B_y, B_z) / (p.eta * B_x)
+    use_A, use_B = math.hypot(A_x, A_z) / limit_A, math.hypot(B_y, B_z) / limit_B
     return (math.atan2(A_z, -A_x), math.atan2(-B_z, B_y)) if abs(use_A - use_B) <= _TOGETHER else None
 
 

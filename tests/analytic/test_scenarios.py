@@ -1,0 +1,68 @@
+"""The trajectories of sections 3 and 5.3, by what the paper says of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from analytic import scenarios, stationary_solutions, thresholds
+from model import Case, InputError, Parameters
+
+ROUGH = Parameters.named("high-wall-friction")
+LIMIT = math.sqrt(ROUGH.g / (ROUGH.eta * ROUGH.R))
+"""omega_0 at which NR's stationary orbit loses its stability with respect to slipping (61)."""
+
+
+def test_figure_4_slip_dies_out():
+    run = scenarios.slip_perturbation(ROUGH.replace(omega_0=1.2 * LIMIT))
+    assert [Case(code) for code in run.events.to_case] == [Case.NR]
+    assert run.cases[0] is Case.NS
+    # (60): the slowest direction loses slip at (1+j)/(r j) (eta R omega_0^2 - g).
+    rate = (1 + ROUGH.j) / (ROUGH.r * ROUGH.j) * ROUGH.g * (1.2**2 - 1)
+    assert run.events.time[0] <= 1.0 / rate
+
+
+def test_figure_5_slip_grows():
+    run = scenarios.slip_perturbation(ROUGH.replace(omega_0=0.9 * LIMIT))
+    assert set(run.cases) == {Case.NS}
+    assert np.all(np.diff(run.slip_speed_B[len(run.time) // 2 :]) > 0)
+
+
+def test_unloading_ends_in_two_point_rolling_after_impacts():
+    run = scenarios.unloading(ROUGH, hold=20.0)
+    visited = [Case(code) for code in run.events.to_case]
+    assert visited[0] is Case.NS
+    assert visited[-1] is Case.RR
+    assert run.events.time[0] > 3 * 20.0  # only below omega_02
+    assert np.any(run.events.impulse_A[:, 1] > 0)
+    last = 0.98 * LIMIT
+    start = abs(run.omega_c[run.time > run.events.time[-1]][0] - last)
+    left = math.exp(-(80.0 - run.events.time[-1]) / (1 + 2 * ROUGH.j))
+    assert run.omega_c[-1] == pytest.approx(last, abs=1.1 * start * left)
+
+
+def test_hysteresis():
+    """Between omega_02 and omega_04 the way up is SS, the way down the wall; each at its stationary omega_c."""
+    p = Parameters.named("reference")
+    limits = thresholds(p)
+    middle = (limits.omega_02 + limits.omega_04) / 2
+    levels = np.array([middle, 1.1 * limits.omega_04, middle, 0.9 * limits.omega_02])
+    # From RR far below, so that the first level is reached on the lower branch.
+    run = scenarios.hysteresis(p, np.concatenate([[0.8 * limits.omega_01, 25.0], levels]), hold=60.0)
+    ends = np.searchsorted(run.time, 60.0 * np.arange(1, 7), side="right") - 2
+    found = [Case(code) for code in run.case[ends]]
+    assert found[2] is Case.SS
+    assert found[3] in (Case.NR, Case.SR)
+    assert found[4] in (Case.NR, Case.SR)
+    assert found[5] is Case.SS
+    for index, omega_0 in ((2, middle), (5, levels[-1])):
+        slow = [s.x[2] for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.case is Case.SS and s.stable]
+        assert run.omega_c[ends[index]] == pytest.approx(min(slow), rel=1e-4)
+    assert run.omega_c[ends[4]] == pytest.approx(middle, rel=1e-6)
+
+
+def test_no_hysteresis_without_a_fold():
+    with pytest.raises(InputError, match=r"eta = 0\.6 has no fold"):
+        scenarios.hysteresis(ROUGH)
