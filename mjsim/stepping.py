@@ -189,6 +189,9 @@ class Many(Stepper):
         shift = np.array([settings.memory_gain(mass) for mass in m])
         self._shift = np.stack([-shift / r, shift, shift, shift / r])
         self._reach = np.array([[settings.touching(p.g)] for p in parameters])
+        # Kept here, since every step needs them and the settings work them out each time.
+        self._ahead, self._lag, self._gain = settings.midpoint, settings.friction_lag, settings.servo_gain
+        self._shifts = settings.shifts_surfaces
         self._last = self._velocities()
         self._settle(omega_0)
 
@@ -211,7 +214,7 @@ class Many(Stepper):
         row[:, split:] = self._sensors
 
     def advance(self, omega_0: Array) -> None:
-        gain, gaps, margins = self._settings.servo_gain, self._qpos[:, 2:0:-1], self.margins
+        gain, gaps, margins = self._gain, self._qpos[:, 2:0:-1], self.margins
         for omega in omega_0:
             velocities = self._prepare(omega)
             if gain:
@@ -246,7 +249,7 @@ class Many(Stepper):
 
     def _prepare(self, omega_0: Array) -> Array:
         """Write wall, forces and surface velocities for the next step; return its velocities."""
-        settings, qpos, turn = self._settings, self._qpos, self._turn
+        qpos, turn = self._qpos, self._turn
         half = qpos[:, 0] * 0.5
         np.cos(half, out=turn[:, 0])
         np.sin(half, out=turn[:, 3])
@@ -254,7 +257,7 @@ class Many(Stepper):
         v = self._velocities()
         rho = self._lengths[0]
         change = v - self._last
-        middle = v + settings.midpoint * change
+        middle = v + self._ahead * change
         # Drag (9), and what the inertial forces grow by till the middle.
         force = (middle[3] * middle - v[3] * v).take(_INERTIAL, axis=0)
         force *= self._inertia
@@ -262,14 +265,14 @@ class Many(Stepper):
         force[:3] -= self._mc * middle[:3]
         force[0] *= rho
         self._applied.T[:] = force
-        if settings.shifts_surfaces:
+        if self._shifts:
             constraint, sensors = self._contact
             surface = constraint.T.take(_FRICTION, axis=0)
             surface[1:3] -= sensors.T.take(_NORMALS, axis=0)
             surface *= self._shift
             slip, slip_change = _SLIP.dot(v), _SLIP.dot(change)
             slides = _PAIRS.dot(slip * slip - _SLIDES**2 * slip_change * slip_change) > 0
-            surface += settings.friction_lag * slip_change * slides
+            surface += self._lag * slip_change * slides
             self._floor[:], self._wall[:] = surface[:2], surface[2:]
         return v
 

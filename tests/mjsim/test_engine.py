@@ -5,7 +5,6 @@ import pytest
 
 import mjsim
 from mjsim import ContactSettings, recorder
-from mjsim.measurement import richardson
 from model import Flow, InputError, Parameters, SimulationError
 
 P = Parameters.named("reference")
@@ -105,14 +104,11 @@ def test_bad_arguments(arguments, words) -> None:
 
 
 def test_slipping_converges_at_second_order() -> None:
-    """Each halving of the step divides the change of the result by four; the limit is then certain to 1e-7."""
+    """Each halving of the step divides what it changes by four, from the start of a transient on."""
     p = P.replace(omega_0=25.0)
-    steps = [1e-3, 5e-4, 2.5e-4]
-    ends = [
-        mjsim.simulate(p, [0, 0, 14.3, -1, 2, 7], 0.5, settings=ContactSettings.at(h), sample_interval=0.1).omega_c[-1]
-        for h in steps
+    runs = [
+        mjsim.simulate(p, [0, 0, 14.3, -1, 2, 7], 0.4, settings=ContactSettings.at(h), sample_interval=8e-3)
+        for h in (1e-3, 5e-4, 2.5e-4)
     ]
-    limit = richardson(steps, ends)
-    # The next term of the error is smaller by about b_f h = 1 times the lag of the margins: a tenth of the order.
-    assert limit.order > 1.8
-    assert abs(limit.value - ends[2]) < 1e-6 * limit.value
+    coarse, fine = (np.abs(a.x - b.x)[:, 2:6].max() for a, b in zip(runs, runs[1:], strict=False))
+    assert 3.5 < coarse / fine < 8  # the third order shows, too, where margins lag behind the load
