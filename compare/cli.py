@@ -125,6 +125,13 @@ def _parser() -> argparse.ArgumentParser:
     command = _add(commands, "report", _report, "make report.html anew from stored results")
     command.add_argument("directory", type=Path, nargs="?", default=Path("results"), metavar="DIR")
 
+    command = _add(
+        commands, "figures", _figures, "draw the paper's figures, with measured points where there are results"
+    )
+    command.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="DIR")
+    command.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="stored results to draw")
+    command.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
+
     command = _add(commands, "inspect", _inspect, "what a trajectory file holds")
     command.add_argument("file", type=Path, metavar="FILE")
     command.add_argument("--plot", type=Path, metavar="FILE", help="draw it (png, svg or pdf)")
@@ -256,6 +263,14 @@ def _benchmark(args: argparse.Namespace) -> int:
 
 def _report(args: argparse.Namespace) -> int:
     print(report.write(args.directory))
+    return 0
+
+
+def _figures(args: argparse.Namespace) -> int:
+    from compare.figures import gallery  # here, because drawing takes a second to load
+
+    for name, gap in gallery.write(args.output, args.results, tuple(args.format or ["svg"])):
+        print(f"{args.output / name}: {gap or 'written'}")
     return 0
 
 

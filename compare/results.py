@@ -75,7 +75,7 @@ def load(directory: Path) -> Summary:
     try:
         content = json.loads(path.read_text("utf-8"))
     except OSError as error:
-        raise StorageError(f"cannot read {path}: {error.strerror}; run 'dualball validate' first") from error
+        raise StorageError(f"cannot read {path}: {error.strerror}; run 'dualball validate -o {directory}'") from error
     except ValueError as error:
         raise StorageError(f"{path} is not JSON: {error}") from error
     if not isinstance(content, Mapping) or content.get("schema") != SCHEMA:
