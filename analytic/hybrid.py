@@ -30,7 +30,7 @@ ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
 be stiff."""
 PATIENCE = 300
 """Steps of LSODA with a small slip after which it gives way; a slip that dies out takes fewer."""
-LOCAL = 0.1
+LOCAL = 0.25
 """Tolerance of a step of the integrator relative to that asked for: errors of many steps add up."""
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
