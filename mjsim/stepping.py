@@ -66,9 +66,9 @@ class Single(Stepper):
     def __init__(
         self, model: Any, p: Parameters, settings: ContactSettings, start: tuple[Array, Array], omega_0: float
     ) -> None:
-        self._model, self._data, self._p, self._settings = model, mujoco.MjData(model), p, settings
-        self._data.qpos[:], self._data.qvel[:] = start
-        self._data.qpos[:3] += settings.lead * start[1][:3]
+        self.model, self.data, self._p, self._settings = model, mujoco.MjData(model), p, settings
+        self.data.qpos[:], self.data.qvel[:] = start
+        self.data.qpos[:3] += settings.lead * start[1][:3]
         self._floor, self._wall = (model.geom_surfacevel[model.geom(name).id] for name in ("floor", "wall"))
         self._remember(start[1])
         self.margins = model.pair_margin[None]
@@ -76,7 +76,7 @@ class Single(Stepper):
 
     def _settle(self, omega_0: float) -> None:
         """Find the margins, friction forces and accelerations that belong to the first state, at rest in time."""
-        model, data, timestep = self._model, self._data, self._settings.timestep
+        model, data, timestep = self.model, self.data, self._settings.timestep
         stiffness = self._settings.solimp * self._settings.k
         reach = self._settings.touching(self._p.g)
         for _ in range(_START):
@@ -89,10 +89,10 @@ class Single(Stepper):
 
     def _remember(self, qvel: Array) -> None:
         """Take these for the velocities of the last step, with rho omega_c as the seventh."""
-        self._last = [*qvel.tolist(), float((self._p.R - self._data.qpos[1]) * qvel[0])]
+        self._last = [*qvel.tolist(), float((self._p.R - self.data.qpos[1]) * qvel[0])]
 
     def sample(self, omega_0: Array, row: Array) -> None:
-        data, split = self._data, recorder.NQ + recorder.NV
+        data, split = self.data, recorder.NQ + recorder.NV
         row[0, : recorder.NQ], row[0, recorder.NQ : split] = data.qpos, data.qvel
         self.advance(omega_0[None])
         row[0, split:] = data.sensordata
@@ -107,7 +107,7 @@ class Single(Stepper):
         raise NotImplementedError("only runs in a batch can be taken up again")
 
     def _steps(self, omega_0: list[float], step: Callable[[Any, Any], None]) -> None:
-        model, data, p, settings = self._model, self._data, self._p, self._settings
+        model, data, p, settings = self.model, self.data, self._p, self._settings
         qpos, qvel, applied, turn, margins = (
             data.qpos, data.qvel, data.qfrc_applied, data.mocap_quat[0], model.pair_margin
         )  # fmt: skip
