@@ -145,7 +145,7 @@ def test_kill_minus_nine_loses_nothing_that_was_done(tmp_path: Path, undisturbed
 
 def test_a_run_that_takes_too_long_is_reported(tmp_path: Path) -> None:
     endless = Task(engine="mujoco", parameters=Parameters.named("reference"), x0=REST, t_end=6000.0)
-    slow = Task(engine="time-stepping", parameters=Parameters.named("reference"), x0=REST, t_end=6000.0)
+    slow = Task(engine="time-stepping", parameters=endless.parameters, x0=REST, t_end=6000.0, sample_interval=0.01)
     with Campaign(tmp_path, workers=0, limit=4) as campaign:
         failures = campaign.complete([endless, *tasks(1, t_end=0.01), slow])
     assert [failure.task for failure in failures] == [endless, slow]
