@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare import decay, results, stationary
+from compare import decay, results, slip, stationary
 from compare.campaign import Campaign, Progress
 from compare.claims import Claim, Lab, Level, Verdict, judge, select
 from compare.progress import Show
 
-CLAIMS: tuple[Claim, ...] = (*stationary.CLAIMS, *decay.CLAIMS)
+CLAIMS: tuple[Claim, ...] = (*stationary.CLAIMS, *decay.CLAIMS, *slip.CLAIMS)
 """Every claim there is, in the order of the paper."""
 
 
