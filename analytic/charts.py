@@ -367,7 +367,7 @@ def fall_time(y: float, v_y: float, p: Parameters) -> float:
     low, high = _rise_time(v_y, p) if v_y > 0 else 0.0, free
     while height(high) > 0:
         low, high = high, 2 * high
-    return float(brentq(height, low, high, xtol=1e-300, rtol=4 * float(np.finfo(float).eps)))
+    return float(brentq(height, low, high, xtol=4 * math.ulp(1.0) * high, rtol=4 * math.ulp(1.0)))
 
 
 def _rise_time(v_y: float, p: Parameters) -> float:

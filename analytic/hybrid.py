@@ -30,6 +30,7 @@ ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
 be stiff."""
 PATIENCE = 300
 """Steps of LSODA with a small slip after which it gives way; a slip that dies out takes fewer."""
+EPS = math.ulp(1.0)
 LOCAL = 0.25
 """Tolerance of a step of the integrator relative to that asked for: errors of many steps add up."""
 MAX_EVENTS_AT_ONCE = 100
@@ -312,7 +313,7 @@ class Watch:
             return start
         if value(end) >= 0:
             return end
-        return float(brentq(value, start, end, xtol=1e-300, rtol=4 * float(np.finfo(float).eps)))
+        return float(brentq(value, start, end, xtol=4 * EPS * end, rtol=4 * EPS))
 
 
 def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:

@@ -76,7 +76,7 @@ def end(at: Moment, until: float, p: Parameters, omega_0: Fluid, criterion: str)
     first = int(np.argmax(gone))
     if first == 0:
         return at.time
-    return float(brentq(value, times[first - 1], times[first], xtol=1e-300, rtol=4 * np.finfo(float).eps))
+    return float(brentq(value, times[first - 1], times[first], xtol=4 * math.ulp(until), rtol=4 * math.ulp(1.0)))
 
 
 def holds(omega_c: float, p: Parameters, omega_0: float, criterion: str) -> bool:
