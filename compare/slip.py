@@ -353,8 +353,8 @@ CLAIMS = (
     _claim(
         "extrema", "after (80)", "Directions (0, 0) and (π, π) are the global extrema of γ.", _extrema, Outcome.REFUTED,
         "With the Euclidean normal (75) other directions have a larger γ. Here it is even positive where (82) calls "
-        "the rolling stable; the slip dies out all the same, because it turns. With the kinetic energy of the slip as the "
-        "measure the statement holds and (82) follows.",
+        "the rolling stable; the slip dies out all the same, because it turns. Measured by the kinetic energy of the "
+        "slip the statement holds, and (82) follows.",
     ),
 )  # fmt: skip
 

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare import decay, results, slip, stationary
+from compare import decay, results, slip, stationary, table_5
 from compare.campaign import Campaign, Progress
 from compare.claims import Claim, Lab, Level, Verdict, judge, select
+from compare.executors import Workers
 from compare.progress import Show
 
-CLAIMS: tuple[Claim, ...] = (*stationary.CLAIMS, *decay.CLAIMS, *slip.CLAIMS)
+CLAIMS: tuple[Claim, ...] = (*stationary.CLAIMS, *decay.CLAIMS, *slip.CLAIMS, *table_5.CLAIMS)
 """Every claim there is, in the order of the paper."""
 
 
 def validate(
     output: str | Path = "results", *, level: Level = Level.QUICK, claims: Sequence[str] | None = None,
-    workers: int = 1, progress: Show = lambda what, done, total, failed: None,
+    workers: int | Workers = 1, limit: float = math.inf, progress: Show = lambda what, done, total, failed: None,
 ) -> list[Verdict]:  # fmt: skip
     """Judge claims, all of them if None, and store runs, summary and report in a directory.
 
@@ -36,7 +38,7 @@ def validate(
     chosen = select(CLAIMS, claims)
     summary = results.open_directory(output)
     verdicts: list[Verdict] = []
-    with Campaign(output / results.RUNS, workers) as campaign:
+    with Campaign(output / results.RUNS, workers, limit=limit) as campaign:
         for k, claim in enumerate(chosen, start=1):
             what = f"claim {k}/{len(chosen)} {claim.id}"
 
