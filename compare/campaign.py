@@ -16,7 +16,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from compare.executors import Workers, processes
 from compare.tasks import OutOfTimeError, Task, failed_path, store
@@ -141,8 +141,7 @@ class Campaign:
         return failures
 
     def _list_failures(self) -> None:
-        listed = [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in self.failures]
-        write_text(self.directory / FAILURES, json.dumps(listed, indent=1))
+        write_text(self.directory / FAILURES, json.dumps(listed(self.failures), indent=1))
 
     def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[int, list[Failure]]]:
         """Yield, for each batch that ends, how many of its runs are whole and those that failed."""
@@ -197,6 +196,11 @@ class Campaign:
         if self._executor is not None and self._workers is not None:
             self._workers.stop(self._executor, at_once)
             self._executor = None
+
+
+def listed(failures: Iterable[Failure]) -> list[dict[str, Any]]:
+    """Failures as JSON-able data: what failed, why, and all that it takes to try it again."""
+    return [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures]
 
 
 def run_batch(tasks: Sequence[Task], directory: Path, limit: float) -> list[str]:

@@ -90,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     command.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR")
-    command.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (0: none)")
+    options.add_workers(command)
     command.add_argument("--json", action="store_true", help="print the verdicts as JSON")
     command.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -113,7 +113,7 @@ def _parser() -> argparse.ArgumentParser:
     options.add_engine(command)
     command.add_argument("--time", type=options.number, default=30.0, metavar="s", help="duration (default 30)")
     command.add_argument("-o", "--output", type=Path, default=Path("sweep"), metavar="DIR")
-    command.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (0: none)")
+    options.add_workers(command)
     command.add_argument("--batch", type=int, default=campaign.BATCH, metavar="N", help="runs in one MuJoCo batch")
     command.add_argument("--json", action="store_true", help="print a summary as JSON")
     command.add_argument("--quiet", action="store_true", help="no progress")
@@ -136,6 +136,16 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("file", type=Path, metavar="FILE")
     command.add_argument("--plot", type=Path, metavar="FILE", help="draw it (png, svg or pdf)")
     command.add_argument("--json", action="store_true", help="print JSON")
+
+    command = _add(commands, "render", _render, "a picture or film of a run: the scene, contact forces, slip, case")
+    command.add_argument("file", type=Path, metavar="FILE")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="picture.png or film.gif")
+    command.add_argument("--width", type=int, metavar="PIXELS", help="default 960 for a picture, 640 for a film")
+    command.add_argument("--at", type=options.number, metavar="s", help="time of a picture (default: the end)")
+    command.add_argument("--from", dest="start", type=options.number, default=0.0, metavar="s", help="start of a film")
+    command.add_argument("--seconds", type=options.number, default=6.0, help="length of a film (default 6)")
+    command.add_argument("--speed", type=options.number, default=0.25, help="1 is real time (default 0.25)")
+    command.add_argument("--rate", type=int, default=20, help="frames a second (default 20)")
 
     command = _add(commands, "benchmark", _benchmark, "cost of the loop round MuJoCo's step, as ratios within one run")
     command.add_argument("--json", action="store_true", help="print JSON")
@@ -198,7 +208,12 @@ def _validate(args: argparse.Namespace) -> int:
         return 0
     with progress.shown(quiet=args.quiet or args.json) as show:
         verdicts = compare.validate(
-            args.output, level=args.level, claims=args.claim, workers=args.workers, progress=show
+            args.output,
+            level=args.level,
+            claims=args.claim,
+            workers=options.workers(args),
+            limit=args.limit,
+            progress=show,
         )
     if args.json:
         print(json.dumps([results.describe(verdict) for verdict in verdicts], indent=1))
@@ -228,13 +243,13 @@ def _sweep(args: argparse.Namespace) -> int:
         tasks = sweep.held(template, sweep.grid(p, axes))
     with (
         progress.shown(quiet=args.quiet or args.json) as show,
-        Campaign(args.output, args.workers, args.batch) as work,
+        Campaign(args.output, options.workers(args), args.batch, args.limit) as work,
     ):
         work.report = lambda now: show("sweep", now.done, now.total, now.failed)
         failures = work.complete(tasks)
     told = {
         "directory": str(args.output), "runs": len(tasks), "whole": len(tasks) - len(failures),
-        "failures": [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures],
+        "failures": campaign.listed(failures),
     }  # fmt: skip
     if args.json:
         print(json.dumps(told, indent=1))
@@ -274,7 +289,22 @@ def _figures(args: argparse.Namespace) -> int:
     return 0
 
 
+def _render(args: argparse.Namespace) -> int:
+    from compare import render  # here, because drawing takes a second to load
+
+    film = {name: getattr(args, name) for name in ("start", "seconds", "speed", "rate")}
+    print(render.write(storage.load(args.file), args.output, args.at, args.width, **film))
+    return 0
+
+
 def _inspect(args: argparse.Namespace) -> int:
+    if collection.is_collection(args.file):
+        told = collection.describe(args.file)
+        if args.json:
+            print(json.dumps(told, indent=1))
+        else:
+            Console().print(collection.table(told))
+        return 0
     trajectory = storage.load(args.file)
     if args.plot:
         inspection.plot(trajectory, args.plot)

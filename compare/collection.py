@@ -13,9 +13,10 @@ from typing import Any
 
 import h5py
 import numpy as np
+from rich.table import Table
 
 from mjsim.measurement import window_mean
-from model import InputError, Parameters, StorageError, Trajectory, storage
+from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.files import WholeFile, check_writable
 from model.kinematics import UNITS, VARIABLES
 
@@ -42,6 +43,59 @@ def collect(directory: Path, output: Path, progress: Callable[[int, int], None] 
         progress(k, len(files))
     _write(rows, output)
     return len(rows)
+
+
+def is_collection(path: Path) -> bool:
+    """Whether a file is what `collect` writes."""
+    try:
+        with h5py.File(path, "r") as file:
+            return bool(file.attrs.get("schema") == SCHEMA)
+    except OSError:
+        return False
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """What a collection holds: number of runs, engines, failures, and the range of every column, JSON-able.
+
+    Raises `StorageError` for a collection that is not whole or of a newer version.
+    """
+    with h5py.File(path, "r") as file:
+        version = file.attrs.get("schema_version")
+        if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
+            raise StorageError(f"{path} is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
+        columns = {name: _own(file, name, path)[...] for name in file}
+    numbers = {name: values for name, values in columns.items() if values.dtype.kind == "f"}
+    failures = [text.decode() for text in columns["failure"] if text]
+    return {
+        "runs": len(columns["run"]),
+        "engines": sorted({text.decode() for text in columns["engine"]}),
+        "cases": {
+            Case(code).name: int((columns["case"] == code).sum()) for code in sorted(set(columns["case"])) if code >= 0
+        },
+        "failures": failures,
+        "varied": [f.name for f in dataclasses.fields(Parameters) if len(set(columns[f.name].tolist())) > 1],
+        "ranges": {
+            name: [float(np.nanmin(v)), float(np.nanmax(v))] for name, v in numbers.items() if np.isfinite(v).any()
+        },
+    }
+
+
+def _own(file: h5py.File, name: str, path: Path) -> h5py.Dataset:
+    if not isinstance(file.get(name, getlink=True), h5py.HardLink) or not isinstance(file[name], h5py.Dataset):
+        raise StorageError(f"{path} is not whole: {name!r} is not a dataset of its own")
+    return file[name]
+
+
+def table(told: dict[str, Any]) -> Table:
+    """The description for the terminal."""
+    rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    rows.add_row("[bold]runs", f"{told['runs']} ({', '.join(told['engines'])}), {len(told['failures'])} failed")
+    rows.add_row("[bold]cases", ", ".join(f"{name}: {count}" for name, count in told["cases"].items()))
+    rows.add_row(
+        "[bold]varied", "\n".join(f"{n} {told['ranges'][n][0]:g} … {told['ranges'][n][1]:g}" for n in told["varied"])
+    )
+    rows.add_row("[bold]omega_c", "{:.9g} … {:.9g} rad s-1".format(*told["ranges"].get("omega_c", [np.nan, np.nan])))
+    return rows
 
 
 def _row(file: Path, directory: Path) -> dict[str, Any]:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
+import os
 from pathlib import Path
 
 import numpy as np
 
+from compare.executors import Workers, dask
 from compare.tasks import ENGINES
 from model import Flow, InputError, Parameters, StorageError
 from model.errors import suggestion
@@ -62,6 +65,24 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--timestep", type=number, metavar="s", help="time step of mujoco and time-stepping")
     group.add_argument("--rtol", type=number, help="relative tolerance of event")
     group.add_argument("--restitution", type=number, help="coefficient of restitution of event and time-stepping")
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Options that say where runs are carried out."""
+    group = parser.add_argument_group("workers")
+    choice = group.add_mutually_exclusive_group()
+    choice.add_argument(
+        "--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes of this machine (0: this one)"
+    )
+    choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
+    group.add_argument("--limit", type=number, default=math.inf, metavar="s", help="longest real time a run may take")
+
+
+def workers(args: argparse.Namespace) -> int | Workers:
+    """What the options of `add_workers` name."""
+    if args.workers < 0:
+        raise InputError(f"workers = {args.workers} is out of range: must be >= 0")
+    return dask(args.scheduler) if args.scheduler else int(args.workers)
 
 
 def add_start(parser: argparse.ArgumentParser) -> None:
