@@ -313,3 +313,7 @@ def _inspect(args: argparse.Namespace) -> int:
     else:
         Console().print(inspection.table(trajectory))
     return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -61,7 +61,10 @@ def flow(args: argparse.Namespace) -> Flow | None:
 def add_engine(parser: argparse.ArgumentParser) -> None:
     """Options that choose an engine and its accuracy."""
     group = parser.add_argument_group("engine")
-    group.add_argument("--engine", choices=ENGINES, default="mujoco", metavar="NAME", help=", ".join(ENGINES))
+    group.add_argument(
+        "--engine", type=lambda name: {"analytic": "event"}.get(name, name), choices=ENGINES, default="mujoco",
+        metavar="NAME", help=f"{', '.join(ENGINES)}; analytic is event",
+    )  # fmt: skip
     group.add_argument("--timestep", type=number, metavar="s", help="time step of mujoco and time-stepping")
     group.add_argument("--rtol", type=number, help="relative tolerance of event")
     group.add_argument("--restitution", type=number, help="coefficient of restitution of event and time-stepping")

@@ -40,7 +40,7 @@ class Flow:
     @property
     def breakpoints(self) -> Array:
         """Times in s at which omega_0 or its slope jumps: an integrator should stop there."""
-        return self.start[1:]
+        return self.start[self.start > 0]
 
     @property
     def is_steady(self) -> bool:

@@ -251,3 +251,81 @@ def test_bad_campaigns(tmp_path: Path) -> None:
         Campaign(tmp_path / "file")
     with pytest.raises(InputError, match=r"no engine is called 'mujuco' \(did you mean 'mujoco'\?\)"):
         Task(engine="mujuco", parameters=Parameters.named("reference"), x0=REST, t_end=1)
+
+
+LONG_PROGRAM = """
+import sys
+from compare import tasks
+from compare.campaign import Campaign
+from mjsim.journal import Journal
+from model import Parameters
+tasks.LONG = 1000
+tasks.Journal = lambda directory: Journal(directory, interval=0.2)
+if __name__ == "__main__":
+    task = tasks.Task(
+        engine="mujoco", parameters=Parameters.named("reference"), x0=(0.0,) * 8, t_end=20.0, sample_interval=0.02
+    )
+    with Campaign({directory!r}, workers=0) as campaign:
+        campaign.complete([task])
+    print(campaign.path(task))
+"""
+
+
+def test_a_long_run_that_is_killed_goes_on_to_the_bit(tmp_path: Path) -> None:
+    scripts = {}
+    for name in ("killed", "whole"):
+        scripts[name] = tmp_path / f"{name}.py"
+        scripts[name].write_text(LONG_PROGRAM.format(directory=str(tmp_path / name)))
+    kept = []
+    for _ in range(2):
+        process = subprocess.Popen([sys.executable, str(scripts["killed"])], stdout=subprocess.DEVNULL)
+        before = len(kept)
+        while process.poll() is None and len(kept) < before + 2:  # until it has kept something more
+            time.sleep(0.02)
+            kept = sorted((tmp_path / "killed").glob("*.journal/*.h5"))
+        process.kill()
+        process.wait()
+    assert kept
+    for name in ("killed", "whole"):
+        subprocess.run([sys.executable, str(scripts[name])], check=True, stdout=subprocess.DEVNULL)
+    (run,) = data(tmp_path / "killed").values()
+    (whole,) = data(tmp_path / "whole").values()
+    assert run == whole
+    assert [path.suffix for path in (tmp_path / "killed").iterdir()] == [".h5"]
+
+
+def test_interrupted_by_the_keyboard(tmp_path: Path) -> None:
+    command = [
+        sys.executable, "-m", "compare.cli", "sweep", "--vary", "omega_0=5:10:40", "--batch", "2", "--workers", "2",
+        "--time", "2", "-o", str(tmp_path),
+    ]  # fmt: skip
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while len(list(tmp_path.glob("*.h5"))) < 2:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "the same command goes on from there" in err
+    assert "Traceback" not in out + err
+    assert not list(tmp_path.glob(".*"))
+    done = len(list(tmp_path.glob("*.h5")))
+    assert 2 <= done < 40
+    assert all(storage.load(path).complete for path in tmp_path.glob("*.h5"))
+
+
+@pytest.mark.slow
+def test_ten_million_steps_stay_small(tmp_path: Path) -> None:
+    program = f"""
+import resource
+from compare.campaign import Campaign
+from compare.tasks import Task
+from model import Parameters
+task = Task(
+    engine="mujoco", parameters=Parameters.named("reference"), x0=(0.0,) * 8, t_end=1e4, sample_interval=1e-2
+)
+with Campaign({str(tmp_path)!r}, workers=0) as campaign:
+    assert campaign.complete([task]) == []
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert int(answer.stdout) < 300_000  # kB

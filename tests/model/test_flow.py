@@ -22,6 +22,7 @@ def test_values() -> None:
     assert steady.is_steady
     assert not any(flow.is_steady for flow in FLOWS[1:])
     np.testing.assert_array_equal(stairs.breakpoints, [2, 4])
+    np.testing.assert_array_equal(ramp.breakpoints, [1, 6])
 
 
 @pytest.mark.parametrize("flow", FLOWS, ids=lambda f: f.kind)
