@@ -1,0 +1,123 @@
+"""Pictures of runs: they show the case and the ball where it is, and say clearly what can't be shown."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import analytic
+import mjsim
+from compare import cli, opengl, render
+from compare.figures import style
+from model import Case, InputError, Parameters, Trajectory, storage
+from model.kinematics import angular_velocity
+
+WIDTH = 320
+
+
+@pytest.fixture(scope="module")
+def run() -> Trajectory:
+    """Two-point slipping, and rolling before."""
+    p = Parameters.named("reference").replace(omega_0=25.0)
+    return mjsim.simulate(p, [0, 0, 13.0, 0, 0, 0], 0.8, sample_interval=0.01)
+
+
+@pytest.fixture
+def draws() -> None:
+    opengl.backend.cache_clear()
+    try:
+        opengl.backend()
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+def sign(image: Image.Image) -> str:
+    """Colour of the sign with the case, beside its letters."""
+    unit = image.width / 960
+    return "#{:02x}{:02x}{:02x}".format(*image.convert("RGB").getpixel((round(27 * unit), round(50 * unit))))
+
+
+@pytest.mark.usefixtures("draws")
+def test_a_picture_shows_the_case_and_the_ball_moves(run: Trajectory) -> None:
+    early, late = render.picture(run, 0.1, WIDTH), render.picture(run, None, WIDTH)
+    assert early.size == (WIDTH, WIDTH * 10 // 16)
+    cases = [Case(run.case[np.searchsorted(run.time, 0.1)]), Case(run.case[-1])]
+    assert [sign(early), sign(late)] == [style.COLOURS[case].lower() for case in cases]
+    assert np.mean(np.asarray(early) != np.asarray(late)) > 0.01
+
+
+@pytest.mark.usefixtures("draws")
+def test_command_writes_pictures_and_films(run: Trajectory, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, film = tmp_path / "run.h5", tmp_path / "film.gif"
+    storage.save(run, file)
+    options = ["--from", "0.2", "--seconds", "0.4", "--speed", "0.5", "--rate", "10", "--width", str(WIDTH)]
+    assert cli.main(["render", str(file), "-o", str(film), *options]) == 0
+    with Image.open(film) as frames:
+        assert frames.n_frames == 5  # both ends of 0.4 s at 10 a second
+        assert frames.info["duration"] == 100
+    assert cli.main(["render", str(file), "-o", str(tmp_path / "p.png"), "--at", "0.5", "--width", str(WIDTH)]) == 0
+    assert "320 × 200" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("draws")
+def test_runs_of_other_engines_are_shown_in_the_scene_of_their_parameters(run: Trajectory) -> None:
+    p = run.header.parameters
+    event = analytic.simulate(p, run.x[0], 0.3)
+    assert event.header.mjcf == ""
+    assert render.picture(event, 0.3, WIDTH).size == (WIDTH, WIDTH * 10 // 16)
+
+
+def test_the_ball_turns_with_its_angular_velocity(reference: Parameters) -> None:
+    """Rolling steadily, about an axis that itself goes round: the mean turn about z is that of o_y."""
+    p = reference.replace(omega_0=5.0)
+    x = np.array([0, 0, 5.0, 0, 0, 0])
+    run = mjsim.simulate(p, x, 0.05, sample_interval=0.005)
+    times, rotations = render._rotations(run)
+    assert times[-1] == pytest.approx(0.05)
+    step = (rotations[1] * rotations[0].inv()).magnitude() / (times[1] - times[0])
+    # The rotation vector over a step is that of its middle, exact to the second order.
+    assert step == pytest.approx(float(np.linalg.norm(angular_velocity(x, p))), rel=(5.0 * 5e-3) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["-o", "film.mp4"], r"cannot write film\.mp4: a picture is a \.png, a film a \.gif"),
+        (["-o", "nowhere/p.png"], "there is no directory nowhere"),
+        (["-o", "p.png", "--at", "9"], r"time = 9 s is out of range: the run has samples from 0 to 0\.8 s"),
+        (["-o", "p.png", "--width", "9999"], "width = 9999 pixels is out of range"),
+        (["-o", "p.gif", "--from", "2"], "from = 2 s is out of range"),
+        (["-o", "p.gif", "--speed", "0"], "speed = 0 is out of range"),
+    ],
+)
+def test_what_cannot_be_shown(run, tmp_path, monkeypatch, capsys, options: list[str], message: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    storage.save(run, "run.h5")
+    assert cli.main(["render", "run.h5", *options]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert re.search(message, told)
+    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_a_scene_without_a_ball(run: Trajectory) -> None:
+    for mjcf, message in (("<mujoco/>", "no geom named 'ball'"), ("<mujoco", "no valid MJCF")):
+        other = dataclasses.replace(run, header=dataclasses.replace(run.header, mjcf=mjcf))
+        with pytest.raises(InputError, match=message):
+            render.picture(other, 0.0, WIDTH)
+
+
+def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(opengl, "_works", lambda name: False)
+    monkeypatch.setattr("platform.system", lambda: "Linux")
+    for chosen, message in (("", "apt-get install libegl1"), ("glfw", "unset MUJOCO_GL = 'glfw'")):
+        monkeypatch.setenv("MUJOCO_GL", chosen)
+        opengl.backend.cache_clear()
+        with pytest.raises(InputError, match=message):
+            opengl.backend()
+    opengl.backend.cache_clear()
