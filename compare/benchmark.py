@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import statistics
+import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
-from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.table import Table
 
-from mjsim import benchmark, simulate_many
+from compare.campaign import Campaign
+from compare.executors import Workers, dask, processes
+from compare.tasks import Task, store
+from mjsim import benchmark
 from model import Parameters
 
 BATCH = 64
 STEPS = 2000
-REPEATS = 5
+REPEATS = 3
+FINISHED = 10_000
 
 
 @dataclass(frozen=True)
@@ -30,7 +36,13 @@ class Figures:
     batch: benchmark.Cost
     """A batch of `BATCH`."""
     two_over_one: float
-    """Throughput of two processes over that of one."""
+    """Throughput of a campaign with two processes over that with one."""
+    bookkeeping: float
+    """Time a campaign spends on a task beside simulating and storing it, s."""
+    resuming: float
+    """Time to find out that `FINISHED` tasks are done, s."""
+    dask_over_processes: float
+    """Throughput of two Dask workers over that of two processes; nan without Dask."""
 
     def to_mapping(self) -> dict[str, Any]:
         """JSON-able data."""
@@ -38,13 +50,20 @@ class Figures:
             "single": {**dataclasses.asdict(self.single), "ratio": self.single.ratio},
             "batch": {**dataclasses.asdict(self.batch), "ratio": self.batch.ratio},
             "two_over_one": self.two_over_one,
+            "bookkeeping": self.bookkeeping,
+            "resuming": self.resuming,
+            "dask_over_processes": None if math.isnan(self.dask_over_processes) else self.dask_over_processes,
         }
 
 
 def run() -> Figures:
-    """Measure the loop over bare steps, alone and in a batch, and two processes over one."""
+    """Measure the loop over bare steps, alone and in a batch; then campaigns."""
     p, x0 = _problem()
-    return Figures(benchmark.cost(p, x0), benchmark.cost(p, x0, BATCH, STEPS // 4), _two_over_one())
+    two_over_one, dask_over_processes = _campaigns()
+    return Figures(
+        single=benchmark.cost(p, x0), batch=benchmark.cost(p, x0, BATCH, STEPS // 4), two_over_one=two_over_one,
+        bookkeeping=_bookkeeping(), resuming=_resuming(), dask_over_processes=dask_over_processes,
+    )  # fmt: skip
 
 
 def table(figures: Figures) -> Table:
@@ -54,7 +73,10 @@ def table(figures: Figures) -> Table:
         shown.add_column(column, justify="right" if column else "left")
     for name, cost in (("one simulation", figures.single), (f"batch of {figures.batch.runs}", figures.batch)):
         shown.add_row(name, f"{1e6 * cost.bare:.2f} µs", f"{1e6 * cost.whole:.2f} µs", f"{cost.ratio:.2f}")
-    shown.add_row("two processes over one", "", "", f"{figures.two_over_one:.2f}")
+    shown.add_row("campaign: two processes over one", "", "", f"{figures.two_over_one:.2f}")
+    shown.add_row("campaign: two Dask workers over two processes", "", "", f"{figures.dask_over_processes:.2f}")
+    shown.add_row("campaign: bookkeeping of a task", "", f"{1e3 * figures.bookkeeping:.1f} ms", "")
+    shown.add_row(f"campaign: resuming {FINISHED} finished tasks", "", f"{figures.resuming:.1f} s", "")
     return shown
 
 
@@ -63,21 +85,70 @@ def _problem() -> tuple[Parameters, list[float]]:
     return Parameters.named("reference").replace(omega_0=25.0), [0.0] * 8
 
 
-def _two_over_one() -> float:
-    """Median over `REPEATS` of the time of two batches one after the other, over both at once."""
-    ratios = []
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        list(pool.map(_work, [10, 10]))  # processes start and import outside the measurement
-        for _ in range(REPEATS):
-            start = time.perf_counter()
-            pool.submit(_work, STEPS // 2).result()
-            pool.submit(_work, STEPS // 2).result()
-            middle = time.perf_counter()
-            list(pool.map(_work, [STEPS // 2, STEPS // 2]))
-            ratios.append((middle - start) / (time.perf_counter() - middle))
-    return statistics.median(ratios)
-
-
-def _work(steps: int) -> None:
+def _tasks(count: int, t_end: float) -> list[Task]:
     p, x0 = _problem()
-    simulate_many([p] * BATCH, [np.array(x0)] * BATCH, steps * 1e-3, sample_interval=0.1 if steps >= 100 else None)
+    return [
+        Task(engine="mujoco", parameters=p.replace(omega_0=15 + 10 * k / count), x0=tuple(x0), t_end=t_end)
+        for k in range(count)
+    ]
+
+
+def _campaigns() -> tuple[float, float]:
+    """Medians over `REPEATS` of the time with one process over that with two, and of that over two Dask workers'."""
+    tasks = _tasks(2 * BATCH, 2.0)
+    with ExitStack() as stack:
+        kinds: list[Workers] = [processes(1), processes(2), *_dask(stack)]
+        times = [[_timed(kind, tasks) for kind in kinds] for _ in range(REPEATS)]
+    one, two, *others = (statistics.median(column) for column in zip(*times, strict=True))
+    return one / two, two / others[0] if others else math.nan
+
+
+def _dask(stack: ExitStack) -> list[Workers]:
+    try:
+        from distributed import LocalCluster
+    except ImportError:
+        return []
+    cluster = stack.enter_context(
+        LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50)
+    )
+    return [dask(cluster.scheduler_address)]
+
+
+def _timed(kind: Workers, tasks: list[Task]) -> float:
+    """Time of a campaign whose workers have started and imported what they need."""
+    with tempfile.TemporaryDirectory() as warm, tempfile.TemporaryDirectory() as directory:
+        executor = kind.start()
+        kept = dataclasses.replace(kind, start=lambda: executor, stop=lambda executor, at_once: None)
+        with Campaign(Path(warm), kept, batch=1) as campaign:
+            campaign.complete(_tasks(4, 0.01))
+        start = time.perf_counter()
+        with Campaign(Path(directory), kept) as campaign:
+            campaign.complete(tasks)
+        elapsed = time.perf_counter() - start
+        if isinstance(executor, ProcessPoolExecutor):
+            kind.stop(executor, False)
+    return elapsed
+
+
+def _bookkeeping() -> float:
+    """Time a task of a campaign in this process takes beyond simulating and storing it."""
+    tasks = _tasks(BATCH, 0.01)
+    with tempfile.TemporaryDirectory() as one, tempfile.TemporaryDirectory() as other:
+        store(tasks, [Path(one) / f"{k}.h5" for k in range(BATCH)])  # imports and templates
+        start = time.process_time()
+        store(tasks, [Path(one) / f"{k}.h5" for k in range(BATCH)])
+        middle = time.process_time()
+        with Campaign(Path(other), workers=0) as campaign:
+            campaign.complete(_tasks(BATCH, 0.01))
+        return (time.process_time() - 2 * middle + start) / BATCH
+
+
+def _resuming() -> float:
+    with tempfile.TemporaryDirectory() as directory:
+        for task in _tasks(FINISHED, 0.01):
+            (Path(directory) / f"{task.key}.h5").touch()
+        tasks = _tasks(FINISHED, 0.01)
+        start = time.perf_counter()
+        with Campaign(Path(directory), workers=0) as campaign:
+            campaign.complete(tasks)
+        return time.perf_counter() - start

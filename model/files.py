@@ -19,18 +19,24 @@ _SUFFIX = ".part"
 class WholeFile:
     """An HDF5 file under construction; a context manager.
 
-    It has a temporary name until `finish`; leaving the context without that removes it. ``file`` is the h5py file.
+    It has a temporary name until `finish`; leaving the context without that removes it. ``file`` is the h5py file,
+    empty or as in `template`, the bytes of an HDF5 file.
     Raises `StorageError`, in one line, when it can't be written (no such directory, no permission, disk full).
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, template: bytes = b"") -> None:
         self.path = Path(path)
         self._temporary = _temporary(self.path)
         try:
             self._disk = _Disk(self._temporary, "w+b")
         except OSError as error:
             raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
-        self.file = h5py.File(self._disk, "w", track_order=True)
+        self._disk.write(template)
+        if self._disk.refusal:
+            self._disk.close()
+            self._temporary.unlink(missing_ok=True)
+            self._check()
+        self.file = h5py.File(self._disk, "r+" if template else "w", track_order=True)
         self._finished = False
 
     def __enter__(self) -> Self:

@@ -8,6 +8,8 @@ a file that is cut short, foreign, or written by a newer version.
 from __future__ import annotations
 
 import dataclasses
+import functools
+import io
 import json
 import os
 import re
@@ -54,10 +56,12 @@ class TrajectoryWriter:
     """
 
     def __init__(self, path: str | Path, header: Header) -> None:
-        self._whole = WholeFile(path)
+        self._whole = WholeFile(path, _empty())
         self._file = self._whole.file
         try:
-            self._create(header)
+            for name, text in _header_attributes(header).items():
+                self._file.attrs[name] = text
+            self._file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
             self._whole.flush()
         except BaseException as error:
             self.__exit__(type(error), error, error.__traceback__)
@@ -90,33 +94,37 @@ class TrajectoryWriter:
         self._file.attrs["failure"] = failure
         self._whole.finish(path)
 
-    def _create(self, header: Header) -> None:
-        self._file.attrs["schema"] = SCHEMA
-        self._file.attrs["schema_version"] = SCHEMA_VERSION
-        for name, text in _header_attributes(header).items():
-            self._file.attrs[name] = text
-        self._file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
-        axis = self._file.create_dataset("axis", data=np.array(AXES, dtype="S1"))
+
+@functools.cache
+def _empty() -> bytes:
+    """A trajectory file without samples and header: the same for all, and most of the work of making one."""
+    content = io.BytesIO()
+    with h5py.File(content, "w", track_order=True) as file:
+        file.attrs["schema"] = SCHEMA
+        file.attrs["schema_version"] = SCHEMA_VERSION
+        axis = file.create_dataset("axis", data=np.array(AXES, dtype="S1"))
         _describe(axis, {"units": "1", "long_name": "axes of the co-rotating frame: x inwards, y up, z along"})
         axis.make_scale("axis")
         for table, scale_name, rename in ((Trajectory, "time", str), (Events, "event_time", _event_name)):
             for name, meta in columns(table).items():
-                dataset = self._create_column(rename(name), meta)
+                dataset = _create_column(file, rename(name), meta)
                 if rename(name) == scale_name:
                     dataset.make_scale(scale_name)
                 else:
-                    dataset.dims[0].attach_scale(self._file[scale_name])
+                    dataset.dims[0].attach_scale(file[scale_name])
                 if meta["shape"]:
                     dataset.dims[1].attach_scale(axis)
+    return content.getvalue()
 
-    def _create_column(self, name: str, meta: Mapping[str, Any]) -> h5py.Dataset:
-        shape = meta["shape"]
-        dataset = self._file.create_dataset(
-            name, (0, *shape), _CASE_ENUM if meta.get("dtype") is np.int8 else np.float64,
-            maxshape=(None, *shape), chunks=(_CHUNK, *shape), compression="gzip", shuffle=True,
-        )  # fmt: skip
-        _describe(dataset, meta)
-        return dataset
+
+def _create_column(file: h5py.File, name: str, meta: Mapping[str, Any]) -> h5py.Dataset:
+    shape = meta["shape"]
+    dataset = file.create_dataset(
+        name, (0, *shape), _CASE_ENUM if meta.get("dtype") is np.int8 else np.float64,
+        maxshape=(None, *shape), chunks=(_CHUNK, *shape), compression="gzip", shuffle=True,
+    )  # fmt: skip
+    _describe(dataset, meta)
+    return dataset
 
 
 def load(path: str | Path) -> Trajectory:

@@ -115,13 +115,14 @@ def test_no_directory_to_write_to(tmp_path: Path) -> None:
         storage.load(tmp_path / "absent.h5")
 
 
-def test_a_full_disk_is_one_line_and_leaves_no_file(tmp_path: Path) -> None:
+@pytest.mark.parametrize("room", [1_000, 60_000])
+def test_a_full_disk_is_one_line_and_leaves_no_file(tmp_path: Path, room: int) -> None:
     """A limit on the size of files, in a process of its own, plays the disk that is full."""
     program = f"""
 import resource, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 import test_storage
-resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))
 try:
     test_storage.storage.save(test_storage.make(5000), {str(tmp_path / "run.h5")!r})
 except test_storage.StorageError as error:
