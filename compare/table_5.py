@@ -99,11 +99,14 @@ def vanishing(omegas: Array, order: Sequence[Measured]) -> Measured:
     values = np.array([m.value for m in order])
     noise = np.array([m.uncertainty for m in order])
 
+    if not np.all(np.isfinite(values)):
+        return Measured(math.nan, math.nan)
+
     def zero(of: Array, count: int) -> float:
         scaled = of[:count] / np.abs(values).max()
         return float(np.polynomial.Polynomial.fit(scaled, omegas[:count], count - 1)(0.0))
 
-    return _with_noise(lambda of, count: zero(of, count), values, noise)
+    return _with_noise(zero, values, noise)
 
 
 def turning(omegas: Array, order: Sequence[Measured]) -> Measured:
