@@ -6,13 +6,20 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare import branches, decay, results, slip, stationary, table_5
+from compare import branches, decay, maps, results, slip, stationary, table_5
 from compare.campaign import Campaign, Progress
 from compare.claims import Claim, Lab, Level, Verdict, judge, select
 from compare.executors import Workers
 from compare.progress import Show
 
-CLAIMS: tuple[Claim, ...] = (*stationary.CLAIMS, *decay.CLAIMS, *slip.CLAIMS, *table_5.CLAIMS, *branches.CLAIMS)
+CLAIMS: tuple[Claim, ...] = (
+    *stationary.CLAIMS,
+    *decay.CLAIMS,
+    *slip.CLAIMS,
+    *table_5.CLAIMS,
+    *branches.CLAIMS,
+    *maps.CLAIMS,
+)
 """Every claim there is, in the order of the paper."""
 
 
