@@ -38,7 +38,10 @@ LASTS = 20.0
 """Duration of every run, s: 20 time constants of the slowest mode but near a threshold."""
 SINKS = 250.0
 """Height in m above the floor at which a ball starts that may sink, at less than 5 m/s."""
-ENGINES = {"event": analytic.Settings(rtol=1e-6), "mujoco": ContactSettings.at(4e-3)}
+ENGINES: dict[str, analytic.Settings | ContactSettings] = {
+    "event": analytic.Settings(rtol=1e-6),
+    "mujoco": ContactSettings.at(4e-3),
+}
 FIGURES = ("fig-7", "fig-8")
 
 
