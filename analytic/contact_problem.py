@@ -35,7 +35,7 @@ class NotConvergedError(ArithmeticError):
 
 def solve(
     free: Six, A: Closed | None, B: Closed | None, p: Parameters,
-    start: Six = NOTHING, tolerance: float = 1e-15, max_sweeps: int = 20_000,
+    start: Six = NOTHING, tolerance: float = 4e-15, max_sweeps: int = 20_000,
 ) -> tuple[Six, Six]:  # fmt: skip
     """Velocities and impulses that obey Coulomb's law at both contacts.
 
@@ -44,7 +44,8 @@ def solve(
     free : velocities (m s-1 and rad s-1) that the ball would have without any impulse
     A, B : the closed contacts; None for an open one
     start : first guess of the impulses in N s
-    tolerance : the largest change in a sweep at which to stop, relative to the velocities of the problem
+    tolerance : the largest change in a sweep at which to stop, relative to the velocities of the problem, those that
+        the impulses cause among them; a sweep rounds a dozen times, so that less than some eps may never be reached
 
     Raises
     ------
@@ -54,12 +55,13 @@ def solve(
     u, P = apply(free, start, p), start
     if A is None or B is None:  # a contact alone is solved exactly
         return sweep(u, P, A, B, p)
-    enough = tolerance * max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
-    change = math.inf
+    scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
+    change = enough = math.inf
     for _ in range(max_sweeps):
         u, new = sweep(u, P, A, B, p)
         change = max(abs(a - b) for a, b in zip(new, P, strict=True)) / p.m
         P = new
+        enough = tolerance * max(scale, max(map(abs, P)) / p.m)
         if change <= enough:
             return apply(free, P, p), P
     raise NotConvergedError(
