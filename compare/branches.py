@@ -105,14 +105,20 @@ def _flow(part: float) -> Parameters:
     return REFERENCE.replace(omega_0=t.omega_02 + part * (t.omega_04 - t.omega_02))
 
 
-def _sub_branches(lab: Lab) -> list[Check]:
+def found(lab: Lab) -> list[tuple[Line, Measured, Task]]:
+    """The borders on all lines, with every witness of the level."""
     chosen = [line for part in PLACES[lab.level] for line in lines(_flow(part))]
-    found = []
-    for engine, rounds in ROUNDS.items():
-        if lab.level in rounds:
-            for line, (border, task) in zip(chosen, borders(lab, chosen, engine, rounds[lab.level]), strict=True):
-                found.append(Bench(lab, "reference").number(task, "border", "of the line", line.name, 0.0, border))
-    return found
+    return [
+        (line, border, task)
+        for engine, rounds in ROUNDS.items()
+        if lab.level in rounds
+        for line, (border, task) in zip(chosen, borders(lab, chosen, engine, rounds[lab.level]), strict=True)
+    ]
+
+
+def _sub_branches(lab: Lab) -> list[Check]:
+    bench = Bench(lab, "reference")
+    return [bench.number(task, "border", "of the line", line.name, 0.0, border) for line, border, task in found(lab)]
 
 
 def _nonsmooth_fold(lab: Lab) -> list[Check]:

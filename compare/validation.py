@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare import branches, decay, hysteresis, maps, results, slip, stationary, table_5
+from compare import branches, decay, diagrams, hysteresis, maps, results, slip, stationary, table_5
 from compare.campaign import Campaign, Progress
 from compare.claims import Claim, Lab, Level, Verdict, judge, select
 from compare.executors import Workers
@@ -19,6 +19,7 @@ CLAIMS: tuple[Claim, ...] = (
     *table_5.CLAIMS,
     *branches.CLAIMS,
     *maps.CLAIMS,
+    *diagrams.CLAIMS,
     *hysteresis.CLAIMS,
 )
 """Every claim there is, in the order of the paper."""
