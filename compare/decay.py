@@ -86,8 +86,8 @@ def modes(name: str, p: Parameters, case: Case, wanted: int) -> list[Mode]:
     return found[:wanted]
 
 
-def check(bench: Bench, mode: Mode, tasks: Sequence[Task], runs: Sequence[Trajectory]) -> list[Check]:
-    """Hold the exponents of pairs of runs, coarsest step first, against the eigenvalue."""
+def measured_exponent(mode: Mode, runs: Sequence[Trajectory]) -> tuple[complex, float]:
+    """The exponent that pairs of runs show, coarsest step first, and its standard uncertainty, rad/s."""
     rate, size = -mode.exponent.real, abs(mode.exponent)
     last = min(DURATION, LASTS / max(rate, 1e-9 * size))
     found, scatter = [], 0.0
@@ -97,16 +97,29 @@ def check(bench: Bench, mode: Mode, tasks: Sequence[Task], runs: Sequence[Trajec
         value, scatter = exponent(d, INTERVAL, mode.order, 1 / size)
         found.append(value)
     engine_error = abs(found[-1] - found[0]) if len(found) > 1 else RTOL / PUSH * size
+    return found[-1], math.hypot(scatter, engine_error)
+
+
+def measured(lab: Lab, mode: Mode, engine: str) -> tuple[Measured, Task]:
+    """The rate at which a mode decays, 1/s, and one of the runs."""
+    tasks = _tasks(mode, engine, lab.level)
+    value, uncertainty = measured_exponent(mode, lab.run(tasks))
+    return Measured(-value.real, uncertainty), tasks[-1]
+
+
+def check(bench: Bench, mode: Mode, tasks: Sequence[Task], runs: Sequence[Trajectory]) -> list[Check]:
+    """Hold the exponents of pairs of runs, coarsest step first, against the eigenvalue."""
+    found, uncertainty = measured_exponent(mode, runs)
     cases = mode.case, settled_case(runs[-1])
-    parts = [("decay rate", rate, -found[-1].real)]
+    parts = [("decay rate", -mode.exponent.real, -found.real)]
     if mode.order == 2:
-        parts.append(("frequency", abs(mode.exponent.imag), abs(found[-1].imag)))
+        parts.append(("frequency", abs(mode.exponent.imag), abs(found.imag)))
     return [
         bench.number(
             tasks[-1], f"{quantity} of {mode.case.name}", "1/s", f"λ = {mode.exponent:.4g}", predicted,
-            Measured(measured, math.hypot(scatter, engine_error)), cases,
+            Measured(value, uncertainty), cases,
         )
-        for quantity, predicted, measured in parts
+        for quantity, predicted, value in parts
     ]  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare import branches, decay, diagrams, hysteresis, maps, results, slip, stationary, table_5
+from compare import branches, decay, diagrams, hysteresis, laws, maps, results, slip, stationary, table_5
 from compare.campaign import Campaign, Progress
 from compare.claims import Claim, Lab, Level, Verdict, judge, select
 from compare.executors import Workers
@@ -21,6 +21,7 @@ CLAIMS: tuple[Claim, ...] = (
     *maps.CLAIMS,
     *diagrams.CLAIMS,
     *hysteresis.CLAIMS,
+    *laws.CLAIMS,
 )
 """Every claim there is, in the order of the paper."""
 
