@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -161,7 +162,7 @@ class Run:
         where = "" if last is None else " after " + ", ".join(
             f"{name} = {value:.6g} {unit}" for name, value, unit in zip(VARIABLES, last, UNITS, strict=True)
         )  # fmt: skip
-        object.__setattr__(self.headers[i], "failure", f"diverged by t = {time:g} s{where}")
+        self.headers[i] = dataclasses.replace(self.headers[i], failure=f"diverged by t = {time:g} s{where}")
 
 
 def simulate(

@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol, Self
 
 import mujoco
 import numpy as np
@@ -127,17 +128,17 @@ class Single(Stepper):
             orientation[0] = 1.0
             orientation[1] = orientation[2] = orientation[3] = 0.0
             rho = R - h
-            # Change over the last step, and the velocities expected in the middle of this one.
+            # Changes over the last step; half of them lies ahead till the middle of this one.
             d0, d1, d2, d3, d5 = v0 - u0, v1 - u1, v2 - u2, v3 - u3, v5 - u5
             around = rho * v0
             its_change = around - last_around
-            w0, w1, middle = v0 + ahead * d0, v1 + ahead * d1, around + ahead * its_change
             # Drag (9), and what the inertial forces grow by till the middle.
-            applied[0] = rho * (mc * (rho * omega - middle) + 2 * m * (w1 * w0 - v1 * v0))
-            applied[1] = -mc * w1 - m * (w0 * middle - v0 * around)
+            grows = 2 * m * ahead * (v0 * v1 - u0 * u1)
+            applied[0] = rho * (grows - mc * (around + ahead * its_change - rho * omega))
+            applied[1] = -m * ahead * (v0 * around - u0 * last_around) - mc * (v1 + ahead * d1)
             applied[2] = -mc * (v2 + ahead * d2)
-            applied[3] = inertia * (v0 * v5 - w0 * (v5 + ahead * d5))
-            applied[5] = inertia * (w0 * (v3 + ahead * d3) - v0 * v3)
+            applied[3] = -inertia * ahead * (v0 * v5 - u0 * u5)
+            applied[5] = inertia * ahead * (v0 * v3 - u0 * u3)
             if shifts:
                 _, force_h, force_y, moment_x, moment_y, _ = constraint.tolist()
                 turned, turned_change = r * v5, r * d5
@@ -174,26 +175,49 @@ class Many(Stepper):
         self._qpos, self._qvel, self._sensors = (batch.bind(name) for name in ("qpos", "qvel", "sensordata"))
         self._qpos[:], self._qvel[:] = (np.stack(part) for part in zip(*start, strict=True))
         self._qpos[:, :3] += settings.lead * self._qvel[:, :3]
-        self._orientation = self._qpos[:, 3:7]
-        self._applied, self._turn = batch.bind("qfrc_applied"), batch.bind("mocap_quat")[:, 0]
         self._acceleration = batch.bind("qacc")
         self._contact = self._outputs = batch.bind("qfrc_constraint"), self._sensors
         self.margins = batch.expand("pair_margin")
-        surface = batch.expand("geom_surfacevel")
-        self._floor, self._wall = (surface[:, models[0].geom(name).id, :2].T for name in ("floor", "wall"))
-        m, r, R, j, c = (np.array([getattr(p, name) for p in parameters]) for name in ("m", "r", "R", "j", "c"))
-        self._R, self._mc = R, m * c
-        one, none = np.ones_like(m), np.zeros_like(m)
-        self._lengths = np.stack([R, one, one, r, r, r, r])
-        self._inertia = np.stack([2 * m / r, -m / r, none, -j * m, none, j * m])
-        shift = np.array([settings.memory_gain(mass) for mass in m])
-        self._shift = np.stack([-shift / r, shift, shift, shift / r])
-        self._reach = np.array([[settings.touching(p.g)] for p in parameters])
-        # Kept here, since every step needs them and the settings work them out each time.
-        self._ahead, self._lag, self._gain = settings.midpoint, settings.friction_lag, settings.servo_gain
-        self._shifts = settings.shifts_surfaces
-        self._last = self._velocities()
+        self._views(models[0])
+        self._coefficients(parameters)
+        # What a step makes use of, here because making arrays takes longer than filling them.
+        runs = len(models)
+        self._now, self._last, self._change = (_Quantities.of(runs) for _ in range(3))
+        self._half, self._drag, self._fluid = np.empty(runs), np.empty((3, runs)), np.empty(runs)
+        self._around = self._drag[0]
+        self._surface, self._square, self._less = (np.empty((2, 2, runs)) for _ in range(3))
+        self._mixed, self._ends = self._surface.reshape(4, -1)[1:3], self._surface.reshape(4, -1)[::3]
+        self._slides = np.empty((2, 1, runs))
+        self._gap = np.empty((runs, 2))
+        self._take(self._qvel, self._last)
         self._settle(omega_0)
+
+    def _views(self, model: Any) -> None:
+        """Views of the engine's arrays, with the runs in the last axis."""
+        turn, applied = self._batch.bind("mocap_quat")[:, 0], self._batch.bind("qfrc_applied").T
+        self._azimuth, self._inward, self._orientation = self._qpos[:, 0], self._qpos[:, 1], self._qpos[:, 3:7]
+        self._cos, self._sin = turn[:, 0], turn[:, 3]
+        self._force, self._moment = applied[:3], applied[3:6:2]
+        floor, wall = (model.geom(name).id for name in ("floor", "wall"))
+        surfaces = self._batch.expand("geom_surfacevel")
+        self._surfaces = surfaces[:, floor : wall + 1 : wall - floor, :2].transpose(1, 2, 0)
+
+    def _coefficients(self, parameters: Sequence[Parameters]) -> None:
+        settings = self._settings
+        m, r, R, j, c = (np.array([getattr(p, name) for p in parameters]) for name in ("m", "r", "R", "j", "c"))
+        self._r, self._R, self._mc = r, R, m * c
+        self._lengths = np.stack([R, np.ones_like(r), np.ones_like(r), r, r, r])
+        self._rho = self._lengths[0]
+        ahead = settings.midpoint
+        self._factors = _Quantities.of(len(m))
+        self._factors.velocity[:] = ahead
+        self._factors.slip[:] = _SLIDES
+        self._factors.product[:] = ahead * np.stack([2 * m / r, -m / r, np.zeros_like(m), -j * m, j * m])
+        self._per_slide = settings.friction_lag / _SLIDES
+        shift = np.array([settings.memory_gain(mass) for mass in m])
+        self._shift = np.stack([-shift / r, shift, shift, shift / r]).reshape(2, 2, -1)
+        self._reach = np.array([[settings.touching(p.g)] for p in parameters])
+        self._gain, self._shifts = settings.servo_gain, settings.shifts_surfaces
 
     def _settle(self, omega_0: Array) -> None:
         stiffness = self._settings.solimp * self._settings.k
@@ -205,7 +229,7 @@ class Many(Stepper):
             if self._settings.servo:
                 lower = self.margins - self._acceleration[:, 2:0:-1] / stiffness
                 np.maximum(lower, 0.0, out=self.margins, where=touching)
-            self._last = self._velocities(self._qvel - self._settings.timestep * self._acceleration)
+            self._take(self._qvel - self._settings.timestep * self._acceleration, self._last)
 
     def sample(self, omega_0: Array, row: Array) -> None:
         split = recorder.NQ + recorder.NV
@@ -214,17 +238,21 @@ class Many(Stepper):
         row[:, split:] = self._sensors
 
     def advance(self, omega_0: Array) -> None:
-        gain, gaps, margins = self._gain, self._qpos[:, 2:0:-1], self.margins
+        gain, upward, gap, margins = self._gain, self._qpos[:, 2], self._gap, self.margins
+        gap_A, gap_B = gap.T
         for omega in omega_0:
-            velocities = self._prepare(omega)
+            self._prepare(omega)
             if gain:
-                np.maximum(margins - gain * gaps, 0.0, out=margins)
+                np.multiply(upward, gain, out=gap_A)
+                np.multiply(self._inward, gain, out=gap_B)
+                np.subtract(margins, gap, out=gap)
+                np.maximum(gap, 0.0, out=margins)
             self._batch.step()
-            self._last, self._contact = velocities, self._outputs
+            self._now, self._last, self._contact = self._last, self._now, self._outputs
 
     def state(self) -> dict[str, Array]:
         constraint, sensors = self._contact
-        carried = self._carried() | {"qfrc_constraint": constraint, "sensordata": sensors, "last": self._last}
+        carried = self._carried() | {"qfrc_constraint": constraint, "sensordata": sensors, "last": self._last.rows}
         return {name: values.copy() for name, values in carried.items()}
 
     def restore(self, state: dict[str, Array]) -> None:
@@ -232,64 +260,99 @@ class Many(Stepper):
             values[...] = state[name]
         # What the engine puts out can't be written back: until its next step, the copies stand in for it.
         self._contact = state["qfrc_constraint"], state["sensordata"]
-        self._last = state["last"]
+        self._last.rows[:] = state["last"]
 
     def _carried(self) -> dict[str, Array]:
         """The arrays that can be written and of which the next step depends on the values."""
         inner = {name: self._batch.bind(name) for name in ("qpos", "qvel", "qacc_warmstart")}
-        return inner | {"margins": self.margins, "floor": self._floor, "wall": self._wall}
+        return inner | {"margins": self.margins, "surfaces": self._surfaces}
 
-    def _velocities(self, qvel: Array | None = None) -> Array:
-        """(rho omega_c, v_h, v_y, r omega_c, r o_x, r o_y, r o_z), all in m s-1, shape (7, runs)."""
-        np.subtract(self._R, self._qpos[:, 1], out=self._lengths[0])
-        velocities: Array = (self._qvel if qvel is None else qvel).T.take(_VELOCITIES, axis=0)
-        velocities *= self._lengths
-        velocities[5] += velocities[3]
-        return velocities
+    def _take(self, qvel: Array, to: _Quantities) -> None:
+        """Put the quantities of the velocities qvel (runs, 6) in their place."""
+        np.subtract(self._R, self._inward, out=self._rho)
+        np.multiply(qvel.T, self._lengths, out=to.velocity)
+        np.multiply(qvel[:, 0], self._r, out=to.spin)
+        for operation, left, right, result in to.derived:
+            operation(left, right, result)
 
-    def _prepare(self, omega_0: Array) -> Array:
-        """Write wall, forces and surface velocities for the next step; return its velocities."""
-        qpos, turn = self._qpos, self._turn
-        half = qpos[:, 0] * 0.5
-        np.cos(half, out=turn[:, 0])
-        np.sin(half, out=turn[:, 3])
+    def _prepare(self, omega_0: Array) -> None:
+        """Write wall, forces and surface velocities for the next step."""
+        now, change, drag, around = self._now, self._change, self._drag, self._around
+        np.multiply(self._azimuth, 0.5, out=self._half)
+        np.cos(self._half, out=self._cos)
+        np.sin(self._half, out=self._sin)
         np.copyto(self._orientation, _UPRIGHT)
-        v = self._velocities()
-        rho = self._lengths[0]
-        change = v - self._last
-        middle = v + self._ahead * change
+        self._take(self._qvel, now)
+        np.subtract(now.rows, self._last.rows, out=change.rows)
+        np.multiply(change.rows, self._factors.rows, out=change.rows)
         # Drag (9), and what the inertial forces grow by till the middle.
-        force = (middle[3] * middle - v[3] * v).take(_INERTIAL, axis=0)
-        force *= self._inertia
-        middle[0] -= rho * omega_0
-        force[:3] -= self._mc * middle[:3]
-        force[0] *= rho
-        self._applied.T[:] = force
+        np.add(now.centre, change.centre, out=drag)
+        np.multiply(self._rho, omega_0, out=self._fluid)
+        np.subtract(around, self._fluid, out=around)
+        np.multiply(drag, self._mc, out=drag)
+        np.subtract(change.force, drag, out=drag)
+        np.multiply(around, self._rho, out=around)
+        np.copyto(self._force, drag)
+        np.copyto(self._moment, change.moment)
         if self._shifts:
-            constraint, sensors = self._contact
-            surface = constraint.T.take(_FRICTION, axis=0)
-            surface[1:3] -= sensors.T.take(_NORMALS, axis=0)
-            surface *= self._shift
-            slip, slip_change = _SLIP.dot(v), _SLIP.dot(change)
-            slides = _PAIRS.dot(slip * slip - _SLIDES**2 * slip_change * slip_change) > 0
-            surface += self._lag * slip_change * slides
-            self._floor[:], self._wall[:] = surface[:2], surface[2:]
-        return v
+            self._shift_surfaces(now.slip, change.slip)
+
+    def _shift_surfaces(self, slip: Array, change: Array) -> None:
+        """Write the surface velocities; slip and `_SLIDES` times its change, both (2, 2, runs)."""
+        (constraint, sensors), surface, slides = self._contact, self._surface, self._slides
+        square, less = self._square, self._less
+        np.multiply(slip, slip, out=square)
+        np.multiply(change, change, out=less)
+        np.subtract(square, less, out=square)
+        np.add(square[:, :1], square[:, 1:], out=slides)
+        np.heaviside(slides, 0.0, out=slides)
+        np.multiply(slides, self._per_slide, out=slides)
+        np.multiply(change, slides, out=change)
+        # The generalised contact forces that hold A_z, A_x, B_y, B_z, less the normal forces in two of them.
+        np.subtract(constraint.T[1:3], sensors.T[_NORMALS], out=self._mixed)
+        np.copyto(self._ends, constraint.T[3:5])
+        np.multiply(surface, self._shift, out=surface)
+        np.add(surface, change, out=self._surfaces)
 
 
-_VELOCITIES = np.array([0, 1, 2, 0, 3, 4, 5])
-"""Of the joints, in the order of `Many._velocities`."""
-_INERTIAL = np.array([1, 0, 2, 6, 5, 4])
-"""The velocity that, times omega_c, gives the inertial force of each joint; axial ones have none."""
-_FRICTION, _NORMALS = np.array([3, 1, 2, 4]), np.array([_NORMAL_B, _NORMAL_A])
-"""The joints' contact forces that hold A_z, A_x, B_y, B_z, and the normal forces in the second and third."""
-_SLIP = np.array([
-    [1.0, 0, 0, 0, -1, 0, 0], [0, 1, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0, -1], [1, 0, 0, 0, 0, 1, 0]
-])  # fmt: skip
-"""Slip velocities v_Az, v_Ax, v_By, v_Bz, in the order of the surfaces' axes, of `Many._velocities`; sums of no more
-than two terms, which no order of summation can change: a run doesn't depend on how many others share its batch."""
-_PAIRS = np.array([[1.0, 1, 0, 0], [1, 1, 0, 0], [0, 0, 1, 1], [0, 0, 1, 1]])
-"""Adds what belongs to one contact."""
+@dataclass(frozen=True)
+class _Quantities:
+    """What a step looks at, with the runs in the last axis; all parts are views of `rows`."""
+
+    rows: Array
+    velocity: Array
+    """(rho omega_c, v_h, v_y, r o_x, r o_y, r o_z), m s-1."""
+    slip: Array
+    """((v_Az, v_Ax), (v_By, v_Bz)), in the order of the surfaces' axes, m s-1."""
+    product: Array
+    """r omega_c times (v_h, rho omega_c, 0, r o_z, r o_x), in the order of the inertial forces, m2 s-2."""
+    spin: Array
+    """r omega_c, m s-1."""
+
+    centre: Array
+    """The first three velocities."""
+    force: Array
+    moment: Array
+    """The first three products and the others."""
+    derived: tuple[tuple[np.ufunc, Array, Array, Array], ...]
+    """What leads from the velocities of the joints to all of these: operation, operands, result."""
+
+    @classmethod
+    def of(cls, runs: int) -> Self:
+        rows = np.zeros((16, runs))
+        v, slip, product, spin = rows[:6], rows[6:10].reshape(2, 2, runs), rows[10:15], rows[15]
+        derived = (
+            (np.add, v[4], spin, v[4]),
+            (np.subtract, v[0:3:2], v[3:6:2], slip[:, 0]),
+            (np.add, v[1::-1], v[5:3:-1], slip[:, 1]),
+            (np.multiply, v[1::-1], spin, product[:2]),
+            (np.multiply, v[5:2:-2], spin, product[3:]),
+        )
+        return cls(rows, v, slip, product, spin, v[:3], product[:3], product[3:], derived)
+
+
+_NORMALS = slice(_NORMAL_B, None, _NORMAL_A - _NORMAL_B)
+"""The normal forces at B and A among the sensors."""
 
 
 def _expand_differences(batch: Batch, models: Sequence[Any]) -> None:

@@ -50,6 +50,18 @@ def test_batch_is_the_single_run() -> None:
         np.testing.assert_array_equal(run.case, alone.case)
 
 
+def test_a_run_does_not_depend_on_how_many_share_its_batch() -> None:
+    p, x0 = P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6]
+    counts = [
+        mjsim.simulate_many([p] * runs, [x0] * runs, 0.2, settings=ContactSettings(), sample_interval=0.01)
+        for runs in (1, 2, 13)
+    ]
+    for runs in counts[1:]:
+        for run in runs:
+            np.testing.assert_array_equal(run.x, counts[0][0].x)
+            np.testing.assert_array_equal(run.force_B, counts[0][0].force_B)
+
+
 def test_contact_force_is_the_weight_at_rest() -> None:
     """At rest in still fluid away from the wall, the floor carries m g and nothing else acts."""
     run = mjsim.simulate(P.replace(omega_0=0.0), [0, 0, 0, 0, 0, 0, 0.01, 0], 1.0)
