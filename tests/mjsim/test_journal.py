@@ -40,7 +40,7 @@ def test_taken_up_after_some_blocks(tmp_path: Path, uninterrupted: np.ndarray, b
 def test_a_damaged_journal_says_what_to_do(tmp_path: Path) -> None:
     list(islice(run(tmp_path / "journal"), 2))
     (tmp_path / "journal" / "000000.h5").write_bytes(b"no HDF5")
-    with pytest.raises(StorageError, match="remove .*journal to start anew"):
+    with pytest.raises(StorageError, match=r"remove .*journal to start anew"):
         joined(run(tmp_path / "journal"))
 
 
