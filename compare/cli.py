@@ -36,7 +36,7 @@ from compare.claims import Level
 from compare.tasks import Task, carry_out
 from mjsim import ContactSettings
 from model import InputError, SimulationError, storage
-from model.files import check_writable
+from model.files import check_writable, write_text
 from model.trajectory import current_versions
 
 
@@ -146,6 +146,13 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--seconds", type=options.number, default=6.0, help="length of a film (default 6)")
     command.add_argument("--speed", type=options.number, default=0.25, help="1 is real time (default 0.25)")
     command.add_argument("--rate", type=int, default=20, help="frames a second (default 20)")
+
+    command = _add(
+        commands, "grade", _grade, "a score card for MuJoCo contact settings: yours, dualball's, MuJoCo's own"
+    )
+    options.add_native(command)
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write")
+    command.add_argument("--json", action="store_true", help="print JSON")
 
     command = _add(commands, "benchmark", _benchmark, "cost of the loop round MuJoCo's step, as ratios within one run")
     command.add_argument("--json", action="store_true", help="print JSON")
@@ -294,6 +301,26 @@ def _render(args: argparse.Namespace) -> int:
 
     film = {name: getattr(args, name) for name in ("start", "seconds", "speed", "rate")}
     print(render.write(storage.load(args.file), args.output, args.at, args.width, **film))
+    return 0
+
+
+def _grade(args: argparse.Namespace) -> int:
+    from compare import grade  # here, because nothing else needs it
+
+    if args.output:
+        check_writable(args.output)
+    yours = options.native(args)
+    with progress.shown(quiet=args.json) as show:
+        columns = grade.grade(yours, progress=lambda name, done, total: show(f"grade {name}", done, total, 0))
+    if args.output:
+        write_text(args.output, grade.html(columns, options.describe_native(args)))
+    if args.json:
+        print(json.dumps([column.to_mapping() for column in columns], indent=1))
+        return 0
+    console = Console()
+    console.print(grade.table(columns))
+    for item in columns[0].advice:
+        console.print(f"• {item}", markup=False, highlight=False)
     return 0
 
 

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from compare import native as native_settings
 from compare.executors import Workers, dask
+from compare.native import Native
 from compare.tasks import ENGINES
 from model import Flow, InputError, Parameters, StorageError
 from model.errors import suggestion
@@ -109,6 +111,53 @@ def start(args: argparse.Namespace) -> np.ndarray:
         except ValueError as error:
             raise InputError(f"{name} = {value!r} must be a number in {UNITS[k]}") from error
     return x
+
+
+def add_native(parser: argparse.ArgumentParser) -> None:
+    """Options that name settings of MuJoCo's contacts: a file, changes to it, or both."""
+    parser.add_argument("file", type=Path, nargs="?", metavar="FILE.xml", help="MJCF file with a ball and its contacts")
+    group = parser.add_argument_group("settings", "as in MJCF; where not given, those of FILE.xml or MuJoCo's own")
+    group.add_argument("--timestep", type=number, metavar="s")
+    group.add_argument("--integrator", metavar="NAME", help=", ".join(native_settings.INTEGRATORS))
+    group.add_argument("--cone", metavar="NAME", help=", ".join(native_settings.CONES))
+    group.add_argument("--solver", metavar="NAME", help=", ".join(native_settings.SOLVERS))
+    group.add_argument("--impratio", type=number)
+    group.add_argument("--iterations", type=int)
+    group.add_argument("--tolerance", type=number)
+    group.add_argument("--noslip-iterations", type=int)
+    group.add_argument("--solref", type=number, nargs=2, metavar=("TIMECONST", "DAMPRATIO"))
+    group.add_argument("--solreffriction", type=number, nargs=2, metavar=("TIMECONST", "DAMPRATIO"))
+    group.add_argument("--solimp", type=number, nargs="+", metavar="D", help="dmin dmax width midpoint power")
+    group.add_argument("--margin", type=number, metavar="m")
+
+
+def native(args: argparse.Namespace) -> Native:
+    """The settings that the options of `add_native` name."""
+    settings = native_settings.read(args.file) if args.file else Native()
+    given = {name: getattr(args, name) for name in _NATIVE if getattr(args, name) is not None}
+    contacts = {name: getattr(args, name) for name in _CONTACT if getattr(args, name) is not None}
+    if "solimp" in contacts:
+        values = contacts["solimp"]
+        if not 1 <= len(values) <= 5:
+            raise InputError(f"solimp has {len(values)} numbers, but at most 5: dmin dmax width midpoint power")
+        contacts["solimp"] = [*values, *settings.A.solimp[len(values) :]]
+    contacts = {name: tuple(v) if isinstance(v, list) else v for name, v in contacts.items()}
+    return dataclasses.replace(settings, **given).with_contacts(**contacts)
+
+
+def describe_native(args: argparse.Namespace) -> str:
+    """The same in words."""
+    given = [
+        f"{name} {' '.join(f'{v:g}' for v in value) if isinstance(value, list) else value}"
+        for name in (*_NATIVE, *_CONTACT)
+        if (value := getattr(args, name)) is not None
+    ]
+    source = f"Settings of {args.file}" if args.file else "MuJoCo's defaults"
+    return f"{source}, with {', '.join(given)}." if given else f"{source}."
+
+
+_NATIVE = ("timestep", "integrator", "cone", "solver", "impratio", "iterations", "tolerance", "noslip_iterations")
+_CONTACT = ("solref", "solreffriction", "solimp", "margin")
 
 
 def number(text: str) -> float:

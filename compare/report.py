@@ -10,10 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
 from matplotlib.figure import Figure
 
-from compare import results
+from compare import page, results
 from compare.claims import Outcome
 from compare.figures import characteristic
 from compare.results import Summary
@@ -34,11 +33,9 @@ def write(directory: Path) -> Path:
 
 def render(summary: Summary) -> str:
     """The page as text."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("compare"), autoescape=True, undefined=jinja2.StrictUndefined
-    )
     claims = [_row(verdict) for verdict in summary.verdicts.values()]
-    return environment.get_template("report.html").render(
+    return page.render(
+        "report.html",
         summary={"passed": sum(claim["passed"] for claim in claims), "total": len(claims)},
         headline=_headline(claims),
         lead=_lead(summary),

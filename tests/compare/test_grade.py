@@ -1,0 +1,198 @@
+"""The score card: good settings score, bad ones don't, theory foretells creep, and bad files are told apart."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from compare import cli, grade, native
+from compare.grade import Column
+from compare.native import Native, Touch
+from mjsim import ContactSettings, scene
+from mjsim.scene import SCENE
+from model import Case, InputError, Parameters
+
+ELLIPTIC = Native(cone="elliptic", impratio=100.0)
+BALL = '<body name="ball"><freejoint/><geom name="ball" type="sphere" size="0.01"/></body>'
+FLOOR = '<geom name="floor" type="plane" size="1 1 1"/>'
+
+
+def mjcf(world: str, rest: str = "") -> str:
+    return f"<mujoco>{rest}<worldbody>{world}</worldbody></mujoco>"
+
+
+@pytest.fixture(scope="module")
+def columns() -> list[Column]:
+    return grade.grade(ELLIPTIC, [grade.OURS, grade.PLAIN])
+
+
+def test_the_settings_of_the_study_pass(columns: list[Column]) -> None:
+    ours = columns[1]
+    assert ours.reproduced == [case.name for case in Case]
+    for held in ours.stationary:
+        assert abs(held.omega_c) < math.exp(-grade.LASTS) * 1e-2
+        assert held.chatter == 0
+    # Three points of a smooth curve, extrapolated by a tenth of its scale: of the order of 0.1^3.
+    assert abs(ours.omega_01) < 1e-3
+    assert ours.cost == 1.0
+
+
+def test_the_defaults_of_the_engine_do_not(columns: list[Column]) -> None:
+    """Known not to hold: a release of MuJoCo that changes it shall be noticed."""
+    plain = columns[2]
+    assert set(plain.cases) - set(plain.reproduced) >= {"SR", "NR"}
+    assert max(abs(held.omega_c) for held in plain.stationary) > 0.05
+    assert math.isnan(plain.omega_01)
+
+
+def test_creep_and_hovering_are_as_foretold(columns: list[Column]) -> None:
+    yours = columns[0]
+    p = Parameters.named("reference").replace(omega_0=12.0)
+    rolling = grade._target(p, Case.RR)
+    frictions = {
+        "A": np.hypot(rolling.force_A[0], rolling.force_A[2]), "B": np.hypot(rolling.force_B[1], rolling.force_B[2])
+    }  # fmt: skip
+    loads = {"A": rolling.force_A[1], "B": rolling.force_B[0]}
+    creeps = [
+        float(ELLIPTIC.theory(ELLIPTIC.A, float(loads[c]) / p.m).creep_speed(float(frictions[c]) / p.m)) for c in "AB"
+    ]
+    # Rolling leaves one force free: which contact carries which share of friction is the engine's choice.
+    assert 0.3 * max(creeps) < yours.creep < 3 * max(creeps)
+    assert yours.stationary[2].chatter > 0
+    assert any("hovering at A" in item for item in yours.advice)
+    assert not any("pyramidal" in item for item in yours.advice)
+
+
+def test_card_as_table_and_page(columns: list[Column]) -> None:
+    page = grade.html(columns, "cone <elliptic>")
+    assert "cone &lt;elliptic&gt;" in page
+    assert page.count("<td") >= len(grade.lines(columns)) * len(columns)
+    assert grade.table(columns).row_count >= len(grade.lines(columns))
+    assert grade.headline(columns[1]).startswith("dualball: 9 of 9 cases reproduced")
+
+
+def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, columns, capsys) -> None:
+    asked = []
+
+    def measured(yours: Native, progress: object) -> list[Column]:
+        asked.append(yours)
+        return columns
+
+    monkeypatch.setattr(grade, "grade", measured)
+    page = tmp_path / "card.html"
+    argv = ["grade", str(SCENE), "--solimp", "0.5", "0.6", "--cone", "pyramidal", "-o", str(page), "--json"]
+    assert cli.main(argv) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [column["name"] for column in told] == ["yours", "dualball", "MuJoCo"]
+    assert told[2]["omega_01"] is None  # JSON has no nan
+    assert "with cone pyramidal, solimp 0.5 0.6." in page.read_text()
+    ours = ContactSettings()
+    assert asked[0].timestep == ours.timestep
+    assert asked[0].cone == "pyramidal"
+    assert asked[0].A.solimp == (0.5, 0.6, 1e-4, 0.5, 2.0)
+    assert asked[0].B.solref == ours.solref
+
+
+def test_settings_come_through_to_the_engine() -> None:
+    given = Native(
+        timestep=0.0015, integrator="implicitfast", cone="elliptic", solver="CG", impratio=7.0, iterations=33,
+        tolerance=1e-5, noslip_iterations=2,
+        A=Touch(solref=(0.005, 0.8), margin=1e-4), B=Touch(solimp=(0.2, 0.3, 0.01, 0.4, 3)),
+    )  # fmt: skip
+    model = given.build(Parameters.named("reference"), given.loop())
+    assert model.opt.timestep == given.timestep
+    assert model.pair("A").solref.tolist() == [0.005, 0.8]
+    assert model.pair("A").margin[0] == 1e-4
+    assert model.pair("B").solimp.tolist() == [0.2, 0.3, 0.01, 0.4, 3]
+    assert (model.opt.impratio, model.opt.iterations, model.opt.noslip_iterations) == (7.0, 33, 2)
+
+
+def test_a_scene_of_our_own_is_read_back(tmp_path: Path) -> None:
+    settings = ContactSettings.at(5e-4)
+    path = tmp_path / "scene.xml"
+    path.write_text(scene.mjcf(Parameters.named("reference"), settings))
+    found = native.read(path)
+    assert (found.timestep, found.cone, found.impratio) == (5e-4, "elliptic", settings.impratio)
+    for touch in (found.A, found.B):
+        assert touch.solref == settings.solref
+        assert touch.solreffriction[0] == settings.solreffriction
+        theory = found.theory(touch, 9.81)
+        for name in ("b_f", "k", "softness"):
+            assert getattr(theory, name) == pytest.approx(getattr(settings, name), rel=1e-12)
+
+
+def test_geoms_are_mixed_as_the_engine_does(tmp_path: Path) -> None:
+    """Against the contact that MuJoCo itself makes."""
+    world = (
+        '<geom name="floor" type="plane" size="1 1 1" solref="0.01 0.9" solmix="3" margin="0.001"/>'
+        '<geom name="wall" type="box" size="0.1 1 1" pos="0.1095 0 0" solimp="0.5 0.6 0.01" priority="1"/>'
+        '<body pos="0 0 0.0095"><freejoint/><geom type="sphere" size="0.01" solref="0.03 1.1"/></body>'
+    )
+    path = tmp_path / "scene.xml"
+    path.write_text(mjcf(world))
+    found = native.read(path)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 2
+    for contact in data.contact:
+        touch = found.A if model.geom("floor").id in contact.geom else found.B
+        assert touch.solref == pytest.approx(tuple(contact.solref))
+        assert touch.solimp == pytest.approx(tuple(contact.solimp))
+        assert touch.margin - touch.gap == pytest.approx(contact.includemargin)
+
+
+@pytest.mark.parametrize("depth", [0.0, 2e-4, 6e-4, 2e-3])
+def test_impedance_is_the_engines(depth: float) -> None:
+    ball = f'<body pos="0 0 {0.01 - depth}"><freejoint/><geom type="sphere" size="0.01"/></body>'
+    model = mujoco.MjModel.from_xml_string(mjcf(FLOOR + ball))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    if data.nefc:
+        assert Touch().impedance(depth) == pytest.approx(data.efc_KBIP[0, 2], rel=1e-6)
+    else:
+        assert depth == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<mujoco", "is not valid MJCF"),
+        (mjcf(FLOOR), "there is no ball"),
+        (mjcf(FLOOR + '<geom type="sphere" size="1"/>'), "there is no ball"),
+        (mjcf(BALL), "the ball has no contacts"),
+        (mjcf(FLOOR + BALL, '<option><flag contact="disable"/></option>'), "the ball has no contacts"),
+        (mjcf(FLOOR + BALL.replace("ball", "a") + BALL.replace("ball", "b")), "there are 2 spheres that move"),
+    ],
+)
+def test_files_that_cannot_be_graded(tmp_path: Path, capsys, text: str, message: str) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text(text)
+    assert cli.main(["grade", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert message in told
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"timestep": 0.0}, r"timestep = 0 s is out of range: must be > 0"),
+        ({"impratio": -1.0}, "impratio = -1"),
+        ({"cone": "eliptic"}, "did you mean 'elliptic'"),
+        ({"iterations": -1}, "iterations = -1"),
+    ],
+)
+def test_settings_that_cannot_run(changes: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Native(**changes)
+
+
+def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["grade", "nowhere.xml"]) == 2
+    assert "there is no such file" in capsys.readouterr().err
