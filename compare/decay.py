@@ -35,9 +35,9 @@ STEPS = {Level.QUICK: (4e-3, 2e-3), Level.DEFAULT: (2e-3, 1e-3), Level.FULL: (1e
 """Time steps of MuJoCo, and of Moreau-Jean's method, s."""
 HEIGHT = {case: {"R": 0.0, "S": 0.0, "N": 1.0}[case.A.name] for case in Case} | {Case.NS: 1e3}
 """Height y at the start, in units of R: off the floor the ball must not meet it, least of all sinking."""
-INTERVAL = 4e-3
+INTERVAL = 8e-3
 """Time between samples, s."""
-DURATION = 6.0
+DURATION = 4.0
 """One for all runs, so that they share a batch, s."""
 
 
