@@ -33,7 +33,7 @@ RTOL = 1e-7
 SECTIONS = 3
 """Starts in every round, by which a bracket shrinks to a quarter."""
 ROUNDS = {
-    "event": {Level.QUICK: 4, Level.DEFAULT: 8, Level.FULL: 12},
+    "event": {Level.QUICK: 3, Level.DEFAULT: 8, Level.FULL: 12},
     "mujoco": {Level.DEFAULT: 6, Level.FULL: 8},
 }
 ENDS = (-0.2, 0.23)
