@@ -1,0 +1,46 @@
+"""Cases told and the ladder of settings: what is left out, what is counted, and what each rung adds."""
+
+import dataclasses
+
+import numpy as np
+
+import analytic
+from compare import ablation, confusion
+from mjsim import ContactSettings
+from model import Case
+
+
+def test_motions_visit_all_nine_cases():
+    visited = set()
+    for p, x0 in confusion.MOTIONS:
+        run = analytic.simulate(p, x0, confusion.LASTS, sample_interval=1e-3)
+        visited |= {int(run.case[0]), *run.events.from_case.tolist(), *run.events.to_case.tolist()}
+    assert visited == {int(case) for case in Case}
+
+
+def test_dead_times_reach_from_before_a_change_to_the_end_of_a_rebound():
+    p, x0 = confusion.MOTIONS[0]
+    run = analytic.simulate(p, x0, 0.1, sample_interval=confusion.STEP)
+    landing = run.events.time[run.events.impulse_A[:, 1] > 0][0]
+    speed = run.events.impulse_A[run.events.impulse_A[:, 1] > 0][0, 1] / p.m
+    dead = run.time[~confusion.alive(run)]
+    around = dead[(dead > landing - 0.01) & (dead < landing + 2 * confusion.REBOUND * speed / p.g)]
+    margin = confusion.DEAD * confusion.STEP
+    assert landing - margin <= around[0] <= landing - margin + confusion.STEP
+    assert np.all(np.diff(around) < 1.5 * confusion.STEP)
+
+
+def test_a_motion_agrees_with_itself():
+    p, x0 = confusion.MOTIONS[1]
+    motion = analytic.simulate(p, x0, confusion.LASTS, sample_interval=confusion.STEP)
+    piece = confusion.Piece(0, 0, confusion.pieces([motion], 4)[0].task)
+    counts = confusion.confusion([motion], [piece], [motion])
+    assert counts.sum() == np.trace(counts) == confusion.alive(motion)[confusion.DEAD : -1].sum()
+
+
+def test_the_ladder_ends_at_the_defaults():
+    *_, last = ablation.LADDER.values()
+    assert last == ContactSettings()
+    for low, high in zip(list(ablation.LADDER.values())[4:], list(ablation.LADDER.values())[5:], strict=False):
+        changed = [f.name for f in dataclasses.fields(low) if getattr(low, f.name) != getattr(high, f.name)]
+        assert len(changed) == 1
