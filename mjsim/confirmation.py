@@ -1,19 +1,22 @@
 """The theory of `mjsim.contact_settings`, held against what MuJoCo does.
 
-``python -m mjsim.confirmation`` prints the table of docs/mujoco-settings.md.
+``python -m mjsim.confirmation`` prints the table; given a file, such as docs/mujoco-settings.md, it is put there
+between two lines that say so.
 """
 
 from __future__ import annotations
 
 import itertools
+import sys
 import warnings
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run, simulate
-from model import Flow, Parameters, Trajectory
+from model import Flow, InputError, Parameters, Trajectory
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,10 @@ ROLLING = Parameters.named("reference").replace(omega_0=10.0)
 SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
 SLIPPING_START = (0.0, 0.0, 13.85, -4.0, 0.0, 10.0)
 """A start close enough to steady slipping to settle within a few seconds."""
+
+
+BEGIN, END = "<!-- begin: python -m mjsim.confirmation -->", "<!-- end -->"
+"""Lines of a page between which its table stands."""
 
 
 def rows() -> list[Row]:
@@ -139,5 +146,17 @@ def _at(timestep: float, solimp: float, damping: float = 0.5, **changes: float) 
     return ContactSettings.at(timestep, solimp=solimp, solreffriction=2 * timestep / (solimp * damping), **changes)
 
 
+def write(page: Path) -> None:
+    """Put the table where the page has it; raises `InputError` if it has no place for it."""
+    text = page.read_text("utf-8")
+    if text.count(BEGIN) != 1 or text.count(END) != 1:
+        raise InputError(f"{page} must have the lines {BEGIN!r} and {END!r} once each")
+    before, rest = text.split(BEGIN)
+    page.write_text(f"{before}{BEGIN}\n{table()}\n{END}{rest.split(END)[1]}", "utf-8")
+
+
 if __name__ == "__main__":
-    print(table())
+    if len(sys.argv) > 1:
+        write(Path(sys.argv[1]))
+    else:
+        print(table())
