@@ -239,11 +239,12 @@ def _neutral(lab: Lab) -> list[Check]:
         mean = window_mean(run.time[half], run.y[half])
         # What the first steps leave of the start is a height as good as any other.
         settled = abs(mean.value - task.x0[0]) if task.engine == "mujoco" else RTOL * task.x0[0]
+        rounding = float(np.finfo(float).eps) * task.x0[0] * math.sqrt(len(run.time))
         drift = float(run.y[-1] - run.y[half][0])
         found.append(
             Bench(lab, "high-wall-friction").number(
                 task, "drift of y", "m", f"y = {task.x0[0]:g} m", 0.0,
-                Measured(drift, math.hypot(mean.uncertainty, settled)), (Case.NR, settled_case(run)),
+                Measured(drift, math.hypot(mean.uncertainty, settled, rounding)), (Case.NR, settled_case(run)),
             )
         )  # fmt: skip
     return found + _study(Case.NR, lab)
