@@ -239,7 +239,7 @@ def _neutral(lab: Lab) -> list[Check]:
         mean = window_mean(run.time[half], run.y[half])
         # What the first steps leave of the start is a height as good as any other.
         settled = abs(mean.value - task.x0[0]) if task.engine == "mujoco" else RTOL * task.x0[0]
-        rounding = float(np.finfo(float).eps) * task.x0[0] * math.sqrt(len(run.time))
+        rounding = float(np.finfo(float).eps) * (p.R + p.r + task.x0[0]) * math.sqrt(len(run.time))
         drift = float(run.y[-1] - run.y[half][0])
         found.append(
             Bench(lab, "high-wall-friction").number(
