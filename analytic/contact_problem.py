@@ -16,8 +16,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from analytic.rigid_body import NOTHING, Six, apply
+from analytic.rigid_body import NOTHING, Six, apply, mean
 from model import Parameters
+
+PLAIN_SWEEPS = 200
+"""Sweeps after which steps are halved: those that converge at all by themselves mostly have by then."""
 
 
 class Closed(NamedTuple):
@@ -57,9 +60,14 @@ def solve(
         return sweep(u, P, A, B, p)
     scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
     change = enough = math.inf
-    for _ in range(max_sweeps):
+    for k in range(max_sweeps):
         u, new = sweep(u, P, A, B, p)
         change = max(abs(a - b) for a, b in zip(new, P, strict=True)) / p.m
+        if k >= PLAIN_SWEEPS and change > enough:
+            # Each normal force moves the other by friction: where mu eta > 1 the plain sweeps may swing for ever about
+            # the solution. Going half the way has the same solution, and the cones, being convex, contain it.
+            new = mean(P, new)
+            u = apply(free, new, p)
         P = new
         enough = tolerance * max(scale, max(map(abs, P)) / p.m)
         if change <= enough:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from analytic import Settings, simulate
+from analytic import Settings, contact_forces, simulate
 from model import Case, Contact, Flow, InputError, Parameters
 
 P = Parameters.named("reference")
@@ -108,6 +108,16 @@ def test_time_stepping_obeys_coulomb_too(seed):
     largest = max(np.abs(run.force_A).max(), np.abs(run.force_B).max(), p.m * p.g)
     assert max(friction_A.max(), friction_B.max()) <= 1e-14 * largest
     assert min(run.force_A[:, 1].min(), run.force_B[:, 0].min()) >= 0
+
+
+def test_sliding_at_both_points_under_more_friction_than_weight():
+    """For mu eta > 1 plain sweeps over the two contacts swing for ever; (29) has one solution all the same."""
+    p = P.replace(mu=1.2, eta=1.2)
+    x = [0, 0, 5.0, 0.3, -0.2, 12.0]
+    run = simulate(p, x, 1e-3)
+    assert run.cases[0] is Case.SS
+    for found, expected in zip((run.force_A[0], run.force_B[0]), contact_forces(Case.SS, x, p), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * p.m * p.g)
 
 
 @pytest.mark.parametrize("method", METHODS)
