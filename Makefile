@@ -10,10 +10,10 @@ BIN := $(VENV)/bin
 .PHONY: validate test check lint lock clean
 
 validate: $(VENV)/installed
-	$(BIN)/dualball validate
+	$(BIN)/dualball validate --quick
 
 test: $(VENV)/installed-dev
-	$(BIN)/pytest -n 2 -m "not slow"
+	$(BIN)/pytest -n 2 --dist loadgroup -m "not slow"
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

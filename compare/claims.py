@@ -112,6 +112,8 @@ class Claim:
     """The verdict when every check passes."""
     reason: str = ""
     """Why, where `expected` isn't CONFIRMED."""
+    level: Level = Level.QUICK
+    """The least level of which it is a part."""
     study: Callable[[Lab], list[Check]] = field(repr=False)
 
 

@@ -85,7 +85,7 @@ def _parser() -> argparse.ArgumentParser:
 
     command = _add(commands, "validate", _validate, "hold simulation against theory, claim by claim; the main job")
     level = command.add_mutually_exclusive_group()
-    level.add_argument("--quick", dest="level", action="store_const", const=Level.QUICK, default=Level.QUICK)
+    level.add_argument("--quick", dest="level", action="store_const", const=Level.QUICK, default=Level.DEFAULT)
     level.add_argument("--full", dest="level", action="store_const", const=Level.FULL, help="everything")
     command.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
     command.add_argument("--list", action="store_true", help="list the claims and stop")

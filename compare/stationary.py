@@ -193,3 +193,8 @@ CLAIMS = (
         "high-wall-friction", ROUGH, [Case.SR, Case.NR],
     ),
 )  # fmt: skip
+
+if __name__ == "__main__":
+    from compare.studies import main
+
+    raise SystemExit(main(CLAIMS))

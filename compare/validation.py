@@ -6,7 +6,21 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare import branches, decay, diagrams, hysteresis, laws, maps, results, slip, stationary, table_5
+from compare import (
+    ablation,
+    branches,
+    confusion,
+    decay,
+    diagrams,
+    frontier,
+    hysteresis,
+    laws,
+    maps,
+    results,
+    slip,
+    stationary,
+    table_5,
+)  # fmt: skip
 from compare.campaign import Campaign, Progress
 from compare.claims import Claim, Lab, Level, Verdict, judge, select
 from compare.executors import Workers
@@ -22,15 +36,18 @@ CLAIMS: tuple[Claim, ...] = (
     *diagrams.CLAIMS,
     *hysteresis.CLAIMS,
     *laws.CLAIMS,
+    *confusion.CLAIMS,
+    *ablation.CLAIMS,
+    *frontier.CLAIMS,
 )
 """Every claim there is, in the order of the paper."""
 
 
 def validate(
-    output: str | Path = "results", *, level: Level = Level.QUICK, claims: Sequence[str] | None = None,
+    output: str | Path = "results", *, level: Level = Level.DEFAULT, claims: Sequence[str] | None = None,
     workers: int | Workers = 1, limit: float = math.inf, progress: Show = lambda what, done, total, failed: None,
 ) -> list[Verdict]:  # fmt: skip
-    """Judge claims, all of them if None, and store runs, summary and report in a directory.
+    """Judge claims, all that belong to the level if None, and store runs, summary and report in a directory.
 
     What the directory holds already is not computed again. The summary is written after every claim, the report at
     the end, whatever the verdicts.
@@ -45,7 +62,7 @@ def validate(
     from compare import report  # here, because it draws: workers that import this package never need matplotlib
 
     output = Path(output)
-    chosen = select(CLAIMS, claims)
+    chosen = select(CLAIMS, claims) if claims else [claim for claim in CLAIMS if claim.level <= level]
     summary = results.open_directory(output)
     verdicts: list[Verdict] = []
     with Campaign(output / results.RUNS, workers, limit=limit) as campaign:

@@ -11,7 +11,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from compare import maps
-from compare.figures import bifurcation_diagrams, parameter_plane, style, transients
+from compare.figures import bifurcation_diagrams, mujoco, parameter_plane, style, transients
 from compare.results import Summary
 from compare.validation import CLAIMS
 from model import Case, storage
@@ -144,6 +144,7 @@ _OWN: dict[str, Draw] = {
     "fig-12": formal,
     "fig-13-left": loop,
     "fig-13-right": unloading,
+    **mujoco.FIGURES_OF,
 }
 FIGURES_OF: dict[str, Draw] = {claim.id: _OWN.get(claim.id, partial(deviations, claim.id)) for claim in CLAIMS}
 """The figure of each claim, by its id: called with the summary and the results directory."""

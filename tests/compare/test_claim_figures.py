@@ -6,12 +6,11 @@ import io
 
 import pytest
 
-from compare import CLAIMS, results
+from compare import CLAIMS, Level, results
 from compare.figures.claims import FIGURES_OF
 
 
-@pytest.mark.xdist_group("validated")
-@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.id)
+@pytest.mark.parametrize("claim", [c for c in CLAIMS if c.level is Level.QUICK], ids=lambda claim: claim.id)
 def test_figure_draws(validated, claim) -> None:
     figure = FIGURES_OF[claim.id](results.load(validated.directory), validated.directory)
     buffer = io.BytesIO()
