@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import re
-import zlib
 from collections import Counter
 from collections.abc import Mapping
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
 
 from compare import page, results
-from compare.claims import Outcome
-from compare.figures import characteristic
+from compare.claims import Claim, Outcome
+from compare.figures.characteristic import STATIONARY
+from compare.figures.claims import FIGURES_OF
+from compare.figures.gallery import STORED
 from compare.results import Summary
+from compare.validation import CLAIMS
+from model.errors import StorageError
 from model.files import write_text
 
 _SYMBOLS = {Outcome.CONFIRMED: "✓", Outcome.CORRECTED: "✓", Outcome.REFUTED: "✗", Outcome.FORMAL: "○"}
+_NOT_RUN = "not run"
 
 
 def write(directory: Path) -> Path:
@@ -27,13 +34,18 @@ def write(directory: Path) -> Path:
     Raises `model.StorageError` if there is no summary or the page can't be written.
     """
     path = directory / results.REPORT
-    write_text(path, render(results.load(directory)))
+    write_text(path, render(results.load(directory), directory))
     return path
 
 
-def render(summary: Summary) -> str:
-    """The page as text."""
-    claims = [_row(verdict) for verdict in summary.verdicts.values()]
+def render(summary: Summary, directory: Path) -> str:
+    """The page as text; a figure or run file that is missing is shown as a gap, with the command that fills it."""
+    option = {"QUICK": " --quick", "FULL": " --full"}.get(summary.level, "")
+    known = {claim.id: claim for claim in CLAIMS}
+    claims = [_row(summary, directory, verdict, option) for verdict in summary.verdicts.values()]
+    missing = [_not_run(claim, option) for name, claim in known.items() if name not in summary.verdicts]
+    order = list(known)
+    claims = sorted(claims + missing, key=lambda row: order.index(row["id"]) if row["id"] in known else len(order))
     return page.render(
         "report.html",
         summary={"passed": sum(claim["passed"] for claim in claims), "total": len(claims)},
@@ -43,51 +55,91 @@ def render(summary: Summary) -> str:
         figures=_figures(summary),
         claims=claims,
         outcomes=sorted({claim["outcome"] for claim in claims}),
-        level_option={"QUICK": " --quick", "FULL": " --full"}.get(summary.level, ""),
-        errata="",
+        errata=errata(),
+        number=_number,
         provenance=_provenance(summary),
     )
 
 
-def svg(figure: Figure) -> str:
-    """A figure as inline SVG, with text as text."""
-    out = io.StringIO()
-    figure.savefig(out, format="svg", metadata={"Date": None})
-    text = out.getvalue()
-    # An inline element takes its size from the page, and its ids must not meet those of the next figure.
-    prefix = f"f{zlib.crc32(text.encode()):08x}-"
-    text = re.sub(r'\bid="', f'id="{prefix}', text[text.index("<svg") :])
-    text = re.sub(r'(xlink:href="|url\()#', rf"\1#{prefix}", text)
-    return re.sub(
-        r'(<svg[^>]*?) width="[^"]*"', r"\1", re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1), count=1
+def errata() -> str:
+    """The errata of the paper as HTML; links into the source tree, which a page by itself can't follow, are text."""
+    text = (resources.files("compare") / "templates" / "errata.md").read_text("utf-8")
+    made: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
+    made = re.sub(r"<h1>.*?</h1>", "", made)  # the page has a heading for it
+    made = re.sub(r"(</?h)2>", r"\g<1>3>", made)
+    made = re.sub(r'<a href="(?!https?:)[^"]*">(.*?)</a>', r"\1", made)
+    made = made.replace(
+        "<table>", '<div class="scroll" tabindex="0" role="region" aria-label="Errata"><table class="prose">'
     )
+    return made.replace("</table>", "</table></div>")
 
 
-def _row(verdict: Mapping[str, Any]) -> dict[str, Any]:
-    outcome = Outcome(verdict["outcome"])
-    good = verdict["passed"]
+def picture(figure: Figure) -> str:
+    """A figure as the address of an SVG picture that is its own content: a browser looks into it only to show it."""
+    out = io.BytesIO()
+    figure.savefig(out, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    return f"data:image/svg+xml;base64,{base64.b64encode(out.getvalue()).decode()}"
+
+
+def _row(summary: Summary, directory: Path, verdict: Mapping[str, Any], option: str) -> dict[str, Any]:
+    outcome, good = Outcome(verdict["outcome"]), verdict["passed"]
     mark = "fail" if not good else "pass" if outcome in (Outcome.CONFIRMED, Outcome.CORRECTED) else "other"
-    return {**verdict, "mark": mark, "symbol": _SYMBOLS[outcome] if good else "✗", "figure": ""}
+    repeat = f"dualball validate --claim {verdict['id']}{option} -o {directory}"
+    lost = {check["run"] for check in verdict["checks"] if check["run"] and not (directory / check["run"]).is_file()}
+    gaps = [f"{len(lost)} run files are missing" if len(lost) > 1 else "A run file is missing"] if lost else []
+    figure = ""
+    if verdict["checks"] and verdict["id"] in FIGURES_OF:
+        try:
+            figure = picture(FIGURES_OF[verdict["id"]](summary, directory))
+        except StorageError as error:
+            gaps.append(f"The figure can't be drawn: {error}")
+    return {
+        **verdict,
+        "mark": mark,
+        "symbol": _SYMBOLS.get(outcome, "✗") if good else "✗",
+        "figure": figure,
+        "gaps": gaps,
+        "lost": lost,
+        "repeat": repeat,
+    }
+
+
+def _not_run(claim: Claim, option: str) -> dict[str, Any]:
+    """The row of a claim without a verdict."""
+    texts = {
+        name: getattr(claim, name) for name in ("id", "source", "statement", "prediction", "measurement", "tolerance")
+    }
+    blank = {"reason": "", "error": "", "checks": [], "figure": "", "lost": set(), "passed": False}
+    repeat = f"dualball validate --claim {claim.id}{option}"
+    return {
+        **texts, **blank, "outcome": _NOT_RUN, "mark": "other", "symbol": "…", "gaps": ["Not run yet"], "repeat": repeat
+    }  # fmt: skip
 
 
 def _headline(claims: list[dict[str, Any]]) -> str:
-    if not claims:
-        return "Nothing has been checked yet"
-    failed = [claim["id"] for claim in claims if not claim["passed"]]
+    ran = [claim for claim in claims if claim["outcome"] != _NOT_RUN]
+    failed = [claim["id"] for claim in ran if not claim["passed"]]
     if failed:
-        return f"{len(failed)} of {len(claims)} claims did not come out as expected: {', '.join(failed)}"
+        return f"{len(failed)} of {len(ran)} claims did not come out as expected: {', '.join(failed)}"
     counts = Counter(claim["outcome"] for claim in claims)
+    if not ran:
+        return "Nothing has been checked yet"
     return "The paper and the engine agree: " + ", ".join(f"{n} {name}" for name, n in counts.most_common())
 
 
 def _lead(summary: Summary) -> str:
-    checks = [check for verdict in summary.verdicts.values() for check in verdict["checks"]]
-    omega = [abs(c["error"] / c["predicted"]) for c in checks if c["quantity"] == "ω_c" and c["predicted"]]
+    omega = [
+        abs(check["error"] / check["predicted"])
+        for claim in STATIONARY & set(summary.verdicts)
+        for check in summary.verdicts[claim]["checks"]
+        if check["quantity"] == "ω_c" and check["predicted"]
+    ]
     if not omega:
         return "A ball rolls and slips round a cylinder; its closed-form theory is held against simulation."
     return (
         "A ball rolls and slips round a cylinder. Its angular velocity ω_c, predicted in closed form by Antali and "
-        f"Stépán, was measured in {len(omega)} stationary states; the largest relative deviation is {max(omega):.1e}."
+        f"Stépán, was measured in {len(omega)} runs to stationary states; the largest relative deviation is "
+        f"{max(omega):.1e}."
     )
 
 
@@ -102,7 +154,21 @@ def _tiles(claims: list[dict[str, Any]]) -> list[dict[str, str]]:
 
 
 def _figures(summary: Summary) -> list[dict[str, str]]:
-    return [{"svg": svg(characteristic.draw(summary)), "caption": characteristic.CAPTION}]
+    """The figures over all claims; a gap stands for one whose results are missing."""
+    shown = []
+    for name, stored in STORED.items():
+        told = {"id": f"figure-{name}", "title": stored.title, "caption": stored.caption, "picture": "", "gap": ""}
+        try:
+            told["picture"] = picture(stored.draw(summary))
+        except StorageError as error:
+            told["gap"] = str(error)
+        shown.append(told)
+    return shown
+
+
+def _number(value: float) -> str:
+    """A number of a table: round-off is told by its size alone."""
+    return f"{value:.9g}" if value == 0 or abs(value) >= 1e-4 else f"{value:.1e}"
 
 
 def _provenance(summary: Summary) -> dict[str, str]:

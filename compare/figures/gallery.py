@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from compare import results
-from compare.figures import characteristic
+from compare import ablation, frontier, results
+from compare.figures import characteristic, mujoco
 from compare.figures.paper import FIGURES
 from compare.results import Summary
 from model.errors import InputError, StorageError
 
-STORED: dict[str, Callable[[Summary], Figure]] = {"characteristic": characteristic.draw}
-"""Figures made from a results directory, by file name."""
+
+@dataclass(frozen=True)
+class Stored:
+    """A figure made from stored results; `draw` raises `StorageError`, naming the command, where they are missing."""
+
+    title: str
+    caption: str
+    draw: Callable[[Summary], Figure]
+
+
+STORED = {
+    "characteristic": Stored("Characteristic curves", characteristic.CAPTION, characteristic.draw),
+    "frontier": Stored("Error and cost", mujoco.CAPTIONS[frontier.ID], mujoco.draw_frontier),
+    "ablation": Stored("What a newcomer's settings get wrong", mujoco.CAPTIONS[ablation.ID], mujoco.draw_ablation),
+}
+"""By file name, in the order of the report."""
 FORMATS = ("svg", "pdf", "png")
 
 
@@ -40,8 +55,13 @@ def write(output: Path, stored: Path, formats: tuple[str, ...] = ("svg",)) -> It
         for name in STORED:
             yield name, f"skipped: {error}"
         return
-    for name, draw_stored in STORED.items():
-        _save(draw_stored(summary), output, name, formats)
+    for name, wanted in STORED.items():
+        try:
+            figure = wanted.draw(summary)
+        except StorageError as error:
+            yield name, f"skipped: {error}"
+            continue
+        _save(figure, output, name, formats)
         yield name, ""
 
 

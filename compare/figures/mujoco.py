@@ -99,7 +99,7 @@ def draw_ablation(summary: Summary) -> Figure:
 
 def _checks(summary: Summary, claim: str) -> list[Mapping[str, Any]]:
     if claim not in summary.verdicts:
-        raise StorageError(f"no results of the claim {claim!r}; run 'dualball validate {claim}'")
+        raise StorageError(f"no results of the claim {claim!r}; run 'dualball validate --claim {claim}'")
     found: list[Mapping[str, Any]] = summary.verdicts[claim]["checks"]
     return found
 
