@@ -154,6 +154,13 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write")
     command.add_argument("--json", action="store_true", help="print JSON")
 
+    command = _add(commands, "view", _view, "the ball in MuJoCo's viewer, driven by the study's own loop")
+    options.add_parameters(command)
+    options.add_flow(command)
+    options.add_start(command)
+    command.add_argument("--timestep", type=options.number, metavar="s", help="time step")
+    command.add_argument("--speed", type=options.number, default=1.0, help="1 is real time (default)")
+
     command = _add(commands, "benchmark", _benchmark, "cost of the loop round MuJoCo's step, as ratios within one run")
     command.add_argument("--json", action="store_true", help="print JSON")
     return parser
@@ -293,6 +300,17 @@ def _figures(args: argparse.Namespace) -> int:
 
     for name, gap in gallery.write(args.output, args.results, tuple(args.format or ["svg"])):
         print(f"{args.output / name}: {gap or 'written'}")
+    return 0
+
+
+def _view(args: argparse.Namespace) -> int:
+    from compare import viewer  # here, because nothing else needs it
+
+    p = options.parameters(args)
+    settings = (
+        ContactSettings.for_problem(p) if args.timestep is None else ContactSettings.for_problem(p, args.timestep)
+    )
+    viewer.view(p, options.start(args), options.flow(args), settings, args.speed)
     return 0
 
 

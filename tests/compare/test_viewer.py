@@ -1,0 +1,68 @@
+"""The viewer's loop, with a window and a clock that are not there: it is the study's own."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+import numpy as np
+import pytest
+
+import mjsim
+from compare import cli, viewer
+from mjsim import ContactSettings, recorder
+from model import Flow, Parameters
+
+
+class Window:
+    """Closes after so many pictures; a picture takes 1/64 s, a number without round-off."""
+
+    def __init__(self, pictures: int, takes: float = 1 / 64) -> None:
+        self.left, self.takes, self.now = pictures, takes, 0.0
+
+    def is_running(self) -> bool:
+        return self.left > 0
+
+    def lock(self) -> nullcontext[None]:
+        return nullcontext()
+
+    def sync(self) -> None:
+        self.left -= 1
+        self.now += self.takes
+
+
+def test_the_loop_is_that_of_a_simulation(reference: Parameters) -> None:
+    p, x0 = reference.replace(omega_0=25.0), [0, 0, 13.0, 0, 0, 0]
+    flow, settings = Flow.ramp(20.0, 25.0, 0.3), ContactSettings()
+    stepper, window = viewer.start(p, x0, flow, settings), Window(33)
+    steps = viewer.run(window, stepper, flow, settings.timestep, 1.0, lambda: window.now, lambda seconds: None)
+    assert steps == 500  # half a second: the first of the 33 pictures shows the start
+    run = mjsim.simulate(p, x0, 0.5, flow, settings, sample_interval=0.5)
+    qpos, qvel = np.array(stepper.data.qpos), np.array(stepper.data.qvel)
+    qpos[:3] -= settings.lead * qvel[:3]  # positions are ahead of velocities
+    # Equal but for the round-off of turning one state into the paper's variables, or many at once.
+    scale = np.abs(run.x[-1]) + [p.r, 1, 1, 60, 60, 60, p.r, 1]
+    np.testing.assert_array_less(np.abs(recorder.state(qpos, qvel, p) - run.x[-1]), 4 * np.finfo(float).eps * scale)
+
+
+def test_a_slow_machine_does_not_run_after_the_clock(reference: Parameters) -> None:
+    settings = ContactSettings()
+    flow, window = Flow.steady(12.0), Window(4, takes=3.0)
+    stepper = viewer.start(reference, [0, 0, 12.0, 0, 0, 0], flow, settings)
+    steps = viewer.run(window, stepper, flow, settings.timestep, 1.0, lambda: window.now, lambda seconds: None)
+    assert steps == 3 * round(viewer._BEHIND / settings.timestep)
+
+
+def test_what_serves_contact_alone_is_out_of_sight(reference: Parameters) -> None:
+    stepper = viewer.start(reference, np.zeros(6), Flow.steady(12.0), ContactSettings())
+    assert stepper.model.geom("wall").rgba[3] == 0
+
+
+def test_no_display_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("platform.system", lambda: "Linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert cli.main(["view", "--omega-0", "20"]) == 2
+    told = capsys.readouterr().err
+    assert "there is no display" in told
+    assert told.count("\n") == 1
+    assert cli.main(["view", "--speed", "0"]) == 2
