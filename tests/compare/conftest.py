@@ -24,6 +24,7 @@ def validated(tmp_path_factory: pytest.TempPathFactory) -> Validated:
     return Validated(directory, compare.validate(directory, level=Level.QUICK, workers=os.cpu_count() or 1))
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests that share the validation run in one process, which makes it once."""
     for item in items:
