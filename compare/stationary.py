@@ -86,8 +86,7 @@ def points(name: str, omegas: Sequence[float], cases: Sequence[Case]) -> list[Po
 def check(point: Point, trajectory: Trajectory, run: str) -> list[Check]:
     """Hold omega_c and the slip of a settled run against the prediction."""
     p, target = trajectory.header.parameters, point.target
-    first = int((1 - WINDOW) * len(trajectory.time))
-    window = slice(first, None)
+    window = _window(trajectory)
     found = Case(int(np.bincount(trajectory.case[window]).argmax()))
     agrees = _family(found) == _family(target.case)
     checks = []
@@ -130,6 +129,11 @@ def _family(case: Case) -> Case:
     return Case.NR if case is Case.SR else case
 
 
+def _window(trajectory: Trajectory) -> slice:
+    """The samples that are averaged."""
+    return slice(int((1 - WINDOW) * len(trajectory.time)), None)
+
+
 def _systematic(trajectory: Trajectory, target: StationarySolution) -> tuple[float, float, float, float]:
     """What creep and round-off do to omega_c and the three slip components, standard uncertainties in rad s-1.
 
@@ -142,7 +146,7 @@ def _systematic(trajectory: Trajectory, target: StationarySolution) -> tuple[flo
     settings = ContactSettings.from_mapping(
         {k: v for k, v in trajectory.header.settings.items() if k in ContactSettings.__dataclass_fields__}
     )
-    window = slice(int((1 - WINDOW) * len(trajectory.time)), None)
+    window = _window(trajectory)
     rolls_A, rolls_B = (contact is Contact.R for contact in (target.case.A, target.case.B))
     friction_A = rolls_A * float(np.hypot(*trajectory.force_A[window][:, [0, 2]].T).max())
     friction_B = rolls_B * float(np.hypot(*trajectory.force_B[window][:, [1, 2]].T).max())
