@@ -21,11 +21,12 @@ from model import Events, Flow, Header, InputError, Parameters, SimulationError,
 from model.arrays import Array
 from model.kinematics import UNITS, VARIABLES, full_state, slip_speeds
 from model.parameters import check_number
+from model.trajectory import SAMPLE
 
 BLOCK = 256
 """Most samples a run keeps before it hands them out."""
 BLOCK_STEPS = 20_000
-"""Most steps it takes before that, if one sample doesn't need more."""
+"""Most steps it takes before that, if one sample doesn't need more, and for which it holds omega_0."""
 _HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 
@@ -81,6 +82,9 @@ class Run:
             for p, flow, x in zip(parameters, flows, states, strict=True)
         ]
         """Where each trajectory comes from; a failure appears here."""
+        lengths = [(p.R, p.r) for p in parameters]
+        self._alike = [[i for i, own in enumerate(lengths) if own == each] for each in dict.fromkeys(lengths)]
+        """Runs of the same geometry, whose samples are worked out together."""
         self._classifiers = [Classifier(p, settings) for p in parameters]
         """They hold the changes of case so far, as `events`."""
 
@@ -113,7 +117,7 @@ class Run:
         for raw in self._raw_blocks():
             last = first + len(raw)
             time = np.arange(first, last, dtype=np.float64) * (self._interval * self._settings.timestep)
-            yield [self._finish(i, time, raw[:, i], last == self._count) for i in range(len(self._parameters))]
+            yield self._finish(time, raw, last == self._count)
             if all(header.failure for header in self.headers):
                 return
             first = last
@@ -130,37 +134,50 @@ class Run:
                 first += len(raw)
         size = max(1, min(BLOCK, BLOCK_STEPS // self._interval))
         for start in range(first, self._count, size):
-            rows = range(start, min(start + size, self._count))
-            raw = np.empty((len(rows), len(self._parameters), recorder.NQ + recorder.NV + recorder.NSENSOR))
-            for k, row in enumerate(rows):
-                omega_0 = self._omega_0(row * self._interval, self._interval if row + 1 < self._count else 1)
-                self._stepper.sample(omega_0[0], raw[k])
-                self._stepper.advance(omega_0[1:])
+            stop = min(start + size, self._count)
+            raw = np.empty((stop - start, len(self._parameters), recorder.NQ + recorder.NV + recorder.NSENSOR))
+            self._step(raw, start)
             if self._journal:
                 self._journal.note(raw, self._stepper.state())
             yield raw
+
+    def _step(self, raw: Array, start: int) -> None:
+        """Take the steps from sample `start` to the one after the last of raw, or to the end; fill raw."""
+        interval, stepper = self._interval, self._stepper
+        end = min((start + len(raw)) * interval, (self._count - 1) * interval + 1)
+        for first in range(start * interval, end, BLOCK_STEPS):
+            omega_0 = self._omega_0(first, min(BLOCK_STEPS, end - first))
+            for k in range(0, len(omega_0), interval):
+                sample, between = divmod(first + k, interval)
+                if not between:
+                    stepper.sample(omega_0[k], raw[sample - start])
+                stepper.advance(omega_0[k if between else k + 1 : k + interval])
 
     def _omega_0(self, first: int, count: int) -> Array:
         """omega_0 in the middle of each step, shape (count, runs)."""
         time = (np.arange(first, first + count) + 0.5) * self._settings.timestep
         return np.stack([flow(time) for flow in self._flows], axis=-1)
 
-    def _finish(self, i: int, time: Array, raw: Array, last: bool) -> npt.NDArray[np.void]:
-        """Samples of run i from raw rows, cut where they diverge."""
-        p = self._parameters[i]
-        qpos, qvel, sensors = np.split(raw, [recorder.NQ, recorder.NQ + recorder.NV], axis=1)
-        good = np.logical_and.accumulate((np.abs(raw) < _HUGE).all(axis=1))
-        sound = 0 if self.headers[i].failure else int(good.sum())
-        lead = self._settings.lead
-        block = recorder.samples(time[:sound], qpos[:sound], qvel[:sound], sensors[:sound], p, lead)
-        if not self.headers[i].failure and sound < len(time):
-            state = recorder.state(qpos[sound - 1], qvel[sound - 1], p) if sound else None
-            self._fail(i, float(time[sound]), state)
-        return self._classifiers[i].add(block, last or bool(self.headers[i].failure))
+    def _finish(self, time: Array, raw: Array, last: bool) -> list[npt.NDArray[np.void]]:
+        """Samples of each run from raw rows (samples, runs, columns), cut where they diverge."""
+        sound = np.logical_and.accumulate((np.abs(raw) < _HUGE).all(axis=2)).T
+        sound &= np.array([[not header.failure] for header in self.headers])
+        blocks = [np.empty(0, SAMPLE)] * len(raw[0])
+        for runs in self._alike:
+            p, kept = self._parameters[runs[0]], sound[runs]
+            rows = raw.transpose(1, 0, 2)[runs][kept]
+            qpos, qvel, sensors = np.split(rows, [recorder.NQ, recorder.NQ + recorder.NV], axis=1)
+            times = np.broadcast_to(time, kept.shape)[kept]
+            block = recorder.samples(times, qpos, qvel, sensors, p, self._settings.lead)
+            for i, part in zip(runs, np.split(block, kept.sum(axis=1).cumsum()[:-1]), strict=True):
+                if not self.headers[i].failure and len(part) < len(time):
+                    self._fail(i, float(time[len(part)]), part)
+                blocks[i] = self._classifiers[i].add(part, last or bool(self.headers[i].failure))
+        return blocks
 
-    def _fail(self, i: int, time: float, last: Array | None) -> None:
-        where = "" if last is None else " after " + ", ".join(
-            f"{name} = {value:.6g} {unit}" for name, value, unit in zip(VARIABLES, last, UNITS, strict=True)
+    def _fail(self, i: int, time: float, block: npt.NDArray[np.void]) -> None:
+        where = "" if len(block) == 0 else " after " + ", ".join(
+            f"{name} = {block[name][-1]:.6g} {unit}" for name, unit in zip(VARIABLES, UNITS, strict=True)
         )  # fmt: skip
         self.headers[i] = dataclasses.replace(self.headers[i], failure=f"diverged by t = {time:g} s{where}")
 

@@ -188,7 +188,7 @@ class Many(Stepper):
         self._surface, self._square, self._less = (np.empty((2, 2, runs)) for _ in range(3))
         self._mixed, self._ends = self._surface.reshape(4, -1)[1:3], self._surface.reshape(4, -1)[::3]
         self._slides = np.empty((2, 1, runs))
-        self._gap = np.empty((runs, 2))
+        self._share = np.empty((runs, 2))
         self._take(self._qvel, self._last)
         self._settle(omega_0)
 
@@ -197,7 +197,7 @@ class Many(Stepper):
         turn, applied = self._batch.bind("mocap_quat")[:, 0], self._batch.bind("qfrc_applied").T
         self._azimuth, self._inward, self._orientation = self._qpos[:, 0], self._qpos[:, 1], self._qpos[:, 3:7]
         self._cos, self._sin = turn[:, 0], turn[:, 3]
-        self._force, self._moment = applied[:3], applied[3:6:2]
+        self._force, self._torque, self._moment = applied[:3], applied[0], applied[3:6:2]
         floor, wall = (model.geom(name).id for name in ("floor", "wall"))
         surfaces = self._batch.expand("geom_surfacevel")
         self._surfaces = surfaces[:, floor : wall + 1 : wall - floor, :2].transpose(1, 2, 0)
@@ -238,15 +238,13 @@ class Many(Stepper):
         row[:, split:] = self._sensors
 
     def advance(self, omega_0: Array) -> None:
-        gain, upward, gap, margins = self._gain, self._qpos[:, 2], self._gap, self.margins
-        gap_A, gap_B = gap.T
+        gain, gaps, share, margins = self._gain, self._qpos[:, 2:0:-1], self._share, self.margins
         for omega in omega_0:
             self._prepare(omega)
             if gain:
-                np.multiply(upward, gain, out=gap_A)
-                np.multiply(self._inward, gain, out=gap_B)
-                np.subtract(margins, gap, out=gap)
-                np.maximum(gap, 0.0, out=margins)
+                np.multiply(gaps, gain, out=share)
+                np.subtract(margins, share, out=share)
+                np.maximum(share, 0.0, out=margins)
             self._batch.step()
             self._now, self._last, self._contact = self._last, self._now, self._outputs
 
@@ -290,9 +288,8 @@ class Many(Stepper):
         np.multiply(self._rho, omega_0, out=self._fluid)
         np.subtract(around, self._fluid, out=around)
         np.multiply(drag, self._mc, out=drag)
-        np.subtract(change.force, drag, out=drag)
-        np.multiply(around, self._rho, out=around)
-        np.copyto(self._force, drag)
+        np.subtract(change.force, drag, out=self._force)
+        np.multiply(self._torque, self._rho, out=self._torque)
         np.copyto(self._moment, change.moment)
         if self._shifts:
             self._shift_surfaces(now.slip, change.slip)
