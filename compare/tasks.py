@@ -25,7 +25,7 @@ from model.trajectory import current_versions
 
 ENGINES = ("mujoco", "event", "time-stepping")
 LONG = 1e6
-"""Steps from which on a MuJoCo run keeps a journal and has a worker of its own."""
+"""Steps from which on a MuJoCo run keeps a journal and has a worker of its own, and no use for a batch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,7 +176,7 @@ def _mujoco(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
     first = tasks[0]
     return mjsim.Run(
         [task.parameters for task in tasks], [task.x0 for task in tasks], first.t_end, [task.fluid for task in tasks],
-        first.contact_settings, sample_interval=first.sample_interval, journal=journal,
+        first.contact_settings, sample_interval=first.sample_interval, batched=first.steps <= LONG, journal=journal,
     )  # fmt: skip
 
 

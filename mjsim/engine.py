@@ -43,7 +43,7 @@ class Run:
     theta_0 : azimuth at the start, rad
     batched : whether to use MuJoCo's batch even for one run. Its results don't depend on how many runs share it,
         to the bit; a single run outside is faster and rounds differently.
-    journal : keeps what was done, and knows what an earlier process did; for runs in a batch
+    journal : keeps what was done, and knows what an earlier process did
 
     Each iteration yields one block per run, structured arrays of dtype `model.trajectory.SAMPLE`. A run that diverges
     yields what it has, then empty blocks, and its header says why.

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import shutil
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import numpy as np
@@ -16,6 +18,8 @@ import numpy as np
 from model.arrays import Array
 from model.errors import StorageError
 from model.files import WholeFile, remove_leftovers
+
+_T = TypeVar("_T")
 
 
 class Journal:
@@ -40,18 +44,24 @@ class Journal:
         self._waiting: list[Array] = []
         self._last = time.monotonic()
 
-    def recall(self) -> tuple[list[Array], dict[str, Array]]:
-        """Blocks of raw samples (samples, runs, columns) so far, and the stepper's state after them; empty if none."""
-        blocks, state = [], {}
-        for k in range(self._count):
-            path = self._path(k)
-            try:
-                with h5py.File(path, "r") as file:
-                    blocks.append(file["samples"][...])
-                    state = {name: dataset[...] for name, dataset in file["state"].items()}
-            except (OSError, KeyError) as error:
-                raise StorageError(f"cannot read {path}: {error}; remove {self._directory} to start anew") from error
+    def recall(self) -> tuple[Iterator[Array], dict[str, Array]]:
+        """Blocks of raw samples (samples, runs, columns) so far, one at a time, and the state after them, if any.
+
+        Raises `StorageError`, the blocks when they are read, if a segment is damaged.
+        """
+        blocks = (self._read(k, lambda file: file["samples"][...]) for k in range(self._count))
+        if self._count == 0:
+            return blocks, {}
+        state = self._read(self._count - 1, lambda file: {name: part[...] for name, part in file["state"].items()})
         return blocks, state
+
+    def _read(self, k: int, take: Callable[[h5py.File], _T]) -> _T:
+        path = self._path(k)
+        try:
+            with h5py.File(path, "r") as file:
+                return take(file)
+        except (OSError, KeyError) as error:
+            raise StorageError(f"cannot read {path}: {error}; remove {self._directory} to start anew") from error
 
     def note(self, samples: Array, state: dict[str, Array]) -> None:
         """Keep a block of raw samples and the state after it; written once the interval has passed."""

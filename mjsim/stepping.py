@@ -102,10 +102,18 @@ class Single(Stepper):
         self._steps(omega_0[:, 0].tolist(), mujoco.mj_step)
 
     def state(self) -> dict[str, Array]:
-        raise NotImplementedError("only runs in a batch can be taken up again")
+        return {name: values.copy() for name, values in self._carried().items()} | {"last": np.array(self._last)}
 
     def restore(self, state: dict[str, Array]) -> None:
-        raise NotImplementedError("only runs in a batch can be taken up again")
+        for name, values in self._carried().items():
+            values[...] = state[name]
+        self._last = state["last"].tolist()
+
+    def _carried(self) -> dict[str, Array]:
+        """The engine's arrays on whose values the next step depends."""
+        names = ("qpos", "qvel", "qacc_warmstart", "qfrc_constraint", "sensordata")
+        surfaces = {"floor": self._floor, "wall": self._wall}
+        return {name: getattr(self.data, name) for name in names} | surfaces | {"margins": self.margins}
 
     def _steps(self, omega_0: list[float], step: Callable[[Any, Any], None]) -> None:
         model, data, p, settings = self.model, self.data, self._p, self._settings

@@ -15,10 +15,13 @@ from model import Flow, Parameters, StorageError
 P = Parameters.named("reference").replace(omega_0=25.0)
 
 
-def run(directory: Path | None) -> Run:
+def run(directory: Path | None, batched: bool = True) -> Run:
     """Spin-up from rest through rolling into slipping: about four blocks of samples."""
     journal = Journal(directory, interval=0.0) if directory else None
-    return Run([P], [np.zeros(8)], 4.5, [Flow.steady(25.0)], ContactSettings(), sample_interval=5e-3, journal=journal)
+    return Run(
+        [P], [np.zeros(8)], 4.5, [Flow.steady(25.0)], ContactSettings(), sample_interval=5e-3, batched=batched,
+        journal=journal,
+    )  # fmt: skip
 
 
 def joined(part: Run) -> np.ndarray:
@@ -26,15 +29,18 @@ def joined(part: Run) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def uninterrupted() -> np.ndarray:
-    return joined(run(None))
+def uninterrupted() -> dict[bool, np.ndarray]:
+    return {batched: joined(run(None, batched)) for batched in (False, True)}
 
 
+@pytest.mark.parametrize("batched", [False, True])
 @pytest.mark.parametrize("blocks", [0, 1, 2, 3])
-def test_taken_up_after_some_blocks(tmp_path: Path, uninterrupted: np.ndarray, blocks: int) -> None:
-    list(islice(run(tmp_path / "journal"), blocks))
-    again = run(tmp_path / "journal")
-    np.testing.assert_array_equal(joined(again), uninterrupted)
+def test_taken_up_after_some_blocks(
+    tmp_path: Path, uninterrupted: dict[bool, np.ndarray], blocks: int, batched: bool
+) -> None:
+    list(islice(run(tmp_path / "journal", batched), blocks))
+    again = run(tmp_path / "journal", batched)
+    np.testing.assert_array_equal(joined(again), uninterrupted[batched])
 
 
 def test_a_damaged_journal_says_what_to_do(tmp_path: Path) -> None:
