@@ -126,3 +126,17 @@ def test_slipping_converges_at_second_order() -> None:
     ]
     coarse, fine = (np.abs(a.x - b.x)[:, 2:6].max() for a, b in pairwise(runs))
     assert 3.5 < coarse / fine < 8  # the third order shows, too, where margins lag behind the load
+
+
+def test_without_the_servo_sliding_states_are_of_second_order_in_the_step() -> None:
+    """A ball that sinks in rolls on a lever shorter by half its depth, and the depth goes with timestep^2."""
+    p = P.replace(omega_0=25.0)
+    steps = (2e-3, 1e-3, 5e-4)
+    coarse, middle, fine = (
+        float(mjsim.simulate(p, np.zeros(8), 40.0, settings=ContactSettings.at(h, servo=0.0)).omega_c[-1])
+        for h in steps
+    )
+    # The next term is of the fourth order: relative to this one it is of the size of the change of omega_c itself.
+    change = abs(coarse - fine) / abs(fine)
+    assert 1e-3 < change < 0.1
+    assert (coarse - middle) / (middle - fine) == pytest.approx(4, rel=2 * change)
