@@ -10,6 +10,7 @@ import argparse
 import json
 import os
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,8 @@ from compare import (
 )
 from compare.campaign import Campaign
 from compare.claims import Level
-from compare.tasks import Task, carry_out
+from compare.executors import interrupts
+from compare.tasks import Task, failed_path, journal_path, store
 from mjsim import ContactSettings
 from model import InputError, SimulationError, storage
 from model.files import check_writable, write_text
@@ -189,18 +191,37 @@ def _simulate(args: argparse.Namespace) -> int:
     )  # fmt: skip
     if args.output:
         check_writable(args.output)
-    (trajectory,) = carry_out([task])
-    if args.output:
-        storage.save(trajectory, args.output)
-    if args.json:
-        print(json.dumps(inspection.describe(trajectory), indent=1))
-    else:
-        Console().print(inspection.table(trajectory))
-        if args.output:
+    with tempfile.TemporaryDirectory() as scratch, interrupts() as interrupted:
+        path = args.output or Path(scratch) / "run.h5"
+        try:
+            (failure,) = store([task], [path], stop=interrupted)
+        except KeyboardInterrupt:  # an engine that has no samples until its end, or the second Ctrl-C
+            print("dualball: interrupted; no samples are kept", file=sys.stderr)
+            return 130
+        kept = failed_path(path) if failure else path
+        _show(inspection.describe(kept), args.json)
+        if args.output and not failure and not args.json:
             print(f"written to {args.output}")
-    if not trajectory.complete:
-        raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)
-    return 0
+        if failure:
+            print(f"dualball: the simulation {failure}; {_what_is_kept(task, args.output)}", file=sys.stderr)
+        return 130 if interrupted() else 1 if failure else 0
+
+
+def _what_is_kept(task: Task, output: Path | None) -> str:
+    """What is left of a run that broke down or was stopped."""
+    if output is None:
+        return "nothing is kept without --output"
+    journal = journal_path(task, output)
+    goes_on = f", and the same command goes on from what {journal} holds" if journal and journal.exists() else ""
+    return f"its samples so far are kept in {failed_path(output)}{goes_on}"
+
+
+def _show(told: dict[str, Any], as_json: bool) -> None:
+    """Print what `inspection.describe` found."""
+    if as_json:
+        print(json.dumps(told, indent=1))
+    else:
+        Console().print(inspection.table(told))
 
 
 def _settings(args: argparse.Namespace) -> ContactSettings | analytic.Settings:
@@ -350,13 +371,9 @@ def _inspect(args: argparse.Namespace) -> int:
         else:
             Console().print(collection.table(told))
         return 0
-    trajectory = storage.load(args.file)
     if args.plot:
-        inspection.plot(trajectory, args.plot)
-    if args.json:
-        print(json.dumps(inspection.describe(trajectory), indent=1))
-    else:
-        Console().print(inspection.table(trajectory))
+        inspection.plot(storage.load(args.file), args.plot)
+    _show(inspection.describe(args.file), args.json)
     return 0
 
 

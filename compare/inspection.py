@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +12,30 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from compare.figures import style
-from model import Case, StorageError, Trajectory
+from model import Case, Flow, Parameters, StorageError, Trajectory, storage
 from model.kinematics import UNITS, VARIABLES
 
+PART = 100_000
+"""Samples that are looked at together, so that a file may be larger than memory."""
 
-def describe(trajectory: Trajectory) -> dict[str, Any]:
-    """Parameters, versions, cases over time, events and last state, JSON-able."""
-    header, events = trajectory.header, trajectory.events
+
+def describe(path: Path) -> dict[str, Any]:
+    """Parameters, versions, cases over time, events and last state of a stored run, JSON-able.
+
+    Raises `StorageError` for a file that isn't a trajectory or isn't whole.
+    """
+    samples, last = 0, storage.load(path, slice(-1, None))
+    stretches: list[tuple[Case, float, float]] = []
+    for part in _parts(path):
+        samples += len(part.time)
+        for case, start, end in phases(part):
+            if stretches and stretches[-1][0] is case:
+                start = stretches.pop()[1]
+            stretches.append((case, start, end))
+    header, events = last.header, last.events
     return {
         "engine": header.engine,
-        "complete": trajectory.complete,
+        "complete": last.complete,
         "failure": header.failure,
         "parameters": dataclasses.asdict(header.parameters),
         "flow": header.flow.to_mapping(),
@@ -28,15 +43,26 @@ def describe(trajectory: Trajectory) -> dict[str, Any]:
         "versions": dict(header.versions),
         "commit": header.commit,
         "created": header.created,
-        "samples": len(trajectory.time),
-        "duration": float(trajectory.time[-1]) if len(trajectory.time) else 0.0,
-        "cases": [{"case": case.name, "from": start, "to": end} for case, start, end in phases(trajectory)],
+        "samples": samples,
+        "duration": float(last.time[-1]) if samples else 0.0,
+        "cases": [{"case": case.name, "from": start, "to": end} for case, start, end in stretches],
         "events": [
             {"time": float(t), "from": Case(a).name, "to": Case(b).name}
             for t, a, b in zip(events.time, events.from_case, events.to_case, strict=True)
         ],
-        "last": dict(zip(VARIABLES, trajectory.x[-1].tolist(), strict=True)) if len(trajectory.time) else {},
+        "last": dict(zip(VARIABLES, last.x[-1].tolist(), strict=True)) if samples else {},
     }
+
+
+def _parts(path: Path) -> Iterator[Trajectory]:
+    """A stored run, `PART` samples at a time."""
+    first = 0
+    while True:
+        part = storage.load(path, slice(first, first + PART))
+        yield part
+        if len(part.time) < PART:
+            return
+        first += PART
 
 
 def phases(trajectory: Trajectory) -> list[tuple[Case, float, float]]:
@@ -51,19 +77,18 @@ def phases(trajectory: Trajectory) -> list[tuple[Case, float, float]]:
     ]
 
 
-def table(trajectory: Trajectory, most: int = 20) -> Table:
-    """The description as a table of two columns; at most so many phases and events are listed."""
-    told = describe(trajectory)
+def table(told: dict[str, Any], most: int = 20) -> Table:
+    """The answer of `describe` as a table of two columns; at most so many phases and events are listed."""
     rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     rows.add_column(style="bold")
     rows.add_column()
     rows.add_row("engine", f"{told['engine']} (" + ", ".join(f"{k} {v}" for k, v in told["versions"].items()) + ")")
     rows.add_row("made", f"{told['created']} {told['commit'][:12]}".strip())
-    fields = dataclasses.fields(trajectory.header.parameters)
+    fields = dataclasses.fields(Parameters)
     units = {f.name: "" if f.metadata["unit"] == "1" else f.metadata["unit"] for f in fields}
     values = (f"{name} = {told['parameters'][name]:g} {unit}" for name, unit in units.items())
     rows.add_row("parameters", ", ".join(value.strip() for value in values))
-    rows.add_row("flow", _flow(trajectory))
+    rows.add_row("flow", _flow(Flow.from_mapping(told["flow"])))
     rows.add_row("settings", ", ".join(f"{k} = {_short(v)}" for k, v in told["settings"].items()))
     rows.add_row("samples", f"{told['samples']} over {told['duration']:g} s")
     shown = [f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in told["cases"]]
@@ -130,8 +155,7 @@ def draw(trajectory: Trajectory) -> Figure:
     return figure
 
 
-def _flow(trajectory: Trajectory) -> str:
-    flow = trajectory.header.flow
+def _flow(flow: Flow) -> str:
     if flow.is_steady:
         return f"steady, omega_0 = {flow.value[0]:g} rad/s"
     return f"{flow.kind}, omega_0 from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within {flow.start[-1]:g} s"

@@ -8,7 +8,7 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from importlib import resources
@@ -106,8 +106,8 @@ class Deadline:
     limit: float = math.inf
     start: float = field(default_factory=time.monotonic)
 
-    def check(self, _: float = 0.0) -> None:
-        """Raise `OutOfTimeError` if it is over; takes an argument so that it can serve as a progress callback."""
+    def check(self) -> None:
+        """Raise `OutOfTimeError` if it is over."""
         if time.monotonic() - self.start > self.limit:
             raise OutOfTimeError(f"it took longer than {self.limit:g} s")
 
@@ -124,11 +124,14 @@ def carry_out(tasks: Sequence[Task]) -> list[Trajectory]:
     ]
 
 
-def store(tasks: Sequence[Task], paths: Sequence[Path], limit: float = math.inf) -> list[str]:
+def store(
+    tasks: Sequence[Task], paths: Sequence[Path], limit: float = math.inf, stop: Callable[[], bool] = lambda: False
+) -> list[str]:
     """Run tasks of one `Task.batch_key` into files; return, per task, why it failed (empty if it is whole).
 
-    A run that breaks down is kept under the suffix ``.failed.h5``. MuJoCo's samples go to their files as they come, and
-    a run of more than `LONG` steps keeps a journal, from which it goes on after having been killed.
+    A run that breaks down is kept under `failed_path`, until one into the same file is whole. MuJoCo's samples go to
+    their files as they come, and a run of more than `LONG` steps keeps a journal, from which it goes on after having
+    been killed. Once `stop` says so, MuJoCo's runs end as if they had broken down, but keep their journals.
 
     Raises
     ------
@@ -136,15 +139,21 @@ def store(tasks: Sequence[Task], paths: Sequence[Path], limit: float = math.inf)
         If a file can't be written.
     OutOfTimeError
         If the batch takes longer than `limit` s for each of its runs.
+    KeyboardInterrupt
+        If `stop` says so while an engine is at work that has no samples until its end.
     """
     deadline = Deadline(limit * len(tasks))
     if tasks[0].engine == "mujoco":
-        return _stream(tasks, paths, deadline)
-    reasons = []
-    for task, path in zip(tasks, paths, strict=True):
-        trajectory = _analytic(task, deadline)
-        storage.save(trajectory, path if trajectory.complete else failed_path(path))
-        reasons.append(trajectory.header.failure)
+        reasons = _stream(tasks, paths, deadline, stop)
+    else:
+        reasons = []
+        for task, path in zip(tasks, paths, strict=True):
+            trajectory = _analytic(task, deadline, stop)
+            storage.save(trajectory, path if trajectory.complete else failed_path(path))
+            reasons.append(trajectory.header.failure)
+    for path, reason in zip(paths, reasons, strict=True):
+        if not reason:
+            failed_path(path).unlink(missing_ok=True)
     return reasons
 
 
@@ -153,9 +162,23 @@ def failed_path(path: Path) -> Path:
     return path.with_suffix(".failed.h5")
 
 
-def _stream(tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline) -> list[str]:
-    journal = Journal(paths[0].with_suffix(".journal")) if len(tasks) == 1 and tasks[0].steps > LONG else None
-    run = _mujoco(tasks, journal)
+def journal_path(task: Task, path: Path) -> Path | None:
+    """Where a long run into a file keeps its journal; its name tells the run, for the file's may be any."""
+    return path.with_name(f"{task.key}.journal") if task.engine == "mujoco" and task.steps > LONG else None
+
+
+def _stream(
+    tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline, stop: Callable[[], bool]
+) -> list[str]:  # fmt: skip
+    kept = journal_path(tasks[0], paths[0]) if len(tasks) == 1 else None
+    journal = Journal(kept) if kept else None
+    try:
+        run = _mujoco(tasks, journal)
+    except InputError:  # there is nothing to go on with
+        if journal:
+            journal.discard()
+        raise
+    stopped = ""
     with ExitStack() as stack:
         writers = [
             stack.enter_context(storage.TrajectoryWriter(path, header))
@@ -165,11 +188,15 @@ def _stream(tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline) ->
             deadline.check()
             for writer, block in zip(writers, blocks, strict=True):
                 writer.append(block)
-        for writer, header, events, path in zip(writers, run.headers, run.events, paths, strict=True):
-            writer.finish(events, header.failure, failed_path(path) if header.failure else path)
-    if journal:
+            if stop():
+                stopped = f"was stopped at t = {max(block['time'].max(initial=0.0) for block in blocks):g} s"
+                break
+        reasons = [header.failure or stopped for header in run.headers]
+        for writer, reason, events, path in zip(writers, reasons, run.events, paths, strict=True):
+            writer.finish(events, reason, failed_path(path) if reason else path)
+    if journal and not stopped:
         journal.discard()
-    return [header.failure for header in run.headers]
+    return reasons
 
 
 def _mujoco(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
@@ -180,13 +207,18 @@ def _mujoco(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
     )  # fmt: skip
 
 
-def _analytic(task: Task, deadline: Deadline) -> Trajectory:
+def _analytic(task: Task, deadline: Deadline, stop: Callable[[], bool] = lambda: False) -> Trajectory:
+    def check(done: float) -> None:
+        deadline.check()
+        if stop():
+            raise KeyboardInterrupt
+
     settings = task.settings if isinstance(task.settings, analytic.Settings) else analytic.Settings()
     settings = dataclasses.replace(settings, method=task.engine)
     try:
         return analytic.simulate(
             task.parameters, task.x0, task.t_end, task.fluid, settings,
-            sample_interval=task.sample_interval, progress=deadline.check,
+            sample_interval=task.sample_interval, progress=check,
         )  # fmt: skip
     except SimulationError as error:
         return error.trajectory

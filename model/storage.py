@@ -127,14 +127,17 @@ def _create_column(file: h5py.File, name: str, meta: Mapping[str, Any]) -> h5py.
     return dataset
 
 
-def load(path: str | Path) -> Trajectory:
-    """Read a trajectory; raises `StorageError`, in one line, for a file that isn't one or isn't whole."""
+def load(path: str | Path, part: slice = slice(None)) -> Trajectory:
+    """Read a trajectory, or a part of its samples: memory then depends on that part alone.
+
+    Raises `StorageError`, in one line, for a file that isn't one or isn't whole.
+    """
     if not Path(path).is_file():
         raise StorageError(f"cannot read {path}: there is no such file")
     try:
         with h5py.File(path, "r") as file:
             header = _read_header(file, path)
-            samples = {name: _read_column(file, name, meta, path) for name, meta in columns(Trajectory).items()}
+            samples = {name: _read_column(file, name, meta, path, part) for name, meta in columns(Trajectory).items()}
             events = {name: _read_column(file, _event_name(name), meta, path) for name, meta in columns(Events).items()}
     except StorageError:
         raise
@@ -221,14 +224,16 @@ def _dataset(file: h5py.File, name: str, path: str | Path) -> h5py.Dataset:
     return dataset
 
 
-def _read_column(file: h5py.File, name: str, meta: Mapping[str, Any], path: str | Path) -> npt.NDArray[Any]:
+def _read_column(
+    file: h5py.File, name: str, meta: Mapping[str, Any], path: str | Path, part: slice = slice(None)
+) -> npt.NDArray[Any]:
     dataset = _dataset(file, name, path)
     if dataset.shape is None or dataset.shape[1:] != meta["shape"] or len(dataset.shape) != 1 + len(meta["shape"]):
         raise StorageError(f"{path} is not whole: {name!r} has shape {dataset.shape}")
     dtype = meta.get("dtype", np.float64)
     if dataset.dtype.kind != np.dtype(dtype).kind:
         raise StorageError(f"{path} is not whole: {name!r} has type {dataset.dtype}")
-    return np.asarray(dataset[...], dtype=dtype)
+    return np.asarray(dataset[part], dtype=dtype)
 
 
 def _describe(dataset: h5py.Dataset, meta: Mapping[str, Any]) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,8 @@ import xarray
 
 from compare import cli
 from compare.sweep import FIELDS
-from model import Parameters, storage
+from model import Parameters, Trajectory, storage
+from model.trajectory import columns
 
 
 def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
@@ -81,8 +84,76 @@ def test_sweep_and_collect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 def test_a_run_that_diverges_is_kept_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = tmp_path / "run.h5"
     assert cli.main(["simulate", "--start", "omega_c=1e9", "--time", "0.1", "-o", str(run)]) == 1
-    assert "diverged by t =" in capsys.readouterr().err
-    assert not storage.load(run).complete
+    err = capsys.readouterr().err
+    assert "diverged by t =" in err
+    kept = tmp_path / "run.failed.h5"
+    assert f"its samples so far are kept in {kept}" in err
+    assert not storage.load(kept).complete
+    assert not run.exists()
+    assert cli.main(["simulate", "--time", "0.1", "-o", str(run)]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+
+
+INTERRUPTED = """
+import os, signal, sys
+from compare import cli, tasks
+from mjsim.journal import Journal
+tasks.LONG, stop_after = 1000, int(sys.argv[1])
+tasks.Journal = lambda directory: Journal(directory, interval=0.0)
+store, told = tasks.store, 0
+def pressing(tasks, paths, stop):
+    def pressed():
+        global told
+        told += 1
+        if told == stop_after:
+            os.kill(os.getpid(), signal.SIGINT)
+        return stop()
+    return store(tasks, paths, stop=pressed)
+cli.store = pressing
+raise SystemExit(cli.main(["simulate", "--time", "6", "--sample-interval", "0.005", "-o", sys.argv[2]]))
+"""
+
+
+def test_an_interrupted_run_is_kept_and_goes_on(tmp_path: Path) -> None:
+    """Ctrl-C in the second block of samples of five: the third and later are what the same command computes."""
+
+    def simulate(stop_after: int, output: Path) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-c", INTERRUPTED, str(stop_after), str(output)]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    output = tmp_path / "run" / "run.h5"
+    output.parent.mkdir()
+    stopped = simulate(2, output)
+    assert stopped.returncode == 130
+    (journal,) = output.parent.glob("*.journal")
+    assert f"kept in {output.with_suffix('.failed.h5')}, and the same command goes on from what {journal}" in (
+        stopped.stderr
+    )
+    part = storage.load(output.with_suffix(".failed.h5"))
+    assert part.header.failure == f"was stopped at t = {part.time[-1]:g} s"
+    first = sorted(journal.iterdir())
+    again = simulate(4, output)  # the journal's two blocks count, and one more is new
+    assert again.returncode == 130
+    assert sorted(journal.iterdir())[: len(first)] == first
+    assert len(storage.load(output.with_suffix(".failed.h5")).time) == 2 * len(part.time)
+    assert simulate(0, output).returncode == 0
+    assert [path.name for path in output.parent.iterdir()] == ["run.h5"]
+    assert simulate(0, tmp_path / "whole.h5").returncode == 0
+    run, whole = storage.load(output), storage.load(tmp_path / "whole.h5")
+    assert all(np.array_equal(getattr(run, name), getattr(whole, name)) for name in columns(Trajectory))
+    assert run.x[: len(part.x)].tobytes() == part.x.tobytes()
+
+
+def test_a_long_description_is_that_of_its_parts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = str(tmp_path / "run.h5")
+    assert cli.main(["simulate", "--time", "1", "--omega-0", "20", "-o", run, "--json"]) == 0
+    whole = capsys.readouterr().out
+    assert len(json.loads(whole)["cases"]) > 1
+    monkeypatch.setattr("compare.inspection.PART", 7)
+    assert cli.main(["inspect", run, "--json"]) == 0
+    assert capsys.readouterr().out == whole
 
 
 @pytest.mark.parametrize("name", ["prop-1", "prop-4"])
