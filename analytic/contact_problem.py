@@ -7,20 +7,35 @@ accelerations. A closed contact obeys
     P_t = -friction * P_n * v_t/|v_t| where v_t is not zero.
 
 No case is named: which contact sticks, slips or opens is part of the answer. At one contact of a sphere normal and
-tangential impulses do not influence each other, so that each contact alone is solved exactly; the two are swept in turn
-(projected Gauss-Seidel) until nothing changes.
+tangential impulses do not influence each other, so that each contact alone is solved exactly by a projection, given
+the impulse at the other. To `sweep` is to do so at A and then at B (projected Gauss-Seidel); what is sought is an
+impulse at B that a sweep reproduces. Sweeps alone may approach it slowly, or swing about it for ever where
+mu eta > 1: `Continuation` then takes over, which ends as Newton's method.
+
+A solution exists where mu < 1 or eta < 1 (Acary, Cadoux, Lemarechal & Malick, ZAMM 91 (2011) 155: the ball can
+move so that v_n - target > friction * |v_t| at both contacts). Where both are greater, floor and wall can
+lock the ball in the corner, so that no impulses meet a target > 0; `unlocked` is for those.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from analytic.rigid_body import NOTHING, Six, apply, mean
-from model import Parameters
+import numpy as np
 
-PLAIN_SWEEPS = 200
-"""Sweeps after which steps are halved: those that converge at all by themselves mostly have by then."""
+from analytic.rigid_body import NOTHING, Six, apply
+from model import Parameters
+from model.arrays import Array
+
+PLAIN_SWEEPS = 10
+"""Sweeps before the continuation takes over: most problems are solved by then."""
+ATTEMPT = 100
+"""Sweeps after which the continuation starts afresh, from where it is."""
+RISE = 1.3
+"""Rise of the change in a sweep that every other attempt overlooks."""
+MAX_SWEEPS = 2000
 
 
 class Closed(NamedTuple):
@@ -38,7 +53,7 @@ class NotConvergedError(ArithmeticError):
 
 def solve(
     free: Six, A: Closed | None, B: Closed | None, p: Parameters,
-    start: Six = NOTHING, tolerance: float = 4e-15, max_sweeps: int = 20_000,
+    start: Six = NOTHING, tolerance: float = 4e-15, max_sweeps: int = MAX_SWEEPS,
 ) -> tuple[Six, Six]:  # fmt: skip
     """Velocities and impulses that obey Coulomb's law at both contacts.
 
@@ -59,19 +74,15 @@ def solve(
     if A is None or B is None:  # a contact alone is solved exactly
         return sweep(u, P, A, B, p)
     scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
-    change = enough = math.inf
-    for k in range(max_sweeps):
+    pace, change, enough = Continuation(A, B, p), math.inf, math.inf
+    for _ in range(max_sweeps):
         u, new = sweep(u, P, A, B, p)
-        change = max(abs(a - b) for a, b in zip(new, P, strict=True)) / p.m
-        if k >= PLAIN_SWEEPS and change > enough:
-            # Each normal force moves the other by friction: where mu eta > 1 the plain sweeps may swing for ever about
-            # the solution. Going half the way has the same solution, and the cones, being convex, contain it.
-            new = mean(P, new)
-            u = apply(free, new, p)
-        P = new
-        enough = tolerance * max(scale, max(map(abs, P)) / p.m)
+        change = max(abs(new[3] - P[3]), abs(new[4] - P[4]), abs(new[5] - P[5])) / p.m
+        enough = tolerance * max(scale, max(map(abs, new)) / p.m)
         if change <= enough:
-            return apply(free, P, p), P
+            return apply(free, new, p), new
+        P = pace.next(u, P, new, change)
+        u = apply(free, P, p)
     raise NotConvergedError(
         f"contact problem: still a change of {change:g} m s-1 after {max_sweeps} sweeps, asked for {enough:g} m s-1"
     )
@@ -82,25 +93,118 @@ def sweep(u: Six, P: Six, A: Closed | None, B: Closed | None, p: Parameters) -> 
     v_h, v_y, v_k, o_x, o_y, o_z = u
     A_x, A_y, A_z, B_x, B_y, B_z = P
     m, jmr = p.m, p.j * p.m * p.r
-    m_t = m * p.j / (1 + p.j)  # mass that a tangential impulse feels at the contact point
     if A is not None:
-        n = max(0.0, A_y - m * (v_y - A.target))
-        s, t = _friction(A_x - m_t * (v_h + p.r * o_z), A_z - m_t * (v_k - p.r * o_x), p.mu * n, A.slip)
+        n, s, t = _project(*_unlimited_A(u, P, A, p), p.mu, A.slip)
         v_h, v_y, v_k = v_h + (s - A_x) / m, v_y + (n - A_y) / m, v_k + (t - A_z) / m
         o_x, o_z = o_x - (t - A_z) / jmr, o_z + (s - A_x) / jmr
         A_x, A_y, A_z = s, n, t
+        u = v_h, v_y, v_k, o_x, o_y, o_z
     if B is not None:
-        n = max(0.0, B_x - m * (v_h - B.target))
-        s, t = _friction(B_y - m_t * (v_y - p.r * o_z), B_z - m_t * (v_k + p.r * o_y), p.eta * n, B.slip)
+        n, s, t = _project(*_unlimited_B(u, P, B, p), p.eta, B.slip)
         v_h, v_y, v_k = v_h + (n - B_x) / m, v_y + (s - B_y) / m, v_k + (t - B_z) / m
         o_y, o_z = o_y + (t - B_z) / jmr, o_z - (s - B_y) / jmr
         B_x, B_y, B_z = n, s, t
-    return (v_h, v_y, v_k, o_x, o_y, o_z), (A_x, A_y, A_z, B_x, B_y, B_z)
+        u = v_h, v_y, v_k, o_x, o_y, o_z
+    return u, (A_x, A_y, A_z, B_x, B_y, B_z)
 
 
-def _friction(s: float, t: float, limit: float, slip: tuple[float, float] | None) -> tuple[float, float]:
-    """Project the friction that would stop the slip onto the disk, or oppose the known slip."""
+def _unlimited_A(u: Six, P: Six, A: Closed, p: Parameters) -> tuple[float, float, float]:
+    """Impulses (normal, along x, along z) that would bring A to its target and to rest, were they not limited."""
+    m_t = p.m * p.j / (1 + p.j)  # mass that a tangential impulse feels at the contact point
+    return P[1] - p.m * (u[1] - A.target), P[0] - m_t * (u[0] + p.r * u[5]), P[2] - m_t * (u[2] - p.r * u[3])
+
+
+def _unlimited_B(u: Six, P: Six, B: Closed, p: Parameters) -> tuple[float, float, float]:
+    """The same at B: (normal, along y, along z)."""
+    m_t = p.m * p.j / (1 + p.j)
+    return P[3] - p.m * (u[0] - B.target), P[4] - m_t * (u[1] - p.r * u[5]), P[5] - m_t * (u[2] + p.r * u[4])
+
+
+def _project(
+    n: float, s: float, t: float, friction: float, slip: tuple[float, float] | None
+) -> tuple[float, float, float]:
+    """The impulses (n, s, t) that Coulomb's law allows: friction is the point of its disk next to (s, t), or opposes a
+    known slip."""
+    if n <= 0:
+        return 0.0, 0.0, 0.0
+    limit = friction * n
     if slip is not None:
-        return -limit * slip[0], -limit * slip[1]
+        return n, -limit * slip[0], -limit * slip[1]
     size = math.hypot(s, t)
-    return (s, t) if size <= limit else (s / size * limit, t / size * limit)
+    return (n, s, t) if size <= limit else (n, s / size * limit, t / size * limit)
+
+
+def _projection_rate(n: float, s: float, t: float, friction: float, slip: tuple[float, float] | None) -> Array:
+    """Derivative of `_project` by (n, s, t), shape (3, 3)."""
+    if n <= 0:
+        return np.zeros((3, 3))
+    if slip is not None:
+        return np.array([[1.0, 0.0, 0.0], [-friction * slip[0], 0.0, 0.0], [-friction * slip[1], 0.0, 0.0]])
+    size = math.hypot(s, t)
+    if size <= friction * n:
+        return np.eye(3)
+    a, b, turn = s / size, t / size, friction * n / size
+    return np.array([
+        [1.0, 0.0, 0.0],
+        [friction * a, turn * b * b, -turn * a * b],
+        [friction * b, -turn * a * b, turn * a * a],
+    ])  # fmt: skip
+
+
+def unlocked(error: NotConvergedError, p: Parameters) -> Closed:
+    """What a contact can aim at when a rebound from both was not found: to stay closed.
+
+    Raises the error again if friction can't have locked the ball.
+    """
+    if p.mu < 1 or p.eta < 1:
+        raise error
+    return Closed()
+
+
+@dataclass
+class Continuation:
+    """Pseudo-transient continuation (Kelley & Keyes, SIAM J. Numer. Anal. 35 (1998) 508) of sweeps.
+
+    A sweep takes the impulse b at B to f(b). The solution b = f(b) is a place of rest of db/dt = f(b) - b, whose
+    linearly implicit Euler steps, (1/span + 1 - f') db = f(b) - b, are damped sweeps for small spans and those
+    of the generalised Newton method for large ones. A success lengthens the span; a setback shortens it, and makes
+    its growth more careful from then on. A change that rises is a setback where the sweeps swing, but none where
+    impulses that hardly move the ball have to pile up in the corner until one of them finds the limit of friction;
+    attempts that take it for one and attempts that don't take turns.
+    """
+
+    A: Closed
+    B: Closed
+    p: Parameters
+    _span: float = field(init=False, default=1.0)
+    _growth: float = field(init=False, default=8.0)
+    _last: float = field(init=False, default=math.inf)
+    _sweeps: int = field(init=False, default=0)
+
+    def next(self, u: Six, before: Six, after: Six, change: float) -> Six:
+        """Impulses to start the next sweep from; the last took `before` to `after`, with velocities u."""
+        self._sweeps += 1
+        if self._sweeps <= PLAIN_SWEEPS:
+            return after
+        attempt, sweeps = divmod(self._sweeps, ATTEMPT)
+        if sweeps == 0:
+            self._span, self._growth = 1.0, 8.0
+        if change <= self._last * (RISE if attempt % 2 else 1.0):
+            self._span = min(self._span * self._growth, 1e10)
+        else:
+            self._span, self._growth = max(self._span / 20, 0.1), max(self._growth**0.7, 1.1)
+        self._last = change
+        x, y, z = (f - b for f, b in zip(after[3:], before[3:], strict=True))
+        matrix = (1 + 1 / self._span) * np.eye(3) - self._rate(u, after)
+        x, y, z = np.linalg.solve(matrix, (x, y, z)).tolist()
+        return (*after[:3], before[3] + x, before[4] + y, before[5] + z)
+
+    def _rate(self, u: Six, P: Six) -> Array:
+        """f': how the impulse (n, s, t) at B after a sweep changes with that before it."""
+        p = self.p
+        # What a contact's unlimited impulses are changed by those (n, s, t) at the other: the same both ways.
+        k = 1 / (1 + p.j)
+        other = np.array([[0.0, -1.0, 0.0], [-p.j * k, k, 0.0], [0.0, 0.0, -p.j * k]])
+        at_A = _projection_rate(*_unlimited_A(u, P, self.A, p), p.mu, self.A.slip)
+        at_B = _projection_rate(*_unlimited_B(u, P, self.B, p), p.eta, self.B.slip)
+        return np.asarray(at_B @ other @ at_A @ other)

@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from analytic.contact_problem import Closed, NotConvergedError, sweep
+from analytic.contact_problem import Closed, Continuation, NotConvergedError, sweep, unlocked
 from analytic.records import Event, Recorder
 from analytic.rigid_body import (
     NOTHING,
@@ -46,7 +46,7 @@ BLOCK = 256
 
 TOLERANCE = 1e-13
 """Change of the impulses in an iteration at which it stops, as a velocity of the ball relative to sqrt(g R)."""
-MAX_ITERATIONS = 50_000
+MAX_ITERATIONS = 2000
 ZERO_SLIP = 1e-9
 """Sliding speed relative to sqrt(g R) up to which a contact is called rolling: well above what the iteration leaves."""
 
@@ -126,7 +126,13 @@ def step(ball: Ball, dt: float, omega_0: float, p: Parameters, restitution: floa
     old = ball.u
     A = Closed(max(0.0, -restitution * old[1])) if ball.y + dt / 2 * old[1] <= 0 else None
     B = Closed(max(0.0, -restitution * old[0])) if ball.h + dt / 2 * old[0] <= 0 else None
-    new, P, middle = _solve(ball, dt, omega_0, A, B, p)
+    try:
+        new, P, middle = _solve(ball, dt, omega_0, A, B, p)
+    except NotConvergedError as error:
+        if not (A and B):
+            raise
+        A = B = unlocked(error, p)
+        new, P, middle = _solve(ball, dt, omega_0, A, B, p)
     u = mean(old, new)
     work = ball.work + dt * drag_power(u, middle, omega_0, p) + contact_work(u, P, p)
     # A loaded contact has met its target and, if that is rest, is closed; round-off must not open it again.
@@ -152,6 +158,7 @@ def _solve(
     A_x, A_y, A_z, B_x, B_y, B_z = ball.P
     P = (*((A_x, A_y, A_z) if A else (0.0, 0.0, 0.0)), *((B_x, B_y, B_z) if B else (0.0, 0.0, 0.0)))
     new, change = ball.u, math.inf
+    pace = Continuation(A, B, p) if A and B else None
     for _ in range(MAX_ITERATIONS):
         u = mean(ball.u, new)
         x_i = -(p.R - ball.h) + dt / 2 * u[0]
@@ -162,9 +169,9 @@ def _solve(
             p.m * abs(after[0] - v_h), p.m * abs(after[1] - v_y), p.m * abs(after[2] - v_k),
             *(abs(a - b) for a, b in zip(P_after, P, strict=True)),
         )  # fmt: skip
-        new, P = after, P_after
         if change <= enough:
-            return new, P, middle
+            return after, P_after, middle
+        new, P = after, pace.next(after, P, P_after, change) if pace else P_after
     raise NotConvergedError(f"the contact impulses still change by {change:g} N s, asked for {enough:g} N s")
 
 

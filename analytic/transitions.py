@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from analytic import two_point_rolling
 from analytic.charts import Moment
-from analytic.contact_problem import Closed, solve
+from analytic.contact_problem import Closed, NotConvergedError, solve, unlocked
 from analytic.rigid_body import (
     Place,
     Six,
@@ -92,14 +92,19 @@ def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, short
     """Impact of all contacts that touch, at once, with Newton's restitution; friction opposes the slip that is left.
 
     A single contact of a sphere obeys p_n = (1+e) m |v_n| and p_t = min(friction p_n, m_t |slip|) against the slip;
-    two contacts are solved together. Bounces accumulate: a rebound whose hops would come to rest within `shortest`
-    seconds (by the geometric series 2 v_n/a/(1 - e)) stays in contact. The first of the two times is for a ball that
-    touches the floor only, whose hops are known in closed form, the second for all others.
+    two contacts are solved together, without a rebound if friction locks the ball (`contact_problem`). Bounces
+    accumulate: a rebound whose hops would come to rest within `shortest` seconds (by the geometric series
+    2 v_n/a/(1 - e)) stays in contact. The first of the two times is for a ball that touches the floor only, whose hops
+    are known in closed form, the second for all others.
     """
     x, before = at.x, velocities(at.x, p)
     A = Closed(max(0.0, -restitution * x[1])) if x[0] == 0 else None
     B = Closed(max(0.0, -restitution * x[7])) if x[6] == 0 else None
-    u, P = solve(before, A, B, p)
+    try:
+        u, P = solve(before, A, B, p)
+    except NotConvergedError as error:
+        A = B = unlocked(error, p)
+        u, P = solve(before, A, B, p)
     work = at.work + contact_work(mean(before, u), P, p)
     v_h, v_y = B.target if B and P[3] > 0 else u[0], A.target if A and P[1] > 0 else u[1]
     fall, fly_in = _returns(x, u, A is not None, B is not None, p, omega_0)
