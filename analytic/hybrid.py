@@ -220,9 +220,11 @@ class _Simulator:
         watch: Watch,
     ) -> Iterator[Step]:
         """Steps of one solver; its time runs from zero, for directions settle in less than the round-off of `start`."""
+        options: dict[str, Any] = {"jac": _jacobian(motion, start, self.settings.rtol)} if method is BDF else {}
         solver = method(
             lambda t, z: motion.rates(start + t, z.tolist()), 0.0, z, until - start,
             rtol=LOCAL * self.settings.rtol, atol=LOCAL * self.absolute * np.array(motion.scale), first_step=first_step,
+            **options,
         )  # fmt: skip
         times = self.recorder.times
         taken = int(np.searchsorted(times, start, side="right"))
@@ -262,6 +264,25 @@ class _Simulator:
         omega_0 = np.array([fluid(t) for t in path.time.tolist()])
         forces = path_forces(case, path, self.p, omega_0)
         self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
+
+
+def _jacobian(motion: Chart, origin: float, floor: float) -> Callable[[float, Array], Array]:
+    """Derivative of the rates of a chart by its coordinates, from forward differences.
+
+    They are small compared to each coordinate or its natural size; to a slip itself, of which its direction may be
+    a steep function, down to the floor below which it isn't. (The differences of scipy grow with each call
+    for a coordinate that the rates don't depend on, like the azimuth, until they overflow.)
+    """
+    least = np.array(motion.scale)
+    least[list(motion.slips)] *= floor
+
+    def jacobian(t: float, z: Array) -> Array:
+        shift = math.sqrt(EPS) * np.maximum(np.abs(z), least)
+        here = np.array(motion.rates(origin + t, z.tolist()))
+        beside = [motion.rates(origin + t, shifted) for shifted in (z + np.diag(shift)).tolist()]
+        return np.asarray((np.array(beside) - here).T / shift)
+
+    return jacobian
 
 
 class Step(NamedTuple):

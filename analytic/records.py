@@ -68,11 +68,11 @@ class Recorder:
             self._progress(time / float(self.times[-1]))
 
     def _balance(self, energy: Array, work: Array) -> None:
-        """Keep the largest of |E - E(0) - W| and of the energies in play."""
+        """Keep the largest change of E - W, and of the energies in play."""
         if len(energy):
             first, residual, scale = self._energy
-            first = float(energy[0]) if math.isnan(first) else first
-            residual = max(residual, float(np.max(np.abs(energy - first - work))))
+            first = float(energy[0] - work[0]) if math.isnan(first) else first  # an impact may precede the first sample
+            residual = max(residual, float(np.max(np.abs(energy - work - first))))
             scale = max(scale, float(np.max(np.abs(energy))), float(np.max(np.abs(work))))
             self._energy = [first, residual, scale]
 

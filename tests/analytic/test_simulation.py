@@ -7,6 +7,7 @@ import json
 import math
 import os
 import time
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -38,6 +39,7 @@ def random_run(seed):
         x[:2] = rng.uniform(0, 0.1), rng.normal() * 0.5
     if rng.random() < 0.5:
         x[6:] = rng.uniform(0, p.R), rng.normal() * 0.5
+    x[[0, 6]] *= rng.random(2) > 0.1  # some move into what they touch
     return p, x
 
 
@@ -65,7 +67,7 @@ def assert_lawful(run, tolerance):
     assert run.header.settings["energy_residual"] <= tolerance * (run.header.settings["energy_scale"] + p.m * p.g * p.R)
 
 
-@pytest.mark.parametrize("seed", range(0, 200, 4))
+@pytest.mark.parametrize("seed", range(200))
 def test_random_states_end_lawfully(seed):
     """Part of the robustness run (below, slow): no exception, no stall, no law violated."""
     p, x = random_run(seed)
@@ -74,16 +76,32 @@ def test_random_states_end_lawfully(seed):
     assert_lawful(run, 100 * RTOL)
 
 
+def fault(seed):
+    """What is wrong with a run of the robustness test; empty if nothing is."""
+    p, x = random_run(seed)
+    try:
+        run = simulate(p, x, 5.0, initial_impact=True, sample_interval=0.01)
+        assert run.complete, run.header.failure
+        assert_lawful(run, 100 * RTOL)
+    except Exception as error:  # whatever it is, the other seeds are to run
+        return f"seed {seed}: {type(error).__name__}: {error}"
+    return ""
+
+
 @pytest.mark.slow
 def test_ten_thousand_random_runs(capsys):
-    start = time.perf_counter()
-    for seed in range(RUNS):
-        p, x = random_run(seed)
-        run = simulate(p, x, 5.0, initial_impact=True, sample_interval=0.01)
-        assert run.complete, seed
-        assert_lawful(run, 100 * RTOL)
+    """All seeds run, whatever fails among them; the rate is printed."""
+    start, faults = time.perf_counter(), []
+    with ProcessPoolExecutor() as pool:
+        for line in pool.map(fault, range(RUNS), chunksize=20):
+            if line:
+                faults.append(line)
+                with capsys.disabled():
+                    print(f"\n{line}", flush=True)
+    seconds = time.perf_counter() - start
     with capsys.disabled():
-        print(f"\n{RUNS} runs of 5 s, {RUNS / (time.perf_counter() - start):.3g} a second")
+        print(f"\n{RUNS} runs of 5 s, {len(faults)} with faults; {RUNS / seconds:.3g} a second")
+    assert not faults, "\n".join(faults)
 
 
 @given(
@@ -167,6 +185,17 @@ def test_the_first_impact_is_an_event():
     run = simulate(P, [0, -0.1, 10, 0, 0, 0], 0.1, initial_impact=True, restitution=0.5)
     assert run.events.time[0] == 0.0
     assert run.events.impulse_A[0, 1] == pytest.approx(1.5 * P.m * 0.1, rel=1e-9)
+    assert_lawful(run, 100 * RTOL)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_ball_locked_in_the_corner_does_not_rebound(method):
+    """Where mu, eta > 1 a fall into the corner has no impulses that meet restitution at both contacts."""
+    p = P.replace(mu=1.3, eta=1.3)
+    run = simulate(
+        p, [0, -0.4, 0, 0, 0, 40, 0, -0.4], 0.05, method=method, restitution=0.5, initial_impact=True, step=1e-3
+    )
+    assert np.all(run.x[1:, [0, 1, 6, 7]] == 0)
 
 
 @pytest.mark.parametrize(
