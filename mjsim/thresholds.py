@@ -128,15 +128,17 @@ def _lift_off(hold: Hold, below: float) -> Measured:
 
 
 def _end_of_wall_rolling(hold: Hold, grid: Array, rising: Sequence[Trajectory]) -> Measured:
-    """From NR states that slower and slower fluid still holds."""
+    """From NR states that slower and slower fluid still holds, high over a floor that would catch a ball that bobs."""
     found = [k for k, run in enumerate(rising) if _case(run) is Case.NR]
     if not found:
         return _ABSENT
     lowest, x = float(grid[found[0]]), rising[found[0]].x[-1]
+    x[0] = hold.p.R
+    brief = dataclasses.replace(hold, time=hold.time / 4)
     while True:
-        # Down by a hundredth at a time, from a settled state: a larger jump would make the wall slip.
+        # Down by a hundredth at a time, from a state at rest: a larger jump would make the wall slip.
         lower = lowest * 0.99
-        run = hold.run([lower], [_at(x, lower)])[0]
+        run = brief.run([lower], [_at(x, lower)])[0]
         if _case(run) is not Case.NR:
             break
         lowest, x = lower, run.x[-1]
@@ -188,9 +190,13 @@ def _nearest_root(omegas: Array, values: Array, degree: int) -> float:
 
 
 def _best(estimates: Sequence[float]) -> Measured:
-    """Of estimates of rising order the one that differs least from the one before; its neighbours say how certain."""
+    """Of estimates of rising order the one that differs least from the one before.
+
+    That difference and the smaller of those beside it say how certain it is: too low an order may be far off.
+    """
     changes = np.abs(np.diff(estimates))
     if np.all(np.isnan(changes)):
         return _ABSENT
     k = int(np.nanargmin(changes))
-    return Measured(float(estimates[k + 1]), float(np.nansum(changes[max(0, k - 1) : k + 2])))
+    beside = np.concatenate([changes[max(0, k - 1) : k], changes[k + 1 : k + 2]])
+    return Measured(float(estimates[k + 1]), float(changes[k] + np.fmin.reduce(beside, initial=np.inf)))
