@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from analytic import dynamics, rolling_forces, transitions, two_point_rolling
 from analytic.charts import GAPS, Chart, Fluid, Moment, Path, chart
-from analytic.records import Event, Recorder
+from analytic.records import REPORT_EVERY, Event, Recorder
 from analytic.rigid_body import NOTHING, Six
 from analytic.settings import Settings
 from model import Case, Contact, Flow, Parameters
@@ -168,11 +168,13 @@ class _Simulator:
         times, states = [at.time], [motion.start]
         sampled, guard = [self.recorder.taken == 0], None
         try:
-            for step in self._integrate(motion, at.time, until, self._hop(case, at, fluid)):
+            for count, step in enumerate(self._integrate(motion, at.time, until, self._hop(case, at, fluid)), 1):
                 times += [*step.sample_times, step.time]
                 states += [*step.samples, step.z]
                 sampled += [True] * len(step.samples) + [False]
                 guard = step.guard
+                if count % REPORT_EVERY == 0:
+                    self.recorder.reached(step.time)
         finally:
             path = motion.path(np.array(times), np.array(states).T)
             self._record(case, path, np.array(sampled), fluid)

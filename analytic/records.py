@@ -15,6 +15,9 @@ from model.arrays import Array
 from model.kinematics import VARIABLES, angular_velocity, slip_speeds
 from model.trajectory import SAMPLE
 
+REPORT_EVERY = 1000
+"""Steps after which a simulator notes how far it is, even if there is no sample to take."""
+
 
 class Event(NamedTuple):
     """A change of case or an impact."""
@@ -63,9 +66,9 @@ class Recorder:
 
     def reached(self, time: float) -> None:
         """Note how far the run has come."""
-        self.time = time
+        self.time = max(self.time, time)
         if self._progress:
-            self._progress(time / float(self.times[-1]))
+            self._progress(self.time / float(self.times[-1]))
 
     def _balance(self, energy: Array, work: Array) -> None:
         """Keep the largest change of E - W, and of the energies in play."""

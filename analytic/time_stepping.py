@@ -21,7 +21,7 @@ from itertools import pairwise
 import numpy as np
 
 from analytic.contact_problem import Closed, Continuation, NotConvergedError, sweep, unlocked
-from analytic.records import Event, Recorder
+from analytic.records import REPORT_EVERY, Event, Recorder
 from analytic.rigid_body import (
     NOTHING,
     Place,
@@ -79,6 +79,7 @@ def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Se
     knots = np.union1d(times, flow.start[(flow.start > 0) & (flow.start < times[-1])])
     ball = Ball(theta_0, x0[0], x0[6], velocities(x0, p))
     samples: list[tuple[float, Ball, float]] = []
+    taken = 0
     try:
         for start, end in pairwise(knots.tolist()):
             count = math.ceil((end - start) / longest * (1 - 1e-12))
@@ -91,7 +92,9 @@ def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Se
                     samples.append((0.0, ball, dt))
                 elif after.case is not ball.case:
                     recorder.events.append(Event(start + (k + 1) * dt, ball.case, after.case, _impact(ball, after)))
-                ball = after
+                ball, taken = after, taken + 1
+                if taken % REPORT_EVERY == 0:
+                    recorder.reached(start + (k + 1) * dt)
             if end in times:
                 samples.append((end, ball, dt))
             if len(samples) >= BLOCK:

@@ -164,6 +164,21 @@ def test_default_sampling_and_progress(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_progress_within_a_long_stretch(method, monkeypatch):
+    """A single case and a single sample: the steps themselves report, so that a caller can stop the run in time."""
+    for module in ("hybrid", "time_stepping"):
+        monkeypatch.setattr(f"analytic.{module}.REPORT_EVERY", 10)
+    p, seen = P.replace(omega_0=25.0), []
+    run = simulate(
+        p, [0, 0, 13.8, -4, 0.5, 10], 0.2, method=method, step=1e-3, sample_interval=0.2, progress=seen.append
+    )
+    assert not len(run.events)
+    assert len(seen) > 5
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_settings_object_and_keywords_agree(method):
     x0 = [0, 0, 10, 1, 2, 3]
     one = simulate(P, x0, 0.1, settings=Settings(method=method, step=1e-3, rtol=1e-7), sample_interval=0.01)
