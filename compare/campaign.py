@@ -65,7 +65,6 @@ class Campaign:
     batch: int = BATCH
     limit: float = math.inf
     report: Callable[[Progress], None] = lambda progress: None
-    failures: list[Failure] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         if isinstance(self.workers, int):
@@ -84,6 +83,7 @@ class Campaign:
         if not os.access(self.directory, os.W_OK | os.X_OK):
             raise StorageError(f"cannot write to {self.directory}: Permission denied")
         self._executor: Executor | None = None
+        self._failed: dict[str, Failure] = {}
         remove_leftovers(self.directory)
 
     def __enter__(self) -> Self:
@@ -117,7 +117,7 @@ class Campaign:
     def complete(self, tasks: Iterable[Task]) -> list[Failure]:
         """Carry out every task that has no file yet; return those that failed, now or earlier.
 
-        The directory's `FAILURES` lists them for programs.
+        The directory's `FAILURES` lists all that have failed in this campaign, for programs.
         """
         unique = list({task.key: task for task in tasks}.values())
         there = {entry.name for entry in os.scandir(self.directory)}
@@ -134,14 +134,10 @@ class Campaign:
             done += finished
             failures += failed
             self.report(Progress(done, len(unique), len(failures)))
-        known = {failure.task.key for failure in self.failures}
-        self.failures += [failure for failure in failures if failure.task.key not in known]
-        if self.failures or (self.directory / FAILURES).exists():
-            self._list_failures()
+        self._failed |= {failure.task.key: failure for failure in failures}
+        if self._failed or (self.directory / FAILURES).exists():
+            write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
         return failures
-
-    def _list_failures(self) -> None:
-        write_text(self.directory / FAILURES, json.dumps(listed(self.failures), indent=1))
 
     def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[int, list[Failure]]]:
         """Yield, for each batch that ends, how many of its runs are whole and those that failed."""

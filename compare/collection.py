@@ -15,15 +15,13 @@ import h5py
 import numpy as np
 from rich.table import Table
 
-from mjsim.measurement import window_mean
+from compare.studies import settled_case, settled_mean
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.files import WholeFile, check_writable
 from model.kinematics import UNITS, VARIABLES
 
 SCHEMA = "dualball-collection"
 SCHEMA_VERSION = 1
-WINDOW = 0.1
-"""Last part of a run that is averaged."""
 
 
 def collect(directory: Path, output: Path, progress: Callable[[int, int], None] = lambda done, total: None) -> int:
@@ -107,19 +105,17 @@ def _row(file: Path, directory: Path) -> dict[str, Any]:
     return row | settled(trajectory)
 
 
-def settled(trajectory: Trajectory, window: float = WINDOW) -> dict[str, Any]:
+def settled(trajectory: Trajectory) -> dict[str, Any]:
     """Mean, standard uncertainty and prevailing case over the last part of a run; nan for a run too short for it."""
-    last = slice(int((1 - window) * len(trajectory.time)), None)
     row: dict[str, Any] = {}
     for name in VARIABLES:
         try:
-            mean = window_mean(trajectory.time[last], getattr(trajectory, name)[last])
+            mean = settled_mean(trajectory, getattr(trajectory, name))
         except InputError:  # too few samples for a mean
             row |= {name: np.nan, f"{name}_uncertainty": np.nan}
         else:
             row |= {name: mean.value, f"{name}_uncertainty": mean.uncertainty}
-    cases = trajectory.case[last]
-    return row | {"case": int(np.bincount(cases).argmax()) if len(cases) else -1}
+    return row | {"case": int(settled_case(trajectory)) if len(trajectory.case) else -1}
 
 
 def _write(rows: list[dict[str, Any]], output: Path) -> None:

@@ -11,17 +11,15 @@ import analytic
 from analytic.bifurcation import wall_spin
 from compare import branches
 from compare.claims import Check, Claim, Lab, Level
-from compare.studies import COVERAGE, Bench, family, main, settled_case
+from compare.studies import COVERAGE, Bench, family, main, settled_case, settled_mean
 from compare.tasks import Task
 from mjsim import ContactSettings
-from mjsim.measurement import Measured, window_mean
+from mjsim.measurement import Measured
 from model import Case, Parameters
 from model.arrays import Array
 
 LASTS = 30.0
 """Duration of every run, s."""
-WINDOW = 0.1
-"""Last part that is averaged."""
 OFFSET = 1.01
 """Start, in units of the predicted omega_c; where only the wall carries the ball, of the predicted slip_x."""
 HEIGHT = {Case.NR: 1.0, Case.NS: 2e3}
@@ -99,11 +97,11 @@ def _study(figure: str, lab: Lab) -> list[Check]:
         for engine in engines(lab.level):
             tasks = row.tasks(engine, lab.level)
             for task, run in zip(tasks, lab.run(tasks), strict=True):
-                p, last = task.parameters, slice(int((1 - WINDOW) * len(run.time)), None)
-                mean = window_mean(run.time[last], (run.slip_x + p.R / p.r * run.omega_c)[last])
+                p = task.parameters
+                mean = settled_mean(run, run.slip_x + p.R / p.r * run.omega_c)
                 predicted = wall_spin(row.state(p), p)
                 measured = Measured(mean.value, math.hypot(mean.uncertainty, SETTLED * p.R / p.r * p.omega_0))
-                cases = family(row.case), family(settled_case(run, WINDOW))
+                cases = family(row.case), family(settled_case(run))
                 bench = Bench(lab, row.name)
                 found.append(bench.number(task, "ω_x⁰", "rad/s", row.case.name, predicted, measured, cases))
     return found + (_beyond_fold(lab) if figure == "fig-10" else [])

@@ -7,6 +7,7 @@ is averaged over its last part; the prediction is the attracting stationary solu
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,9 +16,10 @@ import numpy as np
 import analytic
 from analytic import StationarySolution
 from compare.claims import Check, Claim, Lab, Level
+from compare.studies import COVERAGE, Bench, family, last_part, main, settled_case, settled_mean
 from compare.tasks import Task
 from mjsim import ContactSettings
-from mjsim.measurement import window_mean
+from mjsim.measurement import Measured
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 from model.kinematics import VARIABLES
@@ -30,10 +32,6 @@ SPIN_UP = 4.0
 """How much longer from rest, in units of 1/c: spinning up takes that to come as near as the other start is."""
 HEIGHT = 1.0
 """Height y, in units of R, at which a ball is started that only the wall carries: it bobs before it comes to rest."""
-WINDOW = 0.1
-"""Last part of a run that is averaged."""
-COVERAGE = 3.0
-"""Tolerance in units of the standard uncertainty."""
 QUANTITIES = {"omega_c": "ω_c", "slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
 
 Omegas = dict[Level, Sequence[float]]
@@ -78,29 +76,21 @@ def points(name: str, omegas: Sequence[float], cases: Sequence[Case]) -> list[Po
             near[0] = HEIGHT * p.R if target.case is Case.NR else 0.0
             settles = TIME_CONSTANTS * _slowest(target)
             found.append(Point(name, p, target, "2 % off", near, settles))
-            if len({_family(t.case) for t in targets}) == 1:  # from rest, only where there is one place to go
+            if len({family(t.case) for t in targets}) == 1:  # from rest, only where there is one place to go
                 found.append(Point(name, p, target, "from rest", np.zeros(8), settles + SPIN_UP / p.c))
     return found
 
 
-def check(point: Point, trajectory: Trajectory, run: str) -> list[Check]:
+def check(bench: Bench, point: Point, task: Task, run: Trajectory) -> list[Check]:
     """Hold omega_c and the slip of a settled run against the prediction."""
-    p, target = trajectory.header.parameters, point.target
-    window = _window(trajectory)
-    found = Case(int(np.bincount(trajectory.case[window]).argmax()))
-    agrees = _family(found) == _family(target.case)
+    target, found = point.target, settled_case(run)
+    cases = (found if family(found) is family(target.case) else target.case), found
     checks = []
-    for (name, symbol), systematic in zip(QUANTITIES.items(), _systematic(trajectory, target), strict=True):
-        mean = window_mean(trajectory.time[window], getattr(trajectory, name)[window])
-        uncertainty = math.hypot(mean.uncertainty, systematic)
-        checks.append(
-            Check(
-                quantity=symbol, unit="rad/s", witness=trajectory.header.engine, parameters=point.name,
-                omega_0=p.omega_0, condition=point.start, predicted=float(target.x[VARIABLES.index(name)]),
-                measured=mean.value, uncertainty=uncertainty, tolerance=COVERAGE * uncertainty,
-                case_predicted=found.name if agrees else target.case.name, case_found=found.name, run=run,
-            )
-        )  # fmt: skip
+    for (name, symbol), systematic in zip(QUANTITIES.items(), _systematic(task, run, target), strict=True):
+        mean = settled_mean(run, getattr(run, name))
+        measured = Measured(mean.value, math.hypot(mean.uncertainty, systematic))
+        predicted = float(target.x[VARIABLES.index(name)])
+        checks.append(bench.number(task, symbol, "rad/s", point.start, predicted, measured, cases))
     return checks
 
 
@@ -113,8 +103,8 @@ def _study(name: str, omegas: Omegas, cases: Sequence[Case], lab: Lab) -> list[C
     ]
     return [
         number
-        for point, task, trajectory in zip(chosen, tasks, lab.run(tasks), strict=True)
-        for number in check(point, trajectory, lab.file(task))
+        for point, task, run in zip(chosen, tasks, lab.run(tasks), strict=True)
+        for number in check(Bench(lab, point.name), point, task, run)
     ]
 
 
@@ -124,17 +114,7 @@ def _slowest(target: StationarySolution) -> float:
     return float(1 / rates[rates > 1e-9 * np.abs(target.eigenvalues).max()].min())
 
 
-def _family(case: Case) -> Case:
-    """SR and NR are one state at y = 0: the floor carries nothing in either."""
-    return Case.NR if case is Case.SR else case
-
-
-def _window(trajectory: Trajectory) -> slice:
-    """The samples that are averaged."""
-    return slice(int((1 - WINDOW) * len(trajectory.time)), None)
-
-
-def _systematic(trajectory: Trajectory, target: StationarySolution) -> tuple[float, float, float, float]:
+def _systematic(task: Task, run: Trajectory, target: StationarySolution) -> tuple[float, float, float, float]:
     """What creep and round-off do to omega_c and the three slip components, standard uncertainties in rad s-1.
 
     A rolling contact of a regularised engine slips at its creep speed under the friction it carries: a slip of
@@ -142,14 +122,10 @@ def _systematic(trajectory: Trajectory, target: StationarySolution) -> tuple[flo
     the ball up, it sinks at that speed, and the drag then carries c creep of its weight.
     Round-off adds an error of eps of the ball's spin at each step, which dies out with the slowest time constant.
     """
-    p = trajectory.header.parameters
-    settings = ContactSettings.from_mapping(
-        {k: v for k, v in trajectory.header.settings.items() if k in ContactSettings.__dataclass_fields__}
-    )
-    window = _window(trajectory)
+    p, settings, last = task.parameters, task.contact_settings, last_part(run)
     rolls_A, rolls_B = (contact is Contact.R for contact in (target.case.A, target.case.B))
-    friction_A = rolls_A * float(np.hypot(*trajectory.force_A[window][:, [0, 2]].T).max())
-    friction_B = rolls_B * float(np.hypot(*trajectory.force_B[window][:, [1, 2]].T).max())
+    friction_A = rolls_A * float(np.hypot(*run.force_A[last][:, [0, 2]].T).max())
+    friction_B = rolls_B * float(np.hypot(*run.force_B[last][:, [1, 2]].T).max())
     v_A, v_B = (float(settings.creep_speed(friction / p.m)) for friction in (friction_A, friction_B))
     omega_c = abs(float(target.x[2]))
     steps = _slowest(target) / settings.timestep
@@ -199,6 +175,4 @@ CLAIMS = (
 )  # fmt: skip
 
 if __name__ == "__main__":
-    from compare.studies import main
-
-    raise SystemExit(main(CLAIMS))
+    sys.exit(main(CLAIMS))

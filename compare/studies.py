@@ -17,12 +17,14 @@ from compare import progress, results, tables
 from compare.campaign import Campaign
 from compare.claims import Check, Claim, Lab, Level, judge
 from compare.tasks import Task
-from mjsim.measurement import Measured
+from mjsim.measurement import Measured, window_mean
 from model import Case, Trajectory
 from model.arrays import Array
 
 COVERAGE = 3.0
 """Tolerance in units of the standard uncertainty."""
+WINDOW = 0.1
+"""Last part of a settled run, which is averaged."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +52,20 @@ class Bench:
         return self.number(task, quantity, "1", condition, predicted, Measured(found, 0.0))
 
 
-def settled_case(trajectory: Trajectory, share: float = 0.1) -> Case:
+def last_part(trajectory: Trajectory, share: float = WINDOW) -> slice:
+    """The samples of the last part of a run."""
+    return slice(int((1 - share) * len(trajectory.time)), None)
+
+
+def settled_mean(trajectory: Trajectory, values: Array) -> Measured:
+    """Mean of values (n,), one a sample, over the last part of a run."""
+    last = last_part(trajectory)
+    return window_mean(trajectory.time[last], values[last])
+
+
+def settled_case(trajectory: Trajectory, share: float = WINDOW) -> Case:
     """The case of most samples in the last part of a run."""
-    tail = trajectory.case[-max(1, int(share * len(trajectory.case))) :]
-    return Case(int(np.bincount(tail).argmax()))
+    return Case(int(np.bincount(trajectory.case[last_part(trajectory, share)]).argmax()))
 
 
 def family(case: Case) -> Case:

@@ -16,10 +16,10 @@ import numpy as np
 import analytic
 from analytic import StationarySolution, thresholds
 from compare.claims import Check, Claim, Lab, Level
-from compare.studies import COVERAGE, Bench, family, main, settled_case
+from compare.studies import COVERAGE, Bench, family, main, settled_case, settled_mean
 from compare.tasks import Task
 from mjsim import ContactSettings
-from mjsim.measurement import Measured, window_mean
+from mjsim.measurement import Measured
 from model import Case, Parameters, Trajectory
 from model.arrays import Array
 
@@ -27,8 +27,6 @@ DISTANCES = {Level.QUICK: 1e-2 * 2.0 ** np.arange(5), Level.DEFAULT: 4e-3 * 2.0 
 """Distances of the points from the threshold, relative; the nearest first."""
 LASTS = 25.0
 """Duration of every run, s: 25 time constants and more of the states with strong drag."""
-WINDOW = 0.1
-"""Last part of a run that is averaged."""
 OFFSET = 1.01
 """Start, in units of the predicted omega_c."""
 LABELS = {"omega_01": "ω₀₁", "omega_02": "ω₀₂", "omega_03": "ω₀₃", "omega_04": "ω₀₄"}
@@ -82,12 +80,9 @@ def check(lab: Lab, of: Approach, engine: str) -> Check:
     tasks = of.tasks(engine, lab.level)
     runs = lab.run(tasks)
     omegas = np.array([task.parameters.omega_0 for task in tasks])
-    means = []
-    for task, run in zip(tasks, runs, strict=True):
-        last = slice(int((1 - WINDOW) * len(run.time)), None)
-        means.append(window_mean(run.time[last], of.order(run, task.parameters)[last]))
+    means = [settled_mean(run, of.order(run, task.parameters)) for task, run in zip(tasks, runs, strict=True)]
     found = (turning if of.turns else vanishing)(omegas, means)
-    cases = [family(settled_case(run, WINDOW)) for run in runs]
+    cases = [family(settled_case(run)) for run in runs]
     odd = [case for case in cases if case is not family(of.case)]
     where = f"{of.symbol} {'turns' if of.turns else '→ 0'}, from {'above' if of.side > 0 else 'below'}"
     pair = family(of.case), odd[0] if odd else family(of.case)

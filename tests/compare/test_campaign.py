@@ -260,10 +260,10 @@ from compare.campaign import Campaign
 from mjsim.journal import Journal
 from model import Parameters
 tasks.LONG = 1000
-tasks.Journal = lambda directory: Journal(directory, interval=0.2)
+tasks.Journal = lambda directory: Journal(directory, interval=0.0)
 if __name__ == "__main__":
     task = tasks.Task(
-        engine="mujoco", parameters=Parameters.named("reference"), x0=(0.0,) * 8, t_end=20.0, sample_interval=0.02
+        engine="mujoco", parameters=Parameters.named("reference"), x0=(0.0,) * 8, t_end=20.0, sample_interval=0.005
     )
     with Campaign({directory!r}, workers=0) as campaign:
         campaign.complete([task])
