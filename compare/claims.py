@@ -62,6 +62,8 @@ class Check:
     case_found: str = ""
     run: str = ""
     """File of the run, relative to the results directory."""
+    judged: bool = True
+    """False for a number that is only shown, for comparison: nothing is claimed of it."""
 
     @property
     def error(self) -> float:
@@ -75,8 +77,8 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Within the tolerance, in the predicted case."""
-        return abs(self.error) <= self.tolerance and self.case_found == self.case_predicted
+        """Within the tolerance, in the predicted case, or not judged."""
+        return not self.judged or (abs(self.error) <= self.tolerance and self.case_found == self.case_predicted)
 
 
 @dataclass(frozen=True)
@@ -135,13 +137,13 @@ class Verdict:
 
 
 def judge(claim: Claim, lab: Lab) -> Verdict:
-    """Run a claim's study and pronounce the verdict: every check must pass, and there must be one."""
+    """Run a claim's study and pronounce the verdict: every check must pass, and there must be one that is judged."""
     start = time.perf_counter()
     try:
         checks, error = tuple(claim.study(lab)), ""
     except (SimulationError, StorageError) as caught:
         checks, error = (), str(caught)
-    holds = bool(checks) and all(check.passed for check in checks)
+    holds = any(check.judged for check in checks) and all(check.passed for check in checks)
     outcome = claim.expected if holds else Outcome.NOT_REPRODUCED
     return Verdict(claim=claim, outcome=outcome, checks=checks, error=error, seconds=time.perf_counter() - start)
 

@@ -21,7 +21,7 @@ SUMMARY = "summary.json"
 REPORT = "report.html"
 RUNS = "runs"
 SCHEMA = "dualball-summary"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,9 @@ def load(directory: Path) -> Summary:
     if not isinstance(content, Mapping) or content.get("schema") != SCHEMA:
         raise StorageError(f"{path} is not a {SCHEMA}")
     found, ours = content.get("provenance", {}).get("versions", {}).get("dualball"), current_versions()["dualball"]
-    if content.get("schema_version") != SCHEMA_VERSION or found != ours:
+    if content.get("schema_version") != SCHEMA_VERSION:
+        raise StorageError(f"{path} is in another format than this program's: choose another directory with --output")
+    if found != ours:
         raise StorageError(
             f"{directory} holds results of dualball {found}, this is {ours}: choose another directory with --output"
         )

@@ -6,7 +6,7 @@ import argparse
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +50,10 @@ class Bench:
     def count(self, task: Task, quantity: str, condition: str, predicted: int, found: int) -> Check:
         """A number of things, which must be right to the last one."""
         return self.number(task, quantity, "1", condition, predicted, Measured(found, 0.0))
+
+    def shown(self, task: Task, quantity: str, condition: str, value: float) -> Check:
+        """A dimensionless number that is shown beside others, with nothing claimed of it."""
+        return replace(self.number(task, quantity, "1", condition, 0.0, Measured(value, 0.0)), judged=False)
 
 
 def last_part(trajectory: Trajectory, share: float = WINDOW) -> slice:

@@ -21,19 +21,20 @@ def verdicts(found: Sequence[Verdict]) -> Iterator[Table]:
     for column in ("claim", "source", "statement", "numbers", "verdict"):
         table.add_column(column, no_wrap=column in ("claim", "verdict"))
     for verdict in found:
-        passed = sum(check.passed for check in verdict.checks)
+        judged = [check.passed for check in verdict.checks if check.judged]
         table.add_row(
             verdict.claim.id, verdict.claim.source, escape(verdict.claim.statement),
-            f"{passed}/{len(verdict.checks)}", _outcome(verdict),
+            f"{sum(judged)}/{len(judged)}", _outcome(verdict),
         )  # fmt: skip
     yield table
 
 
 def checks(verdict: Verdict) -> Table:
     """Predicted and measured numbers of one claim: those of the leading quantity, and any that failed."""
-    leading = verdict.checks[0].quantity
-    shown = [check for check in verdict.checks if check.quantity == leading or not check.passed]
-    others = len(verdict.checks) - len(shown)
+    judged = [check for check in verdict.checks if check.judged]
+    leading = judged[0].quantity if judged else ""
+    shown = [check for check in judged if check.quantity == leading or not check.passed]
+    others = len(judged) - len(shown)
     table = Table(
         title=f"{verdict.claim.id}  {escape(verdict.claim.statement)}", title_justify="left", title_style="bold",
         box=None, padding=(0, 1, 0, 0), caption_justify="left", header_style="dim",

@@ -31,8 +31,9 @@ WITNESSES = {
 
 def deviations(claim: str, summary: Summary, directory: Path) -> Figure:
     """Deviation of every number of a claim in units of its standard uncertainty; the band is the tolerance."""
-    checks = [check for check in _checks(summary, claim) if check["uncertainty"] > 0]
-    counted = [check for check in _checks(summary, claim) if check["uncertainty"] == 0]
+    judged = [check for check in _checks(summary, claim) if check["judged"]]
+    checks = [check for check in judged if check["uncertainty"] > 0]
+    counted = [check for check in judged if check["uncertainty"] == 0]
     figure = style.figure(7.0, 3.2)
     axes = figure.add_subplot()
     groups = list(dict.fromkeys(check["quantity"] for check in checks))

@@ -54,7 +54,7 @@ def draw_frontier(summary: Summary) -> Figure:
     points: dict[str, dict[str, tuple[list[float], list[float]]]] = {}
     spent = {c["condition"]: c["measured"] for c in _checks(summary, frontier.ID) if c["quantity"] == frontier.COST}
     for check in _checks(summary, frontier.ID):
-        if check["quantity"] != frontier.COST:
+        if check["quantity"] in (*frontier.STATES, frontier.TRANSIENT):
             name = check["condition"].split(";")[0]
             x, y = points.setdefault(check["quantity"], {}).setdefault(name, ([], []))
             x.append(spent[check["condition"]])

@@ -1,11 +1,15 @@
 """Cases told and the ladder of settings: what is left out, what is counted, and what each rung adds."""
 
 import dataclasses
+import math
 
 import numpy as np
 
 import analytic
-from compare import ablation, confusion
+from compare import ablation, confusion, frontier
+from compare.campaign import Campaign
+from compare.claims import Lab, Level
+from compare.tasks import Task
 from mjsim import ContactSettings
 from model import Case
 
@@ -44,3 +48,27 @@ def test_the_ladder_ends_at_the_defaults():
     for low, high in zip(list(ablation.LADDER.values())[4:], list(ablation.LADDER.values())[5:], strict=False):
         changed = [f.name for f in dataclasses.fields(low) if getattr(low, f.name) != getattr(high, f.name)]
         assert len(changed) == 1
+
+
+def scored(*numbers: tuple[float, float]) -> list[frontier.Score]:
+    """Scores with the given errors and shares of closed samples."""
+    task = Task(engine="event", parameters=frontier.REFERENCE, x0=(0.0,) * 6, t_end=0.1)
+    return [frontier.Score(f"state {k}", error, closed, task) for k, (error, closed) in enumerate(numbers)]
+
+
+def test_a_step_of_the_ladder_is_in_vain_unless_it_halves_a_number():
+    before = scored((1e-2, 0.6), (1e-3, 1.0))
+    assert not ablation._gain(before, before)
+    assert not ablation._gain(before, scored((6e-3, 0.7), (9e-4, 1.0)))
+    assert ablation._gain(before, scored((2e-2, 0.5), (4e-4, 1.0)))
+    assert ablation._gain(before, scored((2e-2, 0.9), (2e-3, 1.0)))
+    assert not ablation._gain(before, scored((math.nan, 0.6), (math.nan, 1.0)))
+
+
+def test_a_cost_is_measured_once(tmp_path):
+    (score,) = scored((0.0, 1.0))
+    with Campaign(tmp_path, workers=0) as campaign:
+        lab = Lab(campaign, Level.QUICK)
+        first = frontier.cost(lab, score.task)
+        assert first > 0
+        assert frontier.cost(lab, score.task) == first

@@ -25,7 +25,7 @@ def test_verdict(validated, claim: Claim) -> None:
 
 
 def test_no_claim_is_confirmed_by_a_tolerance_wider_than_ten_uncertainties(validated) -> None:
-    wide = [c for v in validated.verdicts for c in v.checks if c.tolerance > 10 * c.uncertainty]
+    wide = [c for v in validated.verdicts for c in v.checks if c.judged and c.tolerance > 10 * c.uncertainty]
     assert wide == []
 
 
@@ -64,6 +64,8 @@ def check(**changes: object) -> Check:
         ([check(case_found="SS")], Outcome.NOT_REPRODUCED),
         ([check(measured=float("nan"))], Outcome.NOT_REPRODUCED),
         ([check(tolerance=float("nan"))], Outcome.NOT_REPRODUCED),
+        ([check(), check(measured=9.0, judged=False)], Outcome.CONFIRMED),
+        ([check(judged=False)], Outcome.NOT_REPRODUCED),
         ([], Outcome.NOT_REPRODUCED),
     ],
 )
