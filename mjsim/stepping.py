@@ -4,11 +4,15 @@ Before each step the wall is turned to be tangent at the ball's azimuth and the 
 generalised force. The body axes of a homogeneous ball are arbitrary: they are set upright, so that forces and
 velocities of the ball's joint are along the paper's axes, ``v = (omega_c, v_h, v_y, o_x, o_y - omega_c, o_z)``.
 
-Three corrections then take out what softness and first-order stepping would leave. None of them knows a solution of the
+Four corrections then take out what softness and first-order stepping would leave. None of them knows a solution of the
 problem; each is built from what the last step gave and vanishes where motion and forces are steady.
 
 * Margins. The contact point lies midway in the overlap, so that a ball which sinks in rolls on a shorter lever. Each
   step a margin takes a share ``servo_gain`` of the gap, until the loaded contact stands at no gap at all.
+* Impact. A ball that comes down overlaps by up to a step's way before the engine sees it; the stiffness would throw it
+  back with up to a quarter of its speed, however small the step, and the other contact would answer a step late. It is
+  set on the surface, and the engine's own solver is asked, with time standing still, for the impulses at both contacts
+  that leave no approach and no rebound: again by their margins.
 * Memory. A rolling contact of finite softness creeps at R_t f/b_f. Surfaces that move backwards at that speed for the
   last step's friction f leave only the change of f to creep. f follows from the normal forces and the generalised
   contact force, ``(., A_x + B_x, A_y + B_y, -r A_z, r B_z, r (A_x - B_y))``.
@@ -26,6 +30,7 @@ from typing import Any, Protocol, Self
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 from mujoco.batch import Batch
 
 from mjsim import recorder
@@ -36,8 +41,15 @@ from model.arrays import Array
 _UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 _NORMAL_A, _NORMAL_B = 1, 15
 """Where the sensors hold the normal forces."""
-_START = 40
-"""Rounds of the search for margins and forces that belong to the first state."""
+_NORMALS = slice(_NORMAL_A, None, _NORMAL_B - _NORMAL_A)
+_ROUNDS = 40
+"""Rounds of the search for margins and forces that belong to the first state, or to an impact."""
+_UNDAMPED = np.array([1e6, 1e-6])
+"""Factors of solref that leave the stiffness and take away the damping: an impact's impulse is the margin's alone."""
+_REST = 1e-6
+"""Normal speed after an impact, relative to that before, up to which the search for the impulses has succeeded."""
+_TOUCH = 1e-15
+"""Least margin of a ball that has just landed, m: more than the round-off of a gap, or the engine sees no contact."""
 _SLIDES = 3.0
 """A contact slides if its speed is over this many times its change in a step; a slip that is ending dies out faster."""
 
@@ -80,7 +92,7 @@ class Single(Stepper):
         model, data, timestep = self.model, self.data, self._settings.timestep
         stiffness = self._settings.solimp * self._settings.k
         reach = self._settings.touching(self._p.g)
-        for _ in range(_START):
+        for _ in range(_ROUNDS):
             self._steps([omega_0], mujoco.mj_forward)
             if self._settings.servo:
                 for contact, axis in enumerate((2, 1)):
@@ -120,17 +132,26 @@ class Single(Stepper):
         qpos, qvel, applied, turn, margins = (
             data.qpos, data.qvel, data.qfrc_applied, data.mocap_quat[0], model.pair_margin
         )  # fmt: skip
+        gain = settings.servo_gain if step is mujoco.mj_step else 0.0
         constraint, normal, floor, wall, orientation = (
             data.qfrc_constraint, data.sensordata.item, self._floor, self._wall, qpos[3:7]
         )  # fmt: skip
         m, R, r, mc, inertia = p.m, p.R, p.r, p.m * p.c, p.j * p.m * p.r**2
         ahead, shift, lag = settings.midpoint, settings.memory_gain(p.m), settings.friction_lag
-        spin_shift, shifts, gain = shift / r, settings.shifts_surfaces, settings.servo_gain
+        spin_shift, shifts = shift / r, settings.shifts_surfaces
         cos, sin, slides = math.cos, math.sin, _SLIDES**2
         u0, u1, u2, u3, u4, u5, last_around = self._last
         for omega in omega_0:
             theta, h, y, *_ = qpos.tolist()
             v0, v1, v2, v3, v4, v5 = qvel.tolist()
+            if gain:
+                if normal(_NORMAL_A) == 0 or normal(_NORMAL_B) == 0:
+                    self._last = [u0, u1, u2, u3, u4, u5, last_around]
+                    if self._lands(omega):
+                        h, y = qpos[1:3].tolist()
+                        v0, v1, v2, v3, v4, v5 = u0, u1, u2, u3, u4, u5 = qvel.tolist()
+                        last_around = (R - h) * v0
+                margins[0], margins[1] = max(0.0, margins.item(0) - gain * y), max(0.0, margins.item(1) - gain * h)
             half = theta / 2
             turn[0], turn[3] = cos(half), sin(half)
             orientation[0] = 1.0
@@ -163,11 +184,35 @@ class Single(Stepper):
                 on = lag if slides * (a_y * a_y + a_z * a_z) < y_ * y_ + z * z else 0.0
                 wall[0] = on * a_y + shift * (force_y - normal(_NORMAL_A))
                 wall[1] = on * a_z + spin_shift * moment_y
-            if gain and step is mujoco.mj_step:
-                margins[0], margins[1] = max(0.0, margins.item(0) - gain * y), max(0.0, margins.item(1) - gain * h)
             step(model, data)
             u0, u1, u2, u3, u4, u5, last_around = v0, v1, v2, v3, v4, v5, around
         self._last = [u0, u1, u2, u3, u4, u5, last_around]
+
+    def _lands(self, omega_0: float) -> bool:
+        """Deal with contacts that carried nothing in the last step; tell whether the ball came down on one."""
+        data, margins, timestep = self.data, self.model.pair_margin, self._settings.timestep
+        normals, gaps, speeds = data.sensordata[_NORMALS], data.qpos[2:0:-1], data.qvel[2:0:-1]
+        lands = (normals == 0) & (gaps < 0) & (speeds < 0)
+        if not lands.any():
+            return False
+        gaps[lands] = 0.0
+        load = (np.array(self._last[2:0:-1]) - speeds) / timestep
+        margins[:2] = _touching(margins[:2], lands, self._settings.margin(1.0) * load)
+        changing = margins, self.model.pair_solref, data.qfrc_constraint, data.sensordata
+        kept = [(values, values.copy()) for values in changing]
+        last, touches = self._last, (normals > 0) | (gaps <= 0)
+        self.model.pair_solref *= _UNDAMPED
+        for _ in range(_ROUNDS):
+            self._steps([omega_0], mujoco.mj_forward)
+            self._last = last
+            jump = timestep * (data.qacc - data.qacc_smooth)
+            after = speeds + jump[2:0:-1]
+            margins[:2] = _margins(margins[:2], after, touches, self._settings)
+        if _at_rest(margins[:2], after, speeds, touches):
+            data.qvel += jump
+        for values, copy in kept:
+            values[:] = copy
+        return True
 
 
 class Many(Stepper):
@@ -183,9 +228,9 @@ class Many(Stepper):
         self._qpos, self._qvel, self._sensors = (batch.bind(name) for name in ("qpos", "qvel", "sensordata"))
         self._qpos[:], self._qvel[:] = (np.stack(part) for part in zip(*start, strict=True))
         self._qpos[:, :3] += settings.lead * self._qvel[:, :3]
-        self._acceleration = batch.bind("qacc")
+        self._acceleration, self._smooth = batch.bind("qacc"), batch.bind("qacc_smooth")
         self._contact = self._outputs = batch.bind("qfrc_constraint"), self._sensors
-        self.margins = batch.expand("pair_margin")
+        self.margins, self._solref = batch.expand("pair_margin"), batch.expand("pair_solref")
         self._views(models[0])
         self._coefficients(parameters)
         # What a step makes use of, here because making arrays takes longer than filling them.
@@ -204,6 +249,7 @@ class Many(Stepper):
         """Views of the engine's arrays, with the runs in the last axis."""
         turn, applied = self._batch.bind("mocap_quat")[:, 0], self._batch.bind("qfrc_applied").T
         self._azimuth, self._inward, self._orientation = self._qpos[:, 0], self._qpos[:, 1], self._qpos[:, 3:7]
+        self._gaps, self._speeds = self._qpos[:, 2:0:-1], self._qvel[:, 2:0:-1]
         self._cos, self._sin = turn[:, 0], turn[:, 3]
         self._force, self._torque, self._moment = applied[:3], applied[0], applied[3:6:2]
         floor, wall = (model.geom(name).id for name in ("floor", "wall"))
@@ -229,9 +275,9 @@ class Many(Stepper):
 
     def _settle(self, omega_0: Array) -> None:
         stiffness = self._settings.solimp * self._settings.k
-        gaps, speeds = self._qpos[:, 2:0:-1], self._qvel[:, 2:0:-1] * self._settings.timestep
-        touching = (np.abs(gaps) < self._reach) & (np.abs(speeds) < self._reach)
-        for _ in range(_START):
+        approach = self._speeds * self._settings.timestep
+        touching = (np.abs(self._gaps) < self._reach) & (np.abs(approach) < self._reach)
+        for _ in range(_ROUNDS):
             self._prepare(omega_0)
             self._batch.forward()
             if self._settings.servo:
@@ -246,15 +292,48 @@ class Many(Stepper):
         row[:, split:] = self._sensors
 
     def advance(self, omega_0: Array) -> None:
-        gain, gaps, share, margins = self._gain, self._qpos[:, 2:0:-1], self._share, self.margins
+        gain, gaps, share, margins = self._gain, self._gaps, self._share, self.margins
         for omega in omega_0:
-            self._prepare(omega)
             if gain:
+                normals = self._contact[1][:, _NORMALS]
+                if not normals.all():
+                    self._land(normals == 0, omega)
                 np.multiply(gaps, gain, out=share)
                 np.subtract(margins, share, out=share)
                 np.maximum(share, 0.0, out=margins)
+            self._prepare(omega)
             self._batch.step()
             self._now, self._last, self._contact = self._last, self._now, self._outputs
+
+    def _land(self, opened: npt.NDArray[np.bool_], omega_0: Array) -> None:
+        """Deal with contacts, marked in (runs, 2), that carried nothing in the last step."""
+        lands = opened & (self._gaps < 0) & (self._speeds < 0)
+        if not lands.any():
+            return
+        timestep = self._settings.timestep
+        self._gaps[lands] = 0.0
+        load = (self._last.velocity[2:0:-1].T - self._speeds) / timestep
+        self.margins[:] = _touching(self.margins, lands, self._settings.margin(1.0) * load)
+        runs = np.flatnonzero(lands.any(axis=1))
+        margins, speeds = self.margins[runs], self._speeds[runs]
+        touches = ~opened[runs] | (self._gaps[runs] <= 0)
+        contact = constraint, sensors = tuple(values.copy() for values in self._contact)
+        self._contact = constraint.copy(), sensors.copy()
+        self._solref *= _UNDAMPED
+        for _ in range(_ROUNDS):
+            self._prepare(omega_0)
+            self._batch.forward(runs)
+            for values, output in zip(self._contact, self._outputs, strict=True):
+                values[runs] = output[runs]
+            jump = timestep * (self._acceleration[runs] - self._smooth[runs])
+            after = speeds + jump[:, 2:0:-1]
+            self.margins[runs] = _margins(self.margins[runs], after, touches, self._settings)
+        self._solref /= _UNDAMPED
+        stopped = _at_rest(self.margins[runs], after, speeds, touches)
+        self._qvel[runs[stopped]] += jump[stopped]
+        self.margins[runs], self._contact = margins, contact
+        self._take(self._qvel, self._now)
+        self._last.rows[:, runs] = self._now.rows[:, runs]
 
     def state(self) -> dict[str, Array]:
         constraint, sensors = self._contact
@@ -314,7 +393,7 @@ class Many(Stepper):
         np.multiply(slides, self._per_slide, out=slides)
         np.multiply(change, slides, out=change)
         # The generalised contact forces that hold A_z, A_x, B_y, B_z, less the normal forces in two of them.
-        np.subtract(constraint.T[1:3], sensors.T[_NORMALS], out=self._mixed)
+        np.subtract(constraint.T[1:3], sensors.T[_NORMALS][::-1], out=self._mixed)
         np.copyto(self._ends, constraint.T[3:5])
         np.multiply(surface, self._shift, out=surface)
         np.add(surface, change, out=self._surfaces)
@@ -356,8 +435,22 @@ class _Quantities:
         return cls(rows, v, slip, product, spin, v[:3], product[:3], product[3:], derived)
 
 
-_NORMALS = slice(_NORMAL_B, None, _NORMAL_A - _NORMAL_B)
-"""The normal forces at B and A among the sensors."""
+def _touching(margins: Array, lands: npt.NDArray[np.bool_], asked: Array) -> Array:
+    """Margins (..., 2) with those the load asks for where a ball lands from a flight, in which the servo took them."""
+    return np.where(lands & (margins == 0), np.maximum(_TOUCH, asked), margins)
+
+
+def _margins(margins: Array, after: Array, touches: npt.NDArray[np.bool_], settings: ContactSettings) -> Array:
+    """Better margins (..., 2) for an impact that leaves the normal speeds `after`, m s-1, at contacts that touch."""
+    better = margins - after / (settings.timestep * settings.solimp * settings.k)
+    return np.where(touches, np.maximum(0.0, better), margins)
+
+
+def _at_rest(margins: Array, after: Array, before: Array, touches: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Whether an impact (..., 2) leaves no contact that touches approaching, and none that was pushed rebounding."""
+    small = _REST * np.abs(before).max(axis=-1, keepdims=True)
+    well = (after >= -small) & ((margins == 0) | (after <= small))
+    return np.asarray((well | ~touches).all(axis=-1))
 
 
 def _expand_differences(batch: Batch, models: Sequence[Any]) -> None:
