@@ -84,7 +84,10 @@ class Chart:
 
     def least_slip(self, z: Sequence[float]) -> float:
         """The smallest slip that has a direction, in natural units; inf if there is none."""
-        return min((z[k] / self.scale[k] for k in self.slips), default=math.inf)
+        least = math.inf
+        for k in self.slips:
+            least = min(least, z[k] / self.scale[k])
+        return least
 
 
 def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
@@ -155,28 +158,24 @@ def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
     T, _, w, E = _natural(p)
     forces, G, least, damping = FORCES[case], p.m * p.g, floor * w, 1 / T
 
-    def state(z: Sequence[float]) -> tuple[list[float], tuple[float, float], tuple[float, float]]:
-        _, omega_c, q_A, alpha, q_B, beta = z[:6]
-        sA, cA, sB, cB = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
-        return [0.0, 0.0, omega_c, q_A * sA, q_B * sB, q_A * cA, 0.0, 0.0], (sA, cA), (sB, cB)
-
     def rates(t: float, z: list[float]) -> list[float]:
-        x, (sA, cA), (sB, cB) = state(z)
-        fluid = omega_0(t)
+        _, omega_c, q_A, alpha, q_B, beta, _ = z
+        sA, cA, sB, cB = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
+        x, fluid = [0.0, 0.0, omega_c, q_A * sA, q_B * sB, q_A * cA, 0.0, 0.0], omega_0(t)
         f = forces(x, p, fluid, (sA, cA), (sB, cB))
         dx = newton_euler(case, x, f, p, fluid)
         d_x, d_y, d_z = dx[3], dx[4], dx[5]
-        bond = damping * (z[4] * cB - z[2] * cA)
+        bond = damping * (q_B * cB - q_A * cA)
         return [
-            x[2], dx[2],
-            d_x * sA + d_z * cA, (d_x * cA - d_z * sA) / max(z[2], least),
-            d_y * sB + d_z * cB - bond * cB, (d_y * cB - d_z * sB) / max(z[4], least),
+            omega_c, dx[2],
+            d_x * sA + d_z * cA, (d_x * cA - d_z * sA) / max(q_A, least),
+            d_y * sB + d_z * cB - bond * cB, (d_y * cB - d_z * sB) / max(q_B, least),
             _friction_power(x, f, p, fluid),
         ]  # fmt: skip
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        x, slip_A, slip_B = state(z)
-        f = forces(x, p, omega_0(t), slip_A, slip_B)
+        x = (0.0, 0.0, z[1])  # besides omega_c the forces depend on the directions alone
+        f = forces(x, p, 0.0, (math.sin(z[3]), math.cos(z[3])), (math.sin(z[5]), math.cos(z[5])))
         return z[2] / w, z[4] / w, f[1] / G, f[3] / G
 
     def path(t: Array, z: Array) -> Path:

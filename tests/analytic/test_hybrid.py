@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from analytic import rolling_forces, simulate, stationary_solutions, two_point_rolling, vector_field
+from analytic.dynamics import newton_euler
 from model import Case, Flow, Parameters
 
 P = Parameters.named("reference")
@@ -162,6 +163,23 @@ def test_two_point_slipping_against_plain_integration():
     np.testing.assert_allclose(run.x[:, 2:6], plain.y.T, rtol=1e-8, atol=1e-8)
     assert not len(run.events)
     assert balance(run) < RTOL
+
+
+def test_costs_at_most_twice_a_bare_integrator(monkeypatch):
+    """Rates evaluated, against LSODA of f_SS with the same tolerances and neither events nor guards nor energy."""
+    p, rtol = P.replace(omega_0=25.0), 1e-9
+    x0 = stationary(Case.SS, p) + OFFSET
+    calls = []
+
+    def counted(*args):
+        calls.append(None)
+        return newton_euler(*args)
+
+    monkeypatch.setattr("analytic.charts.newton_euler", counted)
+    simulate(p, x0, 10.0, rtol=rtol, atol=rtol / 1e3, sample_interval=10.0)
+    natural = np.array([1.0, p.R / p.r, p.R / p.r, p.R / p.r]) * math.sqrt(p.g / p.R)
+    bare = solve_ivp(f_ss(p), (0, 10), x0[2:], method="LSODA", rtol=rtol, atol=rtol / 1e3 * natural)
+    assert 0 < len(calls) <= 2 * bare.nfev
 
 
 def test_sticking_on_the_way_to_two_point_slipping():

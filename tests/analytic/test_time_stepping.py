@@ -136,6 +136,21 @@ def test_converges_through_bounces_and_a_ramp():
     assert errors[-1] < 1e-3
 
 
+@pytest.mark.parametrize("flow", [
+    Flow.steady(20.0), Flow.ramp(5.0, 25.0, 0.2, 0.1), Flow.staircase([10.0, 25.0], 0.1),
+    Flow.sampled([0.0, 0.1, 0.3], [20.0, 5.0, 15.0]),
+])  # fmt: skip
+def test_both_methods_follow_any_flow(flow):
+    """Off the floor, where omega_0 enters by the drag alone: within a step of its effect, c |omega_0| a second."""
+    p, x0, dt = P.replace(c=5.0), [0.3, 0.5, 12.0, 10.0, 20.0, 30.0], 5e-4
+    events = simulate(p, x0, 0.2, flow, sample_interval=0.01)
+    steps = simulate(p, x0, 0.2, flow, method="time-stepping", step=dt, sample_interval=0.01)
+    assert not len(events.events)
+    assert abs(events.omega_c[-1] - simulate(p, x0, 0.2, Flow.steady(0.0), sample_interval=0.2).omega_c[-1]) > 1.0
+    np.testing.assert_allclose(steps.omega_c, events.omega_c, atol=p.c * dt * 25.0)
+    np.testing.assert_allclose(steps.y, events.y, atol=dt * SPEED)
+
+
 def test_energy_balance_is_exact_but_for_the_place_of_landing():
     """Work at mean velocities balances kinetic energy to round-off; only a landing moves the ball, by half a step."""
     run = simulate(P.replace(omega_0=25.0), [0, 0, 9.0, 1, 2, 3], 0.5, method="time-stepping", step=1e-3)
