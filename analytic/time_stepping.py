@@ -175,7 +175,10 @@ def _solve(
         if change <= enough:
             return after, P_after, middle
         new, P = after, pace.next(after, P, P_after, change) if pace else P_after
-    raise NotConvergedError(f"the contact impulses still change by {change:g} N s, asked for {enough:g} N s")
+    raise NotConvergedError(
+        f"the contact impulses still change by {change:g} N s, asked for {enough:g} N s; "
+        f"a shorter step than {dt:g} s may help"
+    )
 
 
 def _gap(gap: float, contact: Closed | None, load: float) -> float:

@@ -171,6 +171,14 @@ def test_no_convergence_keeps_the_samples(monkeypatch):
     assert not caught.value.trajectory.complete
 
 
+def test_a_step_too_long_for_the_drag_is_named():
+    """The iteration over smooth forces contracts by c dt/2, which must be less than one."""
+    with pytest.raises(SimulationError, match=r"a shorter step than 0\.001 s may help"):
+        simulate(
+            P.replace(c=1e4), [0.01, 0, 10, 1, 2, 30], 0.01, method="time-stepping", step=1e-3, sample_interval=1e-3
+        )
+
+
 def test_one_step_of_free_rolling_by_hand():
     """RR at rest in the fluid's frame: one step leaves everything as it is, and the forces are those of (23)."""
     p = P.replace(omega_0=10.0)
