@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,8 @@ from typing import Any
 from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
 
-from compare import page, results
-from compare.claims import Claim, Outcome
+from compare import page, pictures, results
+from compare.claims import Claim, Level, Outcome
 from compare.figures.characteristic import STATIONARY
 from compare.figures.claims import FIGURES_OF
 from compare.figures.gallery import STORED
@@ -26,6 +25,7 @@ from model.files import write_text
 
 _SYMBOLS = {Outcome.CONFIRMED: "✓", Outcome.CORRECTED: "✓", Outcome.REFUTED: "✗", Outcome.FORMAL: "○"}
 _NOT_RUN = "not run"
+_OPTIONS = {Level.QUICK: " --quick", Level.DEFAULT: "", Level.FULL: " --full"}
 
 
 def write(directory: Path) -> Path:
@@ -33,26 +33,30 @@ def write(directory: Path) -> Path:
 
     Raises `model.StorageError` if there is no summary or the page can't be written.
     """
-    path = directory / results.REPORT
+    path, drawn = directory / results.REPORT, directory / results.FIGURES
+    try:
+        drawn.mkdir(exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"cannot write to {drawn}: {error.strerror}") from error
     write_text(path, render(results.load(directory), directory))
     return path
 
 
 def render(summary: Summary, directory: Path) -> str:
     """The page as text; a figure or run file that is missing is shown as a gap, with the command that fills it."""
-    option = {"QUICK": " --quick", "FULL": " --full"}.get(summary.level, "")
+    option = _OPTIONS[Level[summary.level]]
     known = {claim.id: claim for claim in CLAIMS}
     claims = [_row(summary, directory, verdict, option) for verdict in summary.verdicts.values()]
-    missing = [_not_run(claim, option) for name, claim in known.items() if name not in summary.verdicts]
+    missing = [_not_run(claim, Level[summary.level]) for name, claim in known.items() if name not in summary.verdicts]
     order = list(known)
     claims = sorted(claims + missing, key=lambda row: order.index(row["id"]) if row["id"] in known else len(order))
     return page.render(
         "report.html",
-        summary={"passed": sum(claim["passed"] for claim in claims), "total": len(claims)},
+        summary={"passed": sum(claim["passed"] for claim in claims), "total": len(summary.verdicts)},
         headline=_headline(claims),
         lead=_lead(summary),
         tiles=_tiles(claims),
-        figures=_figures(summary),
+        figures=_figures(summary, directory),
         claims=claims,
         outcomes=sorted({claim["outcome"] for claim in claims}),
         errata=errata(),
@@ -74,13 +78,6 @@ def errata() -> str:
     return made.replace("</table>", "</table></div>")
 
 
-def picture(figure: Figure) -> str:
-    """A figure as the address of an SVG picture that is its own content: a browser looks into it only to show it."""
-    out = io.BytesIO()
-    figure.savefig(out, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
-    return f"data:image/svg+xml;base64,{base64.b64encode(out.getvalue()).decode()}"
-
-
 def _row(summary: Summary, directory: Path, verdict: Mapping[str, Any], option: str) -> dict[str, Any]:
     outcome, good = Outcome(verdict["outcome"]), verdict["passed"]
     mark = "fail" if not good else "pass" if outcome in (Outcome.CONFIRMED, Outcome.CORRECTED) else "other"
@@ -90,7 +87,7 @@ def _row(summary: Summary, directory: Path, verdict: Mapping[str, Any], option: 
     figure = ""
     if verdict["checks"] and verdict["id"] in FIGURES_OF:
         try:
-            figure = picture(FIGURES_OF[verdict["id"]](summary, directory))
+            figure = _picture(directory, verdict["id"], verdict, lambda: FIGURES_OF[verdict["id"]](summary, directory))
         except StorageError as error:
             gaps.append(f"The figure can't be drawn: {error}")
     return {
@@ -104,26 +101,29 @@ def _row(summary: Summary, directory: Path, verdict: Mapping[str, Any], option: 
     }
 
 
-def _not_run(claim: Claim, option: str) -> dict[str, Any]:
-    """The row of a claim without a verdict."""
+def _not_run(claim: Claim, level: Level) -> dict[str, Any]:
+    """The row of a claim without a verdict: missing, or part of a deeper level than the one that was run."""
+    deeper = claim.level > level
+    outcome = f"at level {claim.level.name.lower()}" if deeper else _NOT_RUN
+    gap = f"Part of the {claim.level.name.lower()} level, not of {level.name.lower()}" if deeper else "Not run yet"
     texts = {
         name: getattr(claim, name) for name in ("id", "source", "statement", "prediction", "measurement", "tolerance")
     }
     blank = {"reason": "", "error": "", "checks": [], "figure": "", "lost": set(), "passed": False}
-    repeat = f"dualball validate --claim {claim.id}{option}"
+    repeat = f"dualball validate --claim {claim.id}{_OPTIONS[max(level, claim.level)]}"
     return {
-        **texts, **blank, "outcome": _NOT_RUN, "mark": "other", "symbol": "…", "gaps": ["Not run yet"], "repeat": repeat
+        **texts, **blank, "outcome": outcome, "mark": "none", "symbol": "…", "gaps": [gap], "repeat": repeat
     }  # fmt: skip
 
 
 def _headline(claims: list[dict[str, Any]]) -> str:
-    ran = [claim for claim in claims if claim["outcome"] != _NOT_RUN]
+    ran = [claim for claim in claims if claim["mark"] != "none"]
     failed = [claim["id"] for claim in ran if not claim["passed"]]
     if failed:
         return f"{len(failed)} of {len(ran)} claims did not come out as expected: {', '.join(failed)}"
-    counts = Counter(claim["outcome"] for claim in claims)
     if not ran:
         return "Nothing has been checked yet"
+    counts = Counter(claim["outcome"] for claim in ran)
     return "The paper and the engine agree: " + ", ".join(f"{n} {name}" for name, n in counts.most_common())
 
 
@@ -145,25 +145,33 @@ def _lead(summary: Summary) -> str:
 
 def _tiles(claims: list[dict[str, Any]]) -> list[dict[str, str]]:
     checks = [check for claim in claims for check in claim["checks"] if check["judged"]]
+    ran = [claim for claim in claims if claim["mark"] != "none"]
+    rest = Counter(claim["outcome"] for claim in claims if claim["mark"] == "none")
+    more = "".join(f", {n} more {outcome}" for outcome, n in rest.items())
     runs = {check["run"] for claim in claims for check in claim["checks"] if check["run"]}
     return [
-        {"value": f"{sum(c['passed'] for c in claims)}/{len(claims)}", "label": "claims as expected"},
+        {"value": f"{sum(c['passed'] for c in claims)}/{len(ran)}", "label": f"claims as expected{more}"},
         {"value": f"{sum(c['passed'] for c in checks)}/{len(checks)}", "label": "numbers within tolerance"},
         {"value": str(len(runs)), "label": "simulations"},
     ]
 
 
-def _figures(summary: Summary) -> list[dict[str, str]]:
+def _figures(summary: Summary, directory: Path) -> list[dict[str, str]]:
     """The figures over all claims; a gap stands for one whose results are missing."""
     shown = []
     for name, stored in STORED.items():
         told = {"id": f"figure-{name}", "title": stored.title, "caption": stored.caption, "picture": "", "gap": ""}
         try:
-            told["picture"] = picture(stored.draw(summary))
+            told["picture"] = _picture(directory, name, summary.verdicts, partial(stored.draw, summary))
         except StorageError as error:
             told["gap"] = str(error)
         shown.append(told)
     return shown
+
+
+def _picture(directory: Path, name: str, shows: Any, draw: Callable[[], Figure]) -> str:
+    """A picture drawn now or earlier; `shows` is what it is drawn from."""
+    return pictures.kept(directory / results.FIGURES / f"{name}.svg", shows, draw)
 
 
 def _number(value: float) -> str:

@@ -20,6 +20,7 @@ from model.trajectory import current_commit, current_versions
 SUMMARY = "summary.json"
 REPORT = "report.html"
 RUNS = "runs"
+FIGURES = "figures"
 SCHEMA = "dualball-summary"
 SCHEMA_VERSION = 2
 

@@ -227,10 +227,17 @@ def _analytic(task: Task, deadline: Deadline, stop: Callable[[], bool] = lambda:
 @functools.cache
 def _code(engine: str) -> dict[str, str]:
     """Digest of the sources that produce an engine's results, and the versions they stand on."""
+    stands_on = ("numpy", "mujoco") if engine == "mujoco" else ("numpy", "scipy")
+    digest = sources("model", "mjsim" if engine == "mujoco" else "analytic")
+    return {"sources": digest, **{name: current_versions()[name] for name in stands_on}}
+
+
+@functools.cache
+def sources(*packages: str) -> str:
+    """Digest of the sources of packages."""
     digest = hashlib.sha256()
-    for package in ("model", "mjsim" if engine == "mujoco" else "analytic"):
+    for package in packages:
         for entry in sorted(resources.files(package).iterdir(), key=lambda entry: entry.name):
             if entry.name.endswith((".py", ".xml")):
                 digest.update(entry.name.encode() + b"\0" + entry.read_bytes() + b"\0")
-    stands_on = ("numpy", "mujoco") if engine == "mujoco" else ("numpy", "scipy")
-    return {"sources": digest.hexdigest(), **{name: current_versions()[name] for name in stands_on}}
+    return digest.hexdigest()

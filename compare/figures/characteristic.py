@@ -72,7 +72,7 @@ def _branches(p: Parameters) -> dict[tuple[Case, bool, int], list[tuple[float, f
     # Branches begin and end at thresholds, the fold with a vertical tangent.
     near = [limit * (1 + side * 10.0**-k) for limit in limits for side in (-1, 1) for k in (2, 3, 4, 6)]
     branches: dict[tuple[Case, bool, int], list[tuple[float, float]]] = {}
-    for omega_0 in np.sort([*np.linspace(0.5, _TOP, 90), *near]):
+    for omega_0 in np.sort([*np.linspace(0.5, _TOP, 50), *near]):
         seen: dict[Case, int] = {}
         for solution in analytic.stationary_solutions(p.replace(omega_0=float(omega_0))):
             if solution.case not in _SHOWN or not solution.exists:

@@ -68,7 +68,10 @@ def _plane(axes: Axes, p: Parameters, mu: Array, eta: Array, points: list[Double
     kinds = np.unique(plane)
     shades = ListedColormap([_TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
     index = np.searchsorted(kinds, plane)
-    axes.pcolormesh(eta, omega_0, index, cmap=shades, shading="nearest", rasterized=True, vmin=0, vmax=len(kinds) - 1)
+    axes.imshow(
+        index, cmap=shades, vmin=0, vmax=len(kinds) - 1, origin="lower", aspect="auto", interpolation="nearest",
+        extent=(eta[0], eta[-1], omega_0[0], omega_0[-1]),
+    )  # fmt: skip
     unit = np.sqrt(p.g / p.R)
     for name, curve in threshold_curves(p, mu, eta).items():
         if name in _LINES:
@@ -99,11 +102,12 @@ def _names(kind: int) -> str:
 def _label_regions(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, text: str) -> None:
     """Write the cases at the widest spot of every connected region that has room for them."""
     regions, count = ndimage.label(where)
-    for k in range(1, count + 1):
+    for k, box in zip(range(1, count + 1), ndimage.find_objects(regions), strict=True):
         # The frame counts as an edge; text is about three times as wide as high.
-        inside = np.pad(regions == k, 1)
+        inside = np.pad(regions[box] == k, 1)
         room = ndimage.distance_transform_edt(inside, sampling=(1.0, 0.55))[1:-1, 1:-1]
         row, column = np.unravel_index(np.argmax(room), room.shape)
         if room[row, column] > 14:
             size = 8.5 if room[row, column] > 40 else 7
-            axes.text(eta[column], omega_0[row], text, ha="center", va="center", fontsize=size)
+            place = eta[box[1]][column], omega_0[box[0]][row]
+            axes.text(*place, text, ha="center", va="center", fontsize=size)

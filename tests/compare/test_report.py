@@ -14,12 +14,13 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from matplotlib.figure import Figure
 
-from compare import CLAIMS, cli, report, results
-from compare.claims import Check, Outcome, Verdict
+from compare import CLAIMS, cli, pictures, report, results
+from compare.claims import Check, Level, Outcome, Verdict
 from compare.figures import claims, gallery
 from compare.results import Summary
 
@@ -98,6 +99,36 @@ def test_a_figure_without_its_run_file_is_a_gap(tmp_path: Path) -> None:
     )
     text = report.write(tmp_path).read_text("utf-8")
     assert re.search(r"The figure can.{1,5}t be drawn: .*no\.h5.*dualball validate --claim fig-13-left --quick", text)
+
+
+def test_claims_of_a_deeper_level_are_not_missing(tmp_path: Path) -> None:
+    quick = [claim for claim in CLAIMS if claim.level is Level.QUICK]
+    found = [Verdict(claim=claim, outcome=claim.expected, checks=()) for claim in quick]
+    results.save(Summary().with_verdicts("QUICK", found), tmp_path)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "STORED", {})
+        text = report.write(tmp_path).read_text("utf-8")
+    assert "not run" not in text.lower()
+    assert f"claims as expected, {len(CLAIMS) - len(quick)} more at level default" in text
+    assert f"dualball: {len(quick)} of {len(quick)} claims as expected" in text
+
+
+def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
+    drawn = []
+
+    def draw() -> Figure:
+        drawn.append(Figure(figsize=(1, 1)))
+        return drawn[-1]
+
+    path = tmp_path / "made.svg"
+    first = pictures.kept(path, {"a": 1.0}, draw)
+    assert pictures.kept(path, {"a": 1.0}, draw) == first
+    assert len(drawn) == 1
+    path.write_text("something else")
+    assert pictures.kept(path, {"a": 1.0}, draw)[:30] == first[:30] == "data:image/svg+xml;base64,PD94"
+    pictures.kept(path, {"a": 2.0}, draw)
+    assert len(drawn) == 3
+    ElementTree.parse(path)
 
 
 def test_errata_are_the_documented_ones() -> None:

@@ -1,0 +1,42 @@
+"""The report's pictures: each is drawn once, and kept beside the results with a hash of all that it shows."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from compare.tasks import sources
+from model.files import write_text
+
+
+def kept(path: Path, shows: Any, draw: Callable[[], Figure]) -> str:
+    """The address of a picture that is its own content: a browser looks into it only to show it.
+
+    The picture in the SVG file `path` is taken if it was made from the same `shows` (JSON-able) by the same program,
+    else drawn and written there. Raises what `draw` raises, and `StorageError` if it can't be written.
+    """
+    made_by = [matplotlib.__version__, sources("model", "analytic", "compare.figures")]
+    digest = hashlib.sha256(json.dumps([shows, made_by], sort_keys=True).encode()).hexdigest()
+    mark = f"<!-- {digest} -->"
+    picture = path.read_text("utf-8") if path.is_file() else ""
+    if not picture.endswith(mark):
+        picture = svg(draw()) + mark
+        write_text(path, picture)
+    return f"data:image/svg+xml;base64,{base64.b64encode(picture.encode()).decode()}"
+
+
+def svg(figure: Figure) -> str:
+    """A figure as SVG."""
+    out = io.BytesIO()
+    canvas: Any = FigureCanvasSVG(figure)  # draws once; `Figure.savefig` would do so twice, for the layout
+    canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    return out.getvalue().decode()
