@@ -1,9 +1,8 @@
 """Which case is it? The case told from MuJoCo's slip speeds and forces, against that of the event-driven simulation.
 
 A few motions visit all nine cases. They are cut into short pieces: at the start of each, MuJoCo takes over the state of
-the event-driven run, so that what is compared is how cases are told and followed, not how far a rebound leads two
-motions apart. A dead time around each change of case is left out: that in which friction builds up and persistence is
-waited for, and after a landing also the longest flight of the rebound that soft contacts can't avoid.
+the event-driven run, so that what is compared is how cases are told and followed, not how far two motions come apart.
+A dead time around each change of case is left out: that in which friction builds up and persistence is waited for.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from mjsim import ContactSettings
 from mjsim.classify import PERSISTENCE
 from mjsim.measurement import Measured
 from model import Case, Parameters, Trajectory
-from model.arrays import Array
 
 ID = "cases"
 STEP = 2.5e-4
@@ -33,8 +31,6 @@ PIECES = {Level.QUICK: 16, Level.DEFAULT: 20, Level.FULL: 40}
 DEAD = 5 + PERSISTENCE
 """Steps left out after a start and on both sides of a change of case: five in which a slip dies out (three) and forces
 reach the new case's, and what the classifier waits for."""
-REBOUND = 0.25
-"""Fastest rebound of a landing, in units of its speed (docs/mujoco-settings.md)."""
 FASTEST = 2.0
 """Slip speed for which the contacts are set, m s-1."""
 SLACK = 0.02
@@ -83,14 +79,8 @@ def pieces(motions: list[Trajectory], count: int) -> list[Piece]:
 
 def alive(run: Trajectory) -> npt.NDArray[np.bool_]:
     """The samples of an event-driven motion that lie outside every dead time, shape (n,)."""
-    events, p = run.events, run.header.parameters
-    dead = DEAD * STEP
-    since = run.time[:, None] - events.time
-    landing = np.stack([events.impulse_A[:, 1], events.impulse_B[:, 0]], axis=-1) / p.m
-    k = np.searchsorted(run.time, events.time).clip(max=len(run.time) - 1)
-    pull = np.stack([np.full(len(events), p.g), p.R * run.omega_c[k] ** 2], axis=-1)
-    flight: Array = (2 * REBOUND * landing / pull).max(axis=-1)
-    return np.asarray(~np.any((since > -dead) & (since < dead + flight), axis=-1))
+    since = run.time[:, None] - run.events.time
+    return np.asarray(~np.any(np.abs(since) < DEAD * STEP, axis=-1))
 
 
 def confusion(motions: list[Trajectory], cut: list[Piece], runs: list[Trajectory]) -> npt.NDArray[np.intp]:
@@ -132,8 +122,7 @@ CLAIMS = (
             "visit all nine cases"
         ),
         tolerance=(
-            f"{SLACK:g} of the samples of a case, outside a dead time of {DEAD} steps on both sides of a change and of "
-            "the flight of a rebound"
+            f"{SLACK:g} of the samples of a case, outside a dead time of {DEAD} steps on both sides of a change"
         ),
         study=_study,
     ),

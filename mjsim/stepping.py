@@ -46,6 +46,8 @@ _ROUNDS = 40
 """Rounds of the search for margins and forces that belong to the first state, or to an impact."""
 _UNDAMPED = np.array([1e6, 1e-6])
 """Factors of solref that leave the stiffness and take away the damping: an impact's impulse is the margin's alone."""
+_FALL = 0.01
+"""Way in a step from which on it is an impact, in units of the gap that counts as touching."""
 _REST = 1e-6
 """Normal speed after an impact, relative to that before, up to which the search for the impulses has succeeded."""
 _TOUCH = 1e-15
@@ -192,7 +194,7 @@ class Single(Stepper):
         """Deal with contacts that carried nothing in the last step; tell whether the ball came down on one."""
         data, margins, timestep = self.data, self.model.pair_margin, self._settings.timestep
         normals, gaps, speeds = data.sensordata[_NORMALS], data.qpos[2:0:-1], data.qvel[2:0:-1]
-        lands = (normals == 0) & (gaps < 0) & (speeds < 0)
+        lands = (normals == 0) & (gaps < 0) & (speeds * timestep < -_FALL * self._settings.touching(self._p.g))
         if not lands.any():
             return False
         gaps[lands] = 0.0
@@ -307,10 +309,10 @@ class Many(Stepper):
 
     def _land(self, opened: npt.NDArray[np.bool_], omega_0: Array) -> None:
         """Deal with contacts, marked in (runs, 2), that carried nothing in the last step."""
-        lands = opened & (self._gaps < 0) & (self._speeds < 0)
+        timestep = self._settings.timestep
+        lands = opened & (self._gaps < 0) & (self._speeds * timestep < -_FALL * self._reach)
         if not lands.any():
             return
-        timestep = self._settings.timestep
         self._gaps[lands] = 0.0
         load = (self._last.velocity[2:0:-1].T - self._speeds) / timestep
         self.margins[:] = _touching(self.margins, lands, self._settings.margin(1.0) * load)
