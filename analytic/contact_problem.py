@@ -192,7 +192,9 @@ class Continuation:
         if change <= self._last * (RISE if attempt % 2 else 1.0):
             self._span = min(self._span * self._growth, 1e10)
         else:
-            self._span, self._growth = max(self._span / 20, 0.1), max(self._growth**0.7, 1.1)
+            # The rate of a sweep is of the order of mu eta at most: shorter spans damp no better.
+            least = 1 / (10 + self.p.mu * self.p.eta)
+            self._span, self._growth = max(self._span / 20, least), max(self._growth**0.7, 1.1)
         self._last = change
         x, y, z = (f - b for f, b in zip(after[3:], before[3:], strict=True))
         matrix = (1 + 1 / self._span) * np.eye(3) - self._rate(u, after)

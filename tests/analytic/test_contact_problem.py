@@ -69,7 +69,7 @@ def test_both_contacts_obey_coulomb(u, mu, eta, j, e):
         assert energy(0.0, after, p) <= energy(0.0, u, p) * (1 + 1e-12)
 
 
-@pytest.mark.parametrize(("largest", "restitution"), [(0.9, 0.0), (3.0, 0.0), (0.999, 1.0), (1.5, 1.0)])
+@pytest.mark.parametrize(("largest", "restitution"), [(0.9, 0.0), (20.0, 0.0), (0.999, 1.0), (1.5, 1.0)])
 def test_a_thousand_random_problems(largest, restitution):
     """Any friction without restitution, and restitution wherever mu < 1 or eta < 1; speeds over three decades."""
     rng = np.random.default_rng(1)
