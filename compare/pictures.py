@@ -37,6 +37,8 @@ def kept(path: Path, shows: Any, draw: Callable[[], Figure]) -> str:
 def svg(figure: Figure) -> str:
     """A figure as SVG."""
     out = io.BytesIO()
+    if any(axes.child_axes for axes in figure.axes):  # second scales know their limits only once they were drawn
+        figure.draw_without_rendering()
     canvas: Any = FigureCanvasSVG(figure)  # draws once; `Figure.savefig` would do so twice, for the layout
     canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
     return out.getvalue().decode()

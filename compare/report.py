@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from compare import page, pictures, results
 from compare.claims import Claim, Level, Outcome
 from compare.figures.characteristic import STATIONARY
-from compare.figures.claims import FIGURES_OF
+from compare.figures.claims import CAPTIONS, FIGURES_OF
 from compare.figures.gallery import STORED
 from compare.results import Summary
 from compare.validation import CLAIMS
@@ -95,6 +95,7 @@ def _row(summary: Summary, directory: Path, verdict: Mapping[str, Any], option: 
         "mark": mark,
         "symbol": _SYMBOLS.get(outcome, "✗") if good else "✗",
         "figure": figure,
+        "caption": CAPTIONS.get(verdict["id"], ""),
         "gaps": gaps,
         "lost": lost,
         "repeat": repeat,
@@ -109,7 +110,7 @@ def _not_run(claim: Claim, level: Level) -> dict[str, Any]:
     texts = {
         name: getattr(claim, name) for name in ("id", "source", "statement", "prediction", "measurement", "tolerance")
     }
-    blank = {"reason": "", "error": "", "checks": [], "figure": "", "lost": set(), "passed": False}
+    blank = {"reason": "", "error": "", "checks": [], "figure": "", "caption": "", "lost": set(), "passed": False}
     repeat = f"dualball validate --claim {claim.id}{_OPTIONS[max(level, claim.level)]}"
     return {
         **texts, **blank, "outcome": outcome, "mark": "none", "symbol": "…", "gaps": [gap], "repeat": repeat

@@ -107,16 +107,17 @@ def straight_line(x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike) -> t
     The uncertainties are those of the points carried over, and the scatter about the line where that is larger.
     """
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    u = np.maximum(np.broadcast_to(noise, y.shape), np.finfo(float).eps * np.abs(y).max())
-    A = np.stack([np.ones_like(x), x], axis=-1) / u[:, None]
-    covariance = np.linalg.inv(A.T @ A)
-    a, b = covariance @ A.T @ (y / u)
-    scatter = float(np.sum(((y - a - b * x) / u) ** 2)) / max(1, len(x) - 2)
-    covariance = covariance * max(1.0, scatter)
-    carried = np.array([-1 / b, a / b**2])
+    weight = np.maximum(np.broadcast_to(noise, y.shape), np.finfo(float).eps * np.abs(y).max()) ** -2.0
+    # About the weighted mean, height and slope are independent of each other, and one point may outweigh all others.
+    x0, y0 = np.average(x, weights=weight), np.average(y, weights=weight)
+    spread = np.sum(weight * (x - x0) ** 2)
+    slope = np.sum(weight * (x - x0) * (y - y0)) / spread
+    scatter = max(1.0, np.sum(weight * (y - y0 - slope * (x - x0)) ** 2) / max(1, len(x) - 2))
+    height, rise = np.sqrt(scatter / weight.sum()), np.sqrt(scatter / spread)
+    zero = x0 - y0 / slope
     return (
-        Measured(float(-a / b), math.sqrt(float(carried @ covariance @ carried))),
-        Measured(float(b), math.sqrt(float(covariance[1, 1]))),
+        Measured(float(zero), math.hypot(height / slope, (zero - x0) / slope * rise)),
+        Measured(float(slope), float(rise)),
     )
 
 

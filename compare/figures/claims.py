@@ -54,10 +54,8 @@ def deviations(claim: str, summary: Summary, directory: Path) -> Figure:
     axes.set_xticks(range(len(groups)), groups, fontsize=8, rotation=15 if len(groups) > 4 else 0)
     axes.set_ylabel("(measured − predicted)/uncertainty")
     if checks:
-        axes.legend(fontsize=8, frameon=False)
-    if counted:
-        right = sum(check["passed"] for check in counted)
-        axes.set_title(f"and {right} of {len(counted)} counts right", fontsize=9)
+        title = f"and {sum(c['passed'] for c in counted)} of {len(counted)} counts right" if counted else None
+        figure.legend(loc="outside upper center", ncols=4, fontsize=8, frameon=False, title=title, title_fontsize=8)
     return figure
 
 
@@ -84,7 +82,13 @@ def plane(claim: str, summary: Summary, directory: Path) -> Figure:
         if not check["passed"]:
             axes.plot(eta, check["omega_0"], "x", color="red", ms=10)
     axes.set_ylim(0, 1.1 * maps.OMEGA[1])
-    axes.legend(fontsize=7.5, loc="upper right", title="open: MuJoCo, filled: event-driven", title_fontsize=7.5)
+    legend = axes.get_legend()
+    if legend:
+        legend.remove()
+    figure.legend(
+        loc="outside lower center", ncols=5, fontsize=7.5, frameon=False, title_fontsize=7.5,
+        title="SS*: unstable. Marks: where runs ended, open MuJoCo, filled event-driven, crossed if not as predicted",
+    )  # fmt: skip
     return figure
 
 
@@ -112,6 +116,12 @@ def diagram(claim: str, summary: Summary, directory: Path) -> Figure:
             ms=6, mfc="none", mec="black", ls="none", zorder=5,
         )  # fmt: skip
     return figure
+
+
+def slip_perturbation(summary: Summary, directory: Path) -> Figure:
+    """Figs. 4 and 5: one of the pushes that die out, and one of those that grow."""
+    runs = {check["condition"]: check["run"] for check in _checks(summary, "fig-4-5") if check["witness"] == "event"}
+    return transients.draw_slip_perturbation(*(storage.load(directory / str(run)) for run in runs.values()))
 
 
 def loop(summary: Summary, directory: Path) -> Figure:
@@ -142,10 +152,32 @@ def _run(summary: Summary, directory: Path, claim: str, witness: str) -> Path:
 _OWN: dict[str, Draw] = {
     **{name: partial(plane, name) for name in ("fig-7", "fig-8")},
     **{name: partial(diagram, name) for name in ("fig-9", "fig-10", "fig-11")},
+    "fig-4-5": slip_perturbation,
     "fig-12": formal,
     "fig-13-left": loop,
     "fig-13-right": unloading,
     **mujoco.FIGURES_OF,
 }
+_CAPTIONS = {
+    **dict.fromkeys(
+        ("fig-7", "fig-8"),
+        "Theory: regions of the same stationary states, whose names they bear, and the surfaces between them. Marks: "
+        "the states in which runs ended at random points.",
+    ),
+    **dict.fromkeys(
+        ("fig-9", "fig-10", "fig-11"),
+        "Lines: theory, dashed where unstable. Marks: measured states, with their tolerance.",
+    ),
+    "fig-4-5": "Above ω₀₂ a slip at the wall dies out (Fig. 4), below it grows and the ball stays in NS (Fig. 5); the "
+    "event-driven simulation. Left: the slip over time. Right: its path in the plane orthogonal to NR, from the cross.",
+    "fig-12": "Theory alone.",
+    "fig-13-left": "MuJoCo's ball at the end of each held step, as ω₀ is raised and lowered.",
+    "fig-13-right": "ω₀ falls below ω₀₂ while the ball rides the wall: the event-driven simulation. The ball slips, "
+    "falls, hits the floor and ends in two-point rolling.",
+    **mujoco.CAPTIONS,
+}
+_DEVIATIONS = "Every number's deviation from its prediction in units of its standard uncertainty. The band: tolerance."
+CAPTIONS = {claim.id: _CAPTIONS.get(claim.id, _DEVIATIONS) for claim in CLAIMS}
+"""What the figure of each claim shows."""
 FIGURES_OF: dict[str, Draw] = {claim.id: _OWN.get(claim.id, partial(deviations, claim.id)) for claim in CLAIMS}
 """The figure of each claim, by its id: called with the summary and the results directory."""

@@ -110,4 +110,4 @@ def _label_regions(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0
         if room[row, column] > 14:
             size = 8.5 if room[row, column] > 40 else 7
             place = eta[box[1]][column], omega_0[box[0]][row]
-            axes.text(*place, text, ha="center", va="center", fontsize=size)
+            axes.text(*place, text, ha="center", va="center", fontsize=size, clip_on=True)

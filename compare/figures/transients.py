@@ -15,41 +15,29 @@ import analytic
 from compare.figures import style
 from model import Case, Trajectory
 
-CAPTIONS = {
-    "fig04": "A stationary orbit in NR that is stable against slipping (Fig. 4): a slip at the wall dies out at once. "
-    "Left: the slip over time. Right: its path in the plane orthogonal to NR; the cross marks the start.",
-    "fig05": "A stationary orbit in NR that is unstable against slipping (Fig. 5): the slip grows and the ball stays "
-    "in NS. Left: the slip over time. Right: its path in the plane orthogonal to NR; the cross marks the start.",
-    "hysteresis": "Hysteresis of a flowmeter with eta < j (arrows in Fig. 13, left): omega_0 is raised and lowered in "
-    "held steps. Points: the ball's angular velocity at the end of each step, up and down.",
-    "unloading": "Unloading of a flowmeter with eta > j (black dot in Fig. 13, right): omega_0 falls below omega_02 "
-    "while the ball rides the wall. It slips, falls, hits the floor and ends in two-point rolling.",
-}
 
-
-def draw_slip_perturbation(run: Trajectory) -> Figure:
-    """Figs. 4 and 5: slip at the wall over time, and its path in the orthogonal plane (55)."""
-    figure = style.figure(9, 3.6)
-    time, plane = figure.subplots(1, 2)
-    time.plot(run.time, run.slip_y, color=style.COLOURS[Case.NS], label="$\\tilde\\omega_y$")
-    time.plot(run.time, run.slip_z, color=style.COLOURS[Case.NR], label="$\\tilde\\omega_z$")
-    time.set_xlabel("$t$ (s)")
-    time.set_ylabel("slip (rad/s)")
-    time.legend(frameon=False)
-    plane.plot(run.slip_z, run.slip_y, color="black", lw=1.2)
-    plane.plot(run.slip_z[0], run.slip_y[0], "kx")
-    plane.plot(0, 0, **style.POINT)
-    plane.set_xlabel("$\\tilde\\omega_z$ (rad/s)")
-    plane.set_ylabel("$\\tilde\\omega_y$ (rad/s)")
-    returned = len(run.events) and run.cases[-1] is Case.NR
-    if returned:
-        time.set_xlim(0, 3 * float(run.events.time[-1]))
-    for axes in (time, plane):
-        axes.axhline(0, **style.GUIDE)
-    figure.suptitle(
-        f"$\\omega_0$ = {run.header.flow(0.0):.4g} rad/s: "
-        + ("the ball rolls again" if returned else "the ball slips on")
-    )
+def draw_slip_perturbation(*runs: Trajectory) -> Figure:
+    """Figs. 4 and 5, a row a run: slip at the wall over time, and its path in the orthogonal plane (55)."""
+    figure = style.figure(9, 3.4 * len(runs))
+    for run, (time, plane) in zip(runs, figure.subplots(len(runs), 2, squeeze=False), strict=True):
+        time.plot(run.time, run.slip_y, color=style.COLOURS[Case.NS], ls="--", label="$\\tilde\\omega_y$")
+        time.plot(run.time, run.slip_z, color=style.COLOURS[Case.NR], label="$\\tilde\\omega_z$")
+        time.set_xlabel("$t$ (s)")
+        time.set_ylabel("slip (rad/s)")
+        time.legend(frameon=False)
+        plane.plot(run.slip_z, run.slip_y, color="black", lw=1.2)
+        plane.plot(run.slip_z[0], run.slip_y[0], "kx")
+        plane.plot(0, 0, **style.POINT)
+        plane.set_xlabel("$\\tilde\\omega_z$ (rad/s)")
+        plane.set_ylabel("$\\tilde\\omega_y$ (rad/s)")
+        returned = len(run.events) and run.cases[-1] is Case.NR
+        if returned:
+            time.set_xlim(0, 3 * float(run.events.time[-1]))
+            time.locator_params(axis="x", nbins=5)
+        for axes in (time, plane):
+            axes.axhline(0, **style.GUIDE)
+        told = "the ball rolls again" if returned else "the ball slips on"
+        time.set_title(f"$\\omega_0$ = {run.header.flow(0.0):.4g} rad/s: {told}", fontsize=10, loc="left")
     return figure
 
 

@@ -48,6 +48,13 @@ def test_straight_line_and_its_uncertainty() -> None:
     assert np.all(np.abs(np.std(pulls, axis=0) - 0.9) < 0.15)
 
 
+def test_a_line_through_a_point_that_outweighs_all_others() -> None:
+    x = np.array([1.0, 2.0, 3.0, 4.0])
+    zero, slope = straight_line(x, 3 * (x - 2) + [1e-3, 0, -1e-3, 1e-3], [1e-3, 1e-13, 1e-3, 1e-3])
+    assert abs(zero.value - 2) < 1e-12
+    assert abs(slope.value - 3) < 3 * slope.uncertainty < 3e-3
+
+
 def test_what_vanishes_is_extrapolated_to_its_zero() -> None:
     omegas = 7.0 * (1 + np.array([0.01, 0.02, 0.04, 0.08]))
     order = [Measured(float(3 * (w - 7) + 0.2 * (w - 7) ** 2), 0.0) for w in omegas]

@@ -14,7 +14,7 @@ ROUGH = Parameters.named("high-wall-friction")
 @pytest.mark.parametrize(("omega_0", "title"), [(25.0, "rolls again"), (16.0, "slips on")])
 def test_slip_perturbation(omega_0, title):
     figure = transients.draw_slip_perturbation(scenarios.slip_perturbation(ROUGH.replace(omega_0=omega_0)))
-    assert title in figure.get_suptitle()
+    assert title in figure.axes[0].get_title(loc="left")
 
 
 def test_hysteresis_shows_both_ways():
