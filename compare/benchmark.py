@@ -17,14 +17,16 @@ from rich.table import Table
 
 from compare.campaign import Campaign
 from compare.executors import Workers, dask, processes
+from compare.stationary import attractors
 from compare.tasks import Task, store
 from mjsim import benchmark
 from model import Parameters
 
 BATCH = 64
-STEPS = 2000
 REPEATS = 3
 FINISHED = 10_000
+SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
+"""Slipping at both points: both contacts closed, and friction on its cone."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +60,11 @@ class Figures:
 
 def run() -> Figures:
     """Measure the loop over bare steps, alone and in a batch; then campaigns."""
-    p, x0 = _problem()
+    (state,) = attractors(SLIPPING)
+    x0 = state.x.tolist()
     two_over_one, dask_over_processes = _campaigns()
     return Figures(
-        single=benchmark.cost(p, x0), batch=benchmark.cost(p, x0, BATCH, STEPS // 4), two_over_one=two_over_one,
+        single=benchmark.cost(SLIPPING, x0), batch=benchmark.cost(SLIPPING, x0, BATCH), two_over_one=two_over_one,
         bookkeeping=_bookkeeping(), resuming=_resuming(), dask_over_processes=dask_over_processes,
     )  # fmt: skip
 
@@ -80,17 +83,10 @@ def table(figures: Figures) -> Table:
     return shown
 
 
-def _problem() -> tuple[Parameters, list[float]]:
-    """Two-point slipping, from rest: both contacts closed all the time."""
-    return Parameters.named("reference").replace(omega_0=25.0), [0.0] * 8
-
-
 def _tasks(count: int, t_end: float) -> list[Task]:
-    p, x0 = _problem()
-    return [
-        Task(engine="mujoco", parameters=p.replace(omega_0=15 + 10 * k / count), x0=tuple(x0), t_end=t_end)
-        for k in range(count)
-    ]
+    """Runs from rest at different omega_0."""
+    sets = [SLIPPING.replace(omega_0=15 + 10 * k / count) for k in range(count)]
+    return [Task(engine="mujoco", parameters=p, x0=(0.0,) * 8, t_end=t_end) for p in sets]
 
 
 def _campaigns() -> tuple[float, float]:
