@@ -13,7 +13,7 @@ validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
 
 test: $(VENV)/installed-dev
-	$(BIN)/pytest -n 2 --dist loadgroup -m "not slow"
+	$(BIN)/pytest -n 2 --dist loadgroup
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

@@ -27,7 +27,6 @@ from compare import (
     options,
     predict,
     progress,
-    report,
     results,
     sweep,
     tables,
@@ -312,6 +311,8 @@ def _benchmark(args: argparse.Namespace) -> int:
 
 
 def _report(args: argparse.Namespace) -> int:
+    from compare import report  # here, because drawing takes a second to load
+
     print(report.write(args.directory))
     return 0
 
@@ -372,7 +373,9 @@ def _inspect(args: argparse.Namespace) -> int:
             Console().print(collection.table(told))
         return 0
     if args.plot:
-        inspection.plot(storage.load(args.file), args.plot)
+        from compare.figures import trajectory  # here, because drawing takes a second to load
+
+        trajectory.plot(storage.load(args.file), args.plot)
     _show(inspection.describe(args.file), args.json)
     return 0
 
