@@ -12,6 +12,7 @@ import math
 import statistics
 import sys
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -98,13 +99,10 @@ def scores(lab: Lab, engine: str, chosen: Sequence[ContactSettings | analytic.Se
     starts = {name: _state(*state) for name, state in STATES.items()}
     parts: list[list[Task]] = []
     for settings in chosen:
-        tasks = [
-            Task(engine=engine, parameters=p, x0=x, t_end=hold, settings=settings, sample_interval=hold / 100)
-            for p, x, hold in starts.values()
-        ]
-        parts.append([*tasks, _transient(engine, settings)])
+        tasks = [_task(engine, p, x, hold, settings) for p, x, hold in starts.values()]
+        parts.append([*tasks, transient(engine, settings)])
     lab.campaign.complete(task for tasks in parts for task in tasks)
-    (exact,) = lab.run([_transient("event", analytic.Settings(rtol=1e-12))])
+    (exact,) = lab.run([transient("event", analytic.Settings(rtol=1e-12))])
     found = []
     for tasks in parts:
         runs = lab.run(tasks)
@@ -127,10 +125,17 @@ def _state(case: Case, omega_0: float) -> tuple[Parameters, tuple[float, ...], f
     return p, tuple(solution.x.tolist()), math.ceil(HOLDS * slowest)
 
 
-def _transient(engine: str, settings: ContactSettings | analytic.Settings) -> Task:
+def transient(engine: str, settings: ContactSettings | analytic.Settings) -> Task:
     p, x, _ = _state(Case.SS, 25.0)
-    x0 = tuple(a + b for a, b in zip(x, DEPARTURE, strict=True))
-    return Task(engine=engine, parameters=p, x0=x0, t_end=LASTS, settings=settings, sample_interval=LASTS / 100)
+    return _task(engine, p, tuple(a + b for a, b in zip(x, DEPARTURE, strict=True)), LASTS, settings)
+
+
+def _task(
+    engine: str, p: Parameters, x0: tuple[float, ...], lasts: float, settings: ContactSettings | analytic.Settings
+) -> Task:  # fmt: skip
+    return Task(
+        engine=engine, parameters=p, x0=x0, t_end=lasts, settings=settings, sample_interval=lasts / 100, hovers=True
+    )
 
 
 def _closed(run: Trajectory) -> float:
@@ -150,10 +155,12 @@ def _measured_cost(task: Task, repeats: int = 3) -> float:
     found = []
     for _ in range(repeats):
         if task.engine == "mujoco":
-            run = Run(
-                [task.parameters], [task.x0], task.t_end, [task.fluid], task.contact_settings,
-                sample_interval=task.sample_interval, batched=False,
-            )  # fmt: skip
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of hovering
+                run = Run(
+                    [task.parameters], [task.x0], task.t_end, [task.fluid], task.contact_settings,
+                    sample_interval=task.sample_interval, batched=False,
+                )  # fmt: skip
             start = time.process_time()
             list(run)
         else:

@@ -8,6 +8,7 @@ import hashlib
 import json
 import math
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -45,6 +46,8 @@ class Task:
     """Numerical settings of the engine; None for its defaults."""
     sample_interval: float | None = None
     """s; None for a thousandth of t_end."""
+    hovers: bool = False
+    """That contacts may hover is known, and not warned of; no part of the run's identity."""
 
     def __post_init__(self) -> None:
         if self.engine not in ENGINES:
@@ -201,10 +204,14 @@ def _stream(
 
 def _mujoco(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
     first = tasks[0]
-    return mjsim.Run(
-        [task.parameters for task in tasks], [task.x0 for task in tasks], first.t_end, [task.fluid for task in tasks],
-        first.contact_settings, sample_interval=first.sample_interval, batched=first.steps <= LONG, journal=journal,
-    )  # fmt: skip
+    with warnings.catch_warnings():
+        if all(task.hovers for task in tasks):
+            warnings.simplefilter("ignore")
+        return mjsim.Run(
+            [task.parameters for task in tasks], [task.x0 for task in tasks], first.t_end,
+            [task.fluid for task in tasks], first.contact_settings, sample_interval=first.sample_interval,
+            batched=first.steps <= LONG, journal=journal,
+        )  # fmt: skip
 
 
 def _analytic(task: Task, deadline: Deadline, stop: Callable[[], bool] = lambda: False) -> Trajectory:

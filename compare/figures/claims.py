@@ -52,7 +52,7 @@ def deviations(claim: str, summary: Summary, directory: Path) -> Figure:
     axes.axhspan(-tolerance, tolerance, color="0.93", zorder=0)
     axes.axhline(0, **style.GUIDE)
     axes.set_xticks(range(len(groups)), groups, fontsize=8, rotation=15 if len(groups) > 4 else 0)
-    axes.set_ylabel("(measured − predicted)/uncertainty")
+    axes.set_ylabel("(measured − predicted)/uncertainty", fontsize=9)
     if checks:
         title = f"and {sum(c['passed'] for c in counted)} of {len(counted)} counts right" if counted else None
         figure.legend(loc="outside upper center", ncols=4, fontsize=8, frameon=False, title=title, title_fontsize=8)
@@ -109,11 +109,11 @@ def diagram(claim: str, summary: Summary, directory: Path) -> Figure:
     }[claim]()
     axes = figure.axes[0]
     for check in _checks(summary, claim):
-        mark, _ = WITNESSES[check["witness"]]
+        (mark, _), size = WITNESSES[check["witness"]], 7.5 if check["witness"] == "mujoco" else 3.5
         case = Case[check["condition"].split(",")[0]]
         axes.errorbar(
             check["omega_0"], check["measured"], yerr=check["tolerance"], marker=mark, color=style.COLOURS[case],
-            ms=6, mfc="none", mec="black", ls="none", zorder=5,
+            ms=size, mfc="none", mec="black", ls="none", zorder=5,
         )  # fmt: skip
     return figure
 
@@ -166,7 +166,7 @@ _CAPTIONS = {
     ),
     **dict.fromkeys(
         ("fig-9", "fig-10", "fig-11"),
-        "Lines: theory, dashed where unstable. Marks: measured states, with their tolerance.",
+        "Lines: theory, dashed where unstable. Circles: MuJoCo, squares: event-driven; the tolerances are smaller.",
     ),
     "fig-4-5": "Above ω₀₂ a slip at the wall dies out (Fig. 4), below it grows and the ball stays in NS (Fig. 5); the "
     "event-driven simulation. Left: the slip over time. Right: its path in the plane orthogonal to NR, from the cross.",

@@ -20,7 +20,8 @@ CAPTIONS = {
     confusion.ID: "Cases told from MuJoCo's forces and slip speeds (columns) against those of the event-driven "
     "simulation (rows), as shares of each row, outside the dead times.",
     frontier.ID: "Relative error of the orbital angular velocity over the processor time that a simulated second "
-    "takes. Points of one colour: one method at several steps. Hollow: other engines, measured once, elsewhere.",
+    "takes; what is below 1e-16 is drawn there. Points of one mark: one method at several steps. Hollow: other "
+    "engines, measured once, elsewhere.",
     ablation.ID: "Relative error of the orbital angular velocity under settings that each have one thing more than "
     "those above them, from MuJoCo's defaults to the project's.",
 }
@@ -61,9 +62,10 @@ def draw_frontier(summary: Summary) -> Figure:
             y.append(max(check["measured"], _FLOOR))
     figure = style.figure(10, 7)
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
+    marks = dict(zip(dict.fromkeys(name for of in points.values() for name in of), "os^vDP*", strict=False))
     for axes, quantity in zip(panels.flat, [*frontier.STATES, frontier.TRANSIENT], strict=True):
         for name, (x, y) in points.get(quantity, {}).items():
-            axes.plot(x, y, "o-", ms=4, lw=1, label=name)
+            axes.plot(x, y, f"{marks[name]}-", ms=4.5, lw=1, label=name)
         for (name, found), marker in zip(frontier.ELSEWHERE.items(), "sD^", strict=True):
             error, step, time = found[quantity]
             axes.plot(time / step, error, marker, mfc="none", color="0.4", label=name)

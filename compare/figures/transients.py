@@ -104,9 +104,14 @@ def _cases(axes: Axes, run: Trajectory, origin: float, start: float, end: float)
 
 
 def _thresholds(axes: Axes, run: Trajectory) -> None:
-    limits = analytic.thresholds(run.header.parameters)
+    p = run.header.parameters
+    limits = analytic.thresholds(p)
     for name, label in style.THRESHOLD_LABELS.items():
         value = getattr(limits, name)
-        if np.isfinite(value) and value <= run.header.flow.value.max():
+        # omega_03 ends rolling for eta > j only.
+        if np.isfinite(value) and value <= run.header.flow.value.max() and not (name == "omega_03" and p.eta < p.j):
             axes.axvline(value, **style.GUIDE)
-            axes.text(value, 1.01, label, transform=axes.get_xaxis_transform(), ha="center", fontsize=8)
+            axes.annotate(
+                label, (value, 0), xycoords=("data", "axes fraction"), xytext=(2, 3), textcoords="offset points",
+                fontsize=9,
+            )  # fmt: skip
