@@ -14,12 +14,12 @@ from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
 
 from compare import page, pictures, results
+from compare.catalogue import CLAIMS
 from compare.claims import Claim, Level, Outcome
 from compare.figures.characteristic import STATIONARY
 from compare.figures.claims import CAPTIONS, FIGURES_OF
 from compare.figures.gallery import STORED
 from compare.results import Summary
-from compare.validation import CLAIMS
 from model.errors import StorageError
 from model.files import write_text
 

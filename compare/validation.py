@@ -6,41 +6,12 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from compare import (
-    ablation,
-    branches,
-    confusion,
-    decay,
-    diagrams,
-    frontier,
-    hysteresis,
-    laws,
-    maps,
-    results,
-    slip,
-    stationary,
-    table_5,
-)  # fmt: skip
+from compare import results
 from compare.campaign import Campaign, Progress
-from compare.claims import Claim, Lab, Level, Verdict, judge, select
+from compare.catalogue import CLAIMS
+from compare.claims import Lab, Level, Verdict, judge, select
 from compare.executors import Workers
 from compare.progress import Show
-
-CLAIMS: tuple[Claim, ...] = (
-    *stationary.CLAIMS,
-    *decay.CLAIMS,
-    *slip.CLAIMS,
-    *table_5.CLAIMS,
-    *branches.CLAIMS,
-    *maps.CLAIMS,
-    *diagrams.CLAIMS,
-    *hysteresis.CLAIMS,
-    *laws.CLAIMS,
-    *confusion.CLAIMS,
-    *ablation.CLAIMS,
-    *frontier.CLAIMS,
-)
-"""Every claim there is, in the order of the paper."""
 
 
 def validate(

@@ -11,9 +11,9 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from compare import maps
+from compare.catalogue import CLAIMS
 from compare.figures import bifurcation_diagrams, mujoco, parameter_plane, style, transients
 from compare.results import Summary
-from compare.validation import CLAIMS
 from model import Case, storage
 
 Checks = Sequence[Mapping[str, Any]]
