@@ -350,6 +350,8 @@ def _grade(args: argparse.Namespace) -> int:
     if args.output:
         check_writable(args.output)
     yours = options.native(args)
+    if yours.note:
+        print(f"dualball: {yours.note}", file=sys.stderr)
     with progress.shown(quiet=args.json) as show:
         columns = grade.grade(yours, progress=lambda name, done, total: show(f"grade {name}", done, total, 0))
     if args.output:

@@ -24,6 +24,7 @@ from model.parameters import check_number
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 CONES = ("pyramidal", "elliptic")
 SOLVERS = ("PGS", "CG", "Newton")
+_NOTE = "{}: there is no {} that the ball can touch; the contact with its {} stands for both"
 _DOWN = 0.7
 """Least share of down in the way from the ball to its floor."""
 
@@ -68,6 +69,8 @@ class Native:
     noslip_iterations: int = 0
     A: Touch = Touch()
     B: Touch = Touch()
+    note: str = ""
+    """What the file that it was read from lacks, and what stands for it."""
 
     def __post_init__(self) -> None:
         for name, unit in (("timestep", "s"), ("impratio", "1")):
@@ -149,7 +152,8 @@ def read(path: Path) -> Native:
     """Settings of a ball's contacts in an MJCF file: its option, and the attributes of pairs or geoms.
 
     The ball is the sphere that can move (the one named "ball" if there are more). Its floor is the first thing it can
-    touch that is below it, its wall the first one beside it. Where there is one thing only, it stands for both.
+    touch that is below it, its wall the first one beside it. Where one is missing, the other stands for both, and the
+    `note` says so.
 
     Raises
     ------
@@ -172,14 +176,16 @@ def read(path: Path) -> Native:
             "conaffinity meet its own, and contacts switched on"
         )
     floor = {geom for geom in touches if _is_below(model, ball, geom)}
-    floors = [touch for geom, touch in touches.items() if geom in floor] or list(touches.values())
-    walls = [touch for geom, touch in touches.items() if geom not in floor] or floors
+    floors = [touch for geom, touch in touches.items() if geom in floor]
+    walls = [touch for geom, touch in touches.items() if geom not in floor]
+    note = "" if floors and walls else _NOTE.format(path, *(("floor", "wall") if walls else ("wall", "floor")))
     opt = model.opt
     return Native(
         timestep=opt.timestep, integrator=_name(INTEGRATORS, mujoco.mjtIntegrator, "mjINT_", opt.integrator),
         cone=_name(CONES, mujoco.mjtCone, "mjCONE_", opt.cone), impratio=opt.impratio,
         solver=_name(SOLVERS, mujoco.mjtSolver, "mjSOL_", opt.solver), iterations=opt.iterations,
-        tolerance=opt.tolerance, noslip_iterations=opt.noslip_iterations, A=floors[0], B=walls[0],
+        tolerance=opt.tolerance, noslip_iterations=opt.noslip_iterations, A=(floors or walls)[0],
+        B=(walls or floors)[0], note=note,
     )  # fmt: skip
 
 

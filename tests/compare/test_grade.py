@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import mujoco
@@ -168,6 +169,12 @@ def test_impedance_is_the_engines(depth: float) -> None:
         (mjcf(BALL), "the ball has no contacts"),
         (mjcf(FLOOR + BALL, '<option><flag contact="disable"/></option>'), "the ball has no contacts"),
         (mjcf(FLOOR + BALL.replace("ball", "a") + BALL.replace("ball", "b")), "there are 2 spheres that move"),
+        ("", "is not valid MJCF"),
+        ("\0\1\2", "is not valid MJCF"),
+        ("<robot/>", "there is no ball"),
+        (mjcf(FLOOR + BALL, '<contact><pair geom1="ball" geom2="wall"/></contact>'), "is not valid MJCF"),
+        (mjcf(FLOOR + BALL, '<include file="absent.xml"/>'), "is not valid MJCF"),
+        (mjcf(FLOOR + BALL, '<option cone="round"/>'), "is not valid MJCF"),
     ],
 )
 def test_files_that_cannot_be_graded(tmp_path: Path, capsys, text: str, message: str) -> None:
@@ -177,6 +184,22 @@ def test_files_that_cannot_be_graded(tmp_path: Path, capsys, text: str, message:
     told = capsys.readouterr().err
     assert told.count("\n") == 1
     assert message in told
+
+
+WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 1"/>'
+
+
+@pytest.mark.parametrize(
+    ("world", "lacks"),
+    [(FLOOR + BALL, "no wall .* its floor"), (WALL + BALL, "no floor .* its wall"), (FLOOR + WALL + BALL, "^$")],
+)
+def test_what_stands_for_what_is_missing(tmp_path: Path, world: str, lacks: str) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text(mjcf(world))
+    found = native.read(path)
+    assert re.search(lacks, found.note)
+    assert "\n" not in found.note
+    assert (found.A == found.B) is bool(found.note)
 
 
 @pytest.mark.parametrize(
