@@ -355,7 +355,8 @@ def _grade(args: argparse.Namespace) -> int:
     with progress.shown(quiet=args.json) as show:
         columns = grade.grade(yours, progress=lambda name, done, total: show(f"grade {name}", done, total, 0))
     if args.output:
-        write_text(args.output, grade.html(columns, options.describe_native(args)))
+        told = f"{options.describe_native(args)} {yours.note}".rstrip()
+        write_text(args.output, grade.html(columns, told))
     if args.json:
         print(json.dumps([column.to_mapping() for column in columns], indent=1))
         return 0

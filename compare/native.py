@@ -234,12 +234,12 @@ def _touches(model: Any, ball: int) -> dict[int, Touch]:
 
 
 def _is_below(model: Any, ball: int, geom: int) -> bool:
-    """Whether the point of a geom nearest to the ball is rather below than beside it, where the file puts them."""
+    """Whether the ball's own point nearest to a geom, or deepest in it, is rather at its bottom than at its side."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     ends = np.zeros(6)
-    distance = mujoco.mj_geomDistance(model, data, ball, geom, 1e6, ends)
-    way = (ends[3:] - ends[:3]) * (1 if distance >= 0 else -1)
+    mujoco.mj_geomDistance(model, data, ball, geom, 1e6, ends)
+    way = ends[:3] - data.geom_xpos[ball]
     return bool(way[2] < -_DOWN * np.linalg.norm(way))
 
 

@@ -189,6 +189,13 @@ def test_files_that_cannot_be_graded(tmp_path: Path, capsys, text: str, message:
 WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 1"/>'
 
 
+@pytest.mark.parametrize("height", [-0.004, 0.0, 0.0099, 0.01, 0.0101, 1.0])
+def test_a_floor_is_one_wherever_the_ball_begins(tmp_path: Path, height: float) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text(mjcf(FLOOR + BALL.replace('name="ball">', f'name="ball" pos="0 0 {height}">', 1)))
+    assert "no wall" in native.read(path).note
+
+
 @pytest.mark.parametrize(
     ("world", "lacks"),
     [(FLOOR + BALL, "no wall .* its floor"), (WALL + BALL, "no floor .* its wall"), (FLOOR + WALL + BALL, "^$")],
