@@ -13,7 +13,7 @@ from rich.table import Table
 from model import Case, Flow, Parameters, Trajectory, storage
 from model.kinematics import UNITS, VARIABLES
 
-PART = 100_000
+PART = 10_000
 """Samples that are looked at together, so that a file may be larger than memory."""
 
 
