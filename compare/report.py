@@ -34,11 +34,12 @@ def write(directory: Path) -> Path:
     Raises `model.StorageError` if there is no summary or the page can't be written.
     """
     path, drawn = directory / results.REPORT, directory / results.FIGURES
+    summary = results.load(directory)
     try:
         drawn.mkdir(exist_ok=True)
     except OSError as error:
         raise StorageError(f"cannot write to {drawn}: {error.strerror}") from error
-    write_text(path, render(results.load(directory), directory))
+    write_text(path, render(summary, directory))
     return path
 
 
