@@ -317,11 +317,11 @@ class Many(Stepper):
         load = (self._last.velocity[2:0:-1].T - self._speeds) / timestep
         self.margins[:] = _touching(self.margins, lands, self._settings.margin(1.0) * load)
         runs = np.flatnonzero(lands.any(axis=1))
-        margins, speeds = self.margins[runs], self._speeds[runs]
+        margins, solref, speeds = self.margins[runs], self._solref[runs], self._speeds[runs]
         touches = ~opened[runs] | (self._gaps[runs] <= 0)
         contact = constraint, sensors = tuple(values.copy() for values in self._contact)
         self._contact = constraint.copy(), sensors.copy()
-        self._solref *= _UNDAMPED
+        self._solref[runs] = solref * _UNDAMPED
         for _ in range(_ROUNDS):
             self._prepare(omega_0)
             self._batch.forward(runs)
@@ -330,10 +330,9 @@ class Many(Stepper):
             jump = timestep * (self._acceleration[runs] - self._smooth[runs])
             after = speeds + jump[:, 2:0:-1]
             self.margins[runs] = _margins(self.margins[runs], after, touches, self._settings)
-        self._solref /= _UNDAMPED
         stopped = _at_rest(self.margins[runs], after, speeds, touches)
         self._qvel[runs[stopped]] += jump[stopped]
-        self.margins[runs], self._contact = margins, contact
+        self.margins[runs], self._solref[runs], self._contact = margins, solref, contact
         self._take(self._qvel, self._now)
         self._last.rows[:, runs] = self._now.rows[:, runs]
 
