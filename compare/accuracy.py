@@ -18,7 +18,7 @@ from analytic import StationarySolution, rolling_forces
 from compare import frontier
 from compare.claims import Lab
 from compare.frontier import mujoco_defaults, scores
-from compare.stationary import HEIGHT, OFFSET, TIME_CONSTANTS, attractors
+from compare.stationary import HEIGHT, OFFSET, TIME_CONSTANTS, attractors, slowest
 from compare.studies import last_part
 from compare.tasks import Task
 from mjsim import ContactSettings, thresholds
@@ -113,8 +113,7 @@ def _random(count: int) -> list[Parameters]:
 
 
 def _settles(target: StationarySolution) -> float:
-    rates = -target.eigenvalues.real
-    return TIME_CONSTANTS / float(rates[rates > 1e-9 * np.abs(target.eigenvalues).max()].min())
+    return TIME_CONSTANTS * slowest(target)
 
 
 def _approaches(p: Parameters, target: StationarySolution, settings: ContactSettings) -> list[Task]:

@@ -20,6 +20,7 @@ import numpy as np
 
 import analytic
 from compare.claims import Check, Claim, Lab, Level
+from compare.stationary import slowest
 from compare.studies import Bench, main
 from compare.tasks import Task, carry_out
 from mjsim import ContactSettings, Run
@@ -120,9 +121,7 @@ def _state(case: Case, omega_0: float) -> tuple[Parameters, tuple[float, ...], f
     """Parameters, the stable stationary state, and how long it is held."""
     p = REFERENCE.replace(omega_0=omega_0)
     (solution,) = [s for s in analytic.stationary_solutions(p) if s.case is case and s.stable]
-    rates = -solution.eigenvalues.real
-    slowest = 1 / float(rates[rates > 1e-9 * np.abs(rates).max()].min())
-    return p, tuple(solution.x.tolist()), math.ceil(HOLDS * slowest)
+    return p, tuple(solution.x.tolist()), math.ceil(HOLDS * slowest(solution))
 
 
 def transient(engine: str, settings: ContactSettings | analytic.Settings) -> Task:

@@ -24,6 +24,7 @@ from rich.text import Text
 import analytic
 from compare import page
 from compare.native import Native, Touch
+from compare.stationary import slowest
 from mjsim import ContactSettings, recorder, scene
 from mjsim.free import Free
 from mjsim.stepping import Single, Stepper
@@ -197,8 +198,7 @@ def _target(p: Parameters, case: Case) -> Any:
 
 
 def _lasts(target: Any) -> float:
-    rates = -target.eigenvalues.real
-    return LASTS / float(rates[rates > 1e-9 * np.abs(target.eigenvalues).max()].min())
+    return LASTS * slowest(target)
 
 
 def _stationary(contender: Contender, p: Parameters, case: Case) -> Stationary:

@@ -74,7 +74,7 @@ def points(name: str, omegas: Sequence[float], cases: Sequence[Case]) -> list[Po
             near = target.x.copy()
             near[2] *= OFFSET
             near[0] = HEIGHT * p.R if target.case is Case.NR else 0.0
-            settles = TIME_CONSTANTS * _slowest(target)
+            settles = TIME_CONSTANTS * slowest(target)
             found.append(Point(name, p, target, "2 % off", near, settles))
             if len({family(t.case) for t in targets}) == 1:  # from rest, only where there is one place to go
                 found.append(Point(name, p, target, "from rest", np.zeros(8), settles + SPIN_UP / p.c))
@@ -108,7 +108,7 @@ def _study(name: str, omegas: Omegas, cases: Sequence[Case], lab: Lab) -> list[C
     ]
 
 
-def _slowest(target: StationarySolution) -> float:
+def slowest(target: StationarySolution) -> float:
     """Slowest time constant of a state's own dynamics, s; neutral directions have none."""
     rates = -target.eigenvalues.real
     return float(1 / rates[rates > 1e-9 * np.abs(target.eigenvalues).max()].min())
@@ -128,7 +128,7 @@ def _systematic(task: Task, run: Trajectory, target: StationarySolution) -> tupl
     friction_B = rolls_B * float(np.hypot(*run.force_B[last][:, [1, 2]].T).max())
     v_A, v_B = (float(settings.creep_speed(friction / p.m)) for friction in (friction_A, friction_B))
     omega_c = abs(float(target.x[2]))
-    steps = _slowest(target) / settings.timestep
+    steps = slowest(target) / settings.timestep
     round_off = np.finfo(float).eps * omega_c * (1 + p.R / p.r) * math.sqrt(steps / 2)
     lost = (friction_A * v_A + friction_B * v_B) / (p.m * p.c * p.R**2 * omega_c)
     carried = p.c * v_B / (p.j * p.r * omega_c) if target.case is Case.NR else 0.0
