@@ -194,7 +194,7 @@ def _simulate(args: argparse.Namespace) -> int:
         path = args.output or Path(scratch) / "run.h5"
         try:
             (failure,) = store([task], [path], stop=interrupted)
-        except KeyboardInterrupt:  # an engine that has no samples until its end, or the second Ctrl-C
+        except KeyboardInterrupt:  # the second Ctrl-C
             print("dualball: interrupted; no samples are kept", file=sys.stderr)
             return 130
         kept = failed_path(path) if failure else path

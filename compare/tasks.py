@@ -134,7 +134,7 @@ def store(
 
     A run that breaks down is kept under `failed_path`, until one into the same file is whole. MuJoCo's samples go to
     their files as they come, and a run of more than `LONG` steps keeps a journal, from which it goes on after having
-    been killed. Once `stop` says so, MuJoCo's runs end as if they had broken down, but keep their journals.
+    been killed. Once `stop` says so, runs end as if they had broken down, but MuJoCo's keep their journals.
 
     Raises
     ------
@@ -142,8 +142,6 @@ def store(
         If a file can't be written.
     OutOfTimeError
         If the batch takes longer than `limit` s for each of its runs.
-    KeyboardInterrupt
-        If `stop` says so while an engine is at work that has no samples until its end.
     """
     deadline = Deadline(limit * len(tasks))
     if tasks[0].engine == "mujoco":
