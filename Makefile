@@ -1,19 +1,33 @@
 # make validate   set everything up and run the main job: theory against MuJoCo, with a verdict
+# make mutants    which claims notice a wrong theory or a wrong engine? writes docs/mutants.md (half an hour)
 # make test       set everything up and run the tests
-# make check      what CI runs: lint, types, import contracts, tests
+# make test-all   the slow tests, too
+# make check      what CI runs: lint, types, import contracts, a quick validation judged by wrong theories, tests
 # make lock       resolve the dependencies anew (needs uv)
 
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+RESULTS ?= results
 
-.PHONY: validate test check lint lock clean
+.PHONY: validate mutants verdicts test test-all check lint lock clean
 
 validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
 
+mutants: $(VENV)/installed
+	$(BIN)/dualball validate --quick --quiet
+	$(BIN)/python -m compare.mutants results --engines --page docs/mutants.md
+
 test: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist loadgroup
+
+test-all: $(VENV)/installed-dev
+	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or not slow"
+
+verdicts: $(VENV)/installed
+	$(BIN)/dualball validate --quick --quiet -o $(RESULTS)
+	$(BIN)/python -m compare.mutants $(RESULTS)
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .
@@ -21,7 +35,7 @@ lint: $(VENV)/installed-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-check: lint test
+check: lint verdicts test
 
 $(VENV)/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "dualball needs Python 3.11 or newer; name one with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }

@@ -1,12 +1,48 @@
 """The model in closed form: what the equations of the paper say the ball does."""
 
-from analytic.bifurcation import Thresholds, operating_range, thresholds
+from analytic.bifurcation import Thresholds, thresholds
 from analytic.dynamics import contact_forces, vector_field
+from analytic.flowmeter import (
+    characteristic_slope,
+    mean_slope,
+    operating_range,
+    reading_range,
+    slope_jump,
+    unloading_limit,
+)
+from analytic.leaning import floor_force, leaning_modes
 from analytic.settings import Settings
 from analytic.simulation import simulate
-from analytic.stationary import Stability, StationarySolution, stationary_solutions
+from analytic.slip_stability import SlipStability
+from analytic.stationary import (
+    Stability,
+    StationarySolution,
+    attractors,
+    slowest_time_constant,
+    solution,
+    stationary_solutions,
+)
 
 __all__ = [
-    "Settings", "Stability", "StationarySolution", "Thresholds", "contact_forces", "operating_range", "simulate",
-    "stationary_solutions", "thresholds", "vector_field",
-]  # fmt: skip
+    "Settings",
+    "SlipStability",
+    "Stability",
+    "StationarySolution",
+    "Thresholds",
+    "attractors",
+    "characteristic_slope",
+    "contact_forces",
+    "floor_force",
+    "leaning_modes",
+    "mean_slope",
+    "operating_range",
+    "reading_range",
+    "simulate",
+    "slope_jump",
+    "slowest_time_constant",
+    "solution",
+    "stationary_solutions",
+    "thresholds",
+    "unloading_limit",
+    "vector_field",
+]

@@ -7,42 +7,13 @@ from enum import IntFlag
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import brentq
 
 from analytic import branch_stability, slipping_branch
 from analytic.stationary import StationarySolution
-from model import Case, InputError, Parameters
+from model import InputError, Parameters
 from model.arrays import Array
 from model.kinematics import VARIABLES
-
-
-@dataclass(frozen=True)
-class Bifurcation:
-    """One row of Table 5: what happens to the stationary solutions at a threshold."""
-
-    threshold: str
-    """Field of `Thresholds`."""
-    name: str
-    abbreviation: str
-    codimension: int | None
-    """Codimension of the discontinuity set in state space; None for a smooth bifurcation."""
-    cases: tuple[Case, ...]
-    where: str
-    """Range of eta in which it happens."""
-
-
-TABLE_5 = (
-    Bifurcation("omega_01", "persistence", "P3", 3, (Case.RR, Case.SS), "eta < j"),
-    Bifurcation("omega_02", "nonsmooth fold", "NF2", 2, (Case.SS, Case.SR), "eta_cr < eta < j"),
-    Bifurcation("omega_02", "persistence", "P2", 2, (Case.NS, Case.NR), "eta > 0"),
-    Bifurcation("omega_03", "nonsmooth transcritical", "NT1", 1, (Case.RR, Case.SR), "eta > j"),
-    Bifurcation("omega_04", "fold", "F", None, (Case.SS,), "eta_cr < eta < j"),
-)
-"""The bifurcations of codimension 1 in the parameter space, for SR with (12) released where eta > j (Fig. 12).
-
-For eta < eta_cr the branch of SS reaches SR at omega_02 from below: a persistence of codimension 2 instead of NF2.
-"""
-HOPF = Bifurcation("", "Hopf", "H", None, (Case.SS,), "eta < j, for mu > 1.7 or so")
-"""Not in the paper: on floors far rougher than any real one the stable part of the branch loses a stretch."""
 
 
 @dataclass(frozen=True)
@@ -92,60 +63,46 @@ def threshold_curves(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, relea
     }
 
 
-def fold_without_drag(p: Parameters) -> float:
-    """The limit of c omega_04 in rad s-2 for c -> 0: the height of mu (j - eta) cos sin/den, for 0 < eta < j.
+def number_of_folds(p: Parameters) -> int:
+    """Folds along the branch of SS, counted: after Proposition 7 one for eta_cr < eta < j, and none for less eta.
 
-    omega_04 ~ K/c: with the drag of water or air the fold is tens of times beyond omega_02.
+    `InputError` unless 0 < eta < j, mu > 0 and c > 0.
     """
-    if not (0 < p.eta < p.j and p.mu > 0):
-        raise InputError(f"eta = {p.eta:g} is out of range: there is a fold for mu > 0 and 0 < eta < j = {p.j:g} only")
-    return slipping_branch.fold_without_drag(p.j, p.mu, p.eta)[1] * p.g / p.R
+    check_branch(p)
+    return slipping_branch.sign_changes(p.j, p.mu, p.eta, p.kappa)
 
 
-@dataclass(frozen=True)
-class SpecialPoint:
-    """A bifurcation found: what, where, and how well it is known."""
+def fold_birth(p: Parameters) -> float:
+    """The eta in (0, j) at which the fold is born in SR, nan if it has none or one for every eta; p.eta plays no part.
 
-    bifurcation: Bifurcation
-    omega_0: float
-    """rad s-1"""
-    x: Array
-    """The state in which the solutions meet, shape (8,)."""
-    method: str
-    precision: float
-    """Relative uncertainty of omega_0."""
+    From the eigenvalues of f_SS where the branch meets SR, of which one vanishes there: (87) without its formula.
+    """
 
-    def __str__(self) -> str:
-        b = self.bifurcation
-        cases = "-".join(case.name for case in b.cases)
-        return f"{b.abbreviation} ({b.name}) of {cases} at omega_0 = {self.omega_0:.12g} rad s-1, {self.method}"
+    def growth(eta: float) -> float:
+        return float(branch_stability.end_eigenvalues(p.replace(eta=eta))[1][0].real)
+
+    low, high = p.j * float(np.finfo(float).eps), p.j * (1 - float(np.finfo(float).eps))
+    if p.mu == 0 or growth(low) * growth(high) >= 0:
+        return float("nan")
+    return float(brentq(growth, low, high, xtol=1e-300, rtol=8 * float(np.finfo(float).eps)))
 
 
-def special_points(p: Parameters) -> list[SpecialPoint]:
-    """The bifurcations that a set of parameters has, Table 5 and Hopf points, in the order of omega_0."""
-    eps, values = float(np.finfo(float).eps), thresholds(p)
-    slips = p.eta < p.j and p.mu > 0
-    folds = bool(np.isfinite(values.omega_04))
-    lifted = np.zeros(8)
-    if p.eta > 0:
-        lifted[2:4] = values.omega_02, p.g / (p.j * values.omega_02 * p.r) - values.omega_02 * p.R / p.r
-    happens = {"P3": slips, "NF2": folds, "P2": p.eta > 0, "NT1": p.eta > p.j, "F": False}
-    found = []
-    for b in TABLE_5:
-        if happens[b.abbreviation]:
-            omega_0 = getattr(values, b.threshold)
-            rolls = np.array([0.0, 0.0, omega_0, 0.0, 0.0, 0.0, 0.0, 0.0])
-            x = lifted if b.threshold == "omega_02" else rolls
-            found.append(SpecialPoint(b, omega_0, x, "closed form", 8 * eps))
-    places = [(TABLE_5[-1], float(slipping_branch.fold(p.j, p.mu, p.eta, p.kappa)))] if folds else []
-    if slips and p.c > 0:
-        places += [(HOPF, s) for s in branch_stability.hopf_places(p)]
-    for b, s in places:
-        x, fluid = branch_stability.states(s, p)
-        # omega_0 is flat at the fold, and s is known to some round-offs of 1 elsewhere.
-        method = "bracketed root of (89)" if b is not HOPF else "bracketed root of the sums of eigenvalues"
-        found.append(SpecialPoint(b, float(fluid), x, method, 16 * eps if b is not HOPF else 1e-10))
-    return sorted(found, key=lambda point: point.omega_0)
+def hopf_points(p: Parameters) -> list[float]:
+    """Flows omega_0 in rad s-1 of the Hopf points on the branch of SS; [] but for floors rougher than mu = 1.7 or so.
+
+    They aren't in the paper: between two of them the part of the branch before the fold isn't stable.
+    """
+    check_branch(p)
+    return sorted(float(branch_stability.states(s, p)[1]) for s in branch_stability.hopf_places(p))
+
+
+def check_branch(p: Parameters) -> None:
+    """`InputError` unless SS has a branch from RR to SR: 0 < eta < j, mu > 0 and c > 0."""
+    if not (0 < p.eta < p.j and p.mu > 0 and p.c > 0):
+        raise InputError(
+            f"eta = {p.eta:g} is out of range: SS has a branch from RR to SR for 0 < eta < j = {p.j:g}, mu > 0, "
+            "c > 0 only"
+        )
 
 
 @dataclass(frozen=True)
@@ -228,17 +185,6 @@ def case_map(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.
     for flag, where in flags:
         plane |= np.where(where, np.uint8(flag), np.uint8(0))
     return plane
-
-
-def operating_range(p: Parameters) -> float:
-    """The largest omega_0 in rad s-1 up to which omega_c = omega_0 is the ball's only stationary motion (section 5.3).
-
-    It ends where RR ends in slipping (omega_01, eta < j). It doesn't end, inf, for eta >= j, where RR, SR and NR all go
-    round with the fluid, nor on a smooth floor, which can't hold the ball back. Without drag there is none, 0.
-    """
-    if p.c == 0:
-        return 0.0
-    return thresholds(p).omega_01 if p.eta < p.j and p.mu > 0 else np.inf
 
 
 def wall_spin(solution: StationarySolution, p: Parameters) -> float:

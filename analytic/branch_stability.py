@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic import dynamics, slipping_branch
-from analytic.jacobian import STEP, eigenvalues
+from analytic import dynamics, jacobian, slipping_branch
 from model import Case, InputError, Parameters
 from model.arrays import Array
 
@@ -30,7 +29,7 @@ def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128
     b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
     unit = np.sqrt(p.g / p.R)
     omega_c, fluid, q = b.Omega_c * unit, b.Omega_0 * unit, b.v_A * np.sqrt(p.g * p.R) / p.r
-    sin, cos, h = np.sign(p.eta - p.j) * b.sin, b.cos, 1j * STEP
+    sin, cos, h = np.sign(p.eta - p.j) * b.sin, b.cos, 1j * jacobian.STEP
     columns = []
     for d_omega, d_q, d_alpha, d_t in np.eye(4) * h:
         slip_A = (sin + d_alpha * cos, cos - d_alpha * sin)
@@ -41,8 +40,8 @@ def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128
         _, _, orbit, f_x, f_y, f_z, _, _ = dynamics.newton_euler(Case.SS, x, force, p, fluid)
         # At the solution itself all rates vanish, so that the frame may be held fixed.
         rates = (orbit, sin * f_x + cos * f_z, (cos * f_x - sin * f_z) / q, f_y / (q * cos))
-        columns.append(np.stack([np.imag(rate) / STEP for rate in rates], axis=-1))
-    return eigenvalues(np.stack(columns, axis=-1))
+        columns.append(np.stack([np.imag(rate) / jacobian.STEP for rate in rates], axis=-1))
+    return jacobian.eigenvalues(np.stack(columns, axis=-1))
 
 
 def end_eigenvalues(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
@@ -61,7 +60,14 @@ def end_eigenvalues(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDAr
 
 
 def hopf_places(p: Parameters) -> list[float]:
-    """Places s of the branch at which a complex pair crosses the imaginary axis (Hopf); none but for large mu."""
+    """Places s of the branch at which a complex pair crosses the imaginary axis (Hopf).
+
+    For eta < j none but for large mu. For eta > j, with (12) released, there is one in Fig. 12. `InputError` if the
+    branch has a gap, as far beyond j.
+    """
+    s = np.linspace(-30.0, 30.0, 1201)
+    if not np.all(np.isfinite(slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa).Omega_c)):
+        raise InputError(f"eta = {p.eta:g} is out of range: SS has no whole branch, so far beyond j = {p.j:g}")
 
     def pair_sums(s: npt.ArrayLike) -> Array:
         """Product of the sums of all pairs of eigenvalues: zero where lambda_i = -lambda_k."""
@@ -72,7 +78,6 @@ def hopf_places(p: Parameters) -> list[float]:
             product = product * total / (1 + np.abs(total))  # bounded, the zeros stay
         return np.asarray(product.real)
 
-    s = np.linspace(-30.0, 30.0, 1201)
     values, found = pair_sums(s), []
     for k in np.flatnonzero(np.sign(values[1:]) * np.sign(values[:-1]) < 0):
         place = float(brentq(lambda t: float(pair_sums(t)), s[k], s[k + 1], xtol=1e-14, rtol=1e-14))

@@ -3,91 +3,22 @@
 On the wall these are the active variables of the case (Table 4), except that a slip with two components is given by
 its speed q and direction (alpha at A, beta at B): the friction depends on the direction alone, so that the rates have
 limits as the slip vanishes and q simply crosses zero. In SS both pairs are kept, although they share
-slip_z = q_A cos alpha = q_B cos beta; what integration errors make of that bond is damped. Away from the wall the
-horizontal motion is kept in the resting frame as complex numbers, where the vessel's axis is a place like any other:
-position Z = rho e^(i theta), and (a, b) along the paper's i, k becomes e^(i theta)(-a + i b).
-
-The equations themselves are those of `dynamics`; only rates are converted here. The last coordinate is always the
+slip_z = q_A cos alpha = q_B cos beta; what integration errors make of that bond is damped. The equations are those of
+`dynamics`; only rates are converted here. Away from the wall see `charts_off_wall`. The last coordinate is always the
 work of drag and friction, J.
 """
 
 from __future__ import annotations
 
-import cmath
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import brentq
 
-from analytic.dynamics import FORCES, Forces, newton_euler
+from analytic import charts_off_wall, dynamics
+from analytic.motion import Chart, Fluid, Moment, Path, natural_units
 from model import Case, Parameters
 from model.arrays import Array
-
-Fluid = Callable[[float], float]
-"""omega_0 in rad s-1 at a time in s."""
-
-
-GAPS = ("A lands", "B lands")
-"""Names of the guards that are distances."""
-
-
-@dataclass(frozen=True)
-class Moment:
-    """A state together with what the state alone does not tell."""
-
-    time: float
-    theta: float
-    x: list[float]
-    """The eight state variables."""
-    alpha: float = math.nan
-    """Direction of slip at A (8), rad, where it slips: the state doesn't tell at the very onset."""
-    beta: float = math.nan
-    """Direction of slip at B (8), rad."""
-    work: float = 0.0
-    """Work of drag, friction and impacts so far, J."""
-
-
-@dataclass(frozen=True)
-class Path:
-    """States along a stretch of one case: arrays of shape (n,), and x (n, 8)."""
-
-    time: Array
-    theta: Array
-    x: Array
-    alpha: Array
-    beta: Array
-    work: Array
-
-
-@dataclass(frozen=True)
-class Chart:
-    """The motion of one case in its coordinates z."""
-
-    case: Case
-    start: list[float]
-    scale: list[float]
-    """Natural size of each coordinate, for absolute tolerances."""
-    rates: Callable[[float, list[float]], list[float]]
-    ends: tuple[str, ...]
-    """What can end the case."""
-    guards: Callable[[float, Sequence[float]], tuple[float, ...]]
-    """A quantity for each of `ends` that is positive while the case lasts, in natural units."""
-    path: Callable[[Array, Array], Path]
-    """States from times (n,) and coordinates (k, n)."""
-    landing: float = math.inf
-    """When the ball will touch the floor, where that is known in advance, s."""
-    slips: tuple[int, ...] = ()
-    """Which coordinates are slips with a direction of their own."""
-
-    def least_slip(self, z: Sequence[float]) -> float:
-        """The smallest slip that has a direction, in natural units; inf if there is none."""
-        least = math.inf
-        for k in self.slips:
-            least = min(least, z[k] / self.scale[k])
-        return least
 
 
 def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
@@ -99,13 +30,7 @@ def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -
     return _CHARTS[case](case, at, p, omega_0, floor)
 
 
-def _natural(p: Parameters) -> tuple[float, float, float, float]:
-    """Units: of time, of velocity, of the spin of the ball, of energy."""
-    time = math.sqrt(p.R / p.g)
-    return time, p.R / time, p.R / (time * p.r), p.m * p.g * p.R
-
-
-def _friction_power(x: Sequence[float], f: Forces, p: Parameters, omega_0: float) -> float:
+def _friction_power(x: Sequence[float], f: dynamics.Forces, p: Parameters, omega_0: float) -> float:
     """Power of drag and contacts on the wall, W: the contact points move with (6)."""
     v_y, omega_c = x[1], x[2]
     drag = -p.m * p.c * (p.R**2 * omega_c * (omega_c - omega_0) + v_y**2)
@@ -118,8 +43,8 @@ def _signed(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
     """RS and SR: slip along k alone, (theta, omega_c, speed, work) with a fixed sign."""
     A_slips = case is Case.SR
     sign = math.copysign(1.0, math.sin(at.alpha if A_slips else at.beta))
-    forces, index, direction = FORCES[case], (3 if A_slips else 4), (sign, 0.0)
-    T, _, w, E = _natural(p)
+    forces, index, direction = dynamics.FORCES[case], (3 if A_slips else 4), (sign, 0.0)
+    T, _, w, E = natural_units(p)
     G = p.m * p.g
 
     def state(z: Sequence[float]) -> list[float]:
@@ -127,13 +52,13 @@ def _signed(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
         x[index] = sign * z[2]
         return x
 
-    def loads(t: float, z: Sequence[float]) -> Forces:
+    def loads(t: float, z: Sequence[float]) -> dynamics.Forces:
         return forces(state(z), p, omega_0(t), direction)
 
     def rates(t: float, z: list[float]) -> list[float]:
         x, fluid = state(z), omega_0(t)
         f = loads(t, z)
-        dx = newton_euler(case, x, f, p, fluid)
+        dx = dynamics.newton_euler(case, x, f, p, fluid)
         return [x[2], dx[2], sign * dx[index], _friction_power(x, f, p, fluid)]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
@@ -155,15 +80,15 @@ def _signed(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
 
 def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """SS: (theta, omega_c, q_A, alpha, q_B, beta, work)."""
-    T, _, w, E = _natural(p)
-    forces, G, least, damping = FORCES[case], p.m * p.g, floor * w, 1 / T
+    T, _, w, E = natural_units(p)
+    forces, G, least, damping = dynamics.FORCES[case], p.m * p.g, floor * w, 1 / T
 
     def rates(t: float, z: list[float]) -> list[float]:
         _, omega_c, q_A, alpha, q_B, beta, _ = z
         sA, cA, sB, cB = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
         x, fluid = [0.0, 0.0, omega_c, q_A * sA, q_B * sB, q_A * cA, 0.0, 0.0], omega_0(t)
         f = forces(x, p, fluid, (sA, cA), (sB, cB))
-        dx = newton_euler(case, x, f, p, fluid)
+        dx = dynamics.newton_euler(case, x, f, p, fluid)
         d_x, d_y, d_z = dx[3], dx[4], dx[5]
         bond = damping * (q_B * cB - q_A * cA)
         return [
@@ -193,8 +118,8 @@ def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
 
 def _nr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """NR: (theta, y, v_y, omega_c, w_x, work)."""
-    T, v, w, E = _natural(p)
-    forces, G = FORCES[case], p.m * p.g
+    T, v, w, E = natural_units(p)
+    forces, G = dynamics.FORCES[case], p.m * p.g
 
     def state(z: Sequence[float]) -> list[float]:
         return [z[1], z[2], z[3], z[4], 0.0, 0.0, 0.0, 0.0]
@@ -202,7 +127,7 @@ def _nr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
     def rates(t: float, z: list[float]) -> list[float]:
         x, fluid = state(z), omega_0(t)
         f = forces(x, p, fluid)
-        dx = newton_euler(case, x, f, p, fluid)
+        dx = dynamics.newton_euler(case, x, f, p, fluid)
         return [x[2], dx[0], dx[1], dx[2], dx[3], _friction_power(x, f, p, fluid)]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
@@ -221,15 +146,15 @@ def _nr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
 
 def _ns(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """NS: (theta, y, v_y, omega_c, w_x, q_B, beta, work)."""
-    T, v, w, E = _natural(p)
-    forces, least = FORCES[case], floor * w
+    T, v, w, E = natural_units(p)
+    forces, least = dynamics.FORCES[case], floor * w
 
     def rates(t: float, z: list[float]) -> list[float]:
         _, y, v_y, omega_c, w_x, q, beta, _ = z
         s, c = math.sin(beta), math.cos(beta)
         x, fluid = [y, v_y, omega_c, w_x, q * s, q * c, 0.0, 0.0], omega_0(t)
         f = forces(x, p, fluid, (s, c))
-        dx = newton_euler(case, x, f, p, fluid)
+        dx = dynamics.newton_euler(case, x, f, p, fluid)
         return [
             omega_c, v_y, dx[1], dx[2], dx[3],
             dx[4] * s + dx[5] * c, (dx[4] * c - dx[5] * s) / max(q, least),
@@ -256,133 +181,13 @@ def _ns(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
     )
 
 
-def _off_wall(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """RN, SN, NN: (Z, dZ/dt, …, work), complex ones as pairs.
-
-    RN: nothing more, the spin follows. SN: sliding speed at A and its direction in the resting frame. NN: nothing
-    more, height and fall are known (`fall`). The spin about the vertical never changes; in flight the whole spin rests.
-    """
-    _, v, _, E = _natural(p)
-    turn = cmath.exp(1j * at.theta)
-    y, v_y, omega_c, w_x, w_y, w_z, h, v_h = at.x
-    rho = p.R - h
-    v_k = rho * omega_c
-    upright = w_y - v_k / p.r
-    spin = turn * complex(-(w_x + v_k / p.r), w_z + v_y / p.r)
-    Z, V = rho * turn, turn * complex(-v_h, v_k)
-    slip = V + 1j * p.r * spin  # velocity of the lowest point
-    roll_share = p.c / (1 + p.j) if case is Case.RN else p.c
-    lever = 1 + 1 / p.j
-
-    def drag(t: float, z: Sequence[float]) -> complex:
-        return complex(z[2], z[3]) - 1j * omega_0(t) * complex(z[0], z[1])
-
-    def power(t: float, z: Sequence[float]) -> float:
-        pull = drag(t, z)
-        return -p.m * p.c * (pull.real * z[2] + pull.imag * z[3])
-
-    def rates_rolling(t: float, z: list[float]) -> list[float]:
-        push = -roll_share * drag(t, z)
-        return [z[2], z[3], push.real, push.imag, power(t, z)]
-
-    def rates_slipping(t: float, z: list[float]) -> list[float]:
-        push, along = -p.c * drag(t, z), cmath.rect(1.0, z[5])
-        friction = -p.mu * p.g * along
-        force = push + friction
-        turning = (push + lever * friction) / along
-        return [
-            z[2], z[3], force.real, force.imag,
-            turning.real, turning.imag / max(z[4], floor * v),
-            power(t, z) - p.m * p.mu * p.g * z[4],
-        ]  # fmt: skip
-
-    def rates_flying(t: float, z: list[float]) -> list[float]:
-        push, rise = -p.c * drag(t, z), v_y - (p.c * v_y + p.g) * _decay(t - at.time, p.c)
-        return [z[2], z[3], push.real, push.imag, power(t, z) - p.m * p.c * rise**2]
-
-    def path(t: Array, z: Array) -> Path:
-        place, speed = z[0] + 1j * z[1], z[2] + 1j * z[3]
-        height, rise = fall(t - at.time, y, v_y, p) if case is Case.NN else (np.zeros_like(t), np.zeros_like(t))
-        slide = z[4] * np.exp(1j * z[5]) if case is Case.SN else np.zeros_like(place)
-        o = np.full_like(place, spin) if case is Case.NN else (slide - speed) / (1j * p.r)
-        radius, back = np.abs(place), np.conj(place) / np.abs(place)
-        speed, o, slide = speed * back, o * back, slide * back
-        # In RN the state must hold slip_x = 0 and v_h + r slip_z = 0 exactly.
-        w_x = np.zeros_like(t) if case is Case.RN else -o.real - speed.imag / p.r
-        w_z = speed.real / p.r if case is Case.RN else o.imag - rise / p.r
-        x = np.stack([
-            height, rise, speed.imag / radius, w_x, upright + speed.imag / p.r, w_z, p.R - radius, -speed.real,
-        ], axis=-1)  # fmt: skip
-        angle = np.unwrap(np.append(at.theta, np.angle(place)))[1:]
-        # e^(i theta)(-a + i b) with a, b along the cosine and minus the sine of alpha (6), (8).
-        alpha = np.arctan2(-slide.imag, -slide.real) if case is Case.SN else np.full_like(t, math.nan)
-        return Path(t, angle, x, alpha, np.full_like(t, math.nan), z[-1])
-
-    def gap(z: Sequence[float]) -> float:
-        return 1 - math.hypot(z[0], z[1]) / p.R
-
-    start, scale = [Z.real, Z.imag, V.real, V.imag], [p.R, p.R, v, v]
-    if case is Case.RN:
-
-        def grip(t: float, z: Sequence[float]) -> tuple[float, ...]:
-            return p.mu - p.j * roll_share * abs(drag(t, z)) / p.g, gap(z)
-
-        return Chart(case, [*start, at.work], [*scale, E], rates_rolling, ("A slips", "B lands"), grip, path)
-    if case is Case.SN:
-        # At the onset the slip is zero and only alpha tells its direction.
-        phase = cmath.phase(turn * complex(-math.cos(at.alpha), -math.sin(at.alpha)))
-        ends = ("A sticks", "B lands")
-        start = [*start, abs(slip), phase, at.work]
-        return Chart(
-            case, start, [*scale, v, 1.0, E], rates_slipping, ends, lambda t, z: (z[4] / v, gap(z)), path, slips=(4,)
-        )
-    landing = at.time + fall_time(y, v_y, p)
-    return Chart(
-        case, [*start, at.work], [*scale, E], rates_flying, ("B lands",), lambda t, z: (gap(z),), path, landing
-    )
-
-
-def fall(t: Any, y: float, v_y: float, p: Parameters) -> tuple[Any, Any]:
-    """Height and vertical velocity after a time t (a float or an array) of flight with drag."""
-    return y + v_y * _decay(t, p.c) - p.g * t**2 * second(p.c * t), v_y - (p.c * v_y + p.g) * _decay(t, p.c)
-
-
-def _decay(t: Any, c: float) -> Any:
-    """(1 - exp(-c t))/c."""
-    if c == 0:
-        return t
-    return -(math.expm1(-c * t) if isinstance(t, float) else np.expm1(-c * t)) / c
-
-
-def fall_time(y: float, v_y: float, p: Parameters) -> float:
-    """Time until a flight ends on the floor, s; y >= 0, and v_y > 0 if y = 0."""
-    free = (v_y + math.sqrt(v_y**2 + 2 * p.g * y)) / p.g
-    if free == 0:
-        return 0.0
-
-    def height(t: float) -> float:
-        return float(fall(t, y, v_y, p)[0])
-
-    low, high = _rise_time(v_y, p) if v_y > 0 else 0.0, free
-    while height(high) > 0:
-        low, high = high, 2 * high
-    return float(brentq(height, low, high, xtol=4 * math.ulp(1.0) * high, rtol=4 * math.ulp(1.0)))
-
-
-def _rise_time(v_y: float, p: Parameters) -> float:
-    """Time until the top of a flight."""
-    return math.log1p(p.c * v_y / p.g) / p.c if p.c > 0 else v_y / p.g
-
-
-def second(s: Any) -> Any:
-    """(s - 1 + exp(-s))/s^2, by its series where that cancels."""
-    small = np.abs(s) < 1e-2
-    safe = np.where(small, 1.0, s)
-    series = 1 / 2 - s / 6 * (1 - s / 4 * (1 - s / 5 * (1 - s / 6 * (1 - s / 7))))
-    return np.where(small, series, (safe + np.expm1(-safe)) / safe**2)
-
-
 _CHARTS = {
-    Case.RS: _signed, Case.SR: _signed, Case.SS: _ss, Case.NR: _nr, Case.NS: _ns,
-    Case.RN: _off_wall, Case.SN: _off_wall, Case.NN: _off_wall,
-}  # fmt: skip
+    Case.RS: _signed,
+    Case.SR: _signed,
+    Case.SS: _ss,
+    Case.NR: _nr,
+    Case.NS: _ns,
+    Case.RN: charts_off_wall.rolling,
+    Case.SN: charts_off_wall.slipping,
+    Case.NN: charts_off_wall.flying,
+}

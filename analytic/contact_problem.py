@@ -25,7 +25,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analytic.rigid_body import NOTHING, Six, apply
+from analytic import rigid_body
+from analytic.rigid_body import NOTHING, Six
 from model import Parameters
 from model.arrays import Array
 
@@ -70,7 +71,7 @@ def solve(
     NotConvergedError
         After `max_sweeps`.
     """
-    u, P = apply(free, start, p), start
+    u, P = rigid_body.apply(free, start, p), start
     if A is None or B is None:  # a contact alone is solved exactly
         return sweep(u, P, A, B, p)
     scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
@@ -80,9 +81,9 @@ def solve(
         change = max(abs(new[3] - P[3]), abs(new[4] - P[4]), abs(new[5] - P[5])) / p.m
         enough = tolerance * max(scale, max(map(abs, new)) / p.m)
         if change <= enough:
-            return apply(free, new, p), new
+            return rigid_body.apply(free, new, p), new
         P = pace.next(u, P, new, change)
-        u = apply(free, P, p)
+        u = rigid_body.apply(free, P, p)
     raise NotConvergedError(
         f"contact problem: still a change of {change:g} m s-1 after {max_sweeps} sweeps, asked for {enough:g} m s-1"
     )

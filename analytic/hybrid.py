@@ -1,44 +1,33 @@
 """Event-driven simulation: each case by its own equations, from one change of case to the next.
 
-Within a case LSODA integrates the coordinates of `charts` (RR is known in closed form); a guard that turns negative is
-located on the interpolant of the step, and `transitions` says how to go on.
+Within a case `integrator` follows the coordinates of `charts` (RR is known in closed form) up to the guard that turns
+negative first, and `transitions` says how to go on.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
-from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import BDF, LSODA
-from scipy.optimize import brentq
 
-from analytic import dynamics, rolling_forces, transitions, two_point_rolling
-from analytic.charts import GAPS, Chart, Fluid, Moment, Path, chart
+from analytic import charts, dynamics, rolling_forces, transitions, two_point_rolling
+from analytic.integrator import StalledError, Stretch
+from analytic.motion import Fluid, Moment, Path
 from analytic.records import REPORT_EVERY, Event, Recorder
 from analytic.rigid_body import NOTHING, Six
 from analytic.settings import Settings
 from model import Case, Contact, Flow, Parameters
 from model.arrays import Array
 
-ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
-"""Slips, in units of the spin of a ball that rolls at sqrt(g R): one that has just set in, and one whose direction may
-be stiff."""
-PATIENCE = 300
-"""Steps of LSODA with a small slip after which it gives way; a slip that dies out takes fewer."""
-EPS = math.ulp(1.0)
-LOCAL = 0.25
-"""Tolerance of a step of the integrator relative to that asked for: errors of many steps add up."""
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
-
-
-class StalledError(ArithmeticError):
-    """The run makes no progress."""
+ANY = "the case changes"
+CHATTER = {"RR ends": (10, 1e-4), ANY: (1000, 0.05)}
+"""How often within what time, in natural units, is too often. A ball that hops (restitution) may change more often."""
 
 
 def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
@@ -88,6 +77,7 @@ class _Simulator:
     def advance(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[Case, Moment]:
         """Go on through all events before `until`."""
         at_once = 0
+        recent = {what: deque([-math.inf] * count, count) for what, (count, _) in CHATTER.items()}
         while at.time < until:
             start = at.time
             guard, at = self._roll(at, until, fluid) if case is Case.RR else self._follow(case, at, until, fluid)
@@ -95,10 +85,24 @@ class _Simulator:
                 before = case
                 case, at, impulse = self._react(guard, case, at, fluid)
                 self.recorder.events.append(Event(at.time, before, case, impulse))
+                self._check_pace(recent, guard, at.time)
             at_once = at_once + 1 if at.time - start <= 1e-14 * until else 0
             if at_once > MAX_EVENTS_AT_ONCE:
                 raise StalledError(f"no way on from case {case.name} at state {at.x}")
         return case, at
+
+    def _check_pace(self, recent: dict[str, deque[float]], guard: str, now: float) -> None:
+        """Raise `StalledError` if slip or lift sets in and dies out again and again, so that a run would not end."""
+        for what, times in recent.items():
+            if what == guard or (what == ANY and self.settings.restitution == 0):
+                times.append(now)
+        for what, (count, within) in CHATTER.items():
+            lasted = now - recent[what][0]
+            if lasted < within * math.sqrt(self.p.R / self.p.g):
+                raise StalledError(
+                    f"{what} {count} times in {lasted:.3g} s (leave_rolling = {self.settings.leave_rolling!r}): "
+                    "slip or lift sets in and dies out at once, again and again"
+                )
 
     def settle(self, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Six]:
         """Collide if the ball moves into something it touches, then find the case."""
@@ -163,12 +167,14 @@ class _Simulator:
 
     def _follow(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
         """One case up to the first guard or `until`; samples are recorded even if it is interrupted."""
-        motion = chart(case, at, self.p, fluid, self.settings.rtol)
+        motion = charts.chart(case, at, self.p, fluid, self.settings.rtol)
         lands, until = motion.landing <= until, min(until, motion.landing)
         times, states = [at.time], [motion.start]
         sampled, guard = [self.recorder.taken == 0], None
+        stretch = Stretch(motion, at.time, until, self.recorder.times, self.settings.rtol, self.absolute)
+        hop = self._hop(case, at, fluid)
         try:
-            for count, step in enumerate(self._integrate(motion, at.time, until, self._hop(case, at, fluid)), 1):
+            for count, step in enumerate(stretch.steps(hop / 20 if hop < until - at.time else None), 1):
                 times += [*step.sample_times, step.time]
                 states += [*step.samples, step.z]
                 sampled += [True] * len(step.samples) + [False]
@@ -189,69 +195,6 @@ class _Simulator:
         hops = [2 * v / -a for gap, v, a in ((x[0], x[1], dx[1]), (x[6], x[7], dx[7])) if gap == 0 < v and a < 0]
         return min(hops, default=math.inf)
 
-    def _integrate(self, motion: Chart, start: float, until: float, hop: float) -> Iterator[Step]:
-        """Steps of the integrator with the samples in them, the last of them ending at a guard or at `until`.
-
-        LSODA does the work, except where a slip sets in, or stays small: its direction is stiff then, which LSODA
-        doesn't notice where hardly anything else moves. A hop that may be short starts with a step that is shorter.
-        """
-        t, z, first_step = start, motion.start, hop / 20 if hop < until - start else None
-        small = motion.least_slip(z) < ONSET_SLIP
-        watch = Watch(motion, start, self.absolute, self.settings.rtol)
-        while t < until:
-            slow = 0
-            for step in self._stage(motion, BDF if small else LSODA, t, z, until, first_step, watch):
-                yield step
-                t, z, first_step = step.time, step.z, None
-                if step.guard:
-                    return
-                grown = motion.least_slip(z) > SMALL_SLIP
-                slow = 0 if grown else slow + 1
-                if grown if small else slow > PATIENCE:
-                    small = not small
-                    break
-
-    def _stage(
-        self,
-        motion: Chart,
-        method: Any,
-        start: float,
-        z: list[float],
-        until: float,
-        first_step: float | None,
-        watch: Watch,
-    ) -> Iterator[Step]:
-        """Steps of one solver; its time runs from zero, for directions settle in less than the round-off of `start`."""
-        options: dict[str, Any] = {"jac": _jacobian(motion, start, self.settings.rtol)} if method is BDF else {}
-        solver = method(
-            lambda t, z: motion.rates(start + t, z.tolist()), 0.0, z, until - start,
-            rtol=LOCAL * self.settings.rtol, atol=LOCAL * self.absolute * np.array(motion.scale), first_step=first_step,
-            **options,
-        )  # fmt: skip
-        times = self.recorder.times
-        taken = int(np.searchsorted(times, start, side="right"))
-        while solver.status == "running":
-            message = solver.step()
-            z = solver.y.tolist()
-            if solver.status == "failed" or not math.isfinite(sum(z)):
-                raise StalledError(f"{method.__name__} in case {motion.case.name}: {message}")
-            t = until if solver.t == solver.t_bound else start + float(solver.t)
-            fired = watch.fired(t, z)
-            if not fired and (taken == len(times) or times[taken] > t):
-                yield Step(t, z)
-                continue
-            between, guard = solver.dense_output(), None
-            if fired:
-                span = float(solver.t_old), float(solver.t)
-                end, guard = min((watch.root(k, between, start, *span), motion.ends[k]) for k in fired)
-                t, z = start + end, between(end).tolist()
-            due = int(np.searchsorted(times, t, side="right"))
-            samples = between(times[taken:due] - start).T.tolist() if due > taken else []
-            yield Step(t, z, times[taken:due].tolist(), samples, guard)
-            if guard:
-                return
-            taken = due
-
     def _samples(self, start: float, stop: float) -> Array:
         """Times to sample within (start, stop], and the very first."""
         times = self.recorder.times
@@ -266,77 +209,6 @@ class _Simulator:
         omega_0 = np.array([fluid(t) for t in path.time.tolist()])
         forces = path_forces(case, path, self.p, omega_0)
         self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
-
-
-def _jacobian(motion: Chart, origin: float, floor: float) -> Callable[[float, Array], Array]:
-    """Derivative of the rates of a chart by its coordinates, from forward differences.
-
-    They are small compared to each coordinate or its natural size; to a slip itself, of which its direction may be
-    a steep function, down to the floor below which it isn't. (The differences of scipy grow with each call
-    for a coordinate that the rates don't depend on, like the azimuth, until they overflow.)
-    """
-    least = np.array(motion.scale)
-    least[list(motion.slips)] *= floor
-
-    def jacobian(t: float, z: Array) -> Array:
-        shift = math.sqrt(EPS) * np.maximum(np.abs(z), least)
-        here = np.array(motion.rates(origin + t, z.tolist()))
-        beside = [motion.rates(origin + t, shifted) for shifted in (z + np.diag(shift)).tolist()]
-        return np.asarray((np.array(beside) - here).T / shift)
-
-    return jacobian
-
-
-class Step(NamedTuple):
-    """A step of an integrator."""
-
-    time: float
-    z: list[float]
-    sample_times: Sequence[float] = ()
-    """Times to sample within the step."""
-    samples: Sequence[list[float]] = ()
-    """Coordinates then."""
-    guard: str | None = None
-    """The guard that fired at its end."""
-
-
-class Watch:
-    """The guards of a case on duty: one fires when it falls below zero.
-
-    A guard that starts at zero, where round-off mustn't end the case, has to rise above `arm` first, or to fall below
-    -`slack`; a gap is armed by any height.
-    """
-
-    def __init__(self, motion: Chart, start: float, arm: float, slack: float) -> None:
-        self._motion = motion
-        self._arm = [0.0 if name in GAPS else arm for name in motion.ends]
-        values = motion.guards(start, motion.start)
-        self._level = [0.0 if value > arm else -slack for value, arm in zip(values, self._arm, strict=True)]
-
-    def fired(self, t: float, z: list[float]) -> list[int]:
-        """Which guards are below their level."""
-        fired = []
-        for k, value in enumerate(self._motion.guards(t, z)):
-            if value > self._arm[k]:
-                self._level[k] = 0.0
-            elif value < self._level[k]:
-                fired.append(k)
-        return fired
-
-    def root(self, k: int, between: Callable[[float], Array], origin: float, start: float, end: float) -> float:
-        """When within (start, end) after the origin guard k fell through its level.
-
-        The interpolant may differ from the step's ends by round-off.
-        """
-
-        def value(t: float) -> float:
-            return self._motion.guards(origin + t, between(t).tolist())[k] - self._level[k]
-
-        if value(start) <= 0:
-            return start
-        if value(end) >= 0:
-            return end
-        return float(brentq(value, start, end, xtol=4 * EPS * end, rtol=4 * EPS))
 
 
 def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:

@@ -10,9 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analytic.bifurcation import thresholds
-from analytic.simulation import simulate
-from analytic.stationary import stationary_solutions
+from analytic import bifurcation, simulation, stationary
 from model import Case, Flow, InputError, Parameters, Trajectory
 from model.arrays import Array
 
@@ -25,10 +23,10 @@ def slip_perturbation(
     For omega_0 > sqrt(g/(eta R)) (61) slip dies out and the ball returns to NR (Fig. 4), else it grows (Fig. 5).
     `height` in m keeps it clear of the floor, which Figs. 4 and 5 leave out.
     """
-    x = _stationary(Case.NR, p)
+    x = stationary.solution(p, Case.NR, formal=True).x.copy()
     x[0] = height
     x[4], x[5] = slip * math.sin(beta), slip * math.cos(beta)
-    return simulate(p, x, t_end, sample_interval=t_end / 10_000)
+    return simulation.simulate(p, x, t_end, sample_interval=t_end / 10_000)
 
 
 def hysteresis(p: Parameters, levels: Sequence[float] | Array | None = None, hold: float = 40.0) -> Trajectory:
@@ -37,7 +35,7 @@ def hysteresis(p: Parameters, levels: Sequence[float] | Array | None = None, hol
     Held levels instead of a ramp, since the fold at omega_04 slows down without bound. By default from below omega_01
     to above omega_04 and back. Raises `InputError` if there is no fold.
     """
-    limits = thresholds(p)
+    limits = bifurcation.thresholds(p)
     if levels is None:
         if not np.isfinite(limits.omega_04):
             raise InputError(f"eta = {p.eta:g} has no fold: hysteresis of this kind needs eta_cr < eta < j")
@@ -45,7 +43,7 @@ def hysteresis(p: Parameters, levels: Sequence[float] | Array | None = None, hol
         levels = np.concatenate([up, up[-2::-1]])
     flow = Flow.staircase([float(level) for level in levels], hold)
     start = [0.0, 0.0, float(levels[0]), 0.0, 0.0, 0.0]
-    return simulate(p, start, hold * len(levels), flow, sample_interval=hold / 100)
+    return simulation.simulate(p, start, hold * len(levels), flow, sample_interval=hold / 100)
 
 
 def unloading(p: Parameters, hold: float = 20.0, height: float = 0.02) -> Trajectory:
@@ -53,14 +51,10 @@ def unloading(p: Parameters, hold: float = 20.0, height: float = 0.02) -> Trajec
 
     NR is left for NS, the ball falls, hits the floor, and ends in RR: the transients and impacts of section 5.3.
     """
-    limit = math.sqrt(p.g / (p.eta * p.R))
+    limit = bifurcation.thresholds(p).omega_02
     levels = limit * np.array([1.2, 1.1, 1.02, 0.98])
-    x = _stationary(Case.NR, p.replace(omega_0=float(levels[0])))
+    x = stationary.solution(p.replace(omega_0=float(levels[0])), Case.NR).x.copy()
     x[0] = height
-    return simulate(p, x, hold * len(levels), Flow.staircase(levels.tolist(), hold), sample_interval=hold / 4000)
-
-
-def _stationary(case: Case, p: Parameters) -> Array:
-    """The stationary solution of a case, whether its forces are admissible or not, as a full state."""
-    (solution,) = [s for s in stationary_solutions(p) if s.case is case]
-    return np.array(solution.x, dtype=float)
+    return simulation.simulate(
+        p, x, hold * len(levels), Flow.staircase(levels.tolist(), hold), sample_interval=hold / 4000
+    )

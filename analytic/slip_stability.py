@@ -38,6 +38,17 @@ LIFT_ARROWS = ((Case.RR, Case.NR), (Case.RS, Case.NS), (Case.SR, Case.NR), (Case
 _SLIPS = ("slip_x", "slip_y", "slip_z")
 
 
+class SlipStability(Enum):
+    """Definitions 1-3, by gamma over all directions along which the contacts stay closed."""
+
+    STABLE = "stable"
+    """gamma < 0 in all of them, or nothing rolls."""
+    NEUTRAL = "neutral"
+    """gamma = 0 in one, > 0 in none."""
+    UNSTABLE = "unstable"
+    """gamma > 0 in one."""
+
+
 class Metric(Enum):
     """The inner product of (52)."""
 
@@ -199,21 +210,6 @@ def limit_directions(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) 
     return sorted(found, key=lambda push: -push.gamma)
 
 
-def onset_direction(case: Case, x: npt.ArrayLike, p: Parameters) -> dict[str, float]:
-    """Slip directions alpha, beta in rad at which rolling contacts would begin to slip: against their friction.
-
-    cos alpha = -A_x/(mu A_y), sin alpha = A_z/(mu A_y); cos beta = B_y/(eta B_x), sin beta = -B_z/(eta B_x). In RR
-    the forces are those of least utilisation.
-    """
-    (A_x, _, A_z), (_, B_y, B_z) = dynamics.contact_forces(case, x, p)
-    angles = {}
-    if case.A is Contact.R:
-        angles["alpha"] = float(np.arctan2(A_z, -A_x))
-    if case.B is Contact.R:
-        angles["beta"] = float(np.arctan2(-B_z, B_y))
-    return angles
-
-
 def stick_margin(case: Case, x: npt.ArrayLike, p: Parameters) -> float:
     """Slack of the friction cones (13) of the rolling contacts in units of m g: >= 0 where rolling can go on.
 
@@ -231,19 +227,35 @@ def stick_margin(case: Case, x: npt.ArrayLike, p: Parameters) -> float:
     return float(min(slacks))
 
 
-def is_stable(case: Case, p: Parameters) -> bool:
-    """Whether the stationary solution of RR, SR or NR is stable or neutral with respect to slipping.
+def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:
+    """Stability with respect to slipping of the stationary solution of a case at omega_c, p.omega_0 if None.
 
-    RR: (67), (74), and (82), which can be met only for eta < j because A_y < 0 otherwise. SR and NR: (61). These are
-    the signs of gamma in the metric of kinetic energy over all directions along which the contacts stay closed.
+    RR: (67), (74), and (82), which can be met only for eta < j because A_y < 0 otherwise. SR and NR: (61). RS: the
+    friction j m R omega_c^2 that its floor must supply. These are the signs of gamma in the metric of kinetic energy
+    over all directions along which the contacts stay closed; on a threshold, to round-off, it is neutral.
     """
-    Omega2 = p.Omega_0**2
-    if case is not Case.RR:
-        return p.eta * Omega2 >= 1
-    slides_at_A, slides_at_both = p.j * Omega2 > 1, False
-    if p.eta < p.j:
-        slides_at_both = Omega2 * (p.mu * p.eta * (1 + p.j) + p.j - p.eta) > p.mu * (1 + p.eta)
-    return not (slides_at_A or slides_at_both)
+    Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
+    match case:
+        case Case.RR:
+            found = {_sign(0.0, p.eta * Omega2), _sign(p.mu * p.j * Omega2, p.mu)}
+            if p.eta < p.j:
+                found.add(_sign(Omega2 * (p.mu * p.eta * (1 + p.j) + p.j - p.eta), p.mu * (1 + p.eta)))
+        case Case.SR | Case.NR:
+            smooth_floor = case is Case.SR and p.mu == 0  # the floor then carries the weight, the wall nothing
+            found = {_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}
+        case Case.RS:
+            found = {_sign(p.j * Omega2, p.mu)}
+        case _:
+            found = set()
+    worst_first = SlipStability.UNSTABLE, SlipStability.NEUTRAL
+    return next((kind for kind in worst_first if kind in found), SlipStability.STABLE)
+
+
+def _sign(drive: float, hold: float) -> SlipStability:
+    """What the sign of drive - hold says; both are >= 0 and carry the few round-offs of their products."""
+    if abs(drive - hold) <= 8 * np.finfo(float).eps * max(drive, hold):
+        return SlipStability.NEUTRAL
+    return SlipStability.UNSTABLE if drive > hold else SlipStability.STABLE
 
 
 _SCALE = 1e3

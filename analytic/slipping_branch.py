@@ -66,12 +66,28 @@ def slope(s: npt.ArrayLike, j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, kap
     d omega_0/d|alpha| without the factor mu (j - eta) sin^2/(kappa den^2). For eta > j its first term, and with it
     the slope of Omega_c, changes sign.
     """
+    orbit, lag = _slopes(s, j, mu, eta, kappa)
+    return np.asarray(orbit + lag)
+
+
+def characteristic_slope(
+    s: npt.ArrayLike, j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, kappa: npt.ArrayLike
+) -> Array:
+    """d omega_c/d omega_0 along the branch: 0 at the end in RR, infinite at the fold, negative beyond it."""
+    orbit, lag = _slopes(s, j, mu, eta, kappa)
+    return np.asarray(orbit / (orbit + lag))
+
+
+def _slopes(
+    s: npt.ArrayLike, j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, kappa: npt.ArrayLike
+) -> tuple[Array, Array]:
+    """d Omega_c/d|alpha|, and that of the lag Omega_0 - Omega_c, both without the factor that `slope` leaves out."""
     cos, sin = _cos_sin(s)
     mu, eta = np.asarray(mu), np.asarray(eta)
     den = _denominator(cos, j, mu, eta)
     Omega_c = np.sqrt(mu * (1 + eta * cos**2) / den)
-    inner = np.sign(j - eta) * kappa * (1 + 2 * mu * eta * cos - eta * cos**2) / (2 * Omega_c * sin)
-    return np.asarray(inner + den * (cos / sin) ** 2 - mu * eta * (1 - j * cos**2))
+    orbit = np.sign(j - eta) * kappa * (1 + 2 * mu * eta * cos - eta * cos**2) / (2 * Omega_c * sin)
+    return np.asarray(orbit), np.asarray(den * (cos / sin) ** 2 - mu * eta * (1 - j * cos**2))
 
 
 def eta_critical(mu: npt.ArrayLike, kappa: npt.ArrayLike) -> Array:
@@ -98,11 +114,10 @@ def fold(j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, kappa: float, released
     return np.where(exists, found, np.nan)
 
 
-def fold_without_drag(j: float, mu: float, eta: float) -> tuple[float, float]:
-    """The place s of the fold for kappa -> 0, and the limit of kappa Omega_04 there; needs mu > 0, 0 < eta < j."""
-    s = float(_root_of_slope(j, np.asarray(mu), np.asarray(eta), np.asarray(0.0)))
-    point = branch(s, j, mu, eta, 1.0)
-    return s, float(point.cos * point.v_A * j * point.Omega_c)
+def sign_changes(j: float, mu: float, eta: float, kappa: float, points: int = 20_001) -> int:
+    """How often `slope` changes sign along the whole branch: the number of folds, by a search that assumes nothing."""
+    values = slope(np.linspace(-END, END, points), j, mu, eta, kappa)
+    return int(np.sum(np.sign(values[1:]) != np.sign(values[:-1])))
 
 
 def points_at(Omega_0: float, j: float, mu: float, eta: float, kappa: float) -> list[float]:

@@ -13,9 +13,9 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from analytic import branch_stability, dynamics, rolling_forces, slip_stability, slipping_branch
-from analytic.jacobian import eigenvalues, jacobian
-from model import Case, Parameters
+from analytic import branch_stability, dynamics, jacobian, rolling_forces, slip_stability, slipping_branch
+from analytic.slip_stability import SlipStability
+from model import Case, InputError, Parameters
 from model.arrays import Array
 
 _MIRROR = np.array([1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
@@ -48,8 +48,8 @@ class StationarySolution:
     """Whether the contact forces obey (12) and (13)."""
     stability: Stability
     """Within the case, by the eigenvalues."""
-    slip_stable: bool
-    """No direction of slipping grows from it (Definitions 1 and 3, see `slip_stability`); True if nothing rolls."""
+    slip_stability: SlipStability
+    """With respect to slipping of what rolls (Definitions 1-3); STABLE if nothing rolls."""
     family: tuple[str, ...] = ()
     """Variables that are free: the solution is a member of a family."""
     alpha: float = np.nan
@@ -59,6 +59,11 @@ class StationarySolution:
     def stable(self) -> bool:
         """Whether disturbances within the case don't grow (asymptotic or neutral)."""
         return self.stability is not Stability.UNSTABLE
+
+    @property
+    def slip_stable(self) -> bool:
+        """Whether no direction of slipping grows from it (Definition 1 or 3)."""
+        return self.slip_stability is not SlipStability.UNSTABLE
 
     @property
     def moves(self) -> bool:
@@ -77,8 +82,40 @@ def stationary_solutions(p: Parameters) -> list[StationarySolution]:
     return [*_rr(p), *_rs(p), *_sr(p), *_ss(p), *_nr(p), *_ns(p)]
 
 
+def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = False) -> StationarySolution:
+    """The stable stationary solution of a case at p.omega_0, or the unstable one.
+
+    `formal` takes it even if its contact forces are inadmissible: NR below omega_02, SR with A_y < 0.
+
+    Raises
+    ------
+    InputError
+        If there is none, or more than one (two are unstable between the Hopf points of a very rough floor).
+    """
+    found = [s for s in stationary_solutions(p) if s.case is case and s.stable == stable and (formal or s.exists)]
+    if len(found) != 1:
+        raise InputError(
+            f"case {case.name} has {len(found) or 'no'} {'stable' if stable else 'unstable'} stationary "
+            f"solution{'s' if found else ''} at omega_0 = {p.omega_0:g} rad s-1 "
+            f"(mu = {p.mu:g}, eta = {p.eta:g}, j = {p.j:g}, c = {p.c:g} s-1, R = {p.R:g} m, g = {p.g:g} m s-2)"
+        )
+    return found[0]
+
+
+def attractors(p: Parameters) -> list[StationarySolution]:
+    """The stationary solutions that a disturbed ball returns to; the one that only sinks (NS) is none."""
+    return [s for s in stationary_solutions(p) if s.exists and s.stable and s.slip_stable and not s.moves]
+
+
+def slowest_time_constant(of: StationarySolution) -> float:
+    """Slowest time constant in s of the disturbances that die out within the case; inf if none does."""
+    rates = -of.eigenvalues.real
+    decaying = rates[rates > _ROUND_OFF * np.abs(of.eigenvalues).max()]
+    return float(1 / decaying.min()) if decaying.size else np.inf
+
+
 def _solution(
-    case: Case, p: Parameters, x: list[float], exists: bool, slip_stable: bool = True,
+    case: Case, p: Parameters, x: list[float], exists: bool,
     family: tuple[str, ...] = (), alpha: float = np.nan, values: npt.NDArray[np.complex128] | None = None,
 ) -> StationarySolution:  # fmt: skip
     state = np.array([*x, 0.0, 0.0])
@@ -91,13 +128,13 @@ def _solution(
         force = dynamics.forces(case, state.tolist(), p, p.omega_0)
     zeros = len(family)
     if case is Case.NS:  # the reduced field (48), without y
-        values, zeros = eigenvalues(jacobian(case, state, p)[1:, 1:]), zeros - 1
+        values, zeros = jacobian.eigenvalues(jacobian.jacobian(case, state, p)[1:, 1:]), zeros - 1
     elif values is None:
-        values = eigenvalues(jacobian(case, state, p))
+        values = jacobian.eigenvalues(jacobian.jacobian(case, state, p))
     return StationarySolution(
         case=case, x=state, force_A=np.array(force[:3]), force_B=np.array(force[3:]), eigenvalues=values,
         exists=bool(exists), stability=_stability(values, zeros, bool(family) or case is Case.NS),
-        slip_stable=slip_stable, family=family, alpha=alpha,
+        slip_stability=slip_stability.stability(case, p, x[2]), family=family, alpha=alpha,
     )  # fmt: skip
 
 
@@ -113,7 +150,7 @@ def _rr(p: Parameters) -> list[StationarySolution]:
     """Proposition 1. Without drag every omega_c is stationary."""
     best = rolling_forces.least_utilisation(p.omega_0, p)
     exists = bool(best.utilisation <= 1 and (np.isfinite(best.B_y) or rolling_forces.margin(p.omega_0, p) >= 0))
-    return [_solution(Case.RR, p, [0.0, 0.0, p.omega_0, 0.0, 0.0, 0.0], exists, slip_stability.is_stable(Case.RR, p))]
+    return [_solution(Case.RR, p, [0.0, 0.0, p.omega_0, 0.0, 0.0, 0.0], exists)]
 
 
 def _rs(p: Parameters) -> list[StationarySolution]:
@@ -122,7 +159,7 @@ def _rs(p: Parameters) -> list[StationarySolution]:
         return []
     omega_c = p.omega_0 if p.eta == 0 else 0.0
     exists = p.j * p.R * omega_c**2 <= p.mu * p.g
-    return [_solution(Case.RS, p, [0.0, 0.0, omega_c, 0.0, 1.0, 0.0], exists, exists, ("slip_y",))]
+    return [_solution(Case.RS, p, [0.0, 0.0, omega_c, 0.0, 1.0, 0.0], exists, ("slip_y",))]
 
 
 def _sr(p: Parameters) -> list[StationarySolution]:
@@ -139,7 +176,7 @@ def _sr(p: Parameters) -> list[StationarySolution]:
     if w_x == 0:
         return []
     x = [0.0, 0.0, p.omega_0, w_x, 0.0, 0.0]
-    return [_solution(Case.SR, p, x, _wall_carries(p), slip_stability.is_stable(Case.SR, p))]
+    return [_solution(Case.SR, p, x, _wall_carries(p))]
 
 
 def _ss(p: Parameters) -> list[StationarySolution]:
@@ -162,7 +199,7 @@ def _nr(p: Parameters) -> list[StationarySolution]:
     if p.omega_0 == 0:
         return []
     x = [0.0, 0.0, p.omega_0, _lifting_spin(p), 0.0, 0.0]
-    return [_solution(Case.NR, p, x, _wall_carries(p), slip_stability.is_stable(Case.NR, p), ("y",))]
+    return [_solution(Case.NR, p, x, _wall_carries(p), ("y",))]
 
 
 def _ns(p: Parameters) -> list[StationarySolution]:

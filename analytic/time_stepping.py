@@ -20,24 +20,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from analytic.contact_problem import Closed, Continuation, NotConvergedError, sweep, unlocked
+from analytic import contact_problem, rigid_body
+from analytic.contact_problem import Closed, Continuation, NotConvergedError
 from analytic.records import REPORT_EVERY, Event, Recorder
-from analytic.rigid_body import (
-    NOTHING,
-    Place,
-    Six,
-    apply,
-    contact_work,
-    drag_power,
-    mean,
-    plus,
-    slip_at_A,
-    slip_at_B,
-    smooth_rates,
-    state,
-    turned,
-    velocities,
-)  # fmt: skip
+from analytic.rigid_body import NOTHING, Place, Six
 from analytic.settings import Settings
 from model import Case, Contact, Flow, Parameters
 
@@ -77,7 +63,7 @@ def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Se
     longest = settings.step or math.sqrt(p.R / p.g) / 500
     times = recorder.times
     knots = np.union1d(times, flow.start[(flow.start > 0) & (flow.start < times[-1])])
-    ball = Ball(theta_0, x0[0], x0[6], velocities(x0, p))
+    ball = Ball(theta_0, x0[0], x0[6], rigid_body.velocities(x0, p))
     samples: list[tuple[float, Ball, float]] = []
     taken = 0
     try:
@@ -115,7 +101,7 @@ def _record(samples: list[tuple[float, Ball, float]], p: Parameters, recorder: R
     times, balls, steps = zip(*samples, strict=True)
     recorder.add(
         np.array(times), np.array([ball.theta for ball in balls]),
-        np.array([state(ball.y, ball.h, ball.u, p) for ball in balls]),
+        np.array([rigid_body.state(ball.y, ball.h, ball.u, p) for ball in balls]),
         np.array([ball.P for ball in balls]) / np.array(steps)[:, None],
         np.array([ball.case for ball in balls]), np.array([ball.work for ball in balls]),
     )  # fmt: skip
@@ -134,10 +120,10 @@ def step(ball: Ball, dt: float, omega_0: float, p: Parameters, restitution: floa
     except NotConvergedError as error:
         if not (A and B):
             raise
-        A = B = unlocked(error, p)
+        A = B = contact_problem.unlocked(error, p)
         new, P, middle = _solve(ball, dt, omega_0, A, B, p)
-    u = mean(old, new)
-    work = ball.work + dt * drag_power(u, middle, omega_0, p) + contact_work(u, P, p)
+    u = rigid_body.mean(old, new)
+    work = ball.work + dt * rigid_body.drag_power(u, middle, omega_0, p) + rigid_body.contact_work(u, P, p)
     # A loaded contact has met its target and, if that is rest, is closed; round-off must not open it again.
     new = (
         B.target if B and P[3] > 0 else new[0],
@@ -150,7 +136,7 @@ def step(ball: Ball, dt: float, omega_0: float, p: Parameters, restitution: floa
         return Ball(ball.theta + dt * middle.spin, y, h, new, P, case, work)
     x_i, x_k = -(p.R - ball.h) + dt * u[0], dt * u[2]
     angle = math.atan2(x_k, -x_i)
-    return Ball(ball.theta + angle, y, p.R - math.hypot(x_i, x_k), turned(new, angle), P, case, work)
+    return Ball(ball.theta + angle, y, p.R - math.hypot(x_i, x_k), rigid_body.turned(new, angle), P, case, work)
 
 
 def _solve(
@@ -163,11 +149,11 @@ def _solve(
     new, change = ball.u, math.inf
     pace = Continuation(A, B, p) if A and B else None
     for _ in range(MAX_ITERATIONS):
-        u = mean(ball.u, new)
+        u = rigid_body.mean(ball.u, new)
         x_i = -(p.R - ball.h) + dt / 2 * u[0]
         middle = Place(x_i, 0.0, -u[2] / x_i) if B else Place(x_i, dt / 2 * u[2], 0.0)
-        free = plus(ball.u, dt, smooth_rates(u, middle, omega_0, p))
-        (after, P_after), (v_h, v_y, v_k, *_) = sweep(apply(free, P, p), P, A, B, p), new
+        free = rigid_body.plus(ball.u, dt, rigid_body.smooth_rates(u, middle, omega_0, p))
+        (after, P_after), (v_h, v_y, v_k, *_) = contact_problem.sweep(rigid_body.apply(free, P, p), P, A, B, p), new
         change = max(
             p.m * abs(after[0] - v_h), p.m * abs(after[1] - v_y), p.m * abs(after[2] - v_k),
             *(abs(a - b) for a, b in zip(P_after, P, strict=True)),
@@ -191,7 +177,7 @@ def _case(A: Closed | None, B: Closed | None, u: Six, P: Six, p: Parameters) -> 
     still = ZERO_SLIP * math.sqrt(p.g * p.R)
     in_A = A is not None and (P[1] > 0 or u[1] <= 0)
     in_B = B is not None and (P[3] > 0 or u[0] <= 0)
-    roll_A, roll_B = math.hypot(*slip_at_A(u, p)) <= still, math.hypot(*slip_at_B(u, p)) <= still
+    roll_A, roll_B = math.hypot(*rigid_body.slip_at_A(u, p)) <= still, math.hypot(*rigid_body.slip_at_B(u, p)) <= still
     return Case.of(
         (Contact.R if roll_A else Contact.S) if in_A else Contact.N,
         (Contact.R if roll_B else Contact.S) if in_B else Contact.N,

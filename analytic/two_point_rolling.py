@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic import dynamics, rolling_forces, slip_stability
-from analytic.charts import Fluid, Moment, Path, second
+from analytic import dynamics, flight, rolling_forces, slip_stability
+from analytic.motion import Fluid, Moment, Path
 from model import Case, Contact, Parameters
 from model.arrays import Array
 from model.cases import TRAITS
@@ -37,7 +37,7 @@ def omega_c(t: npt.ArrayLike, at: Moment, until: float, p: Parameters, omega_0: 
     a, b = _line(at.time, until, omega_0)
     start = at.x[2]
     # k tau^2 (1 - tau k/3 + …): the lag behind a ramp, without the cancellation of tau - (1 - exp(-k tau))/k.
-    return np.asarray(start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * second(k * tau))
+    return np.asarray(start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * flight.second(k * tau))
 
 
 def path(t: Array, at: Moment, until: float, p: Parameters, omega_0: Fluid) -> Path:

@@ -1,27 +1,55 @@
-"""The main job: run the claims, keep the results, write the report."""
+"""The main job: measure, judge claim by claim, keep the results, write the report."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from compare import results
-from compare.campaign import Campaign, Progress
-from compare.catalogue import CLAIMS
-from compare.claims import Lab, Level, Verdict, judge, select
-from compare.executors import Workers
-from compare.progress import Show
+from compare.claims.catalogue import CLAIMS
+from compare.claims.claim import Claim, Outcome, Verdict
+from compare.claims.judge import judge, select
+from compare.figures.drawing import Material
+from compare.measure import programme, record
+from compare.measure.lab import Lab, Level
+from compare.measure.programme import Protocol
+from compare.measure.protocols import PROTOCOLS
+from compare.measure.record import Records
+from compare.measure.sets import sets as sets_of
+from compare.report import results
+from compare.report.results import Summary
+from compare.runs.campaign import Campaign, Progress
+from compare.runs.engines import MUJOCO, Engine
+from compare.runs.progress import Show
+from compare.runs.workers import Workers
+from compare.scorecard import scoreboard
+from model import InputError, Parameters, SimulationError
+
+Announce = Callable[[Verdict], None]
+"""Called with every verdict as soon as it is there."""
 
 
 def validate(
-    output: str | Path = "results", *, level: Level = Level.DEFAULT, claims: Sequence[str] | None = None,
-    workers: int | Workers = 1, limit: float = math.inf, progress: Show = lambda what, done, total, failed: None,
-) -> list[Verdict]:  # fmt: skip
-    """Judge claims, all that belong to the level if None, and store runs, summary and report in a directory.
+    output: str | Path = "results",
+    *,
+    level: Level = Level.DEFAULT,
+    claims: Sequence[str] | None = None,
+    sets: Mapping[str, Parameters] | None = None,
+    engine: Engine = MUJOCO,
+    workers: int | Workers = 1,
+    limit: float = math.inf,
+    progress: Show = lambda what, done, total, failed: None,
+    announce: Announce = lambda verdict: None,
+    report: bool = True,
+) -> list[Verdict]:
+    """Measure with an engine and judge claims on what was measured; store runs, measurements, summary and report.
 
-    What the directory holds already is not computed again. The summary is written after every claim, the report at
-    the end, whatever the verdicts.
+    What the directory holds already is not measured again. A claim is judged as soon as its measurements are there.
+
+    Parameters
+    ----------
+    claims : ids; all for None
+    sets : parameter sets by name; those of the level for None
 
     Raises
     ------
@@ -30,22 +58,83 @@ def validate(
     StorageError
         If the directory can't be written or holds results of another version.
     """
-    from compare import report  # here, because it draws: workers that import this package never need matplotlib
-
-    output = Path(output)
-    chosen = select(CLAIMS, claims) if claims else [claim for claim in CLAIMS if claim.level <= level]
-    summary = results.open_directory(output)
-    verdicts: list[Verdict] = []
+    output, chosen = Path(output), select(CLAIMS, claims)
+    sets = sets_of(level) if sets is None else sets
+    results.open_directory(output)
+    kept = programme.directory(output, engine, level, sets)
+    names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
+    todo, verdicts, records = list(chosen), dict[str, Verdict](), Records()
+    broken: dict[str, str] = {}
     with Campaign(output / results.RUNS, workers, limit=limit) as campaign:
-        for k, claim in enumerate(chosen, start=1):
-            what = f"claim {k}/{len(chosen)} {claim.id}"
+        lab = Lab(campaign, engine, level)
+        ahead = [p for p in programme.needed(PROTOCOLS, names) if p.level <= level]
+        while True:
+            waiting = {protocol.name for protocol in ahead}
+            for claim in [each for each in todo if not waiting & each.protocols]:
+                todo.remove(claim)
+                verdicts[claim.id] = _verdict(claim, records, broken)
+                announce(verdicts[claim.id])
+            if not ahead:
+                break
+            protocol = ahead.pop(0)
+            campaign.report = _progress(progress, protocol)
+            try:
+                records += programme.carry_out(protocol, lab, sets, records, kept)
+            except (SimulationError, InputError, ArithmeticError, LookupError, ValueError) as error:
+                # A protocol that breaks down takes its own claims with it, and no others.
+                broken[protocol.name] = f"{protocol.name}: {type(error).__name__}: {error}"
+        if level > Level.QUICK and claims is None:
+            progress("ladder of settings, error against cost", 0, 1, 0)
+            scoreboard.write(campaign, output)
+    files = [path for protocol in PROTOCOLS if (path := kept / f"{protocol.name}.h5").exists()]
+    _judged(output, level, files, report)
+    return [verdicts[claim.id] for claim in chosen]
 
-            def tell(now: Progress, what: str = what) -> None:
-                progress(what, now.done, now.total, now.failed)
 
-            campaign.report = tell
-            verdicts.append(judge(claim, Lab(campaign, level)))
-            summary = summary.with_verdicts(level.name, verdicts[-1:])
-            results.save(summary, output)
-    report.write(output)
+def judge_stored(directory: str | Path, claims: Sequence[str] | None = None) -> list[Verdict]:
+    """Judge the measurements of the last validation in a directory again, and write summary and report anew.
+
+    Raises `StorageError` if a file is missing, damaged, or was changed; `InputError` for an unknown claim.
+    """
+    directory = Path(directory)
+    chosen = {claim.id for claim in select(CLAIMS, claims)}
+    summary = results.load(directory)
+    files = [directory / name for name in summary.measurements]
+    return [v for v in _judged(directory, Level[summary.level], files, report=True) if v.claim.id in chosen]
+
+
+def material(directory: Path, verdicts: Sequence[Verdict], records: Records) -> Material:
+    """What figures of a results directory are made of."""
+    return Material(tuple(verdicts), records, directory, **scoreboard.read(directory))
+
+
+def stored_material(directory: Path) -> Material:
+    """The same from what is stored, judged again; of theory alone if nothing is."""
+    if not (directory / results.SUMMARY).exists():
+        return Material()
+    records = results.load(directory).records(directory)
+    return material(directory, judge(CLAIMS, records), records)
+
+
+def _judged(directory: Path, level: Level, files: Sequence[Path], report: bool) -> list[Verdict]:
+    records = sum((record.load(path) for path in files), Records())
+    verdicts = judge(CLAIMS, records)
+    summary = Summary.of(directory, verdicts, level, files)
+    if report:
+        from compare.report import report as page  # here, because drawing takes a second to load
+
+        page.write(material(directory, verdicts, records), summary)
+    else:
+        results.save(summary, directory)
     return verdicts
+
+
+def _verdict(claim: Claim, records: Records, broken: Mapping[str, str]) -> Verdict:
+    errors = [why for name, why in broken.items() if name in claim.protocols]
+    if errors:
+        return Verdict(claim=claim, outcome=Outcome.ERROR, error="; ".join(errors))
+    return judge([claim], records)[0]
+
+
+def _progress(show: Show, protocol: Protocol) -> Callable[[Progress], None]:
+    return lambda now: show(f"measuring {protocol.name}", now.done, now.total, now.failed)

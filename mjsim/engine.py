@@ -71,15 +71,17 @@ class Run:
         theta_0 = check_number("theta_0", theta_0, "rad")
         for x, p in zip(states, parameters, strict=True):
             _warn_of_hovering(x, p, settings)
-        models = [scene.build(p, settings) for p in parameters]
-        self._stepper = self._start(models, states, theta_0, batched)
+        scenes = [p.replace(omega_0=0.0) for p in parameters]  # the fluid is no part of a scene
+        models = {p: scene.build(p, settings) for p in dict.fromkeys(scenes)}
+        mjcf = {p: scene.mjcf(p, settings) for p in models}
+        self._stepper = self._start([models[p] for p in scenes], states, theta_0, batched)
         shown = settings.to_mapping() | {
             "t_end": float(t_end), "sample_interval": self._interval * settings.timestep,
             "x0": None, "theta_0": theta_0,
         }  # fmt: skip
         self.headers = [
-            Header("mujoco", p, flow, shown | {"x0": x.tolist()}, scene.mjcf(p, settings))
-            for p, flow, x in zip(parameters, flows, states, strict=True)
+            Header("mujoco", p, flow, shown | {"x0": x.tolist()}, mjcf[still])
+            for p, flow, x, still in zip(parameters, flows, states, scenes, strict=True)
         ]
         """Where each trajectory comes from; a failure appears here."""
         lengths = [(p.R, p.r) for p in parameters]

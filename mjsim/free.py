@@ -6,6 +6,7 @@ MuJoCo leaves the turning of the contact frame out of what drives the contact (J
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -62,7 +63,8 @@ class Free(Stepper):
 
 class _Ball:
     def __init__(self, model: Any, p: Parameters, x: Array, settings: ContactSettings, theta_0: float) -> None:
-        self.model, self.data = model, mujoco.MjData(model)
+        self.model = copy.copy(model)  # its margins move
+        self.data = mujoco.MjData(self.model)
         self._p, self._settings, self.theta = p, settings, theta_0
         world = to_world(x, theta_0, p)
         self.data.qpos[:] = np.concatenate([world.position, world.quaternion])

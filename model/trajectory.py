@@ -124,6 +124,14 @@ class Trajectory:
         """The case of every sample."""
         return [Case(code) for code in self.case]
 
+    def phases(self) -> list[tuple[Case, float, float]]:
+        """Longest stretches of samples in one case, with the times of their first and last sample, s."""
+        starts = np.flatnonzero(np.diff(self.case, prepend=-1))
+        ends = np.append(starts[1:], len(self.case)) - 1
+        return [
+            (Case(self.case[a]), float(self.time[a]), float(self.time[b])) for a, b in zip(starts, ends, strict=False)
+        ]
+
     @property
     def complete(self) -> bool:
         """Whether the run reached its end."""

@@ -1,225 +1,235 @@
-"""Figs. 9-12: stationary solutions over the flow, by their spin on the wall (91); Fig. 13: characteristic curves."""
+"""Figs. 9-12: stationary solutions over the flow, by their spin on the wall (91), with measured states upon them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analytic import branch_stability, slipping_branch
-from analytic.bifurcation import threshold_curves, thresholds
+from analytic import bifurcation, branch_stability, slipping_branch
 from compare.figures import style
+from compare.figures.drawing import Material
+from compare.measure.record import Measurement
 from model import Case, Parameters
 from model.arrays import Array
 
-_SPIN = "$\\omega_x^0\\sqrt{R/g}$"
+SETS = {"fig-9": "reference", "fig-10": "reference", "fig-11": "high-wall-friction", "fig-12": ""}
+"""The parameter set of each figure; of Fig. 12 see `RELEASED`."""
+RELEASED = Parameters.named("reference").replace(eta=0.43)
+"""eta so little over j that the branch of SS, with (12) released, is whole."""
+_CASES = {"fig-9": ("NS", "NR"), "fig-10": ("RR", "SS", "SR", "NR"), "fig-11": ("RR", "SR", "NR")}
 Quantity = Callable[[Array, Array], Array]
 """What is drawn, of slip_x and omega_c."""
 
 
-def draw_figure_9(p: Parameters | None = None) -> Figure:
-    """Cases NS and NR, off the floor."""
-    p = p or Parameters.named("reference")
-    figure, axes = _diagram(p)
-    t = thresholds(p)
-    top = 2 * t.omega_02
-    below, above = np.linspace(0.0, t.omega_02, 100), np.linspace(t.omega_02, top, 200)
-    axes.plot(below, p.eta / p.j * below * p.R / p.r, color=style.COLOURS[Case.NS], lw=2, label="NS")
-    axes.plot(above, _lifted(above, p), color=style.COLOURS[Case.NR], lw=2, label="NR")
-    style.mark(axes, t.omega_02, float(_lifted(np.array(t.omega_02), p)), "P2", (0, 8))
-    _finish(axes, {"omega_02": t.omega_02}, top)
-    return figure
+@dataclass(frozen=True)
+class Diagram:
+    """A parameter set, and the states measured with it."""
+
+    figure: str
+    p: Parameters
+    states: tuple[Measurement, ...] = ()
 
 
-def draw_figure_10(p: Parameters | None = None) -> Figure:
-    """Cases RR, SS and SR for eta < j."""
-    p = p or Parameters.named("reference")
-    figure, axes = _diagram(p)
-    t = thresholds(p)
-    top = 1.25 * t.omega_04
-    _rolling(axes, p, 0.0, t.omega_01, style.STABLE)
-    _slipping(axes, p, _spin(p))
-    _lifting(axes, p, t.omega_02, top, style.STABLE)
-    style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (6, 4))
-    style.mark(axes, t.omega_02, float(_lifted(np.array(t.omega_02), p)), "NF2", (2, 8))
-    fold = _state_of_fold(p)
-    style.mark(axes, t.omega_04, float(fold[3] + fold[2] * p.R / p.r), "F", (6, 0))
-    _finish(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in (1, 2, 4)}, top, legend="center")
-    return figure
-
-
-def draw_figure_11(p: Parameters | None = None) -> Figure:
-    """Cases RR and SR for eta > j."""
-    p = p or Parameters.named("high-wall-friction")
-    figure, axes = _diagram(p)
-    t = thresholds(p)
-    top = 1.6 * t.omega_03
-    _rolling(axes, p, 0.0, t.omega_03, style.STABLE)
-    _lifting(axes, p, t.omega_02, t.omega_03, style.UNSTABLE)
-    _lifting(axes, p, t.omega_03, top, style.STABLE)
-    axes.plot([t.omega_02], [_lifted(np.array(t.omega_02), p)], **style.POINT)
-    axes.plot([t.omega_03], [t.omega_03 * p.R / p.r], **style.POINT)
-    _finish(axes, {"omega_02": t.omega_02, "omega_03": t.omega_03}, top)
-    return figure
-
-
-def draw_figure_12(p: Parameters | None = None) -> Figure:
-    """The same with (12) released (A_y < 0 allowed), for eta so little over j that the branch of SS is whole."""
-    p = p or Parameters.named("reference").replace(eta=0.43)
-    figure, axes = _diagram(p)
-    t = thresholds(p)
-    unit = np.sqrt(p.g / p.R)
-    released = {name: float(v * unit) for name, v in threshold_curves(p, p.mu, p.eta, released=True).items()}
-    omega_01, omega_04 = released["omega_01"], released["omega_04"]
-    top, bottom = omega_04 + 0.35 * (omega_04 - t.omega_02), t.omega_02 - 0.5 * (omega_04 - t.omega_02)
-    _rolling(axes, p, bottom, t.omega_03, style.STABLE)
-    _rolling(axes, p, t.omega_03, omega_01, style.UNSTABLE, label="RR, virtual")
-    _slipping(axes, p, _spin(p))
-    _lifting(axes, p, t.omega_02, t.omega_03, style.UNSTABLE)
-    _lifting(axes, p, t.omega_03, top, style.STABLE)
-    style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (0, 6))
-    style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (-6, -2))
-    style.mark(axes, t.omega_02, float(_lifted(np.array(t.omega_02), p)), "NF2", (-4, 4))
-    fold = _state_of_fold(p, released=True)
-    style.mark(axes, omega_04, float(fold[3] + fold[2] * p.R / p.r), "F", (6, 0))
-    names = {"omega_01": omega_01, "omega_02": t.omega_02, "omega_03": t.omega_03, "omega_04": omega_04}
-    axes.set_ylim(top=1.3 * released["omega_01"] * p.R / p.r)
-    _finish(axes, names, top, bottom, "upper right")
-    return figure
-
-
-def draw_figure_13(p: Parameters | None = None, q: Parameters | None = None) -> Figure:
-    """Characteristic curves of the flowmeter: left eta < j with its hysteresis, right eta > j."""
-    p, q = p or Parameters.named("reference"), q or Parameters.named("high-wall-friction")
-    figure = style.figure(9.0, 4.2)
-    left, right = figure.subplots(1, 2)
-    t = thresholds(p)
-    top = 1.25 * t.omega_04
-    _orbit(left, Case.RR, 0.0, t.omega_01)
-    _slipping(left, p, lambda _, omega_c: omega_c)
-    _orbit(left, Case.SR, t.omega_02, top, label="SR, NR")
-    fold = _state_of_fold(p)
-    for x, low, high in (
-        (t.omega_04, float(fold[2]), t.omega_04),
-        (t.omega_02, t.omega_02, _slipping_speed(p, t.omega_02)),
-    ):
-        left.annotate(
-            "",
-            (x, high),
-            (x, low),
-            arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2},
-        )
-    _finish(left, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in (1, 2, 4)}, top)
-    left.set_title(f"$\\eta$ = {p.eta:g} < $j$", fontsize=10)
-    t = thresholds(q)
-    top = 1.6 * t.omega_03
-    _orbit(right, Case.RR, 0.0, t.omega_03)
-    # The curves of SR and NR lie on the same line; each is shown beside it, joined by dots where it begins.
-    shift = 0.04 * top
-    for case, steps, begin, line in (
-        (Case.SR, 1, t.omega_02, style.UNSTABLE), (Case.SR, 1, t.omega_03, style.STABLE),
-        (Case.NR, 2, t.omega_02, style.STABLE),
-    ):  # fmt: skip
-        end = t.omega_03 if line is style.UNSTABLE else top
-        label = f"{case.name}{', unstable' if line is style.UNSTABLE else ''}"
-        right.plot(
-            [begin, end],
-            [begin + steps * shift, end + steps * shift],
-            color=style.COLOURS[case],
-            ls=line,
-            lw=2,
-            label=label,
-        )
-    for begin in (t.omega_02, t.omega_03):
-        right.plot([begin, begin], [begin, begin + 2 * shift], color="black", ls=":", lw=1)
-    right.plot([t.omega_02], [t.omega_02 + 2 * shift], **style.POINT)
-    _finish(right, {"omega_02": t.omega_02, "omega_03": t.omega_03}, top)
-    right.set_title(f"$\\eta$ = {q.eta:g} > $j$   (SR, NR: same line, set apart)", fontsize=10)
-    for axes, of in ((left, p), (right, q)):
-        axes.set_ylabel(style.OMEGA_C)
-        style.dimensionless_x(axes, of)
-        style.dimensionless_y(axes, of, "$\\Omega_c = \\omega_c\\sqrt{R/g}$")
-    return figure
-
-
-def _diagram(p: Parameters) -> tuple[Figure, Axes]:
-    figure = style.figure(5.4, 3.9)
-    axes = figure.add_subplot()
-    axes.set_ylabel(style.OMEGA_X)
-    style.dimensionless_x(axes, p)
-    style.dimensionless_y(axes, p, _SPIN)
-    return figure, axes
-
-
-def _finish(axes: Axes, values: dict[str, float], top: float, bottom: float = 0.0, legend: str = "upper left") -> None:
-    last, step = -np.inf, 0
-    for name, value in sorted(values.items(), key=lambda item: item[1]):
-        step = 1 - step if value - last < 0.08 * (top - bottom) else 0  # names side by side would overlap
-        last = value
-        axes.axvline(value, **style.GUIDE)
-        axes.annotate(
-            style.THRESHOLD_LABELS[name], (value, 0.02 + 0.06 * step), xycoords=("data", "axes fraction"),
-            xytext=(2, 0), textcoords="offset points", fontsize=9, color="0.25",
-        )  # fmt: skip
-    axes.set_xlim(bottom, top)
-    if bottom == 0:
-        axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
-    axes.set_xlabel(style.OMEGA_0)
-    handles, labels = axes.get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
-    place: Any = legend
-    axes.legend(
-        list(once.values()), list(once), fontsize=8.5, loc=place, framealpha=0.95, ncols=2 if len(once) > 4 else 1
+def select(material: Material, figure: str) -> Diagram:
+    """The measured spins on the wall, by case and set."""
+    if figure == "fig-12":
+        return Diagram(figure, RELEASED)
+    spins = [m for m in material.select("wall_spin", case=None) if m.set == SETS[figure]]
+    return Diagram(
+        figure, Parameters.named(SETS[figure]), tuple(m for m in spins if m.conditions["case"] in _CASES[figure])
     )
 
 
-def _lifted(omega_0: Array, p: Parameters) -> Array:
-    """omega_x^0 of SR and NR (35), (46)."""
+def caption(of: Diagram) -> str:
+    """Of Figs. 9-12, with their parameters."""
+    p = of.p
+    what = {
+        "fig-9": "off the floor, where y is free: sinking along the wall (NS) passes over to riding it (NR) at P2",
+        "fig-10": "on the floor, for η < j: rolling (RR) passes over to slipping (SS) at P3, SS turns back at the fold "
+        "F and ends in SR at NF2",
+        "fig-11": "on the floor, for η > j: SR appears at ω₀₂, and RR ends at ω₀₃ where it meets SR",
+        "fig-12": "as Fig. 11, but with the floor allowed to pull (A_y < 0), which is formal: the branch of SS and its "
+        "bifurcations P3, F and NF2 reappear, and RR and SR exchange stability at NT1",
+    }[of.figure]
+    text = f"Stationary solutions {what}; {style.named(p)}, r/R = {p.r / p.R:g}. Dashed: unstable."
+    if of.figure == "fig-12" and len(_hopf(p)):
+        text += " H: a Hopf point of SS, beyond which an oscillation grows, too."
+    if of.states:
+        text += f" Marks: {len(of.states)} measured states; three standard uncertainties are smaller than the marks."
+        if of.figure in ("fig-10", "fig-11"):
+            text += " A ball on the wall (NR) has the spin of SR, also where SR is unstable."
+    return text
+
+
+def draw(of: Diagram) -> Figure:
+    """One diagram, with both scales."""
+    figure = style.figure(5.8, 4.1)
+    axes = figure.add_subplot()
+    values = {"fig-9": _figure_9, "fig-10": _figure_10, "fig-11": _figure_11, "fig-12": _figure_12}[of.figure](
+        axes, of.p
+    )
+    style.points(axes, of.states)
+    axes.set_xlabel(style.OMEGA_0)
+    axes.set_ylabel(style.OMEGA_X)
+    style.guides(axes, values)
+    if of.states:
+        style.legend(axes, loc="upper left")
+    style.dimensionless_x(axes, of.p)
+    style.dimensionless_y(axes, of.p, "$\\omega_x^0\\sqrt{R/g}$")
+    return figure
+
+
+def _figure_9(axes: Axes, p: Parameters) -> dict[str, float]:
+    t = bifurcation.thresholds(p)
+    top = 2 * t.omega_02
+    below, above = np.linspace(0.0, t.omega_02, 100), np.linspace(t.omega_02, top, 200)
+    _curve(axes, Case.NS, below, p.eta / p.j * below * p.R / p.r, at=0.35, offset=(-4, 6))
+    _curve(axes, Case.NR, above, lifted(above, p), at=0.5, offset=(4, 6))
+    style.mark(axes, t.omega_02, float(lifted(np.array(t.omega_02), p)), "P2", (0, 8))
+    _frame(axes, 0.0, top)
+    return {"omega_02": t.omega_02}
+
+
+def _figure_10(axes: Axes, p: Parameters) -> dict[str, float]:
+    t = bifurcation.thresholds(p)
+    top = 1.25 * t.omega_04
+    _rolling(axes, p, 0.0, t.omega_01)
+    slipping(axes, p, lambda slip_x, omega_c: slip_x + p.R / p.r * omega_c, "SS", (0.5, (0, -7)), (0.4, (6, 6)))
+    _lifting(axes, p, t.omega_02, top, style.STABLE, 0.85, (-5, -5))
+    style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (-6, 4))
+    style.mark(axes, t.omega_02, float(lifted(np.array(t.omega_02), p)), "NF2", (-4, -6))
+    fold = fold_state(p)
+    style.mark(axes, t.omega_04, float(fold[3] + fold[2] * p.R / p.r), "F", (7, 0))
+    _frame(axes, 0.0, top)
+    return {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_04")}
+
+
+def _figure_11(axes: Axes, p: Parameters) -> dict[str, float]:
+    t = bifurcation.thresholds(p)
+    top = 1.6 * t.omega_03
+    _rolling(axes, p, 0.0, t.omega_03)
+    _lifting(axes, p, t.omega_02, t.omega_03, style.UNSTABLE, 0.4, (6, 4), "SR, unstable")
+    _lifting(axes, p, t.omega_03, top, style.STABLE, 0.5, (4, 6))
+    axes.plot([t.omega_02], [lifted(np.array(t.omega_02), p)], **style.POINT)
+    axes.plot([t.omega_03], [t.omega_03 * p.R / p.r], **style.POINT)
+    _frame(axes, 0.0, top)
+    return {"omega_02": t.omega_02, "omega_03": t.omega_03}
+
+
+def _figure_12(axes: Axes, p: Parameters) -> dict[str, float]:
+    t = bifurcation.thresholds(p)
+    unit = np.sqrt(p.g / p.R)
+    released = {
+        name: float(v * unit) for name, v in bifurcation.threshold_curves(p, p.mu, p.eta, released=True).items()
+    }
+    omega_01, omega_04 = released["omega_01"], released["omega_04"]
+    top, bottom = omega_04 + 0.35 * (omega_04 - t.omega_02), t.omega_02 - 0.5 * (omega_04 - t.omega_02)
+    _rolling(axes, p, bottom, t.omega_03)
+    _curve(
+        axes,
+        Case.RR,
+        np.array([t.omega_03, omega_01]),
+        np.array([t.omega_03, omega_01]) * p.R / p.r,
+        style.UNSTABLE,
+        "RR, virtual",
+        0.6,
+        (-4, 4),
+    )
+    slipping(axes, p, lambda slip_x, omega_c: slip_x + p.R / p.r * omega_c, "SS", (0.5, (0, 7)), (0.35, (0, 7)))
+    _lifting(axes, p, t.omega_02, t.omega_03, style.UNSTABLE, 0.5, (-20, 60), "SR, unstable")
+    _lifting(axes, p, t.omega_03, top, style.STABLE, 0.35, (-5, -5))
+    style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
+    style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (0, -8))
+    style.mark(axes, t.omega_02, float(lifted(np.array(t.omega_02), p)), "NF2", (-6, 4))
+    fold = fold_state(p, released=True)
+    style.mark(axes, omega_04, float(fold[3] + fold[2] * p.R / p.r), "F", (7, 0))
+    for s in _hopf(p):
+        x, omega_0 = branch_stability.states(s, p)
+        style.mark(axes, float(omega_0), float(x[3] + x[2] * p.R / p.r), "H", (5, -6))
+    _frame(axes, bottom, top)
+    axes.set_ylim(0.75 * t.omega_03 * p.R / p.r, 1.15 * omega_01 * p.R / p.r)
+    return {"omega_01": omega_01, "omega_02": t.omega_02, "omega_03": t.omega_03, "omega_04": omega_04}
+
+
+def _frame(axes: Axes, bottom: float, top: float) -> None:
+    axes.set_xlim(bottom, top)
+    axes.set_ylim(0, 1.12 * axes.get_ylim()[1])
+
+
+def _hopf(p: Parameters) -> Array:
+    return np.asarray(branch_stability.hopf_places(p), dtype=float)
+
+
+def _curve(
+    axes: Axes,
+    case: Case,
+    x: Array,
+    y: Array,
+    line: str | tuple[object, ...] = style.STABLE,
+    text: str = "",
+    at: float = 0.5,
+    offset: tuple[float, float] = (0, 6),
+) -> None:
+    """A curve with its name beside it, at a share of its samples."""
+    axes.plot(x, y, color=style.COLOURS[case], ls=line, lw=2)
+    k = int(at * (len(x) - 1))
+    here = (x[0] + at * (x[1] - x[0]), y[0] + at * (y[1] - y[0])) if len(x) == 2 else (x[k], y[k])
+    style.name(axes, float(here[0]), float(here[1]), text or case.name, offset, style.COLOURS[case])
+
+
+def lifted(omega_0: Array, p: Parameters) -> Array:
+    """omega_x^0 of SR and NR (35), (46), rad s-1."""
     return np.asarray(p.g / (p.j * omega_0 * p.r))
 
 
-def _spin(p: Parameters) -> Quantity:
-    return lambda slip_x, omega_c: slip_x + p.R / p.r * omega_c
-
-
-def _rolling(
-    axes: Axes, p: Parameters, begin: float, end: float, line: str | tuple[object, ...], label: str = "RR"
-) -> None:
+def _rolling(axes: Axes, p: Parameters, begin: float, end: float) -> None:
     omega = np.array([begin, end])
-    axes.plot(omega, omega * p.R / p.r, color=style.COLOURS[Case.RR], ls=line, lw=2, label=label)
+    _curve(axes, Case.RR, omega, omega * p.R / p.r, at=0.5, offset=(-5, 5))
 
 
-def _lifting(axes: Axes, p: Parameters, begin: float, end: float, line: str | tuple[object, ...]) -> None:
+def _lifting(
+    axes: Axes,
+    p: Parameters,
+    begin: float,
+    end: float,
+    line: str | tuple[object, ...],
+    at: float,
+    offset: tuple[float, float],
+    text: str = "",
+) -> None:
     omega = np.linspace(begin, end, 200)
-    label = "SR" if line == style.STABLE else "SR, unstable"
-    axes.plot(omega, _lifted(omega, p), color=style.COLOURS[Case.SR], ls=line, lw=2, label=label)
+    _curve(axes, Case.SR, omega, lifted(omega, p), line, text, at, offset)
 
 
-def _slipping(axes: Axes, p: Parameters, quantity: Quantity) -> None:
-    """The branch of SS, its line by its eigenvalues."""
+def slipping(
+    axes: Axes,
+    p: Parameters,
+    quantity: Quantity,
+    name: str,
+    stable: tuple[float, tuple[float, float]],
+    unstable: tuple[float, tuple[float, float]],
+) -> None:
+    """The branch of SS, its line by its eigenvalues; its names each at a share of their part, with an offset."""
     s = np.linspace(-16.0, 16.0, 1601)
     states, omega_0 = branch_stability.states(s, p)
-    unstable = branch_stability.eigenvalues_at(s, p).real.max(axis=-1) > 0
+    grows = branch_stability.eigenvalues_at(s, p).real.max(axis=-1) > 0
     values = quantity(states[:, 3], states[:, 2])
-    for part, line, label in ((~unstable, style.STABLE, "SS"), (unstable, style.UNSTABLE, "SS, unstable")):
-        shown = np.where(part, values, np.nan)
+    for part, line, text, (at, offset) in (
+        (~grows, style.STABLE, name, stable),
+        (grows, style.UNSTABLE, f"{name}, unstable", unstable),
+    ):
         if part.any():
-            axes.plot(omega_0, shown, color=style.COLOURS[Case.SS], ls=line, lw=2, label=label)
+            axes.plot(omega_0, np.where(part, values, np.nan), color=style.COLOURS[Case.SS], ls=line, lw=2)
+            way = np.cumsum(np.hypot(np.gradient(omega_0), np.gradient(values)) * part)
+            k = int(np.searchsorted(way, at * way[-1]))
+            style.name(axes, float(omega_0[k]), float(values[k]), text, offset, style.COLOURS[Case.SS])
 
 
-def _orbit(axes: Axes, case: Case, begin: float, end: float, label: str = "") -> None:
-    axes.plot([begin, end], [begin, end], color=style.COLOURS[case], lw=2, label=label or case.name)
-
-
-def _state_of_fold(p: Parameters, released: bool = False) -> Array:
+def fold_state(p: Parameters, released: bool = False) -> Array:
+    """The state of SS at the fold, shape (8,)."""
     s = slipping_branch.fold(p.j, p.mu, p.eta, p.kappa, released)
     return branch_stability.states(s, p)[0]
-
-
-def _slipping_speed(p: Parameters, omega_0: float) -> float:
-    """omega_c on the stable part of the branch."""
-    (s, *_) = slipping_branch.points_at(p.replace(omega_0=omega_0 * (1 + 1e-9)).Omega_0, p.j, p.mu, p.eta, p.kappa)
-    return float(branch_stability.states(s, p)[0][2])

@@ -1,43 +1,25 @@
-"""Every figure there is: those that theory alone can draw, and those that need stored results."""
+"""All figures as files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from compare import ablation, frontier, results
-from compare.figures import characteristic, mujoco
-from compare.figures.paper import FIGURES
-from compare.results import Summary
+from compare.figures.drawing import GapError, Material
+from compare.figures.registry import FIGURES
 from model.errors import InputError, StorageError
+from model.files import write_text
 
-
-@dataclass(frozen=True)
-class Stored:
-    """A figure made from stored results; `draw` raises `StorageError`, naming the command, where they are missing."""
-
-    title: str
-    caption: str
-    draw: Callable[[Summary], Figure]
-
-
-STORED = {
-    "characteristic": Stored("Characteristic curves", characteristic.CAPTION, characteristic.draw),
-    "frontier": Stored("Error and cost", mujoco.CAPTIONS[frontier.ID], mujoco.draw_frontier),
-    "ablation": Stored("What a newcomer's settings get wrong", mujoco.CAPTIONS[ablation.ID], mujoco.draw_ablation),
-}
-"""By file name, in the order of the report."""
 FORMATS = ("svg", "pdf", "png")
+CAPTIONS = "captions.txt"
 
 
-def write(output: Path, stored: Path, formats: tuple[str, ...] = ("svg",)) -> Iterator[tuple[str, str]]:
-    """Write every figure to a directory; yield for each its name and the gap, empty if it was written.
+def write(output: Path, material: Material, formats: tuple[str, ...] = ("svg",)) -> Iterator[tuple[str, str]]:
+    """Write all figures to a directory, and their captions; yield the name of each, and why it wasn't drawn if so.
 
-    `stored` is the results directory. Raises `InputError` for an unknown format, `StorageError` if a file can't be
-    written.
+    Raises `InputError` for an unknown format, `StorageError` if a file can't be written.
     """
     for suffix in formats:
         if suffix not in FORMATS:
@@ -46,23 +28,18 @@ def write(output: Path, stored: Path, formats: tuple[str, ...] = ("svg",)) -> It
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StorageError(f"cannot write {output}: {error.strerror}") from error
-    for name, draw in FIGURES.items():
-        _save(draw(), output, name, formats)
-        yield name, ""
-    try:
-        summary = results.load(stored)
-    except StorageError as error:
-        for name in STORED:
-            yield name, f"skipped: {error}"
-        return
-    for name, wanted in STORED.items():
+    captions = []
+    for name, drawing in FIGURES.items():
         try:
-            figure = wanted.draw(summary)
-        except StorageError as error:
-            yield name, f"skipped: {error}"
+            data = drawing.select(material)
+            figure = drawing.draw(data)
+        except (GapError, StorageError) as gap:
+            yield name, f"not drawn: {gap}"
             continue
         _save(figure, output, name, formats)
+        captions.append(f"{name}\n{drawing.title}. {drawing.caption(data)}\n")
         yield name, ""
+    write_text(output / CAPTIONS, "\n".join(captions))
 
 
 def _save(figure: Figure, output: Path, name: str, formats: tuple[str, ...]) -> None:

@@ -1,6 +1,8 @@
-"""Figs. 7 and 8: which stationary solutions exist in the plane of wall friction and flow."""
+"""Figs. 7 and 8: which stationary solutions exist in the plane of wall friction and flow, and where runs ended."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -9,105 +11,184 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from scipy import ndimage
 
-from analytic.bifurcation import (
-    DoublePoint,
-    Exists,
-    case_map,
-    double_points,
-    double_points_of_equal_friction,
-    threshold_curves,
-)
+from analytic import bifurcation
+from analytic.bifurcation import Exists
+from compare.claims.claim import Check
 from compare.figures import style
+from compare.figures.drawing import Material
+from compare.runs.engines import ENGINES
 from model import Parameters
 from model.arrays import Array
 
-ETA_MAX, OMEGA_MAX = 0.8, 90.0
+_THEORY = Parameters.named("reference")
+"""Shown where nothing was measured."""
+_WIDEST = 0.8
+_SECTIONS = {0.2: "Figs. 9, 10", 0.6: "Figs. 9, 11"}
+"""The two typical sections of Fig. 7, by wall friction."""
 _LINES = {
-    "omega_01": ("#0072B2", "-"), "omega_02": ("#009E73", "--"), "omega_03": ("#E69F00", "-."),
-    "omega_04": ("#D55E00", "-"),
-}  # fmt: skip
+    "omega_01": ("#0072B2", "-"),
+    "omega_02": ("#009E73", "--"),
+    "omega_03": ("#E69F00", "-."),
+    "omega_04": ("#D55E00", (0, (1, 1))),
+}
+_BOTH = "\nbistable"
+_BISTABLE = Exists.SS | Exists.SS_BEYOND_FOLD | Exists.SR | Exists.NR
 _TINTS = {
     Exists.RR | Exists.NS: "#e8f1f8",
     Exists.SS | Exists.NS: "#fbe6dc",
-    Exists.SS | Exists.SS_BEYOND_FOLD | Exists.SR | Exists.NR: "#f4e6ef",
+    _BISTABLE: "#f4e6ef",
     Exists.RR | Exists.SR | Exists.NR: "#fdf3df",
     Exists.SR | Exists.NR: "#e3f3ec",
 }
 """Pale grounds of the regions; lines and names tell them apart without colour."""
 
 
-def draw_figure_7(p: Parameters | None = None) -> Figure:
-    """Fixed mu, eta along the axis; the two typical sections of Figs. 9-13 are the thin vertical lines."""
-    p = p or Parameters.named("reference")
-    figure = style.figure(6.2, 4.6)
-    axes = figure.add_subplot()
-    eta = np.linspace(0.0, ETA_MAX, 801)
-    _plane(axes, p, np.full(eta.shape, p.mu), eta, double_points(p))
-    for section in (0.2, 0.6):
-        axes.axvline(section, **style.GUIDE)
-    axes.set_xlabel(
-        f"wall friction $\\eta$   ($\\mu$ = {p.mu:g}, $\\kappa = c\\sqrt{{R/g}}$ = {p.kappa:.3g}, $j$ = {p.j:g})"
+@dataclass(frozen=True)
+class Plane:
+    """A plane of parameters, and where runs ended in it."""
+
+    p: Parameters
+    equal: bool
+    """Whether mu = eta (Fig. 8) or fixed (Fig. 7)."""
+    checks: tuple[Check, ...]
+
+
+def select(material: Material, figure: str) -> Plane:
+    """The plane of the measured points of a figure, "fig-7" or "fig-8"; of several sets the first."""
+    checks = [c for c in material.checks(figure) if c.measurement.quantity in ("case", "cases")]
+    chosen = tuple(c for c in checks if c.measurement.set == checks[0].measurement.set)
+    return Plane(chosen[0].measurement.parameters if chosen else _THEORY, figure == "fig-8", chosen)
+
+
+def caption(plane: Plane) -> str:
+    """Of either figure."""
+    p, runs = plane.p, len(plane.checks)
+    fixed = style.named(p, "j", "kappa") if plane.equal else style.named(p, "mu", "j", "kappa")
+    text = (
+        f"Which stationary solutions exist over ω₀ and {'η = μ' if plane.equal else 'η'}, for {fixed}. Lines: the "
+        "thresholds (84)-(88); dots: where they meet; SS*: the unstable part of SS; hatched: two stable motions (SS, "
+        "and SR or NR)."
     )
-    return figure
+    if runs:
+        failed = sum(not check.agrees for check in plane.checks)
+        text += f" Marks: the {runs} points at which runs were started; {failed or 'none'} crossed, not as predicted."
+    return text
 
 
-def draw_figure_8(p: Parameters | None = None) -> Figure:
-    """mu = eta, varied together."""
-    p = p or Parameters.named("reference")
-    figure = style.figure(6.2, 4.6)
+def draw(plane: Plane) -> Figure:
+    """Regions with their names, the thresholds between them, measured points by what was reached there."""
+    p = plane.p
+    figure = style.figure(6.4, 4.9)
     axes = figure.add_subplot()
-    eta = np.linspace(0.0, ETA_MAX, 801)
-    _plane(axes, p, eta, eta, double_points_of_equal_friction(p))
-    axes.set_xlabel(f"friction $\\eta = \\mu$   ($\\kappa = c\\sqrt{{R/g}}$ = {p.kappa:.3g}, $j$ = {p.j:g})")
+    eta = np.linspace(0.0, _WIDEST, 801)
+    mu = eta if plane.equal else np.full(eta.shape, p.mu)
+    doubles = bifurcation.double_points_of_equal_friction(p) if plane.equal else bifurcation.double_points(p)
+    highest = [point.omega_0 for point in doubles] + [c.measurement.parameters.omega_0 for c in plane.checks]
+    fastest = 1.15 * max([2.2 * float(np.sqrt(p.g / p.R)), *highest])
+    _regions(axes, p, mu, eta, np.linspace(0.0, fastest, 901))
+    for point in doubles:
+        axes.plot([point.eta], [point.omega_0], **style.POINT)
+        axes.axvline(point.eta, ymax=point.omega_0 / fastest, **style.GUIDE)
+        name = "$j$" if point.eta == p.j else "$\\eta_{cr}$"
+        axes.annotate(name, (point.eta, 0), xytext=(2, 2), textcoords="offset points", fontsize=9)
+    for section, text in () if plane.equal else _SECTIONS.items():
+        axes.axvline(section, color="0.4", lw=0.7, zorder=1)
+        axes.text(section, 0.985 * fastest, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3")
+    _points(axes, plane)
+    axes.set_xlabel("friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$")
+    axes.set_ylabel(style.OMEGA_0)
+    axes.set_xlim(0, _WIDEST)
+    axes.set_ylim(0, fastest)
+    figure.legend(loc="outside lower center", fontsize=8, ncols=6, frameon=False, handlelength=2.6)
+    style.dimensionless_y(axes, p, style.UP_TO_UNITS)
     return figure
 
 
-def _plane(axes: Axes, p: Parameters, mu: Array, eta: Array, points: list[DoublePoint]) -> None:
-    omega_0 = np.linspace(0.0, OMEGA_MAX, 901)
-    plane = case_map(p, mu, eta, omega_0).T
+def _regions(axes: Axes, p: Parameters, mu: Array, eta: Array, omega_0: Array) -> None:
+    plane = bifurcation.case_map(p, mu, eta, omega_0).T
     kinds = np.unique(plane)
     shades = ListedColormap([_TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
-    index = np.searchsorted(kinds, plane)
     axes.imshow(
-        index, cmap=shades, vmin=0, vmax=len(kinds) - 1, origin="lower", aspect="auto", interpolation="nearest",
+        np.searchsorted(kinds, plane),
+        cmap=shades,
+        vmin=0,
+        vmax=len(kinds) - 1,
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
         extent=(eta[0], eta[-1], omega_0[0], omega_0[-1]),
-    )  # fmt: skip
+        zorder=0,
+    )
+    both = (plane == _BISTABLE).astype(float)
+    if both.any():
+        hatched = axes.contourf(eta, omega_0, both, levels=[0.5, 1.5], colors="none", hatches=["////"], zorder=0.2)
+        hatched.set(edgecolor="0.75", linewidth=0)
     unit = np.sqrt(p.g / p.R)
-    for name, curve in threshold_curves(p, mu, eta).items():
+    for name, curve in bifurcation.threshold_curves(p, mu, eta).items():
         if name in _LINES:
             colour, line = _LINES[name]
-            shown = curve * unit
             # omega_03 ends rolling for eta > j only.
-            shown = np.where((eta < p.j) & (name == "omega_03"), np.nan, shown)
+            shown = np.where((eta < p.j) & (name == "omega_03"), np.nan, curve * unit)
             axes.plot(eta, shown, color=colour, ls=line, lw=1.8, label=style.THRESHOLD_LABELS[name])
     for kind in kinds:
         _label_regions(axes, plane == kind, eta, omega_0, _names(int(kind)))
-    for point in points:
-        axes.plot([point.eta], [point.omega_0], **style.POINT)
-        axes.axvline(point.eta, ymax=point.omega_0 / OMEGA_MAX, **style.GUIDE)
-        name = "$j$" if point.eta == p.j else "$\\eta_{cr}$"
-        axes.annotate(name, (point.eta, 0), xytext=(2, 2), textcoords="offset points", fontsize=9)
-    axes.set_ylabel(style.OMEGA_0)
-    axes.set_xlim(0, ETA_MAX)
-    axes.set_ylim(0, OMEGA_MAX)
-    axes.legend(loc="upper right", framealpha=0.95, fontsize=9, title="SS*: unstable", title_fontsize=8)
-    style.dimensionless_y(axes, p, "$\\Omega_0 = \\omega_0\\sqrt{R/g}$")
 
 
 def _names(kind: int) -> str:
     names = [flag.name.replace("SS_BEYOND_FOLD", "SS*") for flag in Exists if flag & kind and flag.name]
-    return "\n".join(["  ".join(names[:2]), "  ".join(names[2:])]) if len(names) > 2 else "  ".join(names)
+    text = "\n".join(["  ".join(names[:2]), "  ".join(names[2:])]) if len(names) > 2 else "  ".join(names)
+    return text + (_BOTH if kind == _BISTABLE else "")
 
 
 def _label_regions(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, text: str) -> None:
-    """Write the cases at the widest spot of every connected region that has room for them."""
+    """Write the cases at the widest spot of every connected region that has room for them, clear of sections."""
     regions, count = ndimage.label(where)
+    near = np.any([np.abs(eta - section) < 0.035 for section in _SECTIONS], axis=0)
     for k, box in zip(range(1, count + 1), ndimage.find_objects(regions), strict=True):
         # The frame counts as an edge; text is about three times as wide as high.
         inside = np.pad(regions[box] == k, 1)
         room = ndimage.distance_transform_edt(inside, sampling=(1.0, 0.55))[1:-1, 1:-1]
+        room = np.where(near[box[1]][None, :], room / 4, room)
         row, column = np.unravel_index(np.argmax(room), room.shape)
-        if room[row, column] > 14:
-            size = 8.5 if room[row, column] > 40 else 7
-            place = eta[box[1]][column], omega_0[box[0]][row]
-            axes.text(*place, text, ha="center", va="center", fontsize=size, clip_on=True)
+        if room[row, column] > 7:
+            here = float(eta[box[1]][column]), float(omega_0[box[0]][row])
+            if text.endswith(_BOTH):
+                _far_label(axes, here, text)
+            else:
+                style.name(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
+
+
+def _far_label(axes: Axes, here: tuple[float, float], text: str) -> None:
+    """A name at the top, with a line to where it belongs: the region itself is too narrow."""
+    axes.annotate(
+        text,
+        here,
+        xytext=(0.31, 0.97),
+        textcoords="axes fraction",
+        fontsize=9,
+        va="top",
+        bbox=style.HALO,
+        zorder=6,
+        arrowprops={"arrowstyle": "-", "lw": 0.7, "color": "0.4"},
+    )
+
+
+def _points(axes: Axes, plane: Plane) -> None:
+    for engine in dict.fromkeys(check.measurement.engine for check in plane.checks):
+        own = [check for check in plane.checks if check.measurement.engine == engine]
+        x, y = np.transpose([[c.measurement.parameters.eta, c.measurement.parameters.omega_0] for c in own])
+        look = ENGINES[engine]
+        axes.plot(
+            x, y, ls="none", marker=look.mark, color=look.colour, ms=4.5, mfc="white", label=f"{engine}, as predicted"
+        )
+    failed = [c.measurement.parameters for c in plane.checks if not c.agrees]
+    if failed:
+        axes.plot(
+            [p.eta for p in failed],
+            [p.omega_0 for p in failed],
+            "x",
+            color="#B3261E",
+            ms=10,
+            mew=2,
+            label="not as predicted",
+        )

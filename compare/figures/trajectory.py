@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from compare.figures import style
-from compare.inspection import phases
 from model import StorageError, Trajectory
 
 
@@ -49,7 +48,7 @@ def draw(trajectory: Trajectory) -> Figure:
     force.plot(t, trajectory.force_B[:, 0], color="#E69F00", label="B_x")
     force.plot(t, np.hypot(*trajectory.force_B[:, [1, 2]].T), color="#E69F00", ls=":", label="friction at B")
     force.set_ylabel("force (N)")
-    for case, start, end in phases(trajectory):
+    for case, start, end in trajectory.phases():
         band.axvspan(start, end, color=style.COLOURS[case], lw=0)
         if t[-1] > 0 and end - start > 0.04 * t[-1]:
             band.text((start + end) / 2, 0.5, case.name, ha="center", va="center", fontsize=8, color="white")

@@ -6,21 +6,20 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from analytic import operating_range, stationary_solutions, thresholds
 from analytic import slipping_branch as sb
+from analytic import stationary_solutions, thresholds
 from analytic.bifurcation import (
-    TABLE_5,
     Exists,
     case_map,
     double_points,
     double_points_of_equal_friction,
-    fold_without_drag,
-    special_points,
+    fold_birth,
+    hopf_points,
+    number_of_folds,
     threshold_curves,
     wall_spin,
 )
 from model import Case, InputError, Parameters
-from model.cases import codimension
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps
@@ -117,13 +116,11 @@ def test_thresholds_that_do_not_exist() -> None:
     assert thresholds(P.replace(c=0.0)).eta_cr == 0
 
 
-def test_fold_without_drag() -> None:
-    """omega_04 ~ K/c: the difference vanishes linearly with c (omega_c adds to the lag)."""
-    K = fold_without_drag(P)
-    errors = [abs(thresholds(P.replace(c=c)).omega_04 * c / K - 1) for c in (1e-2, 1e-4, 1e-6)]
-    np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 100, rtol=0.02)
-    with pytest.raises(InputError, match=r"eta = 0.6 is out of range"):
-        fold_without_drag(P.replace(eta=0.6))
+def test_fold_moves_away_with_vanishing_drag() -> None:
+    """omega_04 ~ K/c: what is left of it goes to zero linearly with c (omega_c adds to the lag)."""
+    K = thresholds(P.replace(c=1e-9)).omega_04 * 1e-9
+    errors = [abs(thresholds(P.replace(c=c)).omega_04 * c / K - 1) for c in (1e-2, 1e-4)]
+    assert errors[0] / errors[1] == pytest.approx(100, rel=0.02)
 
 
 def test_slope_is_the_derivative() -> None:
@@ -165,32 +162,48 @@ def test_solutions_appear_and_vanish_at_the_thresholds(eta: float) -> None:
         assert change(t.omega_03) == {"RR": -1}
 
 
-def test_table_5() -> None:
-    assert [(b.threshold, b.abbreviation, b.codimension) for b in TABLE_5] == [
-        ("omega_01", "P3", 3), ("omega_02", "NF2", 2), ("omega_02", "P2", 2), ("omega_03", "NT1", 1),
-        ("omega_04", "F", None),
-    ]  # fmt: skip
-    for b in TABLE_5:
-        if b.codimension is not None:
-            dimensions = sorted(b.cases, key=lambda case: codimension(case, Case.NN))
-            assert b.codimension == abs(codimension(dimensions[1], dimensions[0])), b.abbreviation
+@pytest.mark.parametrize("trial", range(40))
+def test_one_fold_beyond_eta_cr_and_none_before(trial: int) -> None:
+    """Proposition 7, and that omega_04 is unique, by counting; omega_04 > omega_02 > omega_01."""
+    rng = np.random.default_rng(trial)
+    j, mu, kappa = rng.uniform(0.1, 2 / 3), 10 ** rng.uniform(-1.5, 0.5), 10 ** rng.uniform(-3, 0.5)
+    p = P.replace(j=float(j), mu=float(mu), c=float(kappa * np.sqrt(P.g / P.R)))
+    p = p.replace(eta=float(p.j * rng.uniform(0.001, 0.999)))
+    t = thresholds(p)
+    assert number_of_folds(p) == (p.eta > t.eta_cr) == np.isfinite(t.omega_04)
+    if p.eta > t.eta_cr:
+        assert t.omega_04 > t.omega_02 > t.omega_01
 
 
-@pytest.mark.parametrize(
-    ("eta", "expected"),
-    [(0.2, ["P3", "NF2", "P2", "F"]), (0.02, ["P3", "P2"]), (0.6, ["P2", "NT1"])],
-)
-def test_special_points(eta: float, expected: list[str]) -> None:
-    points = special_points(P.replace(eta=eta))
-    assert [point.bifurcation.abbreviation for point in points] == expected
-    for point in points:
-        assert point.precision <= 1e-12
-        assert point.bifurcation.abbreviation in str(point)
+@pytest.mark.parametrize("mu", [0.05, 0.2, 1.0])
+@pytest.mark.parametrize("c", [1e-3, 0.3, 1.0, 4.0])
+def test_fold_birth_is_eta_cr(mu: float, c: float) -> None:
+    """(87) from the eigenvalue of f_SS that vanishes where the branch meets SR; nan where eta_cr >= j."""
+    p = P.replace(mu=mu, c=c)
+    eta_cr = thresholds(p).eta_cr
+    if eta_cr < p.j:
+        assert fold_birth(p) == pytest.approx(eta_cr, rel=1e-12)
+    else:
+        assert np.isnan(fold_birth(p))
+    assert np.isnan(fold_birth(p.replace(mu=0.0)))
 
 
-def test_hopf_is_reported() -> None:
-    points = [q for q in special_points(P.replace(mu=3.0, eta=0.35)) if q.bifurcation.name == "Hopf"]
-    assert len(points) == 2
+def test_the_branch_is_asked_for_where_there_is_one() -> None:
+    for ask in (number_of_folds, hopf_points):
+        for change in ({"eta": 0.6}, {"eta": 0.0}, {"mu": 0.0}, {"c": 0.0}):
+            with pytest.raises(InputError, match="SS has a branch from RR to SR for"):
+                ask(P.replace(**change))
+
+
+def test_hopf_points() -> None:
+    """Between the two the part of the branch before the fold is unstable."""
+    assert hopf_points(P) == []
+    p = P.replace(mu=3.0, eta=0.35)
+    first, last = hopf_points(p)
+    assert thresholds(p).omega_01 < first < last < thresholds(p).omega_04
+    for omega_0, stable in ((0.999 * first, True), (0.5 * (first + last), False), (1.001 * last, True)):
+        found = [s for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.case is Case.SS]
+        assert any(s.stable for s in found) == stable
 
 
 @pytest.mark.parametrize("equal", [False, True])
@@ -224,16 +237,6 @@ def test_map_against_the_solutions(mu: float | None) -> None:
             if found != Exists(int(flags)):
                 wrong.append((e, w, found, Exists(int(flags))))
     assert not wrong
-
-
-def test_operating_range() -> None:
-    assert operating_range(P) == thresholds(P).omega_01
-    assert operating_range(P.replace(eta=0.6)) == np.inf
-    assert operating_range(P.replace(mu=0.0)) == np.inf
-    assert operating_range(P.replace(c=0.0)) == 0
-    for omega_0, holds in ((operating_range(P) * 0.999, True), (operating_range(P) * 1.001, False)):
-        found = [s for s in stationary_solutions(P.replace(omega_0=omega_0)) if s.exists and s.slip_stable]
-        assert all(np.isclose(s.x[2], omega_0, rtol=1e-12) for s in found) == holds
 
 
 def test_wall_spin() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from analytic import charts, contact_forces, two_point_rolling, vector_field
+from analytic import charts, contact_forces, flight, motion, two_point_rolling, vector_field
 from analytic.rigid_body import energy, velocities
 from model import Case, Contact, Parameters
 from model.cases import TRAITS
@@ -22,7 +22,7 @@ def ramp(t: float) -> float:
     return P.omega_0 + 3.0 * t
 
 
-def moment(case: Case, seed: int) -> charts.Moment:
+def moment(case: Case, seed: int) -> motion.Moment:
     """A random state of the case."""
     rng = np.random.default_rng(seed)
     values = dict(zip(VARIABLES, rng.normal(size=8) * [0.1, 0.3, 10, 20, 20, 20, 0, 0.3], strict=True))
@@ -31,7 +31,7 @@ def moment(case: Case, seed: int) -> charts.Moment:
     if case is Case.RN:
         x[5] = -x[7] / P.r
     alpha, beta = slip_directions(np.array(x), P)
-    return charts.Moment(
+    return motion.Moment(
         0.3, 1.1, x, float(alpha) if case.A is Contact.S else math.nan, float(beta) if case.B is Contact.S else math.nan
     )
 
@@ -73,7 +73,7 @@ def test_vanishing_slip_has_a_direction(case):
         x[3], x[5] = 0.0, -(x[7] + x[1]) / P.r
     if case.B is Contact.S:
         x[4] = x[5] = 0.0
-    at = charts.Moment(at.time, at.theta, x, at.alpha, at.beta)
+    at = motion.Moment(at.time, at.theta, x, at.alpha, at.beta)
     chart = charts.chart(case, at, P, ramp, FLOOR)
     assert chart.least_slip(chart.start) == pytest.approx(0.0, abs=1e-15)
     path = chart.path(np.array([at.time]), np.array(chart.start)[:, None])
@@ -88,8 +88,8 @@ def test_vanishing_slip_has_a_direction(case):
 def test_fall_ends_on_the_floor(c, y, v_y):
     """y'' = -g - c y' by its textbook solution, in a form that needs no small-c care: the work-energy of the fall."""
     p = P.replace(c=c)
-    t = charts.fall_time(y, v_y, p)
-    height, speed = charts.fall(t, y, v_y, p)
+    t = flight.fall_time(y, v_y, p)
+    height, speed = flight.fall(t, y, v_y, p)
     scale = y + v_y**2 / p.g
     assert t > 0
     assert abs(height) <= 1e-14 * scale
@@ -97,7 +97,7 @@ def test_fall_ends_on_the_floor(c, y, v_y):
     # Momentum: v(t) - v(0) = -g t - c (y(t) - y(0)).
     assert speed - v_y == pytest.approx(-p.g * t - c * (0 - y), rel=1e-12)
     # And the height is the integral of the velocity.
-    drop = quad(lambda s: charts.fall(s, y, v_y, p)[1], 0.0, t, epsabs=1e-12 * scale, epsrel=1e-12)[0]
+    drop = quad(lambda s: flight.fall(s, y, v_y, p)[1], 0.0, t, epsabs=1e-12 * scale, epsrel=1e-12)[0]
     assert drop == pytest.approx(-y, abs=2e-12 * scale)
 
 
@@ -105,7 +105,7 @@ def test_fall_ends_on_the_floor(c, y, v_y):
 def test_two_point_rolling_solves_its_equation(c):
     """Along a ramp: omega_c' = -c (omega_c - omega_0)/(1+2j), azimuth and work by their definitions."""
     p = P.replace(c=c)
-    at, until = charts.Moment(0.3, 1.1, [0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0]), 4.0
+    at, until = motion.Moment(0.3, 1.1, [0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0]), 4.0
     t = np.linspace(0.3, until, 50)[1:]
     path = two_point_rolling.path(t, at, until, p, ramp)
     k = c / (1 + 2 * p.j)

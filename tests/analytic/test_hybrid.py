@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from analytic import rolling_forces, simulate, stationary_solutions, two_point_rolling, vector_field
 from analytic.dynamics import newton_euler
-from model import Case, Flow, Parameters
+from model import Case, Flow, Parameters, SimulationError
 
 P = Parameters.named("reference")
 RTOL = 1e-9
@@ -175,8 +175,9 @@ def test_costs_at_most_twice_a_bare_integrator(monkeypatch):
         calls.append(None)
         return newton_euler(*args)
 
-    monkeypatch.setattr("analytic.charts.newton_euler", counted)
+    monkeypatch.setattr("analytic.dynamics.newton_euler", counted)
     simulate(p, x0, 10.0, rtol=rtol, atol=rtol / 1e3, sample_interval=10.0)
+    monkeypatch.undo()
     natural = np.array([1.0, p.R / p.r, p.R / p.r, p.R / p.r]) * math.sqrt(p.g / p.R)
     bare = solve_ivp(f_ss(p), (0, 10), x0[2:], method="LSODA", rtol=rtol, atol=rtol / 1e3 * natural)
     assert 0 < len(calls) <= 2 * bare.nfev
@@ -255,3 +256,18 @@ def test_near_the_axis_is_an_ordinary_place():
     start = rho * np.exp(0.4j)
     velocity = np.exp(0.4j) * (-radial + 1j * along)
     np.testing.assert_allclose(place, start + velocity * run.time, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("change", "omega_c", "message"),
+    [
+        ({"mu": 1.4, "eta": 0.066, "j": 0.45, "c": 0.3, "omega_0": 16.7, "r": 0.049}, 9.9, "RR ends 10 times"),
+        ({"mu": 2.4, "eta": 0.057, "j": 0.63, "c": 0.59, "omega_0": 26.9, "r": 0.033}, 26.7, "case changes 1000 times"),
+    ],
+)
+def test_chatter_is_given_up(change, omega_c, message):
+    """Where mu > 1, rolling and slipping are both consistent off the stationary point: the run says so and ends."""
+    p, x0 = P.replace(R=0.1, **change), [0, 0, omega_c, 0, 0, 0]
+    with pytest.raises(SimulationError, match=rf"{message} in .* s \(leave_rolling = 'slip-stability'\)"):
+        simulate(p, x0, 10.0, leave_rolling="slip-stability")
+    assert simulate(p, x0, 10.0).header.failure == ""

@@ -190,7 +190,7 @@ def test_energy_and_forces_agree_on_omega_01(mu: float, eta: float) -> None:
         _, greatest = slip.extrema(Case.RR, Case.SS, rolling(omega), q, Metric.ENERGY, closed=True)
         assert (greatest.gamma < 0) == holds
         assert (slip.stick_margin(Case.RR, rolling(omega), q) > 0) == holds
-        assert slip.is_stable(Case.RR, q) == holds
+        assert (slip.stability(Case.RR, q) is slip.SlipStability.STABLE) == holds
         if factor > 0.9:  # the direction in which it ends
             np.testing.assert_allclose(np.abs(greatest.n / np.linalg.norm(greatest.n)), [0, 0, 1], atol=1e-3)
 
@@ -204,7 +204,7 @@ def test_gamma_and_forces_agree_on_omega_03(eta: float) -> None:
         q = p.replace(omega_0=omega)
         assert (slip.extrema(Case.RR, Case.SR, rolling(omega), q)[1].gamma < 0) == holds
         assert (slip.stick_margin(Case.RR, rolling(omega), q) > 0) == holds
-        assert slip.is_stable(Case.RR, q) == holds
+        assert (slip.stability(Case.RR, q) is slip.SlipStability.STABLE) == holds
         if omega < thresholds(p).omega_02:
             assert slip.extrema(Case.RR, Case.SS, rolling(omega), q, Metric.ENERGY, closed=True)[1].gamma < 0
 
@@ -216,7 +216,7 @@ def test_three_routes_agree_on_omega_02(case: Case) -> None:
         p = P.replace(omega_0=factor * thresholds(P).omega_02)
         (x,) = (s.x for s in stationary_solutions(p) if s.case is case)
         assert (slip.stick_margin(case, x, p) > 0) == holds
-        assert slip.is_stable(case, p) == holds
+        assert (slip.stability(case, p) is slip.SlipStability.STABLE) == holds
         if case is Case.NR:
             for metric in Metric:
                 assert (slip.extrema(case, outer, x, p, metric)[1].gamma < 0) == holds
@@ -319,26 +319,24 @@ def test_limit_directions_of_nr_to_ns() -> None:
         np.testing.assert_allclose(push.gamma, extreme.gamma, rtol=1e-8)
 
 
-def test_onset_direction_is_a_limit_direction_at_the_threshold() -> None:
-    """Where NR reaches its cone, slip begins against the friction: along the greatest gamma, which is 0 there."""
-    p = P.replace(omega_0=30.0, eta=0.5)
-
-    def margin(omega_c: float) -> float:
-        return slip.stick_margin(Case.NR, [0, 0, omega_c, 20.0, 0, 0], p)
-
-    omega_c = brentq(margin, 5.0, 80.0, xtol=1e-13)
-    x = [0, 0, omega_c, 20.0, 0, 0]
-    beta = slip.onset_direction(Case.NR, x, p)["beta"]
-    _, greatest = slip.extrema(Case.NR, Case.NS, x, p)
-    np.testing.assert_allclose(greatest.n, [np.sin(beta), np.cos(beta)], atol=1e-5)
-    assert abs(greatest.gamma) < 1e-8 * p.g / (p.j * p.r)
-
-
-def test_onset_from_two_point_rolling() -> None:
-    """At omega_01 both contacts are at their limit and slip along slip_z > 0: alpha = beta = 0."""
-    omega = thresholds(P).omega_01 * (1 - 1e-12)
-    angles = slip.onset_direction(Case.RR, rolling(omega), P.replace(omega_0=omega))
-    np.testing.assert_allclose([angles["alpha"], angles["beta"]], 0, atol=1e-6)
+@pytest.mark.parametrize("eta", [0.2, 0.6])
+def test_definition_3(eta: float) -> None:
+    """Neutral on the thresholds (67), (74), (82), (61) and nowhere near them; and where there is no friction."""
+    p = P.replace(eta=eta)
+    t, SlipStability = thresholds(p), slip.SlipStability
+    edge = t.omega_01 if eta < p.j else t.omega_03
+    for case, value, below, above in (
+        (Case.RR, edge, SlipStability.STABLE, SlipStability.UNSTABLE),
+        (Case.NR, t.omega_02, SlipStability.UNSTABLE, SlipStability.STABLE),
+        (Case.SR, t.omega_02, SlipStability.UNSTABLE, SlipStability.STABLE),
+    ):
+        for factor, expected in ((1 - 1e-12, below), (1.0, SlipStability.NEUTRAL), (1 + 1e-12, above)):
+            assert slip.stability(case, p.replace(omega_0=factor * value)) is expected
+    assert slip.stability(Case.RR, p.replace(omega_0=0.0)) is SlipStability.NEUTRAL
+    assert slip.stability(Case.RR, p.replace(omega_0=5.0, eta=0.0)) is SlipStability.NEUTRAL
+    assert slip.stability(Case.RR, p.replace(omega_0=5.0, eta=0.6, mu=0.0)) is SlipStability.NEUTRAL
+    assert slip.stability(Case.RS, p.replace(omega_0=0.0)) is SlipStability.STABLE
+    assert slip.stability(Case.SS, p) is slip.stability(Case.NS, p) is SlipStability.STABLE
 
 
 def test_stick_margins_of_one_rolling_contact() -> None:

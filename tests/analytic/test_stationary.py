@@ -7,11 +7,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analytic import Stability, StationarySolution, contact_forces, stationary_solutions, thresholds, vector_field
+from analytic import (
+    SlipStability,
+    Stability,
+    StationarySolution,
+    attractors,
+    contact_forces,
+    slowest_time_constant,
+    solution,
+    stationary_solutions,
+    thresholds,
+    vector_field,
+)
 from analytic import branch_stability as stability
 from analytic.jacobian import jacobian
 from analytic.slipping_branch import branch, fold, points_at
-from model import Case, Parameters
+from model import Case, InputError, Parameters
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, slip_directions, slip_speeds
 
@@ -119,6 +130,78 @@ def test_proposition_6() -> None:
     assert not of_case(P.replace(omega_0=32.0), Case.NS)
 
 
+# --- one solution, and those that attract -----------------------------------------------------------------------
+
+
+def test_solution_of_a_case() -> None:
+    """The stable one; the unstable one on request; below omega_02 that of NR formally."""
+    p = P.replace(omega_0=35.0)
+    first, second = of_case(p, Case.SS)
+    assert np.array_equal(solution(p, Case.SS).x, first.x)
+    assert np.array_equal(solution(p, Case.SS, stable=False).x, second.x)
+    slow = P.replace(omega_0=9.0)
+    assert solution(slow, Case.NR, formal=True).exists is False
+    for ask, message in (
+        (
+            lambda: solution(slow, Case.NR),
+            r"case NR has no stable stationary solution at omega_0 = 9 rad s-1 \(mu",
+        ),
+        (lambda: solution(slow, Case.SS), "case SS has no stable stationary solution"),
+        (lambda: solution(slow, Case.RR, stable=False), "case RR has no unstable stationary solution"),
+        (lambda: solution(p, Case.NN), "case NN has no stable"),
+    ):
+        with pytest.raises(InputError, match=message):
+            ask()
+
+
+@pytest.mark.parametrize(
+    ("eta", "omega_0", "expected"),
+    [
+        (0.2, 9.0, {Case.RR}), (0.2, 20.0, {Case.SS}), (0.2, 35.0, {Case.SS, Case.SR, Case.NR}),
+        (0.2, 50.0, {Case.SR, Case.NR}), (0.6, 12.0, {Case.RR}), (0.6, 20.0, {Case.RR, Case.NR}),
+        (0.6, 25.0, {Case.SR, Case.NR}), (0.6, 0.0, {Case.RR, Case.RS}),
+    ],
+)  # fmt: skip
+def test_attractors(eta: float, omega_0: float, expected: set[Case]) -> None:
+    """The regions of Figs. 7, 10 and 11; no sinking ball among them, nor the far part of SS."""
+    found = attractors(P.replace(eta=eta, omega_0=omega_0))
+    assert {s.case for s in found} == expected
+    assert len(found) == len(expected)
+
+
+def test_slowest_time_constant() -> None:
+    """The groups of time in theory.md: RR, NR's swing; inf where nothing decays."""
+    p = P.replace(omega_0=9.0)
+    assert slowest_time_constant(solution(p, Case.RR)) == pytest.approx((1 + 2 * p.j) / p.c)
+    fast = P.replace(omega_0=45.0)
+    assert slowest_time_constant(solution(fast, Case.NR)) == pytest.approx(2 * (1 + p.j) / p.c)
+    assert slowest_time_constant(solution(P.replace(c=0.0), Case.RR)) == np.inf
+
+
+@pytest.mark.parametrize(("omega_0", "c"), [(3.0, 0.1), (9.0, 1.0), (20.0, 4.0), (30.0, 1.0)])
+def test_time_constants_of_ns(omega_0: float, c: float) -> None:
+    """c, and the roots of x^2 - (1 + q (1+j)/j) x + q/j in units of c: the slower one is that of the spin slip_y."""
+    p = P.replace(omega_0=omega_0, c=c)
+    q = p.eta * p.Omega_0**2 / (1 - p.eta * p.Omega_0**2)
+    expected = np.sort([1.0, *np.roots([1.0, -(1 + q * (1 + p.j) / p.j), q / p.j])])
+    s = solution(p, Case.NS)
+    decaying = -s.eigenvalues.real[np.abs(s.eigenvalues.imag) < 0.5 * omega_0] / c
+    np.testing.assert_allclose(decaying, expected, rtol=1e-10)
+    assert slowest_time_constant(s) == pytest.approx(1 / (c * expected[0]), rel=1e-10)
+
+
+def test_neutral_with_respect_to_slipping() -> None:
+    """Definition 3: a ball at rest that rolls may as well spin; and the end of rolling, to round-off."""
+    (s,) = of_case(P.replace(omega_0=0.0), Case.RR)
+    assert s.slip_stability is SlipStability.NEUTRAL
+    (s,) = of_case(P.replace(omega_0=thresholds(P).omega_01), Case.RR)
+    assert s.slip_stability is SlipStability.NEUTRAL
+    assert s.slip_stable
+    (s,) = of_case(P.replace(omega_0=14.0), Case.RR)
+    assert s.slip_stability is SlipStability.UNSTABLE
+    assert not s.slip_stable
+
+
 # --- eigenvalues -----------------------------------------------------------------------------------------------
 
 
@@ -205,6 +288,16 @@ def test_hopf_points_exist_for_rough_floors_only() -> None:
         assert np.abs(pair.real).max() <= 1e-9 * np.abs(pair).max()
     between = stability.eigenvalues_at(np.mean(places), p)
     assert np.sum(between.real > 0) == 2
+
+
+def test_hopf_point_of_figure_12() -> None:
+    """With (12) released: one pair crosses, so that the number of unstable directions changes by two there."""
+    p = P.replace(eta=0.43)
+    (place,) = stability.hopf_places(p)
+    before, after = (np.sum(stability.eigenvalues_at(place + d, p).real > 0) for d in (-0.01, 0.01))
+    assert abs(before - after) == 2
+    with pytest.raises(InputError, match=r"eta = 0\.6 is out of range: SS has no whole branch"):
+        stability.hopf_places(P.replace(eta=0.6))
 
 
 # --- the branch without loss of digits -------------------------------------------------------------------------

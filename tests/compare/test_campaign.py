@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.campaign import FAILURES, Campaign, Failure, Progress, run_batch
-from compare.executors import dask
-from compare.tasks import Task
+from compare.runs.campaign import FAILURES, Campaign, Failure, Progress, run_batch
+from compare.runs.tasks import Task
+from compare.runs.workers import dask
 from model import InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 
@@ -113,7 +113,7 @@ PROGRAM = """
 import sys
 sys.path.insert(0, {here!r})
 import test_campaign
-from compare.campaign import Campaign
+from compare.runs.campaign import Campaign
 if __name__ == "__main__":
     with Campaign({directory!r}, workers=2, batch=1) as campaign:
         campaign.complete(test_campaign.tasks())
@@ -163,7 +163,7 @@ def deadly(tasks, directory, limit):
 def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
     tmp_path: Path, undisturbed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("compare.campaign.run_batch", deadly)
+    monkeypatch.setattr("compare.runs.campaign.run_batch", deadly)
     with Campaign(tmp_path, workers=2, batch=3) as campaign:
         failures = campaign.complete(tasks())
     assert failures == [Failure(tasks()[2], "its worker died (killed, or out of memory)")]
@@ -255,8 +255,8 @@ def test_bad_campaigns(tmp_path: Path) -> None:
 
 LONG_PROGRAM = """
 import sys
-from compare import tasks
-from compare.campaign import Campaign
+from compare.runs import tasks
+from compare.runs.campaign import Campaign
 from mjsim.journal import Journal
 from model import Parameters
 tasks.LONG = 1000
@@ -296,7 +296,7 @@ def test_a_long_run_that_is_killed_goes_on_to_the_bit(tmp_path: Path) -> None:
 
 def test_interrupted_by_the_keyboard(tmp_path: Path) -> None:
     command = [
-        sys.executable, "-m", "compare.cli", "sweep", "--vary", "omega_0=5:10:200", "--batch", "2", "--workers", "2",
+        sys.executable, "-m", "compare.commands.cli", "sweep", "--vary", "omega_0=5:10:200", "--batch", "2", "--workers", "2",
         "--time", "2", "-o", str(tmp_path),
     ]  # fmt: skip
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -317,8 +317,8 @@ def test_interrupted_by_the_keyboard(tmp_path: Path) -> None:
 def test_ten_million_steps_stay_small(tmp_path: Path) -> None:
     program = f"""
 import resource
-from compare.campaign import Campaign
-from compare.tasks import Task
+from compare.runs.campaign import Campaign
+from compare.runs.tasks import Task
 from model import Parameters
 task = Task(
     engine="mujoco", parameters=Parameters.named("reference"), x0=(0.0,) * 8, t_end=1e4, sample_interval=1e-2

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import xarray
 
-from compare import cli
-from compare.sweep import FIELDS
+from compare.commands import cli
+from compare.runs.sweep import FIELDS
 from model import Parameters, Trajectory, storage
 from model.trajectory import columns
 
@@ -96,7 +96,8 @@ def test_a_run_that_diverges_is_kept_and_told(tmp_path: Path, capsys: pytest.Cap
 
 INTERRUPTED = """
 import os, signal, sys
-from compare import cli, tasks
+from compare.commands import cli, simulate
+from compare.runs import tasks
 from mjsim.journal import Journal
 tasks.LONG, stop_after = 1000, int(sys.argv[1])
 tasks.Journal = lambda directory: Journal(directory, interval=0.0)
@@ -109,7 +110,7 @@ def pressing(tasks, paths, stop):
             os.kill(os.getpid(), signal.SIGINT)
         return stop()
     return store(tasks, paths, stop=pressed)
-cli.store = pressing
+simulate.store = pressing
 raise SystemExit(cli.main(["simulate", "--time", "6", "--sample-interval", "0.005", "-o", sys.argv[2]]))
 """
 
@@ -151,7 +152,7 @@ def test_a_long_description_is_that_of_its_parts(
     assert cli.main(["simulate", "--time", "1", "--omega-0", "20", "-o", run, "--json"]) == 0
     whole = capsys.readouterr().out
     assert len(json.loads(whole)["cases"]) > 1
-    monkeypatch.setattr("compare.inspection.PART", 7)
+    monkeypatch.setattr("compare.view.inspection.PART", 7)
     assert cli.main(["inspect", run, "--json"]) == 0
     assert capsys.readouterr().out == whole
 
@@ -178,8 +179,8 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str], name: str) -> Non
         ("simulate --time=-1", "t_end = -1 s is out of range"),
         ("simulate --timestep=-1", "timestep"),
         ("simulate --sample-interval=1e-9", "sample_interval = 1e-09 s is out of range"),
-        ("simulate --engine event --timestep 0.1", "event has a tolerance"),
-        ("simulate --restitution 0.5", "not for mujoco"),
+        ("simulate --engine event --timestep 0.1", "--timestep is for mujoco and mujoco-defaults and time-stepping, not for event"),
+        ("simulate --restitution 0.5", "--restitution is for event and time-stepping, not for mujoco"),
         ("simulate --engine event --restitution 1.5", "restitution = 1.5 1 is out of range"),
         ("simulate --flow absent.txt", "cannot read the flow from absent.txt"),
         ("simulate --flow broken.toml", "broken.toml is not a table of numbers"),

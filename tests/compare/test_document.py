@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from compare import accuracy, document
-from compare.campaign import Campaign
-from compare.claims import Lab, Level
+from compare.runs.campaign import Campaign
+from compare.scorecard import accuracy, document
+from compare.scorecard.accuracy import RANGES, REACHED
 from model import InputError
 
 PAGE = Path(__file__).parents[2] / "docs" / "mujoco-settings.md"
@@ -37,19 +39,44 @@ def test_the_page_has_a_place_for_every_table(tmp_path: Path) -> None:
     assert page.read_text("utf-8").count(document.markdown(ROWS)) == len(document.TABLES)
 
 
-def test_random_sets_are_in_range_and_settle() -> None:
-    sets = accuracy._random(6)
-    assert sets == accuracy._random(6)
+def test_random_sets_are_in_range() -> None:
+    sets = accuracy.random_parameters(6)
+    assert sets == accuracy.random_parameters(6)
     for p in sets:
         unit = np.sqrt(p.g / p.R)
         values = {"R": p.R, "r/R": p.r / p.R, "j": p.j, "mu": p.mu, "eta": p.eta, "g": p.g, "kappa": p.c / unit}
-        assert all(accuracy.LOW[name] <= value <= accuracy.HIGH[name] for name, value in values.items())
+        assert all(RANGES[name][0] <= value <= RANGES[name][1] for name, value in values.items())
 
 
-def test_the_transient_converges_and_is_extrapolated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(accuracy, "FINE", (2e-3, 1e-3, 5e-4))
+def test_the_transient_converges_and_is_extrapolated(tmp_path: Path) -> None:
+    steps = (2e-3, 1e-3, 5e-4)
     with Campaign(tmp_path, workers=0) as campaign:
-        _, *rows, last = accuracy.transient(Lab(campaign, Level.QUICK))
+        head, *rows, last = accuracy.transient(campaign, steps)
     errors = [float(row[1]) for row in rows]
-    assert float(rows[-1][2]) > 1.8
-    assert float(last[1]) < errors[-1] < errors[0]
+    assert errors == sorted(errors, reverse=True)
+    for before, row in itertools.pairwise(rows):
+        # The order as it is written, to a digit, is the slope of the errors as they are written, to two.
+        slope = math.log2(float(before[1]) / float(row[1]))
+        assert float(row[2]) == pytest.approx(slope, abs=0.05 + 0.1 / math.log(2))
+        assert slope > 1.8
+    assert float(last[1]) < errors[-1]
+    assert len(head) == len(last)
+
+
+def test_states_are_reached_from_rest_and_from_near(tmp_path: Path) -> None:
+    with Campaign(tmp_path, workers=0) as campaign:
+        head, row = accuracy.reached(campaign, REACHED[:1], [4e-3])
+    assert dict(zip(head, row, strict=True))["state"] == REACHED[0].name
+    assert row[-1] == "0.0%"
+
+
+def test_splits_lie_in_the_admissible_interval(tmp_path: Path) -> None:
+    with Campaign(tmp_path, workers=0) as campaign:
+        _, row = accuracy.force_split(campaign, [10.0])
+    least, greatest = (float(end) for end in row[1].split(" … "))
+    digit = 1e-4  # of what is written
+    assert all(least - digit <= float(chosen) <= greatest + digit for chosen in row[2:])
+
+
+def test_numbers_of_tables() -> None:
+    assert [accuracy.number(value) for value in (1.23e-5, 1e-16, math.nan)] == ["1.2e-05", "< 1e-14", "diverged"]

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from compare import cli
+from compare.commands import cli
 from model import InputError, Parameters, StorageError, storage
 from model.trajectory import Trajectory, columns
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,9 @@ from PIL import Image
 
 import analytic
 import mjsim
-from compare import cli, opengl, render
+from compare.commands import cli
 from compare.figures import style
+from compare.view import motion, opengl, render
 from model import Case, InputError, Parameters, Trajectory, storage
 from model.kinematics import angular_velocity
 
@@ -77,7 +77,8 @@ def test_the_ball_turns_with_its_angular_velocity(reference: Parameters) -> None
     p = reference.replace(omega_0=5.0)
     x = np.array([0, 0, 5.0, 0, 0, 0])
     run = mjsim.simulate(p, x, 0.05, sample_interval=0.005)
-    times, rotations = render._rotations(run)
+    turning = motion.Turning.of(run)
+    times, rotations = turning.times, turning.rotations
     assert times[-1] == pytest.approx(0.05)
     step = (rotations[1] * rotations[0].inv()).magnitude() / (times[1] - times[0])
     # The rotation vector over a step is that of its middle, exact to the second order.
@@ -85,24 +86,21 @@ def test_the_ball_turns_with_its_angular_velocity(reference: Parameters) -> None
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("name", "options", "message"),
     [
-        (["-o", "film.mp4"], r"cannot write film\.mp4: a picture is a \.png, a film a \.gif"),
-        (["-o", "nowhere/p.png"], "there is no directory nowhere"),
-        (["-o", "p.png", "--at", "9"], r"time = 9 s is out of range: the run has samples from 0 to 0\.8 s"),
-        (["-o", "p.png", "--width", "9999"], "width = 9999 pixels is out of range"),
-        (["-o", "p.gif", "--from", "2"], "from = 2 s is out of range"),
-        (["-o", "p.gif", "--speed", "0"], "speed = 0 is out of range"),
+        ("film.mp4", {}, r"cannot write film\.mp4: a picture is a \.png, a film a \.gif"),
+        ("nowhere/p.png", {}, "there is no directory nowhere"),
+        ("p.png", {"at": 9.0}, r"time = 9 s is out of range: the run has samples from 0 to 0\.8 s"),
+        ("p.png", {"width": 9999}, "width = 9999 pixels is out of range"),
+        ("p.gif", {"start": 2.0}, "from = 2 s is out of range"),
+        ("p.gif", {"speed": 0.0}, "speed = 0 is out of range"),
     ],
 )
-def test_what_cannot_be_shown(run, tmp_path, monkeypatch, capsys, options: list[str], message: str) -> None:
+def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name: str, options: dict, message: str) -> None:
     monkeypatch.chdir(tmp_path)
-    storage.save(run, "run.h5")
-    assert cli.main(["render", "run.h5", *options]) == 2
-    told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    assert re.search(message, told)
-    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+    with pytest.raises(InputError, match=message):
+        render.write(run, Path(name), **options)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_scene_without_a_ball(run: Trajectory) -> None:
@@ -113,7 +111,7 @@ def test_a_scene_without_a_ball(run: Trajectory) -> None:
 
 
 def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(opengl, "_works", lambda name: False)
+    monkeypatch.setattr(opengl, "works", lambda name: False)
     monkeypatch.setattr("platform.system", lambda: "Linux")
     for chosen, message in (("", "apt-get install libegl1"), ("glfw", "unset MUJOCO_GL = 'glfw'")):
         monkeypatch.setenv("MUJOCO_GL", chosen)

@@ -1,95 +1,175 @@
-"""The quick claims come out as they should; a claim known not to hold is asserted as such."""
+"""The main job on protocols that cost nothing: what is measured, kept, judged, and what one failure takes with it."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
 
-import compare
-from compare import CLAIMS, Check, Claim, Outcome, results
-from compare.campaign import Campaign
-from compare.claims import Lab, Level, judge
-from model import InputError, StorageError, storage
+from compare import validation
+from compare.claims.claim import Bearing, Claim, Outcome
+from compare.commands import cli
+from compare.measure.lab import Lab, Level
+from compare.measure.programme import UNDAMPED, Measure, Protocol
+from compare.measure.record import Measurement, Missing, Records
+from compare.report import results
+from model import InputError, Parameters, SimulationError, StorageError
 
-QUICK = [claim for claim in CLAIMS if claim.level is Level.QUICK]
-
-
-@pytest.mark.parametrize("claim", QUICK, ids=lambda claim: claim.id)
-def test_verdict(validated, claim: Claim) -> None:
-    (verdict,) = (v for v in validated.verdicts if v.claim.id == claim.id)
-    failed = [check for check in verdict.checks if not check.passed]
-    assert verdict.outcome is claim.expected, (verdict.error, failed[:5])
+SETS = {"mine": Parameters.named("reference"), "undamped": Parameters.named("reference").replace(c=0.0)}
+Rows = Iterator[Measurement | Missing]
 
 
-def test_no_claim_is_confirmed_by_a_tolerance_wider_than_ten_uncertainties(validated) -> None:
-    wide = [c for v in validated.verdicts for c in v.checks if c.judged and c.tolerance > 10 * c.uncertainty]
-    assert wide == []
+def going_round(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
+    """A measurement of every set, made up."""
+    for name, p in sets.items():
+        yield Measurement(
+            protocol="round",
+            quantity="omega_c",
+            value=p.omega_0,
+            uncertainty=1e-9,
+            engine=lab.engine.name,
+            set=name,
+            parameters=p,
+        )
 
 
-def test_the_results_directory_is_whole(validated) -> None:
-    summary = results.load(validated.directory)
-    assert set(summary.verdicts) == {claim.id for claim in QUICK}
-    for verdict in summary.verdicts.values():
-        for check in verdict["checks"]:
-            if check["run"]:
-                run = storage.load(validated.directory / check["run"])
-                assert run.complete
-                assert run.header.engine == check["witness"]
+def after(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
+    """Goes out from what was measured before."""
+    for m in records.select("round"):
+        yield Missing("after", m.set, f"nothing comes after {m.value:g} rad/s")
 
 
-def test_what_is_there_is_not_computed_again(validated) -> None:
-    before = {path: path.stat().st_mtime_ns for path in (validated.directory / "runs").iterdir()}
-    again = compare.validate(validated.directory, level=Level.QUICK, claims=[CLAIMS[0].id], workers=0)
-    assert [check.measured for check in again[0].checks] == [c.measured for c in validated.verdicts[0].checks]
-    assert {path: path.stat().st_mtime_ns for path in (validated.directory / "runs").iterdir()} == before
+def broken(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
+    raise ArithmeticError("it can't be done")
+    yield
 
 
-def check(**changes: object) -> Check:
-    values = {
-        "quantity": "ω_c", "unit": "rad/s", "witness": "mujoco", "parameters": "reference", "omega_0": 1.0,
-        "condition": "", "predicted": 2.0, "measured": 2.1, "uncertainty": 0.05, "tolerance": 0.15,
-        "case_predicted": "RR", "case_found": "RR",
-    }  # fmt: skip
-    return Check(**(values | changes))
+def claim(name: str, protocol: str) -> Claim:
+    bearing = Bearing(protocol=protocol, quantity="omega_c", predict=lambda m: m.parameters.omega_0)
+    return Claim(id=name, section="Stationary states", source="(1)", statement="So it is.", bearings=(bearing,))
 
 
-@pytest.mark.parametrize(
-    ("checks", "outcome"),
-    [
-        ([check()], Outcome.CONFIRMED),
-        ([check(), check(measured=2.2)], Outcome.NOT_REPRODUCED),
-        ([check(case_found="SS")], Outcome.NOT_REPRODUCED),
-        ([check(measured=float("nan"))], Outcome.NOT_REPRODUCED),
-        ([check(tolerance=float("nan"))], Outcome.NOT_REPRODUCED),
-        ([check(), check(measured=9.0, judged=False)], Outcome.CONFIRMED),
-        ([check(judged=False)], Outcome.NOT_REPRODUCED),
-        ([], Outcome.NOT_REPRODUCED),
-    ],
-)
-def test_a_verdict_can_fail(tmp_path: Path, checks: list[Check], outcome: Outcome) -> None:
-    claim = dataclasses.replace(CLAIMS[0], study=lambda lab: checks)
-    verdict = judge(claim, Lab(Campaign(tmp_path, workers=0), Level.QUICK))
-    assert verdict.outcome is outcome
-    assert verdict.passed is (outcome is Outcome.CONFIRMED)
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Three protocols and their claims in the place of the real ones; the names of those that were carried out."""
+    done: list[str] = []
+
+    def counting(name: str, measure: Measure) -> Protocol:
+        def carried_out(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
+            done.append(name)
+            yield from measure(lab, sets, records)
+
+        return Protocol(name, carried_out, ("round",) if name == "after" else ())
+
+    protocols = [counting("round", going_round), counting("broken", broken), counting("after", after)]
+    monkeypatch.setattr(validation, "PROTOCOLS", tuple(protocols))
+    monkeypatch.setattr(validation, "CLAIMS", tuple(claim(f"of-{p.name}", p.name) for p in protocols))
+    return done
 
 
-def test_an_unknown_claim_gets_a_suggestion(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no claim is called 'prop1' \(did you mean 'prop-1'\?\)"):
-        compare.validate(tmp_path, claims=["prop1"])
+def run(directory: Path, **how: object) -> dict[str, Outcome]:
+    verdicts = validation.validate(directory, level=Level.QUICK, sets=SETS, workers=0, **how)  # type: ignore[arg-type]
+    return {verdict.claim.id: verdict.outcome for verdict in verdicts}
 
 
-def test_results_of_another_version_are_refused(tmp_path: Path) -> None:
-    results.save(results.Summary().with_verdicts("QUICK", []), tmp_path)
-    path = tmp_path / results.SUMMARY
-    content = json.loads(path.read_text())
-    content["provenance"]["versions"]["dualball"] = "0.0.1"
-    path.write_text(json.dumps(content))
+def test_one_failure_takes_its_own_claim_only(tmp_path: Path, counted: list[str]) -> None:
+    assert run(tmp_path) == {"of-round": "confirmed", "of-broken": "error", "of-after": "not run"}
+    assert (tmp_path / results.REPORT).exists()
+
+
+def test_what_was_measured_is_not_measured_again(tmp_path: Path, counted: list[str]) -> None:
+    run(tmp_path)
+    run(tmp_path)
+    assert counted == ["round", "broken", "after", "broken"]
+
+
+def test_only_what_a_claim_needs_is_measured(tmp_path: Path, counted: list[str]) -> None:
+    assert run(tmp_path, claims=["of-after"]) == {"of-after": "not run"}
+    assert counted == ["round", "after"]
+
+
+def test_verdicts_are_announced_as_they_come(tmp_path: Path, counted: list[str]) -> None:
+    seen: list[tuple[str, int]] = []
+    run(tmp_path, announce=lambda verdict: seen.append((verdict.claim.id, len(counted))))
+    assert seen == [("of-round", 1), ("of-broken", 2), ("of-after", 3)]
+
+
+def test_a_set_that_never_settles_is_named(tmp_path: Path, counted: list[str]) -> None:
+    verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=SETS, workers=0)
+    assert verdicts[0].missing == (f"undamped: {UNDAMPED}",)
+    assert {check.measurement.set for check in verdicts[0].checks} == {"mine"}
+
+
+def test_other_sets_are_kept_apart(tmp_path: Path, counted: list[str]) -> None:
+    run(tmp_path)
+    validation.validate(tmp_path, level=Level.QUICK, sets={"mine": SETS["mine"].replace(mu=0.3)}, workers=0)
+    assert counted.count("round") == 2
+    assert len(list(tmp_path.glob("measurements/*/round.h5"))) == 2
+
+
+def test_stored_measurements_are_judged_again(tmp_path: Path, counted: list[str]) -> None:
+    run(tmp_path)
+    (tmp_path / results.REPORT).unlink()
+    verdicts = validation.judge_stored(tmp_path, ["of-round"])
+    assert [verdict.outcome for verdict in verdicts] == [Outcome.CONFIRMED]
+    assert (tmp_path / results.REPORT).exists()
+    assert counted == ["round", "broken", "after"]
+
+
+def test_a_file_that_was_touched_is_named(tmp_path: Path, counted: list[str]) -> None:
+    run(tmp_path)
+    (path,) = tmp_path.glob("measurements/*/round.h5")
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(StorageError, match=r"round\.h5"):
+        validation.judge_stored(tmp_path)
+    path.unlink()
+    with pytest.raises(StorageError, match=r"round\.h5"):
+        validation.judge_stored(tmp_path)
+
+
+def test_results_of_another_version_are_refused(tmp_path: Path, counted: list[str]) -> None:
+    run(tmp_path)
+    summary = json.loads((tmp_path / results.SUMMARY).read_text())
+    summary["provenance"]["versions"]["dualball"] = "0.0.1"
+    (tmp_path / results.SUMMARY).write_text(json.dumps(summary))
     with pytest.raises(StorageError, match=r"holds results of dualball 0\.0\.1"):
-        compare.validate(tmp_path)
-    for text in ("{", "[]", "{}"):
-        path.write_text(text)
-        with pytest.raises(StorageError, match=r"summary\.json is not"):
-            compare.validate(tmp_path)
+        run(tmp_path)
+
+
+def test_an_unknown_claim_leaves_nothing_behind(tmp_path: Path, counted: list[str]) -> None:
+    with pytest.raises(InputError, match="no claim is called 'of-rund'"):
+        run(tmp_path / "new", claims=["of-rund"])
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_run_that_breaks_down_loses_its_protocol(
+    tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diverging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
+        (failed,) = lab.run([lab.task(SETS["mine"], [0, 0, 1e9, 0, 0, 0], 0.1, 4e-3)])
+        yield Missing("broken", "mine", failed.header.failure)
+
+    monkeypatch.setattr(validation, "PROTOCOLS", (Protocol("broken", diverging),))
+    verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=SETS, workers=0, claims=["of-broken"])
+    assert verdicts[0].outcome is Outcome.ERROR
+    assert SimulationError.__name__ in verdicts[0].error
+
+
+@pytest.mark.parametrize("command", ["validate", "judge"])
+def test_the_command_line(command: str, tmp_path: Path, counted: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    validate = ["validate", "--quick", "-o", str(tmp_path), "--workers", "0", "--set", "reference"]
+    assert cli.main([*validate, "--quiet"]) == 1
+    shown = capsys.readouterr().out
+    assert "of-round" in shown
+    assert "it can't be done" in shown
+    assert len(shown.splitlines()) < 12
+    again = ["judge", str(tmp_path)] if command == "judge" else validate
+    cli.main([*again, "--json"])
+    verdicts = json.loads(capsys.readouterr().out)
+    assert verdicts[0]["id"] == "of-round"
+    assert verdicts[0]["verdict"] == "confirmed"
+    assert verdicts[0]["passed"] is True
+    assert set(verdicts[0]["resolving_power"]) == {"omega_c"}
+    assert verdicts[0]["checks"][0]["predicted"] == Parameters.named("reference").omega_0

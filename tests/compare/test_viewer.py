@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import mjsim
-from compare import cli, viewer
+from compare.commands import cli
+from compare.view import viewer
 from mjsim import ContactSettings, recorder
 from model import Flow, Parameters
 
@@ -49,7 +50,7 @@ def test_a_slow_machine_does_not_run_after_the_clock(reference: Parameters) -> N
     flow, window = Flow.steady(12.0), Window(4, takes=3.0)
     stepper = viewer.start(reference, [0, 0, 12.0, 0, 0, 0], flow, settings)
     steps = viewer.run(window, stepper, flow, settings.timestep, 1.0, lambda: window.now, lambda seconds: None)
-    assert steps == 3 * round(viewer._BEHIND / settings.timestep)
+    assert steps == 3 * round(viewer.BEHIND / settings.timestep)
 
 
 def test_what_serves_contact_alone_is_out_of_sight(reference: Parameters) -> None:
@@ -62,7 +63,7 @@ def test_no_display_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     assert cli.main(["view", "--omega-0", "20"]) == 2
-    told = capsys.readouterr().err
-    assert "there is no display" in told
-    assert told.count("\n") == 1
+    shown = capsys.readouterr().err
+    assert "there is no display" in shown
+    assert shown.count("\n") == 1
     assert cli.main(["view", "--speed", "0"]) == 2

@@ -3,8 +3,8 @@
 import math
 
 import pytest
-
 from mjsim.thresholds import measure
+
 from model import InputError, Parameters
 
 

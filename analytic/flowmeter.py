@@ -1,0 +1,88 @@
+"""What the ball is good for as a flowmeter (section 5.3): its characteristic curve omega_c(omega_0), and its range."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analytic import bifurcation, slipping_branch, stationary
+from model import Case, InputError, Parameters
+
+
+def operating_range(p: Parameters) -> float:
+    """The largest omega_0 in rad s-1 below which rolling at both points (RR) is the ball's only lasting motion.
+
+    It ends where RR ends in slipping (omega_01, eta < j); for eta >= j at omega_02, the limit from unloading: a flow
+    beyond it may leave the ball on the wall, which drops it with transients and impacts when it falls below again.
+    """
+    if p.c == 0:
+        return 0.0
+    t = bifurcation.thresholds(p)
+    return t.omega_01 if p.eta < p.j else t.omega_02
+
+
+def reading_range(p: Parameters) -> float:
+    """The largest omega_0 in rad s-1 up to which the ball reads the flow itself, omega_c = omega_0, in every motion.
+
+    omega_01 for eta < j. inf for eta >= j, where RR, SR and NR all go round with the fluid, and on a smooth floor,
+    which can't hold the ball back. 0 without drag.
+    """
+    if p.c == 0:
+        return 0.0
+    return bifurcation.thresholds(p).omega_01 if p.eta < p.j and p.mu > 0 else np.inf
+
+
+def unloading_limit(p: Parameters) -> float:
+    """omega_02 in rad s-1: a ball on the wall (NR) stays there while omega_0 is above; below it slips, sinks and lands.
+
+    nan for a smooth wall, which carries no ball.
+    """
+    return bifurcation.thresholds(p).omega_02
+
+
+def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
+    """d omega_c/d omega_0 along the attractors at p.omega_0: 1 in RR, SR and NR; in SS from (38) and (41), (89).
+
+    Parameters
+    ----------
+    case : which attractor; needed between omega_02 and omega_04 only, where SS lags and SR and NR don't
+
+    Raises
+    ------
+    InputError
+        If there is no attractor (of that case), or if `case` is needed.
+    """
+    found = stationary.attractors(p) if case is None else [stationary.solution(p, case)]
+    if p.c == 0 or not found:
+        raise InputError(f"no motion follows the flow at omega_0 = {p.omega_0:g} rad s-1 with c = {p.c:g} s-1")
+    slips = {bool(np.isfinite(s.alpha)) for s in found}
+    if len(slips) > 1:
+        names = ", ".join(s.case.name for s in found)
+        raise InputError(f"the characteristic has several branches at omega_0 = {p.omega_0:g} rad s-1: choose {names}")
+    if slips == {False}:
+        return 1.0
+    s = np.log(np.abs(np.tan(found[0].alpha)))
+    return float(slipping_branch.characteristic_slope(s, p.j, p.mu, p.eta, p.kappa))
+
+
+def slope_jump(p: Parameters) -> float:
+    """By how much the slope of the characteristic jumps at omega_01, where slipping sets in: to zero, by -1.
+
+    The first bit of slip turns the friction at the floor without changing the load: omega_c doesn't rise at first.
+    """
+    bifurcation.check_branch(p)
+    return float(slipping_branch.characteristic_slope(-slipping_branch.END, p.j, p.mu, p.eta, p.kappa)) - 1.0
+
+
+def mean_slope(p: Parameters) -> float:
+    """Mean slope of the characteristic between omega_01 and omega_02, along SS from RR: "very small" (section 5.3).
+
+    1 for eta <= eta_cr, where the branch arrives at omega_02 without a lag. `InputError` unless 0 < eta < j, mu, c > 0.
+    """
+    bifurcation.check_branch(p)
+    t = bifurcation.thresholds(p)
+    if np.isnan(t.omega_04):
+        return 1.0
+    Omega_02 = t.omega_02 * np.sqrt(p.R / p.g)
+    s = slipping_branch.points_at(Omega_02, p.j, p.mu, p.eta, p.kappa)[0]
+    omega_c = float(slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa).Omega_c) * np.sqrt(p.g / p.R)
+    return float((omega_c - t.omega_01) / (t.omega_02 - t.omega_01))

@@ -1,0 +1,79 @@
+"""What a stretch of motion is made of: a moment, a path, and the chart of a case, its regular coordinates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from model import Case, Parameters
+from model.arrays import Array
+
+Fluid = Callable[[float], float]
+"""omega_0 in rad s-1 at a time in s."""
+
+
+GAPS = ("A lands", "B lands")
+"""Names of the guards that are distances."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A state together with what the state alone does not tell."""
+
+    time: float
+    theta: float
+    x: list[float]
+    """The eight state variables."""
+    alpha: float = math.nan
+    """Direction of slip at A (8), rad, where it slips: the state doesn't tell at the very onset."""
+    beta: float = math.nan
+    """Direction of slip at B (8), rad."""
+    work: float = 0.0
+    """Work of drag, friction and impacts so far, J."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """States along a stretch of one case: arrays of shape (n,), and x (n, 8)."""
+
+    time: Array
+    theta: Array
+    x: Array
+    alpha: Array
+    beta: Array
+    work: Array
+
+
+@dataclass(frozen=True)
+class Chart:
+    """The motion of one case in its coordinates z."""
+
+    case: Case
+    start: list[float]
+    scale: list[float]
+    """Natural size of each coordinate, for absolute tolerances."""
+    rates: Callable[[float, list[float]], list[float]]
+    ends: tuple[str, ...]
+    """What can end the case."""
+    guards: Callable[[float, Sequence[float]], tuple[float, ...]]
+    """A quantity for each of `ends` that is positive while the case lasts, in natural units."""
+    path: Callable[[Array, Array], Path]
+    """States from times (n,) and coordinates (k, n)."""
+    landing: float = math.inf
+    """When the ball will touch the floor, where that is known in advance, s."""
+    slips: tuple[int, ...] = ()
+    """Which coordinates are slips with a direction of their own."""
+
+    def least_slip(self, z: Sequence[float]) -> float:
+        """The smallest slip that has a direction, in natural units; inf if there is none."""
+        least = math.inf
+        for k in self.slips:
+            least = min(least, z[k] / self.scale[k])
+        return least
+
+
+def natural_units(p: Parameters) -> tuple[float, float, float, float]:
+    """Units: of time, of velocity, of the spin of the ball, of energy."""
+    time = math.sqrt(p.R / p.g)
+    return time, p.R / time, p.R / (time * p.r), p.m * p.g * p.R

@@ -1,0 +1,153 @@
+"""Claims about the bifurcations over omega_0: Table 5, Proposition 7, and the branch that divides two attractors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import analytic
+from analytic import StationarySolution, bifurcation
+from compare.claims.claim import Bearing, Claim
+from compare.claims.judge import remembered
+from compare.measure.record import Measurement
+from compare.measure.settling import rotation_scale
+from model import Case, InputError, Parameters
+from model.kinematics import VARIABLES
+
+SECTION = "Bifurcations"
+THRESHOLDS, EDGE = "thresholds", "edge"
+
+
+@remembered
+def _thresholds(p: Parameters) -> analytic.Thresholds:
+    return analytic.thresholds(p)
+
+
+def _at(quantity: str, protocol: str = THRESHOLDS, side: str | None = None, of: str | None = None) -> Bearing:
+    """A threshold as measured from a side; `of` names what was extrapolated, or every bearing counts."""
+
+    def when(m: Measurement) -> bool:
+        by = str(m.conditions["by"])
+        return side in (None, m.conditions["side"]) and (by.startswith(of) if of else not by.startswith(SLIPPING))
+
+    return Bearing(
+        protocol=protocol,
+        quantity=quantity,
+        predict=lambda m: float(getattr(_thresholds(m.parameters), quantity)),
+        when=when,
+        by=f"analytic.thresholds: {quantity}",
+    )
+
+
+SLIPPING = "floor force of settled slipping"
+"""How omega_02 is measured where slipping at both points ends without a fold: that is a claim of its own."""
+
+
+@remembered
+def _unstable(p: Parameters) -> StationarySolution:
+    """The unstable state of SS; LookupError if theory has none."""
+    try:
+        return analytic.solution(p, Case.SS, stable=False)
+    except InputError as error:
+        raise LookupError(str(error)) from error
+
+
+def _edge(name: str) -> Bearing:
+    def spin(m: Measurement) -> float:
+        return bifurcation.wall_spin(_unstable(m.parameters), m.parameters)
+
+    def variable(m: Measurement) -> float:
+        return float(_unstable(m.parameters).x[VARIABLES.index(name)])
+
+    predict: Callable[[Measurement], float] = spin if name == "wall_spin" else variable
+    return Bearing(
+        protocol=EDGE,
+        quantity=f"edge_{name}",
+        predict=predict,
+        scale=rotation_scale if name == "omega_c" else lambda p: rotation_scale(p) * p.R / p.r,
+        by="analytic.solution: SS beyond the fold, (37)-(41)",
+    )
+
+
+def _folds(m: Measurement) -> float:
+    """1 where theory has a fold in reach, by (87); LookupError where it has no branch of slipping."""
+    p = m.parameters
+    if not p.eta < p.j:
+        raise LookupError("no branch of slipping at both points for eta > j")
+    return float(p.eta > _thresholds(p).eta_cr)
+
+
+def _number_of_folds(m: Measurement) -> float:
+    try:
+        return float(bifurcation.number_of_folds(m.parameters))
+    except InputError as error:
+        raise LookupError(str(error)) from error
+
+
+def _claim(bifurcation: str, statement: str, *bearings: Bearing) -> Claim:
+    return Claim(
+        id=f"table-5-{bifurcation}",
+        section=SECTION,
+        source=f"Table 5, {bifurcation}",
+        statement=statement,
+        bearings=bearings,
+    )
+
+
+CLAIMS = (
+    _claim(
+        "P3",
+        "At ω₀₁ two-point rolling gives way to slipping at both points, whose slip begins at zero.",
+        _at("omega_01"),
+    ),
+    _claim(
+        "P2",
+        "At ω₀₂ the sinking state (NS) and the state carried by the wall (NR) meet.",
+        _at("omega_02"),
+    ),
+    _claim(
+        "NF2",
+        "At ω₀₂ the unstable state of slipping at both points merges with the state carried by the wall.",
+        _at("omega_02", EDGE),
+    ),
+    _claim(
+        "NT1",
+        "With η > j two-point rolling ends at ω₀₃: below, it takes in a ball pressed to the floor; above, it is lost.",
+        _at("omega_03", side="from below"),
+        _at("omega_03", side="from above"),
+    ),
+    _claim("F", "The stable branch of slipping at both points ends in a fold at ω₀₄.", _at("omega_04")),
+    Claim(
+        id="sub-branches",
+        section=SECTION,
+        source="Prop. 7, (87)-(90), Fig. 10",
+        statement="Between ω₀₂ and ω₀₄ an unstable state of slipping at both points divides two attractors.",
+        bearings=tuple(_edge(name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "wall_spin")),
+    ),
+    Claim(
+        id="eta-critical",
+        section=SECTION,
+        source="(87), Fig. 7",
+        statement=(
+            "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
+            "the wall at ω₀₂, without a jump."
+        ),
+        bearings=(
+            Bearing(protocol=THRESHOLDS, quantity="folds", predict=_folds, by="analytic.thresholds: eta_cr"),
+            _at("omega_02", of=SLIPPING),
+        ),
+    ),
+    Claim(
+        id="one-fold",
+        section=SECTION,
+        source="after Prop. 7",
+        statement="There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
+        bearings=(
+            Bearing(
+                protocol=THRESHOLDS,
+                quantity="folds",
+                predict=_number_of_folds,
+                by="analytic.bifurcation.number_of_folds",
+            ),
+        ),
+    ),
+)

@@ -1,0 +1,75 @@
+"""Claims about cases and impacts: which case it is (Fig. 2), and what a landing leaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+import analytic
+from compare.claims.claim import Bearing, Claim
+from compare.claims.equations import state
+from compare.claims.judge import remembered
+from compare.measure.impacts import NAMES
+from compare.measure.record import Measurement
+from model import Parameters, SimulationError, Trajectory
+
+
+@remembered
+def _after(x: tuple[float, ...], p: Parameters, time: float) -> Trajectory:
+    try:
+        return analytic.simulate(p, np.array(x), time, sample_interval=time)
+    except SimulationError as error:
+        raise LookupError(str(error)) from error
+
+
+def _simulated(m: Measurement) -> Trajectory:
+    return _after(state(m), m.parameters, float(m.conditions["time"]))
+
+
+_SPEEDS: dict[str, Callable[[Parameters], float]] = {
+    "v_y": lambda p: math.sqrt(p.g * p.R),
+    "v_h": lambda p: math.sqrt(p.g * p.R),
+    "omega_c": lambda p: math.sqrt(p.g / p.R),
+    **{f"slip_{axis}": lambda p: math.sqrt(p.g * p.R) / p.r for axis in "xyz"},
+}
+
+
+def _impact(name: str) -> Bearing:
+    return Bearing(
+        protocol="impacts",
+        quantity=f"after_{name}",
+        predict=lambda m: float(getattr(_simulated(m), name)[-1]),
+        scale=_SPEEDS[name],
+        by="analytic.simulate",
+    )
+
+
+CLAIMS = (
+    Claim(
+        id="cases",
+        section="Laws and cases",
+        source="Fig. 2, Table 3",
+        statement=(
+            "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
+            "equations of motion say."
+        ),
+        bearings=(
+            Bearing(
+                protocol="motions",
+                quantity="case",
+                predict=lambda m: float(_simulated(m).case[-1]),
+                by="analytic.simulate",
+            ),
+        ),
+    ),
+    Claim(
+        id="impacts",
+        section="Laws and cases",
+        source="extension",
+        statement="A ball that lands does not rebound, and friction takes its share of the impulse.",
+        bearings=tuple(_impact(name) for name in NAMES),
+        reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
+    ),
+)

@@ -1,0 +1,31 @@
+"""All claims, in the order of the report."""
+
+from __future__ import annotations
+
+from compare.claims import (
+    bifurcations,
+    cases,
+    equations,
+    flowmeter,
+    formal,
+    laws,
+    slipping,
+    stability,
+    stationary,
+    unloading,
+)
+from compare.claims.claim import Claim
+
+CLAIMS: tuple[Claim, ...] = (
+    *stationary.CLAIMS,
+    *stability.CLAIMS,
+    *bifurcations.CLAIMS,
+    *flowmeter.CLAIMS,
+    *unloading.CLAIMS,
+    *laws.CLAIMS,
+    *slipping.CLAIMS,
+    *cases.CLAIMS,
+    *equations.CLAIMS,
+    *formal.CLAIMS,
+)
+"""Every claim there is."""

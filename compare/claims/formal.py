@@ -1,0 +1,86 @@
+"""Fig. 12: with (12) released the bifurcations of Table 5 appear for eta > j as well. Algebra is all there is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.optimize import brentq
+
+import analytic
+from analytic import bifurcation, branch_stability, dynamics, jacobian, slipping_branch
+from compare.claims.claim import COVERAGE, Check, Claim, Text
+from compare.measure.record import Measurement
+from model import Case, Parameters
+from model.arrays import Array
+
+FORMAL = Parameters.named("reference").replace(eta=0.43)
+"""eta so little above j that the branch of SS is whole once (12) is released."""
+ROUND_OFF = 1e-12
+"""Relative: some thousand operations, each to the last digit."""
+POINTS = 4001
+"""Along the branch, where its turning point is looked for."""
+
+
+def _figure_12() -> Iterator[Check]:
+    """The branch with A_y < 0 solves the equations and joins the thresholds as drawn."""
+    p, unit = FORMAL, math.sqrt(FORMAL.g / FORMAL.R)
+    t = analytic.thresholds(p)
+    curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
+    released = {name: float(value) * unit for name, value in curves.items()}
+    s = np.linspace(-8.0, 8.0, 65)
+    states, fluid = branch_stability.states(s, p)
+    ends, _ = branch_stability.states(np.array([-40.0, 40.0]), p)
+    rates = max(_residual(x, p.replace(omega_0=float(w))) for x, w in zip(states, fluid, strict=True))
+    pushed = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa).A_y
+    exchange = brentq(lambda w: _second_rate(p.replace(omega_0=w)), 0.8 * t.omega_03, 1.2 * t.omega_03, rtol=1e-14)
+    along = branch_stability.states(np.linspace(-8.0, 8.0, POINTS), p)[1]
+    k = int(np.argmax(along))
+    # The maximum lies between the neighbours of the largest value, which is lower by no more than they are.
+    spacing = float(along[k] - min(along[k - 1], along[k + 1]))
+    yield _check("omega_01", "P3: ω_c where slip vanishes", float(ends[0, 2]), released["omega_01"])
+    yield _check("omega_02", "NF2: ω_c where w̃_z vanishes", float(ends[1, 2]), t.omega_02)
+    yield _check("omega_03", "NT1: ω₀ where SR turns stable", float(exchange), t.omega_03)
+    yield _check("omega_04", "F: ω₀ where the branch turns", float(along[k]), released["omega_04"], spacing)
+    yield _check("law", "greatest rate on the branch over g/r", rates, 0.0)
+    yield _check("law", "points with A_y ≥ 0", float(np.sum(pushed >= 0)), 0.0)
+
+
+def _check(quantity: str, what: str, value: float, predicted: float, uncertainty: float = 0.0) -> Check:
+    own = max(uncertainty, ROUND_OFF * (abs(predicted) or 1.0))
+    algebra = Measurement(
+        protocol="algebra",
+        quantity=quantity,
+        value=value,
+        uncertainty=own,
+        engine="theory",
+        set="reference",
+        parameters=FORMAL,
+        conditions={"by": what},
+    )
+    return Check(measurement=algebra, predicted=predicted, tolerance=COVERAGE * own, scale=abs(predicted) or 1.0)
+
+
+def _residual(x: Array, p: Parameters) -> float:
+    """Largest rate of slip in SS, in units of g/r, with (12) released."""
+    return float(np.abs(dynamics.rates(Case.SS, x.tolist(), p, p.omega_0)[2:6]).max() * p.r / p.g)
+
+
+def _second_rate(p: Parameters) -> float:
+    """The determinant of SR, whose sign is that of the eigenvalue that isn't the decay of omega_c."""
+    (state,) = (s for s in analytic.stationary_solutions(p) if s.case is Case.SR)
+    return float(np.linalg.det(jacobian.jacobian(Case.SR, state.x, p)))
+
+
+CLAIMS = (
+    Claim(
+        id="fig-12",
+        section="Formal",
+        source="Fig. 12",
+        statement="With (12) released all bifurcations of Table 5 appear for η > j as well.",
+        algebra=_figure_12,
+        text=Text.FORMAL,
+        reason="The floor would have to pull: no ball and no engine does this.",
+    ),
+)

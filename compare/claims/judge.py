@@ -1,0 +1,95 @@
+"""Where measurements and predictions meet: the checks of a claim, and the verdict."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar
+
+from compare.claims.claim import COVERAGE, Bearing, Check, Claim, Outcome, Verdict
+from compare.measure.quantities import quantity
+from compare.measure.record import Measurement, Records
+from compare.statistics import Measured
+from model import InputError
+from model.errors import suggestion
+
+F = TypeVar("F", bound=Callable[..., Any])
+_remembered: list[Any] = []
+
+
+def remembered(function: F) -> F:
+    """Compute each prediction once a judgement: a cache that `judge` empties, because theory may be exchanged."""
+    cached = functools.lru_cache(maxsize=None)(function)
+    _remembered.append(cached)
+    return cached  # type: ignore[return-value]
+
+
+def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:
+    """The verdicts on claims, in their order; each stands for itself, whatever becomes of the others."""
+    for cached in _remembered:
+        cached.cache_clear()
+    return [verdict(claim, records) for claim in claims]
+
+
+def verdict(claim: Claim, records: Records) -> Verdict:
+    """Predict, compare, and say what the numbers say.
+
+    Refuted if one check deviates beyond its tolerance; else inconclusive if one is too coarse; else confirmed.
+    Whatever a prediction raises makes the verdict an error of this claim alone.
+    """
+    missing = tuple(
+        dict.fromkeys(f"{each.set}: {each.reason}" for each in records.missing if each.protocol in claim.protocols)
+    )
+    try:
+        checks = tuple(claim.algebra() if claim.algebra else _checks(claim.bearings, records))
+    except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other
+        told = f"{type(error).__name__}: {error}"
+        return Verdict(claim=claim, outcome=Outcome.ERROR, error=told, missing=missing)
+    if not checks:
+        outcome = Outcome.NOT_RUN
+    elif not all(check.agrees for check in checks):
+        outcome = Outcome.REFUTED
+    elif not all(check.conclusive for check in checks):
+        outcome = Outcome.INCONCLUSIVE
+    else:
+        outcome = Outcome.CONFIRMED
+    return Verdict(claim=claim, outcome=outcome, checks=checks, missing=missing)
+
+
+def _checks(bearings: Sequence[Bearing], records: Records) -> Iterator[Check]:
+    for bearing in bearings:
+        for m in records.select(bearing.protocol, bearing.quantity, bearing.when):
+            yield check(bearing, m)
+
+
+def check(bearing: Bearing, m: Measurement) -> Check:
+    """One measurement beside its prediction; what must be equal to the last digit has no scale but 1."""
+    try:
+        prediction = bearing.predict(m)
+    except LookupError:
+        prediction = math.nan
+    own = prediction if isinstance(prediction, Measured) else Measured(float(prediction), 0.0)
+    exact = quantity(m.quantity).resolves == 0
+    if exact:
+        scale = 1.0
+    elif bearing.size:
+        scale = bearing.size(m)
+    else:
+        scale = bearing.scale(m.parameters) if bearing.scale else abs(own.value)
+    return Check(
+        measurement=m,
+        predicted=own.value,
+        tolerance=COVERAGE * math.hypot(m.uncertainty, own.uncertainty),
+        scale=scale,
+        relation=bearing.relation,
+    )
+
+
+def select(claims: Iterable[Claim], ids: Sequence[str] | None) -> list[Claim]:
+    """The claims of the given ids, all for None; `InputError` with a suggestion for an unknown id."""
+    known = {claim.id: claim for claim in claims}
+    for name in ids or ():
+        if name not in known:
+            raise InputError(f"no claim is called {name!r}{suggestion(name, known)}; list them with --list")
+    return [known[name] for name in (ids or known)]

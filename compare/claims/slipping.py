@@ -1,0 +1,236 @@
+"""Claims about slip: does a slight one grow or die out (sections 3 and 4, Fig. 6)?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from analytic import slip_bounds, slip_stability
+from compare.claims.claim import Bearing, Claim, Outcome, Relation, Text
+from compare.claims.equations import state
+from compare.measure.record import Measurement
+from model import Case, Parameters
+
+
+def _gamma(m: Measurement) -> float:
+    inner, outer = Case[str(m.conditions["inner"])], Case[str(m.conditions["outer"])]
+    n = [m.conditions[f"n_{name[-1]}"] for name in slip_stability.normals(inner, outer)]
+    return float(slip_stability.gamma(inner, outer, np.array(state(m)), np.array(n, dtype=float), m.parameters))
+
+
+def slip_unit(p: Parameters) -> float:
+    """The rate of slip, rad s-2, that a force as large as the weight makes at a contact."""
+    return p.g * (1 + p.j) / (p.j * p.r)
+
+
+def _along(inner: Case, outer: Case, by: str = "") -> Callable[[Measurement], bool]:
+    def along(m: Measurement) -> bool:
+        at = m.conditions
+        return (at["inner"], at["outer"], at.get("by", "")) == (inner.name, outer.name, by)
+
+    return along
+
+
+def _arrow(inner: Case, outer: Case) -> Claim:
+    return Claim(
+        id=f"slip-{inner.name}-{outer.name}",
+        section="Slipping",
+        source="(56)-(59)" if inner is Case.NR else "(53), Fig. 6",
+        statement=f"Out of any state of {inner.name} a slip along any direction of {outer.name} grows at the rate γ.",
+        bearings=(
+            Bearing(
+                protocol="growth",
+                quantity="gamma",
+                predict=_gamma,
+                when=_along(inner, outer),
+                scale=slip_unit,
+                by="slip_stability.gamma",
+            ),
+            *((_GAMMA_NR,) if inner is Case.NR else ()),
+        ),
+    )
+
+
+def _gamma_nr(m: Measurement) -> float:
+    beta = math.atan2(float(m.conditions["n_y"]), float(m.conditions["n_z"]))
+    return float(slip_bounds.gamma_nr(beta, np.array(state(m)), m.parameters))
+
+
+_GAMMA_NR = Bearing(
+    protocol="growth",
+    quantity="gamma",
+    predict=_gamma_nr,
+    when=_along(Case.NR, Case.NS),
+    scale=slip_unit,
+    by="slip_bounds.gamma_nr",
+)
+
+
+def _bound(
+    arrow: tuple[Case, Case],
+    by: str,
+    bound: Callable[[Measurement], slip_bounds.SlipBound],
+    side: int = 0,
+    from_rest: bool = False,
+) -> tuple[Bearing, ...]:
+    """Zero and slope of gamma.
+
+    `side` is the sign of n_z where that makes another bound; `from_rest`: the zero is 0 or nearly so.
+    """
+    on_line = _along(*arrow, by)
+
+    def when(m: Measurement) -> bool:
+        return on_line(m) and (not side or m.conditions["n_z"] == side)
+
+    square = "_square" if by == "stationary" else ""
+    return (
+        Bearing(
+            protocol="bounds",
+            quantity=f"gamma_zero{square}",
+            predict=lambda m: bound(m).zero,
+            when=when,
+            scale=(lambda p: p.g / p.R) if from_rest else None,
+            by="slip_bounds",
+        ),
+        Bearing(
+            protocol="bounds",
+            quantity=f"gamma_slope{square}",
+            predict=lambda m: bound(m).slope,
+            when=when,
+            by="slip_bounds",
+        ),
+    )
+
+
+def _held(m: Measurement) -> float:
+    return float(m.conditions["omega_c"])
+
+
+def _sign(m: Measurement, name: str) -> int:
+    return round(float(m.conditions[name]))
+
+
+def _claim(id: str, source: str, statement: str, bearings: tuple[Bearing, ...], reason: str = "") -> Claim:
+    return Claim(
+        id=id,
+        section="Slipping",
+        source=source,
+        statement=statement,
+        bearings=bearings,
+        text=Text.CORRECTED if reason else Text.PRINTED,
+        reason=reason,
+    )
+
+
+_NR_NS, _RR_RS, _RR_SR, _RR_SS = (Case.NR, Case.NS), (Case.RR, Case.RS), (Case.RR, Case.SR), (Case.RR, Case.SS)
+
+
+def _greatest_as_printed(m: Measurement) -> float:
+    n = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    return float(slip_stability.gamma(*_RR_SS, np.array(state(m)), n, m.parameters).max())
+
+
+def _watched(inner: Case, outer: Case) -> Bearing:
+    def predict(m: Measurement) -> float:
+        stable = slip_stability.stability(inner, m.parameters) is slip_stability.SlipStability.STABLE
+        return float(inner if stable else outer)
+
+    return Bearing(
+        protocol="watched",
+        quantity="case",
+        predict=predict,
+        when=lambda m: m.conditions["inner"] == inner.name,
+        by="slip_stability.stability",
+    )
+
+
+CLAIMS = (
+    *(_arrow(inner, outer) for inner, outer in slip_stability.SLIP_ARROWS),
+    _claim(
+        "eq-61",
+        "(60), (61)",
+        "Rolling on the wall alone is stable with respect to slipping above ω₀₂.",
+        _bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
+    ),
+    _claim(
+        "eq-66",
+        "(66)",
+        "A ball that lags behind the fluid begins to slip at the wall where (66) says.",
+        _bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, _held(m), _sign(m, "n_y"))),
+        "(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
+    ),
+    _claim(
+        "eq-67",
+        "(67)",
+        "Going round with the fluid, the ball never begins to slip at the wall alone, but at ω₀ = 0.",
+        _bound(_RR_RS, "stationary", lambda m: slip_bounds.rr_to_rs_stationary(m.parameters), from_rest=True),
+    ),
+    _claim(
+        "eq-73",
+        "(73)",
+        "A ball that lags behind the fluid begins to slip at the floor where (73) says.",
+        _bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, _held(m), _sign(m, "n_x"))),
+    ),
+    _claim(
+        "eq-74",
+        "(74)",
+        "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃.",
+        _bound(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
+    ),
+    _claim(
+        "eq-82",
+        "(82)",
+        "Slip at both points at once, with directions (0, 0), grows above ω₀₁ and dies out below.",
+        (*_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1), _watched(*_RR_SS)),
+    ),
+    _claim(
+        "eq-83",
+        "(83)",
+        "Slip at both points with directions (π, π) dies out: (83) has no bound for η < 1.",
+        _bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, -1), side=-1, from_rest=True),
+    ),
+    _claim(
+        "fig-4-5",
+        "Figs. 4 and 5",
+        "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below it remains slipping for good.",
+        (_watched(*_NR_NS),),
+    ),
+    _claim(
+        "eq-69",
+        "(69)",
+        "Rolling at both points is the convex combination of slipping to either side that doesn't slip.",
+        (
+            Bearing(
+                protocol="growth",
+                quantity="filippov_share",
+                predict=lambda m: slip_bounds.filippov_share(Case[str(m.conditions["outer"])], _held(m), m.parameters),
+                scale=lambda p: 1.0,
+                by="slip_bounds.filippov_share",
+            ),
+        ),
+    ),
+    Claim(
+        id="extrema",
+        section="Slipping",
+        source="after (80)",
+        statement="(α, β) = (0, 0) and (π, π) are the global extrema of γ.",
+        bearings=(
+            Bearing(
+                protocol="growth",
+                quantity="gamma",
+                predict=_greatest_as_printed,
+                when=_along(*_RR_SS, "sideways"),
+                scale=slip_unit,
+                relation=Relation.AT_MOST,
+                by="slip_stability.gamma at (0, 0), (π, π)",
+            ),
+        ),
+        expected=Outcome.REFUTED,
+        reason=(
+            "False for the Euclidean normal (75): γ is larger along other directions. With kinetic energy as the inner "
+            "product it is true."
+        ),
+    ),
+)

@@ -1,0 +1,281 @@
+"""Stationary states: Propositions 1-6 with their forces, and the bifurcation diagrams of Figs. 9-11."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+
+import analytic
+from analytic import StationarySolution, bifurcation
+from compare.claims.claim import Bearing, Claim, Text
+from compare.claims.judge import remembered
+from compare.measure.record import Measurement
+from compare.measure.settling import FORCES, SUMS, family, scale
+from model import Case, InputError, Parameters
+from model.kinematics import VARIABLES
+
+SECTION = "Stationary states"
+MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
+_SUMS = {"force_Ax-By": ("Ax", -1, "By"), "force_Ay+By": ("Ay", 1, "By"), "force_Bx+By": ("Bx", 1, "By")}
+When = Callable[[Measurement], bool]
+
+
+@remembered
+def lasting(p: Parameters) -> tuple[StationarySolution, ...]:
+    """The stationary solutions that a ball may settle to: those that attract, and the one that sinks for ever."""
+    sinking = [s for s in analytic.stationary_solutions(p) if s.moves and s.exists and s.stable]
+    return (*analytic.attractors(p), *sinking)
+
+
+def cases(p: Parameters) -> set[Case]:
+    """Cases of the states that last; SR, the state of NR on an unloaded floor, is none of its own."""
+    return {s.case for s in lasting(p)} - {Case.SR}
+
+
+@remembered
+def solution(p: Parameters, case: Case) -> StationarySolution:
+    """The stable solution of a case; LookupError if theory has none."""
+    try:
+        return analytic.solution(p, case)
+    except InputError as error:
+        raise LookupError(str(error)) from error
+
+
+def detected(m: Measurement) -> Case:
+    """The case of the state that was measured; two cases in which a contact carries nothing count as one.
+
+    SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall.
+    """
+    case = family(Case[str(m.conditions["case"])])
+    return Case.RS if case is Case.RN else case
+
+
+def reached(m: Measurement) -> StationarySolution:
+    """The lasting state of the case that was detected; LookupError if theory has none."""
+    found = next((s for s in lasting(m.parameters) if s.case is detected(m)), None)
+    if found is None:
+        raise LookupError(f"no state of case {detected(m).name} lasts")
+    return found
+
+
+def leaning(m: Measurement) -> StationarySolution:
+    """The state of SR."""
+    return solution(m.parameters, Case.SR)
+
+
+def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
+    """A quantity of a stationary solution by its name in the measurements."""
+    if quantity == "wall_spin":
+        return bifurcation.wall_spin(s, p)
+    if not quantity.startswith("force_"):
+        return float(s.x[VARIABLES.index(quantity)])
+    if quantity in _SUMS:
+        one, sign, other = _SUMS[quantity]
+        return number(f"force_{one}", s, p) + sign * number(f"force_{other}", s, p)
+    axis = "xyz".index(quantity[-1])
+    return float(s.force_A[axis] if quantity[-2] == "A" else s.force_B[axis])
+
+
+def case(m: Measurement) -> float:
+    """The case that was detected, if theory lets a ball from that start settle there; LookupError else.
+
+    From the floor it may settle to whatever attracts. High up on the wall it stays where the wall carries it, and
+    sinks where not.
+    """
+    allowed = cases(m.parameters)
+    if m.conditions["start"] == "on the wall":
+        allowed &= {Case.NR} if Case.NR in allowed else {Case.NS}
+    else:
+        allowed -= {Case.NS}
+    if detected(m) in allowed:
+        return m.value
+    if len(allowed) == 1:
+        return float(allowed.pop())
+    raise LookupError(f"{detected(m).name} is none of {allowed}")
+
+
+def rolling(m: Measurement) -> float:
+    """RR as long as it exists, (84) and (86); beyond, anything but RR."""
+    t = analytic.thresholds(m.parameters)
+    limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
+    if m.parameters.omega_0 < limit:
+        return float(Case.RR)
+    if detected(m) is Case.RR:
+        raise LookupError("RR has ended")
+    return m.value
+
+
+def reachable(m: Measurement) -> float:
+    """The set of cases that last, as the measurement's bit mask."""
+    return float(sum(1 << each for each in cases(m.parameters)))
+
+
+def bearings(
+    quantities: Iterable[str], when: When, state: Callable[[Measurement], StationarySolution] = reached, by: str = ""
+) -> tuple[Bearing, ...]:
+    """Bearings of settled states on a claim, one a quantity."""
+
+    def predict(m: Measurement) -> float:
+        return number(m.quantity, state(m), m.parameters)
+
+    return tuple(
+        Bearing(protocol="settled", quantity=q, predict=predict, when=when, scale=partial(scale, q), by=by)
+        for q in quantities
+    )
+
+
+def is_in(*cases: Case) -> When:
+    """Whether the state that was measured is of one of these cases."""
+    return lambda m: detected(m) in cases
+
+
+def _both(one: When, other: When) -> When:
+    return lambda m: one(m) and other(m)
+
+
+def _below(m: Measurement) -> bool:
+    return m.parameters.eta < m.parameters.j
+
+
+def _above(m: Measurement) -> bool:
+    return m.parameters.eta > m.parameters.j
+
+
+def _from_floor(m: Measurement) -> bool:
+    return m.conditions["start"] in ("rest", "with the fluid")
+
+
+def _cases(when: When) -> Bearing:
+    return Bearing(protocol="settled", quantity="case", predict=case, when=when, by="analytic.attractors")
+
+
+def _with_fluid(when: When = lambda m: True) -> Bearing:
+    def begins(m: Measurement) -> bool:
+        return m.conditions["start"] == "with the fluid" and when(m)
+
+    return Bearing(protocol="settled", quantity="case", predict=rolling, when=begins, by="analytic.thresholds")
+
+
+def _plane(figure: str, source: str, axis: str) -> Claim:
+    return Claim(
+        id=figure,
+        section="Bifurcations",
+        source=source,
+        statement=(
+            f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
+            "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR)."
+        ),
+        bearings=(
+            Bearing(
+                protocol="plane",
+                quantity="cases",
+                predict=reachable,
+                when=lambda m: m.conditions["figure"] == figure,
+                by="analytic.attractors",
+            ),
+        ),
+    )
+
+
+_MISPRINT_35 = "(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it."
+_ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
+
+CLAIMS = (
+    Claim(
+        id="prop-1",
+        section=SECTION,
+        source="Prop. 1, (30)-(32)",
+        statement=(
+            "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
+            "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j)."
+        ),
+        bearings=(*bearings((*MOTION, *SUMS), _ROLLS, by="(31), (32)"), _cases(_ROLLS), _with_fluid()),
+    ),
+    Claim(
+        id="prop-1-rough",
+        section=SECTION,
+        source="Prop. 1, (83), (86)",
+        statement="With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
+        bearings=(*bearings(("omega_c",), _both(_above, _ROLLS), by="(32)"), _with_fluid(_above)),
+    ),
+    Claim(
+        id="prop-2-forces",
+        section=SECTION,
+        source="Prop. 2, (33), (34)",
+        statement="In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
+        bearings=bearings(
+            ("omega_c", "slip_x", "slip_z", "v_y", *FORCES),
+            is_in(Case.RS),
+            lambda m: solution(m.parameters, Case.RS),
+            by="(33), (34)",
+        ),
+    ),
+    Claim(
+        id="prop-3-5",
+        section=SECTION,
+        source="Props. 3 and 5, (35), (36), (46), (47)",
+        statement=(
+            "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
+            "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR."
+        ),
+        bearings=(
+            *bearings((*MOTION, *FORCES), _LIFTED, by="(46), (47)"),
+            *bearings((*MOTION, *FORCES), _both(_LIFTED, _from_floor), leaning, by="(35), (36)"),
+            _cases(_LIFTED),
+        ),
+        text=Text.CORRECTED,
+        reason=_MISPRINT_35,
+    ),
+    Claim(
+        id="prop-4",
+        section=SECTION,
+        source="Prop. 4, (37)-(42)",
+        statement=(
+            "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
+            "its contact forces are (42)-(44)."
+        ),
+        bearings=(*bearings((*MOTION, *FORCES), _SLIPS, by="(37)-(44)"), _cases(_SLIPS)),
+    ),
+    Claim(
+        id="prop-6",
+        section=SECTION,
+        source="Prop. 6, (49), (50)",
+        statement=(
+            "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
+            "with the fluid; B_x = mRω₀², B_y = ηmRω₀²."
+        ),
+        bearings=(*bearings((*MOTION, *FORCES), _SINKS, by="(49), (50)"), _cases(_SINKS)),
+        text=Text.CORRECTED,
+        reason="(49) lost a row: the second of its five is ω_c = ω₀.",
+    ),
+    Claim(
+        id="fig-9",
+        section="Bifurcations",
+        source="Fig. 9",
+        statement="Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
+        bearings=bearings(("wall_spin",), is_in(Case.NS, Case.NR), by="(91)"),
+    ),
+    Claim(
+        id="fig-10",
+        section="Bifurcations",
+        source="Fig. 10",
+        statement="For η < j the spins on the wall in rolling, slipping and in the lifted state join as drawn.",
+        bearings=(
+            *bearings(("wall_spin",), _both(_below, is_in(Case.RR, Case.SS)), by="(91)"),
+            *bearings(("wall_spin",), _both(_below, _both(_LIFTED, _from_floor)), leaning, by="(91)"),
+        ),
+    ),
+    Claim(
+        id="fig-11",
+        section="Bifurcations",
+        source="Fig. 11",
+        statement="For η > j rolling ends at ω₀₃ upon the state whose spin on the wall falls like 1/ω₀.",
+        bearings=(
+            *bearings(("wall_spin",), _both(_above, _ROLLS), by="(91)"),
+            *bearings(("wall_spin",), _both(_above, _both(_LIFTED, _from_floor)), leaning, by="(91)"),
+            _with_fluid(_above),
+        ),
+    ),
+    _plane("fig-7", "Fig. 7", "η"),
+    _plane("fig-8", "Fig. 8", "μ = η"),
+)

@@ -1,0 +1,51 @@
+"""The program ``dualball``: one command line for everything, one module a command.
+
+Exit codes: 0 done and as expected, 1 a verdict failed or a run broke down, 2 a mistake in what was asked,
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+from compare.commands import benchmark, grade, look, predict, simulate, sweep, validate
+from model import InputError, SimulationError
+from model.trajectory import current_versions
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program with the given arguments, the process's own for None; return its exit code."""
+    args = _parser().parse_args(argv)
+    try:
+        return int(args.run(args))
+    except InputError as error:
+        print(f"dualball: error: {error}", file=sys.stderr)
+        return 2
+    except SimulationError as error:
+        print(f"dualball: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:  # the reader of our output has gone, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        print("dualball: interrupted; finished runs are kept, the same command goes on from there", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="dualball",
+        description="A physics engine on trial: the dual-point contact ball, in closed form and in MuJoCo.",
+    )
+    parser.add_argument("--version", action="version", version=f"dualball {current_versions()['dualball']}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for module in (predict, simulate, validate, sweep, look, grade, benchmark):
+        module.add(commands)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

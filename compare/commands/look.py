@@ -1,0 +1,103 @@
+"""What is stored, shown: ``report``, ``figures``, ``inspect``, ``render``; and ``view``, a live ball."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from compare.commands import options
+from compare.report import results
+from compare.runs import collection
+from compare.view import inspection
+from mjsim import ContactSettings
+from model import storage
+
+
+def add(commands: options.Commands) -> None:
+    """Declare the commands."""
+    command = options.command(commands, "report", report, "make report.html anew from stored measurements")
+    command.add_argument("directory", type=Path, nargs="?", default=Path("results"), metavar="DIR")
+
+    command = options.command(
+        commands, "figures", figures, "draw the paper's figures, with measured points where there are results"
+    )
+    command.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="DIR")
+    command.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="stored results to draw")
+    command.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
+
+    command = options.command(commands, "inspect", inspect, "what a trajectory file holds")
+    command.add_argument("file", type=Path, metavar="FILE")
+    command.add_argument("--plot", type=Path, metavar="FILE", help="draw it (png, svg or pdf)")
+    command.add_argument("--json", action="store_true", help="print JSON")
+
+    command = options.command(
+        commands, "render", render, "a picture or film of a run: the scene, contact forces, slip, case"
+    )
+    command.add_argument("file", type=Path, metavar="FILE")
+    command.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="picture.png or film.gif")
+    command.add_argument("--width", type=int, metavar="PIXELS", help="default 960 for a picture, 640 for a film")
+    command.add_argument("--at", type=options.number, metavar="s", help="time of a picture (default: the end)")
+    command.add_argument("--from", dest="start", type=options.number, default=0.0, metavar="s", help="start of a film")
+    command.add_argument("--seconds", type=options.number, default=6.0, help="length of a film (default 6)")
+    command.add_argument("--speed", type=options.number, default=0.25, help="1 is real time (default 0.25)")
+    command.add_argument("--rate", type=int, default=20, help="frames a second (default 20)")
+
+    command = options.command(commands, "view", view, "the ball in MuJoCo's viewer, driven by the study's own loop")
+    options.add_parameters(command)
+    options.add_flow(command)
+    options.add_start(command)
+    command.add_argument("--timestep", type=options.number, metavar="s", help="time step")
+    command.add_argument("--speed", type=options.number, default=1.0, help="1 is real time (default)")
+
+
+def report(args: argparse.Namespace) -> int:
+    """Judge the stored measurements anew and write the page."""
+    from compare import validation  # here, because drawing takes a second to load
+
+    validation.judge_stored(args.directory)
+    print(args.directory / results.REPORT)
+    return 0
+
+
+def figures(args: argparse.Namespace) -> int:
+    """Draw every figure; one whose results are missing is named."""
+    from compare import validation  # here, because drawing takes a second to load
+    from compare.figures import gallery
+
+    stored = validation.stored_material(args.results)
+    for name, gap in gallery.write(args.output, stored, tuple(args.format or ["svg"])):
+        print(f"{args.output / name}: {gap or 'written'}")
+    return 0
+
+
+def inspect(args: argparse.Namespace) -> int:
+    """Describe a run or a collection."""
+    if collection.is_collection(args.file):
+        options.show(collection.describe(args.file), collection.table, args.json)
+        return 0
+    if args.plot:
+        from compare.figures import trajectory  # here, because drawing takes a second to load
+
+        trajectory.plot(storage.load(args.file), args.plot)
+    options.show(inspection.describe(args.file), inspection.table, args.json)
+    return 0
+
+
+def render(args: argparse.Namespace) -> int:
+    """Draw a picture or a film."""
+    from compare.view import render  # here, because drawing takes a second to load
+
+    film = {name: getattr(args, name) for name in ("start", "seconds", "speed", "rate")}
+    print(render.write(storage.load(args.file), args.output, args.at, args.width, **film))
+    return 0
+
+
+def view(args: argparse.Namespace) -> int:
+    """Open the viewer."""
+    from compare.view import viewer  # here, because nothing else needs it
+
+    p = options.parameters(args)
+    timestep = {} if args.timestep is None else {"timestep": args.timestep}
+    settings = ContactSettings.for_problem(p, **timestep)
+    viewer.view(p, options.start(args), options.flow(args), settings, args.speed)
+    return 0

@@ -1,0 +1,66 @@
+"""``dualball simulate``: one run with any engine."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from compare.commands import options
+from compare.runs.tasks import Task, failed_path, journal_path, store
+from compare.runs.workers import interrupts
+from compare.view import inspection
+from model.files import check_writable
+
+
+def add(commands: options.Commands) -> None:
+    """Declare the command."""
+    command = options.command(commands, "simulate", run, "one run with any engine, into an HDF5 file")
+    options.add_engine(command)
+    options.add_parameters(command)
+    options.add_flow(command)
+    options.add_start(command)
+    command.add_argument("--time", type=options.number, default=10.0, metavar="s", help="duration (default 10)")
+    command.add_argument(
+        "--sample-interval", type=options.number, metavar="s", help="default: a thousandth of the duration"
+    )
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HDF5 file to write")
+    command.add_argument("--json", action="store_true", help="print the last state as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate, keep what there is, and show it."""
+    task = Task(
+        engine=args.engine.name,
+        parameters=options.parameters(args),
+        x0=tuple(options.start(args).tolist()),
+        t_end=args.time,
+        flow=options.flow(args),
+        sample_interval=args.sample_interval,
+        settings=options.settings(args),
+    )
+    if args.output:
+        check_writable(args.output)
+    with tempfile.TemporaryDirectory() as scratch, interrupts() as interrupted:
+        path = args.output or Path(scratch) / "run.h5"
+        try:
+            (failure,) = store([task], [path], stop=interrupted)
+        except KeyboardInterrupt:  # the second Ctrl-C
+            print("dualball: interrupted; no samples are kept", file=sys.stderr)
+            return 130
+        options.show(inspection.describe(failed_path(path) if failure else path), inspection.table, args.json)
+        if args.output and not failure and not args.json:
+            print(f"written to {args.output}")
+        if failure:
+            print(f"dualball: the simulation {failure}; {_what_is_kept(task, args.output)}", file=sys.stderr)
+        return 130 if interrupted() else 1 if failure else 0
+
+
+def _what_is_kept(task: Task, output: Path | None) -> str:
+    """What is left of a run that broke down or was stopped."""
+    if output is None:
+        return "nothing is kept without --output"
+    journal = journal_path(task, output)
+    goes_on = f", and the same command goes on from what {journal} holds" if journal and journal.exists() else ""
+    return f"its samples so far are kept in {failed_path(output)}{goes_on}"

@@ -1,0 +1,101 @@
+"""``dualball validate`` and ``dualball judge``: the verdicts."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from compare.claims.catalogue import CLAIMS
+from compare.claims.claim import Verdict
+from compare.commands import options, tables
+from compare.measure.lab import Level
+from compare.report import results
+from compare.runs import progress
+from model import Parameters
+
+
+def add(commands: options.Commands) -> None:
+    """Declare the commands."""
+    command = options.command(commands, "validate", run, "hold simulation against theory, claim by claim; the main job")
+    level = command.add_mutually_exclusive_group()
+    level.add_argument("--quick", dest="level", action="store_const", const=Level.QUICK, default=Level.DEFAULT)
+    level.add_argument("--full", dest="level", action="store_const", const=Level.FULL, help="everything")
+    own = command.add_mutually_exclusive_group()
+    own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
+    own.add_argument("--parameters", type=Path, metavar="FILE", help="your own set, a TOML file, instead of many")
+    command.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR")
+    command.add_argument("--list", action="store_true", help="list the claims and stop")
+    options.add_workers(command)
+    command.add_argument("--quiet", action="store_true", help="no progress")
+    _add_shared(command)
+
+    command = options.command(commands, "judge", judge, "judge the stored measurements of a validation again")
+    command.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR")
+    _add_shared(command)
+
+
+def _add_shared(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
+    command.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
+    command.add_argument("--json", action="store_true", help="print the verdicts as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and judge."""
+    from compare import validation  # here, because it loads everything there is
+
+    console = Console()
+    if args.list:
+        console.print(tables.claims(CLAIMS))
+        return 0
+    chosen = _own_set(args)
+
+    def announce(verdict: Verdict) -> None:
+        if not args.json:
+            console.print(tables.line(verdict), soft_wrap=True)
+
+    with progress.shown(quiet=args.quiet or args.json) as show:
+        verdicts = validation.validate(
+            args.output,
+            level=args.level,
+            claims=args.claim,
+            sets=chosen,
+            workers=options.workers(args),
+            limit=args.limit,
+            progress=show,
+            announce=announce,
+        )
+    return _finish(verdicts, args, console)
+
+
+def judge(args: argparse.Namespace) -> int:
+    """Judge what is stored."""
+    from compare import validation  # here, because it loads everything there is
+
+    console = Console()
+    verdicts = validation.judge_stored(args.output, args.claim)
+    if not args.json:
+        for verdict in verdicts:
+            console.print(tables.line(verdict), soft_wrap=True)
+    return _finish(verdicts, args, console)
+
+
+def _own_set(args: argparse.Namespace) -> dict[str, Parameters] | None:
+    if args.parameters:
+        return {args.parameters.stem: Parameters.load(args.parameters)}
+    return {args.set: Parameters.named(args.set)} if args.set else None
+
+
+def _finish(verdicts: Sequence[Verdict], args: argparse.Namespace, console: Console) -> int:
+    if args.json:
+        print(json.dumps([results.describe(verdict) for verdict in verdicts], indent=1))
+    else:
+        if args.verbose:
+            console.print(*(tables.checks(verdict) for verdict in verdicts if verdict.checks))
+        console.print(tables.summary(verdicts), soft_wrap=True)
+        console.print(f"report: {args.output / results.REPORT}")
+    return 0 if all(verdict.passed for verdict in verdicts) else 1

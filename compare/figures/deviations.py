@@ -1,0 +1,100 @@
+"""The numbers of a claim, each by how much of its tolerance it is off: a strip for every quantity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from compare.claims.claim import COVERAGE, Check
+from compare.figures import style
+from compare.figures.drawing import Drawing, GapError, Material
+from compare.measure.quantities import quantity
+from compare.runs.engines import ENGINES
+
+_WIDEST = 1.5
+"""Deviations over tolerance beyond this are drawn at the edge, as arrows."""
+_MANY = 100
+"""From so many points on, they are drawn as pixels: a page of many figures stays small."""
+
+
+@dataclass(frozen=True)
+class Strips:
+    """Checks of one claim that have a tolerance."""
+
+    claim: str
+    checks: tuple[Check, ...]
+
+
+def of(claim: str) -> Drawing:
+    """The figure of a claim that has none of its own."""
+    return Drawing(
+        title=f"Deviations of {claim}",
+        select=lambda material: select(material, claim),
+        draw=draw,
+        caption=caption,
+        claims=(claim,),
+    )
+
+
+def select(material: Material, claim: str) -> Strips:
+    """The checks of a claim; `GapError` if none has a tolerance, since counts need no figure."""
+    checks = tuple(c for c in material.checks(claim) if c.tolerance > 0 and np.isfinite(c.deviation))
+    if not checks:
+        raise GapError("nothing with a tolerance was measured")
+    return Strips(claim, checks)
+
+
+def caption(strips: Strips) -> str:
+    """What is shown, and with which parameters."""
+    sets = dict.fromkeys(c.measurement.set for c in strips.checks)
+    p = strips.checks[0].measurement.parameters
+    many = f"{len(sets)} parameter sets" if len(sets) > 1 else f"{next(iter(sets))}: {style.named(p)}"
+    return (
+        f"Measured less predicted, over the tolerance of each of the {len(strips.checks)} numbers ({many}). Shaded: "
+        "within tolerance, three standard uncertainties; darker: within one. Arrows: beyond the frame."
+    )
+
+
+def draw(strips: Strips) -> Figure:
+    """As high as there are quantities."""
+    names = list(dict.fromkeys(c.measurement.quantity for c in strips.checks))
+    engines = list(dict.fromkeys(c.measurement.engine for c in strips.checks))
+    figure = style.figure(7.0, 0.75 + 0.27 * len(names) + (0.25 if len(engines) > 1 else 0))
+    axes = figure.add_subplot()
+    for band, grey in ((1, "0.93"), (1 / COVERAGE, "0.86")):
+        axes.axvspan(-band, band, color=grey, lw=0, zorder=0)
+    axes.axvline(0, **style.GUIDE)
+    many = len(strips.checks) > _MANY
+    for row, name in enumerate(names):
+        alike = [c for c in strips.checks if c.measurement.quantity == name]
+        # Neighbours one above the other, so that few points lie upon each other.
+        lanes = row + 0.6 * ((np.arange(len(alike)) * 0.618 + 0.5) % 1 - 0.5) * (len(alike) > 1)
+        for engine in engines:
+            chosen = np.array([c.measurement.engine == engine for c in alike])
+            ratio = np.array([c.deviation / c.tolerance for c in alike])[chosen]
+            mark, colour = (ENGINES[engine].mark, ENGINES[engine].colour) if engine in ENGINES else ("D", "0.3")
+            look: dict[str, Any] = {
+                "color": colour,
+                "mfc": "none" if many else "white",
+                "ls": "none",
+                "rasterized": many,
+            }
+            within, at = np.abs(ratio) <= _WIDEST, lanes[chosen]
+            axes.plot(ratio[within], at[within], marker=mark, ms=3 if many else 4.5, label=engine, **look)
+            for side, arrow in ((-1, "<"), (1, ">")):
+                beyond = side * ratio > _WIDEST
+                axes.plot(
+                    np.full(beyond.sum(), side * _WIDEST), at[beyond], marker=arrow, ms=7, color="#B3261E", ls="none"
+                )
+    axes.set_yticks(range(len(names)), [quantity(name).symbol for name in names])
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.set_xlim(-1.08 * _WIDEST, 1.08 * _WIDEST)
+    axes.set_xlabel("(measured − predicted)/tolerance")
+    if len(engines) > 1:
+        handles, labels = axes.get_legend_handles_labels()
+        once = dict(zip(labels, handles, strict=True))
+        figure.legend(list(once.values()), list(once), loc="outside upper center", ncols=4, fontsize=8, frameon=False)
+    return figure

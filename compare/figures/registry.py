@@ -1,0 +1,99 @@
+"""All figures. To add one, write a module with what it selects, how that is drawn, its caption; add a record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from compare.figures import (
+    bifurcation_diagrams,
+    cases,
+    characteristic,
+    deviations,
+    flow_curve,
+    parameter_plane,
+    settings,
+    slipping,
+    unloading,
+)
+from compare.figures.drawing import Drawing
+
+
+def _explaining(title: str, draw: Callable[[object], Figure], text: str) -> Drawing:
+    """A figure of the model itself, which depends on no parameter and no result."""
+    return Drawing(title=title, select=lambda _: None, draw=draw, caption=lambda _: text, background=True)
+
+
+def _of_paper(module: Any, name: str, title: str, claim: str = "") -> Drawing:
+    """A figure whose module draws several of a kind; it stands beside the claim of its own name, or another."""
+    select = partial(module.select, figure=name)
+    return Drawing(title=title, select=select, draw=module.draw, caption=module.caption, claims=(claim or name,))
+
+
+FIGURES: dict[str, Drawing] = {
+    "characteristic": Drawing(
+        title="Characteristic curves",
+        select=characteristic.select,
+        draw=characteristic.draw,
+        caption=characteristic.caption,
+    ),
+    "ladder": Drawing(
+        title="From a newcomer's settings to the study's",
+        select=settings.select_ladder,
+        draw=settings.draw_ladder,
+        caption=settings.caption_ladder,
+    ),
+    "frontier": Drawing(
+        title="Error and cost",
+        select=settings.select_frontier,
+        draw=settings.draw_frontier,
+        caption=settings.caption_frontier,
+    ),
+    "fig-2": _explaining(
+        "Fig. 2: the nine cases",
+        cases.draw_figure_2,
+        "The nine kinematic cases: rolling (R), slipping (S) or no contact (N), first at the floor (A), second at the "
+        "wall (B). Dot: rolls; arrows: slips. Numbers: variables of position that are needed, plus independent "
+        "velocities, make the dimension of the state space. Off the wall (right column) the distance h from it counts.",
+    ),
+    "fig-3": _explaining(
+        "Fig. 3: sections of the state space",
+        cases.draw_figure_3,
+        "Where the cases are. Left: y = v_y = 0 at one ω_c, over the three components of slip: RR is a point, SR and "
+        "RS are lines, SS is all the rest. Right: y = v_y = ω̃_z = 0 over ω_c: SR and RS are planes that meet in the "
+        "line RR.",
+    ),
+    "fig-4": _of_paper(slipping, "fig-4", "Fig. 4: a slip that dies out", "slip-NR-NS"),
+    "fig-5": _of_paper(slipping, "fig-5", "Fig. 5: a slip that grows", "slip-NR-NS"),
+    "fig-6": _explaining(
+        "Fig. 6: transitions to more freedom",
+        cases.draw_figure_6,
+        "Transitions to cases of more freedom, which are drawn higher up; dim: dimension of the state space. Solid: "
+        "slip begins at the floor (A); dashed: at the wall (B); dotted: the ball leaves the floor.",
+    ),
+    "fig-7": _of_paper(parameter_plane, "fig-7", "Fig. 7: regions over wall friction and flow"),
+    "fig-8": _of_paper(parameter_plane, "fig-8", "Fig. 8: regions over equal friction and flow"),
+    "fig-9": _of_paper(bifurcation_diagrams, "fig-9", "Fig. 9: off the floor"),
+    "fig-10": _of_paper(bifurcation_diagrams, "fig-10", "Fig. 10: on the floor, η < j"),
+    "fig-11": _of_paper(bifurcation_diagrams, "fig-11", "Fig. 11: on the floor, η > j"),
+    "fig-12": _of_paper(bifurcation_diagrams, "fig-12", "Fig. 12: on the floor, η > j, (12) released"),
+    "fig-13-left": _of_paper(flow_curve, "fig-13-left", "Fig. 13, left: hysteresis, η < j"),
+    "fig-13-right": _of_paper(flow_curve, "fig-13-right", "Fig. 13, right: η > j"),
+    "unloading": Drawing(
+        title="Section 5.3: the fall at unloading",
+        select=unloading.select,
+        draw=unloading.draw,
+        caption=unloading.caption,
+        claims=("fig-13-right",),
+    ),
+}
+"""Every figure by its file name, in the order of the report."""
+
+
+def figures_of(claim: str) -> dict[str, Drawing]:
+    """The figures that stand beside a claim; unless one bears its name, also the deviations of its numbers."""
+    own = {name: each for name, each in FIGURES.items() if claim in each.claims}
+    return own if claim in own else own | {f"claim-{claim}": deviations.of(claim)}

@@ -1,0 +1,119 @@
+"""What ways of setting MuJoCo reach: errors along the ladder of settings, and error against cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from compare.figures import style
+from compare.figures.drawing import GapError, Material, Score
+
+_LEAST = 1e-16
+"""Smaller errors are drawn here: an error may be zero."""
+COLUMNS = 3
+_MARKS = "os^vDP*X"
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B")
+_OF_STATES = (
+    "the stationary states named (case and ω₀ in rad/s; RR and SS with μ = η = 0.2, NR with η = 0.6; j = 0.4, "
+    "κ = 0.0714)"
+)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Scores, and those of engines that are not part of this program."""
+
+    scores: tuple[Score, ...]
+    elsewhere: tuple[Score, ...] = ()
+
+
+def select_ladder(material: Material) -> Comparison:
+    """The scores of the ladder; `GapError` if it was not climbed."""
+    if not material.ladder:
+        raise GapError("the ladder of settings was not measured")
+    return Comparison(material.ladder)
+
+
+def select_frontier(material: Material) -> Comparison:
+    """The scores that have a cost; `GapError` if there are none."""
+    if not material.frontier:
+        raise GapError("error against cost was not measured")
+    return Comparison(material.frontier, material.elsewhere)
+
+
+def caption_ladder(of: Comparison) -> str:
+    """Of the ladder."""
+    return (
+        f"Relative error of ω_c in {_OF_STATES} and, as root mean square, in a transient, under settings that each "
+        "have one thing more than those above them, from what a newcomer writes to those of this study (ours). What "
+        "is below 1e-16 is drawn there; a run that diverged has no mark."
+    )
+
+
+def caption_frontier(of: Comparison) -> str:
+    """Of error against cost."""
+    text = (
+        f"Relative error of ω_c over the processor time that a simulated second takes, in {_OF_STATES} and in a "
+        "transient. Marks of one kind: one method at several time steps, joined. What is below 1e-16 is drawn there."
+    )
+    return text + (" Grey: other engines, measured once, elsewhere." if of.elsewhere else "")
+
+
+def draw_ladder(of: Comparison) -> Figure:
+    """Rows of settings, a mark for each state."""
+    methods = list(dict.fromkeys(score.method for score in of.scores))
+    figure = style.figure(9, 1.1 + 0.33 * len(methods))
+    axes = figure.add_subplot()
+    for k, quantity in enumerate(dict.fromkeys(score.quantity for score in of.scores)):
+        own = [s for s in of.scores if s.quantity == quantity and math.isfinite(s.error)]
+        x, y = [max(s.error, _LEAST) for s in own], [methods.index(s.method) for s in own]
+        axes.plot(x, y, f"{_MARKS[k]}-", color=_COLOURS[k], mfc="white", lw=0.6, label=quantity)
+    axes.set_yticks(range(len(methods)), methods, fontsize=8.5)
+    axes.invert_yaxis()
+    axes.set_xscale("log")
+    axes.set_xlabel("$|\\Delta\\omega_c|/\\omega_c$")
+    axes.grid(alpha=0.3)
+    figure.legend(loc="outside upper center", ncols=5, fontsize=8, frameon=False)
+    return figure
+
+
+def draw_frontier(of: Comparison) -> Figure:
+    """A panel for each state and one for the transient."""
+    quantities = list(dict.fromkeys(score.quantity for score in of.scores))
+    rows = -(-len(quantities) // COLUMNS)
+    figure = style.figure(11, 0.8 + 3.1 * rows)
+    panels = figure.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
+    looks = _looks(of.scores, of.elsewhere)
+    for axes, quantity in zip(panels, quantities, strict=False):
+        for method, look in looks.items():
+            own = [s for s in (*of.scores, *of.elsewhere) if (s.method, s.quantity) == (method, quantity)]
+            own.sort(key=lambda score: score.cost)
+            axes.plot([s.cost for s in own], [max(s.error, _LEAST) for s in own], label=method, ms=5, lw=1, **look)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_title(quantity, fontsize=10)
+        axes.grid(alpha=0.3)
+    for axes in panels[len(quantities) :]:
+        axes.set_visible(False)
+    for axes in panels[::COLUMNS]:
+        axes.set_ylabel("$|\\Delta\\omega_c|/\\omega_c$")
+    for axes in panels[max(0, len(quantities) - COLUMNS) : len(quantities)]:
+        axes.set_xlabel("processor time per simulated time")
+        axes.tick_params(labelbottom=True)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8, frameon=False
+    )
+    return figure
+
+
+def _looks(scores: Sequence[Score], elsewhere: Sequence[Score]) -> dict[str, dict[str, str]]:
+    """Mark and colour of each method; those elsewhere are hollow and grey."""
+    own = list(dict.fromkeys(score.method for score in scores))
+    others = list(dict.fromkeys(score.method for score in elsewhere))
+    looks = {name: {"marker": _MARKS[k % 8], "color": _COLOURS[k % 8], "mfc": "white"} for k, name in enumerate(own)}
+    return looks | {
+        name: {"marker": "s^Dv"[k % 4], "color": "0.5", "mfc": "white", "ls": "none"} for k, name in enumerate(others)
+    }

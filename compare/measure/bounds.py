@@ -1,0 +1,245 @@
+"""Where slip begins to grow: gamma along straight lines of states, its zero and its slope.
+
+A ball that goes round at a held omega_c is given more and more flow; or the flow takes it along at its own omega_0,
+rolling at both points or hanging on the wall alone, as its settled states do. Two flows show about where gamma passes
+through zero, and two more are taken around it. gamma is drawn over omega_0, or its square where the orbit goes with it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.measure.field import DOUBT, LIMIT
+from compare.measure.growth import LARGE, SMALL, SMOOTH, STRAIGHT, Push
+from compare.measure.lab import Lab, time_unit
+from compare.measure.record import Measurement, Missing, Records
+from compare.measure.settling import Start, high, settle
+from compare.measure.watched import ends_of_rolling
+from compare.runs.tasks import Task
+from compare.statistics import straight_line
+from model import Case, Parameters, Trajectory
+from model.arrays import Array
+
+NAME = "bounds"
+AROUND = (0.7, 1.3)
+"""Where the second two flows are, over the zero that the first two show."""
+MEDIUM = (1.0, 0.5)
+"""Sizes of slip of a ball that hangs on a smooth wall, and so goes round fast, in units as those of `LARGE`."""
+COARSE = 6e-3
+"""Largest uncertainty of a slope that counts, over the slope."""
+BEYOND = 2.1
+"""Largest zero that counts, over the largest value at which slip stayed in its case: a line isn't followed farther."""
+FAR = 100.0
+"""Largest zero that is followed, over the largest of the first flows."""
+HANGING = (1.05, 1.6, 1.3)
+"""Flows at which a ball hangs on the wall, over the measured one at which it ceases to."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """States in a row, and the slip that they are given."""
+
+    set: str
+    inner: Case
+    outer: Case
+    n: tuple[float, float, float]
+    by: str
+    """``held``: at the same omega_c; ``stationary``: going round with the fluid."""
+    first: tuple[float, float]
+    """The first two flows, rad s-1."""
+    at: Callable[[float], tuple[Parameters, Array]]
+    """Parameters and state (8,) at a flow."""
+    last: tuple[float, ...] = ()
+    """Other flows than those around the zero: where the ball can't be at that."""
+
+    @property
+    def power(self) -> int:
+        """Of omega_0, over which gamma is drawn."""
+        return 1 if self.by == "held" else 2
+
+    def push(self, omega_0: float) -> Push:
+        """The state at a flow, and the slip."""
+        p, x = self.at(omega_0)
+        return Push(self.set, p, self.inner, self.outer, x, np.array(self.n))
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Sizes of slip."""
+        if self.inner is Case.NR:
+            return MEDIUM
+        return SMALL if self.outer in (Case.RS, Case.SR) else LARGE
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Zero and slope of gamma along every line."""
+    yield from (Missing(NAME, name, SMOOTH) for name, p in sets.items() if not (p.mu and p.eta))
+    sets = {name: p for name, p in sets.items() if p.mu and p.eta}
+    lines = [line for name, p in sets.items() for line in _lines(name, p)]
+    hanging, missing = _hanging(lab, sets, records)
+    yield from missing
+    lines += hanging
+    tasks = [_tasks(lab, line, line.first, True) for line in lines]
+    lab.complete([task for some in tasks for task in some])
+    begun = [_points(lab, line, line.first, some) for line, some in zip(lines, tasks, strict=True)]
+    around = [_around(line, points) for line, points in zip(lines, begun, strict=True)]
+    more = [_tasks(lab, line, flows, False) for line, flows in zip(lines, around, strict=True)]
+    lab.complete([task for some in more for task in some])
+    for line, points, flows, some in zip(lines, begun, around, more, strict=True):
+        if points is None:
+            yield Missing(
+                NAME, line.set, f"slips from {line.inner.name} to {line.outer.name} did not stay in {line.outer.name}"
+            )
+            continue
+        yield from _result(lab, line, points, flows, some)
+
+
+def _tasks(lab: Lab, line: Line, flows: Sequence[float], first: bool) -> list[Task]:
+    """Two sizes with the shorter step for every flow; with `first`, one with the longer step, too."""
+    large, small = line.sizes
+    found = []
+    for push in map(line.push, flows):
+        found += [push.task(lab, large, 2), push.task(lab, small, 2)]
+        found += [push.task(lab, large)] if first else []
+    return found
+
+
+@dataclass(frozen=True)
+class _Points:
+    """gamma at flows, how it goes to a vanishing step, and its uncertainty; rad s-2."""
+
+    flows: tuple[float, ...]
+    gammas: tuple[float, ...]
+    shifts: tuple[float, ...]
+    """What to add, at the first and the second flow."""
+    noise: float
+
+
+def _points(lab: Lab, line: Line, flows: Sequence[float], tasks: Sequence[Task]) -> _Points | None:
+    """The first two points; None if a record was not in the case."""
+    runs = lab.run(tasks)
+    pushes = [line.push(flow) for flow in flows]
+    fine = np.array([_vanishing(push, runs[3 * k], runs[3 * k + 1]) for k, push in enumerate(pushes)])
+    rates = np.array([[push.rate(runs[3 * k], 2)[0], push.rate(runs[3 * k + 2])[0]] for k, push in enumerate(pushes)])
+    if np.isnan(rates).any() or np.isnan(fine).any():
+        return None
+    p = pushes[0].p
+    change = rates[:, 0] - rates[:, 1]
+    noise = math.hypot(np.abs(change).max() * DOUBT, fine[:, 1].max(), STRAIGHT * p.g / p.r)
+    return _Points(tuple(flows), tuple(fine[:, 0].tolist()), tuple((change * LIMIT).tolist()), noise)
+
+
+def _vanishing(push: Push, large: Trajectory, small: Trajectory) -> tuple[float, float]:
+    """gamma for a vanishing size, of which one is twice the other, and what a degree of the polynomials changes."""
+    rates = 2 * push.rate(small, 2) - push.rate(large, 2)
+    return float(rates[0]), float(abs(rates[1] - rates[0]))
+
+
+def _around(line: Line, points: _Points | None) -> tuple[float, ...]:
+    """Two flows around the zero of the line through the first two; none if there is none ahead."""
+    if points is None or line.last:
+        return line.last
+    q = np.array(points.flows) ** line.power
+    rates = np.array(points.gammas) + points.shifts
+    slope = np.diff(rates)[0] / np.diff(q)[0]
+    zero = float(q[0] - rates[0] / slope) if slope else math.inf
+    if not 0 < zero < (FAR * max(points.flows)) ** line.power:
+        return ()
+    _, x = line.at(points.flows[0])
+    start = float(x[2]) if line.power == 1 else 0.0
+    return tuple(start + (zero ** (1 / line.power) - start) * factor for factor in AROUND)
+
+
+def _result(
+    lab: Lab, line: Line, points: _Points, flows: Sequence[float], tasks: Sequence[Task]
+) -> Iterator[Measurement | Missing]:
+    reached, gammas = list(points.flows), list(points.gammas)
+    runs = lab.run(tasks)
+    for flow, large, small in zip(flows, runs[::2], runs[1::2], strict=True):
+        gamma, _ = _vanishing(line.push(flow), large, small)
+        if not math.isnan(gamma):
+            reached.append(flow)
+            gammas.append(gamma)
+    q = np.array(reached) ** line.power
+    one, other = points.shifts
+    shifts = one + (other - one) * (q - q[0]) / (q[1] - q[0])
+    gamma = np.array(gammas) + shifts
+    # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none of it.
+    _, slope = straight_line(q, gamma, points.noise)
+    zero, _ = straight_line(q, gamma, points.noise * math.sqrt(len(q)))
+    if slope.uncertainty > COARSE * abs(slope.value):
+        what = f"{line.inner.name} to {line.outer.name}, {line.by}"
+        yield Missing(NAME, line.set, f"growth of slip from {what}, changes too little with the flow")
+        return
+    p, x = line.at(line.first[0])
+    conditions = line.push(line.first[0]).conditions | {"by": line.by, "omega_c": float(x[2])}
+    square = "_square" if line.power == 2 else ""
+    for quantity, value in zip((f"gamma_zero{square}", f"gamma_slope{square}"), (zero, slope), strict=True):
+        if quantity.startswith("gamma_zero") and abs(value.value) > BEYOND * np.abs(q).max():
+            continue
+        yield Measurement(
+            protocol=NAME,
+            quantity=quantity,
+            value=value.value,
+            uncertainty=value.uncertainty,
+            engine=lab.engine.name,
+            set=line.set,
+            parameters=p,
+            conditions=conditions,
+            runs=tuple(lab.file(task) for task in tasks),
+        )
+
+
+def _lines(name: str, p: Parameters) -> Iterator[Line]:
+    """The lines out of rolling at both points, in natural units; what friction and inertia there are sets the scale."""
+    unit = time_unit(p)
+
+    def held(omega_c: float) -> Callable[[float], tuple[Parameters, Array]]:
+        return lambda omega_0: (p.replace(omega_0=omega_0), _rolling(omega_c))
+
+    def along(omega_0: float) -> tuple[Parameters, Array]:
+        return p.replace(omega_0=omega_0), _rolling(omega_0)
+
+    slow = 0.5 / unit * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
+    yield Line(name, Case.RR, Case.RS, (0, 1, 0), "held", (slow, 3 * slow), held(slow))
+    rubbing = math.sqrt(p.mu) / unit
+    yield Line(name, Case.RR, Case.RS, (0, -1, 0), "stationary", (0.5 * rubbing, 0.9 * rubbing), along)
+    spinning = math.sqrt(1 / p.j) / unit
+    fast = 0.7 * spinning
+    yield Line(name, Case.RR, Case.SR, (-1, 0, 0), "held", (fast, 1.5 * fast), held(fast))
+    yield Line(name, Case.RR, Case.SR, (1, 0, 0), "stationary", (0.5 * spinning, 0.8 * spinning), along)
+    hanging = min(1.0, 1 / math.sqrt(p.eta)) / unit
+    yield Line(name, Case.RR, Case.SS, (0, 0, 1), "stationary", (0.4 * hanging, 0.8 * hanging), along)
+    yield Line(name, Case.RR, Case.SS, (0, 0, -1), "stationary", (1.5 * rubbing, 2.2 * rubbing), along)
+
+
+def _rolling(omega_c: float) -> Array:
+    return np.array([0.0, 0.0, omega_c, 0, 0, 0, 0, 0])
+
+
+def _hanging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tuple[list[Line], list[Missing]]:
+    """The lines out of NR, through states settled above the measured omega_02."""
+    ends = ends_of_rolling(records, "omega_02")
+    flows = {name: [ends[name] * factor for factor in HANGING] for name in sets if name in ends}
+    starts = [
+        Start(name, q, "on the wall", np.array([high(q), 0, q.omega_0, 0, 0, 0, 0, 0]))
+        for name in flows
+        for q in (sets[name].replace(omega_0=flow) for flow in flows[name])
+    ]
+    states = {(s.start.set, s.start.p.omega_0): s for s in settle(lab, starts) if not s.failure and s.case is Case.NR}
+    lines, missing = [], []
+    for name, p in sets.items():
+        if name not in flows or any((name, flow) not in states for flow in flows[name]):
+            missing.append(Missing(NAME, name, "no flow was found at which the wall alone carries the ball"))
+            continue
+
+        def at(omega_0: float, name: str = name, p: Parameters = p) -> tuple[Parameters, Array]:
+            _, _, omega_c, slip_x, *_ = states[name, omega_0].mean.tolist()
+            return p.replace(omega_0=omega_0), np.array([p.R, 0, omega_c, slip_x, 0, 0, 0, 0])
+
+        first, second, *last = flows[name]
+        lines.append(Line(name, Case.NR, Case.NS, (0, 0, 1), "stationary", (first, second), at, tuple(last)))
+    return lines, missing

@@ -1,0 +1,110 @@
+"""Where along omega_0 a run's answer changes: brackets narrowed down, many at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.measure.lab import Lab
+from compare.runs.tasks import Task
+from compare.statistics import Measured
+from model import Trajectory
+
+SECTIONS = 7
+"""Flows inside a bracket in each round, by which it shrinks to an eighth."""
+
+
+@dataclass(frozen=True)
+class Care:
+    """How a run is done: times as long, and with the time step over `refine`."""
+
+    time: int = 1
+    refine: int = 1
+
+
+USUAL, LONGER, FINER = Care(), Care(time=4), Care(refine=2)
+
+
+@dataclass(frozen=True, eq=False)
+class Bracket:
+    """Two values between which the answer changes from yes to no, and the runs that said so."""
+
+    low: float
+    high: float
+    runs: tuple[Trajectory | None, Trajectory | None] = (None, None)
+    tasks: tuple[Task, ...] = ()
+    shift: float = 0.0
+    """How far the place moves with half the time step."""
+
+    @property
+    def place(self) -> Measured:
+        """Its middle; the uncertainty is that of a uniform distribution, and the shift."""
+        return Measured((self.low + self.high) / 2, math.hypot((self.high - self.low) / math.sqrt(12), self.shift))
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A question with a yes at `begin.low` and a no at `begin.high`."""
+
+    begin: Bracket
+    task: Callable[[float, Bracket, Care], Task]
+    """The run to ask at a value, given the bracket so far."""
+    answer: Callable[[Trajectory], bool | None]
+    """Yes, no, or None where the run doesn't show it, and is done again for longer."""
+    width: float
+    """Width at which it is narrow enough."""
+
+
+def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
+    """Narrow every search down to its width, or as far as runs show it, all of them together, round by round.
+
+    With `careful` the last round is done once more with half the time step, which gives `Bracket.shift`.
+    """
+    found = [search.begin for search in searches]
+    before = list(found)
+    todo = list(range(len(searches)))
+    while todo := [k for k in todo if found[k].high - found[k].low > searches[k].width]:
+        for k, bracket in zip(todo, _round(lab, [searches[k] for k in todo], [found[k] for k in todo]), strict=True):
+            before[k], found[k] = found[k], bracket
+        todo = [k for k in todo if found[k].high - found[k].low < (before[k].high - before[k].low) / 2]
+    if not careful:
+        return found
+    again = _round(lab, searches, before, FINER)
+    return [Bracket(b.low, b.high, b.runs, b.tasks, _between(b, more)) for b, more in zip(found, again, strict=True)]
+
+
+def _between(one: Bracket, other: Bracket) -> float:
+    """Distance of two brackets, 0 where they overlap by half or more."""
+    apart = abs(one.low + one.high - other.low - other.high) / 2
+    return apart if apart > (one.high - one.low) / 2 else 0.0
+
+
+def _round(lab: Lab, searches: Sequence[Search], brackets: Sequence[Bracket], care: Care = USUAL) -> list[Bracket]:
+    """Ask inside every bracket; once more, for longer, where the run doesn't show the answer."""
+    asked = [(s, b, v) for s, b in zip(searches, brackets, strict=True) for v in _inside(b)]
+    tasks = [s.task(v, b, care) for s, b, v in asked]
+    runs = lab.run(tasks)
+    answers = [s.answer(run) for (s, _, _), run in zip(asked, runs, strict=True)]
+    open_ = [k for k, answer in enumerate(answers) if answer is None]
+    longer = [asked[k][0].task(asked[k][2], asked[k][1], Care(LONGER.time, care.refine)) for k in open_]
+    for k, task, run in zip(open_, longer, lab.run(longer), strict=True):
+        tasks[k], runs[k], answers[k] = task, run, asked[k][0].answer(run)
+    rows = [slice(n * SECTIONS, (n + 1) * SECTIONS) for n in range(len(searches))]
+    return [_section(b, answers[row], tasks[row], runs[row]) for b, row in zip(brackets, rows, strict=True)]
+
+
+def _inside(bracket: Bracket) -> list[float]:
+    values: list[float] = np.linspace(bracket.low, bracket.high, SECTIONS + 2)[1:-1].tolist()
+    return values
+
+
+def _section(around: Bracket, inside: list[bool | None], tasks: list[Task], runs: list[Trajectory]) -> Bracket:
+    """From the last yes before the first no to that no."""
+    answers = [True, *inside, False]
+    ends, asked = [around.low, *_inside(around), around.high], [around.runs[0], *runs, around.runs[1]]
+    b = answers.index(False)
+    a = max(k for k in range(b) if answers[k])
+    return Bracket(ends[a], ends[b], (asked[a], asked[b]), tuple(tasks[max(a - 1, 0) : b]))

@@ -1,0 +1,254 @@
+"""The unstable state between two attractors, by following the edge of their basins.
+
+Where at one flow a ball slips on the floor (SS) or goes round with the fluid (SR, which is NR at y = 0), the straight
+line between the two measured states crosses the border between the balls that end in the one and in the other. The last
+two runs on either side of it shadow a ball on the border for a while, which comes to rest in the unstable state. The
+mean of the time that they stay together begins the next line, across the same border.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compare.measure.brackets import Bracket, Care, Search, narrow
+from compare.measure.extrapolation import vanishing
+from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.questions import lasting, rest, wall
+from compare.measure.record import Measurement, Missing, Records
+from compare.measure.settling import TAPER, Settled, Start, family, settle
+from compare.runs.tasks import Task
+from compare.statistics import Measured, tail
+from model import Case, Parameters, Trajectory
+from model.arrays import Array
+
+PROTOCOL = "edge"
+CLOSING = (0.05, 0.1, 0.2, 0.4)
+"""Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
+PARTS = {Level.QUICK: (0.3,), Level.DEFAULT: (*CLOSING, 0.7), Level.FULL: (*CLOSING, 0.55, 0.7, 0.85)}
+"""The flows at each set; at the quick level that with most drag, which settles soonest, has `CLOSING`."""
+TIME = {Level.QUICK: 20.0, Level.DEFAULT: 60.0, Level.FULL: 60.0}
+"""How long a ball has to leave the edge, in units of 1/c."""
+FIRST, NEXT = 3e-4, 2e-5
+"""Widths of the last brackets on the first line and on the others, in parts of the distance of the attractors."""
+REACH = 5e-3
+"""Half the length of a later line, in those parts."""
+TOGETHER = 2e-3
+"""The distance up to which two runs count as being together, in those parts."""
+CYCLES = {Level.QUICK: 3, Level.DEFAULT: 4, Level.FULL: 6}
+"""Lines for each edge."""
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """A line across the border, and where it crosses it."""
+
+    set: str
+    p: Parameters
+    slipping: Array
+    """The settled states on either side, (8,)."""
+    lifted: Array
+    centre: Array
+    reach: tuple[float, float]
+    """The part of the line that is searched, from its centre, in units of the distance of the states."""
+    found: Bracket | None = None
+    moved: Array | None = None
+    """How far the crossing is from that of the line before; None for the first line, and after one without crossing."""
+    stretched: int = 0
+    """How many lines were too short since the last crossing."""
+
+    @property
+    def line(self) -> Array:
+        """Direction and unit of the line."""
+        return self.lifted - self.slipping
+
+    @property
+    def crossing(self) -> Array:
+        """The state in the middle of the last bracket, (8,)."""
+        assert self.found is not None
+        return np.asarray(self.centre + self.found.place.value * self.line)
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Between the measured omega_02 and omega_04, cross the border again and again."""
+    limits = {name: _limits(records, name) for name in sets}
+    folds = {name: between for name, between in limits.items() if between}
+    for name in sets:
+        if name not in folds:
+            yield Missing(PROTOCOL, name, "at no flow are a slipping ball and a lifted one both settled")
+    if not folds:
+        return
+    soonest = max(folds, key=lambda name: sets[name].c)
+    parts = dict.fromkeys(folds, PARTS[lab.level])
+    if lab.level is Level.QUICK:
+        parts[soonest] = CLOSING
+    edges, missing = _lines(lab, sets, {n: [a + part * (b - a) for part in parts[n]] for n, (a, b) in folds.items()})
+    yield from missing
+    followed = _followed(lab, edges)
+    for edge in followed:
+        yield from _rows(lab, edge)
+    for name in folds:
+        own = [edge for edge in followed if edge.set == name and _part(edge, *folds[name]) < max(CLOSING) + 1e-6]
+        yield from _closing(lab, sets[name], name, own)
+
+
+def _limits(records: Records, name: str) -> tuple[float, float] | None:
+    """omega_02 and omega_04 of a set, as measured; None without either."""
+    found = [
+        [m.value for m in records.select("thresholds", q, lambda m: m.set == name)] for q in ("omega_02", "omega_04")
+    ]
+    return (found[0][0], found[1][0]) if all(found) else None
+
+
+def _part(edge: Edge, low: float, high: float) -> float:
+    return (edge.p.omega_0 - low) / (high - low)
+
+
+def _lines(
+    lab: Lab, sets: Mapping[str, Parameters], flows: Mapping[str, Sequence[float]]
+) -> tuple[list[Edge], list[Missing]]:
+    """The first lines, between the settled states at each flow."""
+    begin = [
+        Start(name, q, kind, start(q, q.omega_0))
+        for name, omegas in flows.items()
+        for q in (sets[name].replace(omega_0=float(omega)) for omega in omegas)
+        for kind, start in (("rest", rest), ("wall", wall))
+    ]
+    states, edges, missing = settle(lab, begin), [], []
+    for slipping, lifted in zip(states[::2], states[1::2], strict=True):
+        name, q = slipping.start.set, slipping.start.p
+        if slipping.failure or lifted.failure or (slipping.case, family(lifted.case)) != (Case.SS, Case.NR):
+            why = f"no two attractors settled at omega_0 = {q.omega_0:.4g} rad/s: {_fate(slipping)}, {_fate(lifted)}"
+            missing.append(Missing(PROTOCOL, name, why))
+        else:
+            low, high = (_grounded(state.mean) for state in (slipping, lifted))
+            edges.append(Edge(name, q, low, high, low, (0.0, 1.0)))
+    return edges, missing
+
+
+def _fate(state: Settled) -> str:
+    return state.failure or state.case.name
+
+
+def _grounded(x: Array) -> Array:
+    """The state on the floor: a lifted ball knows nothing of its height."""
+    return np.asarray([0.0, 0.0, *x[2:6], 0.0, 0.0])
+
+
+def _followed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
+    """Cross the border on one line after the other; where all runs end alike the next is longer."""
+    current = list(edges)
+    for cycle in range(CYCLES[lab.level]):
+        lines = [edge if cycle == 0 else _onward(edge) for edge in current]
+        searches = [_search(lab, line, FIRST if cycle == 0 else NEXT) for line in lines]
+        for k, bracket in enumerate(narrow(lab, searches, careful=False)):
+            if None in bracket.runs:
+                current[k] = replace(current[k], moved=None, stretched=current[k].stretched + 1)
+            else:
+                crossed = replace(lines[k], found=bracket, stretched=0)
+                moved = np.abs(crossed.crossing - current[k].crossing) if current[k].found else None
+                current[k] = replace(crossed, moved=moved)
+    return [edge for edge in current if edge.found and edge.moved is not None]
+
+
+def _search(lab: Lab, edge: Edge, width: float) -> Search:
+    t_end, step = lasting(edge.p, TIME[lab.level]), coarse_step(edge.p)
+
+    def task(s: float, bracket: Bracket, care: Care) -> Task:
+        return lab.task(edge.p, edge.centre + s * edge.line, t_end, step, samples=round(t_end / (8 * step)))
+
+    def falls_behind(run: Trajectory) -> bool:
+        return _falls_behind(run, edge)
+
+    return Search(Bracket(*edge.reach), task, falls_behind, width)
+
+
+def _falls_behind(run: Trajectory, edge: Edge) -> bool:
+    """Whether a ball ends up slipping: by which way it still goes, or where it has come to rest."""
+    last = run.omega_c[tail(run, 0.2)]
+    first, second = np.array_split(last, 2)
+    gap = float(edge.lifted[2] - edge.slipping[2])
+    going = float(second.mean() - first.mean())
+    if abs(going) > 1e-5 * gap:
+        return going < 0
+    return float(second.mean() - edge.slipping[2]) < gap / 2
+
+
+def _onward(edge: Edge) -> Edge:
+    """A line through the mean of the time in which the last two runs have stayed together."""
+    if edge.found is None:
+        return edge
+    low, high = (run.x for run in edge.found.runs if run is not None)
+    along = np.abs((high - low) @ edge.line / float(edge.line @ edge.line))
+    together = int(np.argmax(along > TOGETHER)) or len(along)
+    length = max(together - together // 4, 1)
+    weights = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER
+    mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
+    reach = REACH * 4.0**edge.stretched
+    return replace(edge, centre=_grounded(mean), reach=(-reach, reach))
+
+
+def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement]:
+    """The state on the edge, as sure as the last bracket and as little as it has moved since the line before."""
+    for name, (value, sure) in _values(edge).items():
+        yield Measurement(
+            protocol=PROTOCOL,
+            quantity=f"edge_{name}",
+            value=value,
+            uncertainty=sure,
+            engine=lab.engine.name,
+            set=edge.set,
+            parameters=edge.p,
+            conditions={"case": "SS"},
+            runs=_files(lab, edge),
+        )
+
+
+def _files(lab: Lab, edge: Edge) -> tuple[str, ...]:
+    return tuple(lab.file(task) for task in edge.found.tasks) if edge.found else ()
+
+
+def _values(edge: Edge) -> dict[str, tuple[float, float]]:
+    """omega_c, the slips and the spin on the wall, each with its uncertainty; those of the slips are alike."""
+    x, roll, sure = edge.crossing, edge.p.R / edge.p.r, _sure(edge)
+    slips = float(max(sure[3:6].max(), roll * sure[2]))
+    spin = float(x[3] + roll * x[2])
+    return {
+        "omega_c": (float(x[2]), slips / roll),
+        "slip_x": (float(x[3]), slips),
+        "slip_y": (float(x[4]), slips),
+        "slip_z": (float(x[5]), slips),
+        "wall_spin": (spin, slips),
+    }
+
+
+def _sure(edge: Edge) -> Array:
+    """Standard uncertainty of the crossing, (8,)."""
+    assert edge.found is not None
+    assert edge.moved is not None
+    return np.hypot(edge.found.place.uncertainty * edge.line, edge.moved)
+
+
+def _closing(lab: Lab, p: Parameters, name: str, edges: Sequence[Edge]) -> Iterator[Measurement | Missing]:
+    """Where the edge would meet the lifted ball: the distance in omega_c, extrapolated to zero."""
+    if len(edges) < len(CLOSING):
+        return
+    omegas = np.array([edge.p.omega_0 for edge in edges])
+    noise = max(float(_sure(edge)[2]) for edge in edges)
+    apart = [Measured(float(edge.crossing[2] - edge.lifted[2]), noise) for edge in edges]
+    place = vanishing(omegas, apart)
+    if math.isfinite(place.uncertainty):
+        yield Measurement(
+            protocol=PROTOCOL,
+            quantity="omega_02",
+            value=place.value,
+            uncertainty=place.uncertainty,
+            engine=lab.engine.name,
+            set=name,
+            parameters=p.replace(omega_0=place.value),
+            conditions={"side": "from above", "by": "unstable slipping meets the lifted ball"},
+            runs=tuple(file for edge in edges for file in _files(lab, edge)),
+        )

@@ -1,0 +1,56 @@
+"""Where something vanishes or turns, from settled states on one side of the place: polynomials of rising degree."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from compare.statistics import Measured
+from model.arrays import Array
+
+POINTS = 5
+"""Least number of states from which a place is extrapolated."""
+LEAST_GAIN = 0.2
+"""By how much one more point improves a polynomial at best, whatever the points before it seem to say."""
+
+
+def vanishing(where: Array, order: Sequence[Measured]) -> Measured:
+    """The place at which a quantity is zero; `where` (n,) and its values in the order of their distance from there."""
+
+    def zero(values: Array, count: int) -> float:
+        fit = np.polynomial.Polynomial.fit(values[:count] / np.abs(values).max(), where[:count], count - 1)
+        return float(fit(0.0))
+
+    return _converged(zero, order)
+
+
+def turning(where: Array, order: Sequence[Measured]) -> Measured:
+    """The place at its maximum as a function of a quantity; nan if the polynomials have none."""
+
+    def maximum(values: Array, count: int) -> float:
+        scaled = values[:count] / np.abs(values).max()
+        fit = np.polynomial.Polynomial.fit(scaled, where[:count], count - 1)
+        roots = [root.real for root in fit.deriv().roots() if abs(root.imag) < 1e-9]
+        beyond = [root for root in roots if (root - scaled[0]) * (scaled[0] - scaled[-1]) > 0]
+        return float(fit(min(beyond, key=lambda root: abs(root - scaled[0])))) if beyond else math.nan
+
+    return _converged(maximum, order)
+
+
+def _converged(estimate: Callable[[Array, int], float], order: Sequence[Measured]) -> Measured:
+    """The estimate from all points, the nearest first, with the noise of each carried over.
+
+    How far it is from the limit: what the farthest point changed, times what such changes shrink by from one point to
+    the next, which is the larger of the last two ratios, at least `LEAST_GAIN` and at most 1.
+    """
+    values, noise = (np.array([getattr(m, name) for m in order]) for name in ("value", "uncertainty"))
+    count = len(values)
+    row = np.array([estimate(values, n) for n in range(count - 3, count + 1)])
+    changes = np.abs(np.diff(row))
+    ratios = np.divide(changes[1:], changes[:-1], out=np.ones(2), where=changes[:-1] > 0)
+    rest = float(changes[-1] * np.clip(ratios.max(), LEAST_GAIN, 1.0))
+    carried = [estimate(values + shift, count) - row[-1] for shift in np.diag(noise)]
+    rounding = np.finfo(float).eps * abs(row[-1]) * 2**count
+    return Measured(float(row[-1]), math.hypot(rest, rounding, *carried))

@@ -1,0 +1,238 @@
+"""The equations of motion themselves: accelerations and contact forces in all nine cases, at the engine's own states.
+
+Balls start at random in the state space of every case, in natural units, and move freely for a few hundredths of a
+second. Which case each is in, its own contacts say. In short windows during which the case does not change, polynomials
+through the samples give the state, its rate of change and the contact forces in the middle of the window.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.runs.tasks import Task
+from model import Case, Contact, Parameters, Trajectory
+from model.arrays import Array
+from model.cases import TRAITS
+from model.kinematics import VARIABLES, slip_velocities
+
+NAME = "field"
+SEED = 53
+STARTS = {Level.QUICK: 4, Level.DEFAULT: 4, Level.FULL: 12}
+"""Random starts for every case and set."""
+KEPT = {Level.QUICK: 4, Level.DEFAULT: 6, Level.FULL: 24}
+"""Most states measured for every case and set."""
+REFINED = 16
+"""Steps in one of `coarse_step`; the second run of a start has twice as many. With shorter ones the studies' settings
+come to the engine's least impedance, and contacts then answer no faster."""
+CENTRES, HALF = (16, 40, 64), 8
+"""Middles of the windows and half their width, in steps of the coarser run."""
+APART = 4
+"""Steps around a window in which the case doesn't change, either: in that time friction builds up or dies out."""
+FLOOR = 3e-5
+"""Least uncertainty over the scale: a contact follows its load within a few steps, of which a window has 16 and the
+unit of time 300; what that leaves is of second order in the step, and halving the step may by chance not show it."""
+
+COARSE = 1.6e-3
+"""Largest uncertainty over the scale with which a state counts: where a fast slip hardly presses, contact comes and
+goes."""
+LIMIT, DOUBT = 2 / 3, 1 / 2
+"""Limit of a vanishing step beyond the finer run, and its uncertainty, in differences of two steps, one twice the
+other: their error is between first order, for the direction of friction, and second, with limits of 1 and 1/3."""
+TURN = 0.5
+"""Largest change of a slip in a window over the slip itself: where it is about to vanish, friction turns too fast."""
+COMPONENTS = ("Ax", "Ay", "Az", "Bx", "By", "Bz")
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """State, rates and contact forces in the middle of a window."""
+
+    case: Case
+    x: Array
+    """(8,)"""
+    rates: Array
+    """(8,), each per second."""
+    forces: Array
+    """(6,): A_x, A_y, A_z, B_x, B_y, B_z in N."""
+
+
+def polynomial(time: Array, values: Array, degree: int, at: float) -> tuple[Array, Array]:
+    """Values (n,) and rates (n,) at a time of the polynomials through values (samples, n), by least squares."""
+    unit = float(np.ptp(time)) / 2
+    powers = np.vander((time - at) / unit, degree + 1, increasing=True)
+    fit = np.linalg.lstsq(powers, values, rcond=None)[0]
+    return fit[0], fit[1] / unit
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Rates of change and contact forces, each with the state they belong to."""
+    starts = [(name, *start) for name, p in sets.items() for start in _starts(p, STARTS[lab.level], name)]
+    tasks = [_tasks(lab, p, x) for _, p, x in starts]
+    lab.complete([task for pair in tasks for task in pair])
+    runs = [lab.run(pair) for pair in tasks]
+    kept = Counter[tuple[str, Case]]()
+    for centre in CENTRES:
+        for (name, p, _), pair, (coarse, fine) in zip(starts, tasks, runs, strict=True):
+            seen = _seen(coarse, fine, centre)
+            if seen is None or kept[name, seen[0].case] == KEPT[lab.level]:
+                continue
+            values = list(_values(*seen, p))
+            kept[name, seen[0].case] += bool(values)
+            for quantity, value, uncertainty in values:
+                yield Measurement(
+                    protocol=NAME,
+                    quantity=quantity,
+                    value=value,
+                    uncertainty=uncertainty,
+                    engine=lab.engine.name,
+                    set=name,
+                    parameters=p,
+                    conditions=_conditions(seen[0]),
+                    runs=tuple(lab.file(task) for task in pair),
+                )
+    for name in sets:
+        for case in Case:
+            if not kept[name, case]:
+                yield Missing(NAME, name, f"no random start moved smoothly in case {case.name} for {2 * HALF} steps")
+
+
+def _starts(p: Parameters, count: int, name: str) -> Iterator[tuple[Parameters, Array]]:
+    """Parameters with a flow, and a state, at random in natural units: lengths in R, times in sqrt(R/g)."""
+    rng = np.random.default_rng([SEED, *name.encode()])
+    unit = time_unit(p)
+    for case in Case:
+        for _ in range(count):
+            x = random_state(case, p, rng)
+            # Two contacts that both roll hold the ball against no more than a slight lag.
+            omega_0 = x[2] * rng.uniform(0.8, 1.2) if case is Case.RR else rng.uniform(0.3, 2.5) / unit
+            yield p.replace(omega_0=omega_0), x
+
+
+def random_state(case: Case, p: Parameters, rng: np.random.Generator) -> Array:
+    """A state (8,) that satisfies the constraints of a case.
+
+    A ball that rolls goes round so slowly, or one that hangs on the wall so fast, that friction has something to
+    spare; a ball that the wall alone keeps from turning spins backwards about its radial axis.
+    """
+    unit, speed = time_unit(p), math.sqrt(p.g * p.R)
+    slips = rng.uniform(0.4, 1.0, 3) * rng.choice([-1, 1], 3) * speed / p.r
+    omega_c = rng.uniform(0.4, 1.6) / unit
+    if case.A is Contact.R and case.B is not Contact.N:
+        omega_c = rng.uniform(0.2, 0.7) / unit * min(1.0, math.sqrt(p.mu), math.sqrt(p.mu / p.j))
+    if case.B is Contact.R and case.A is not Contact.R:
+        hangs = 1.0 if case.A is Contact.N else p.mu
+        omega_c = rng.uniform(1.05, 1.3) / unit * max(1.0, math.sqrt(hangs / max(p.eta, 0.01)))
+        slips[0] = -rng.uniform(0.6, 1.2) * p.R * omega_c / p.r
+    values = {
+        "y": rng.uniform(0.2, 0.6) * p.R,
+        "v_y": rng.uniform(-0.2, 0.3) * speed,
+        "omega_c": omega_c,
+        **dict(zip(("slip_x", "slip_y", "slip_z"), slips, strict=True)),
+        "h": rng.uniform(0.3, 0.5) * p.R,
+        "v_h": rng.uniform(-0.2, 0.3) * speed,
+    }
+    x = np.array([values[name] if name in TRAITS[case].active else 0.0 for name in VARIABLES])
+    return constrained(case, x, p)
+
+
+def constrained(case: Case, x: Array, p: Parameters) -> Array:
+    """The state (8,) with what the case holds at zero set to exactly that, of which a contact leaves some 1e-9."""
+    held = [name in TRAITS[case].constraints for name in VARIABLES]
+    x = np.where(held, 0.0, x)
+    if case is Case.RN:
+        x[5] = -x[7] / p.r
+    return x
+
+
+def _tasks(lab: Lab, p: Parameters, x: Array) -> list[Task]:
+    step = coarse_step(p) / REFINED
+    lasts = (CENTRES[-1] + HALF + APART) * step
+    return [lab.task(p, x, lasts, step / times, samples=round(lasts / step) * times) for times in (1, 2)]
+
+
+def _seen(coarse: Trajectory, fine: Trajectory, centre: int) -> tuple[Sighting, Sighting, Sighting] | None:
+    """A window's sighting extrapolated to a vanishing step, that of the finer run, and that by polynomials less high.
+
+    None if the case changes in or near the window, or a slip turns.
+    """
+    seen = [_sight(*each) for each in ((coarse, centre, 1, 5), (fine, 2 * centre, 2, 5), (fine, 2 * centre, 2, 3))]
+    one, two, lower = seen
+    if not (one and two and lower and one.case is two.case):
+        return None
+    x, rates, force = (
+        b + (b - a) * LIMIT for a, b in ((one.x, two.x), (one.rates, two.rates), (one.forces, two.forces))
+    )
+    return Sighting(one.case, constrained(one.case, x, fine.header.parameters), rates, force), two, lower
+
+
+def _sight(run: Trajectory, centre: int, refined: int, degree: int) -> Sighting | None:
+    """What happens in a window, None if the case changes in or near it or a slip turns."""
+    near, half = (HALF + APART) * refined, HALF * refined
+    window = slice(centre - half, centre + half + 1)
+    case, p = Case(int(run.case[centre])), run.header.parameters
+    if np.ptp(run.case[centre - near : centre + near + 1]) or _turns(case, run.x[window], p):
+        return None
+    time, at = run.time[window], float(run.time[centre])
+    x, rates = polynomial(time, run.x[window], degree, at)
+    # The forces of a sample act from then on for a step: they belong to the middle of it.
+    later = (time[1] - time[0]) / 2
+    force, _ = polynomial(time + later, np.concatenate([run.force_A, run.force_B], axis=1)[window], degree, at)
+    return Sighting(case, x, rates, force)
+
+
+def _turns(case: Case, x: Array, p: Parameters) -> bool:
+    """Whether the velocity of a contact that slips changes by more than `TURN` of it in the states x (samples, 8)."""
+    slips = [v for v, contact in zip(slip_velocities(x, p), (case.A, case.B), strict=True) if contact is Contact.S]
+    return any(np.linalg.norm(v[-1] - v[0]) > TURN * np.linalg.norm(v, axis=1).min() for v in slips)
+
+
+def _values(best: Sighting, fine: Sighting, lower: Sighting, p: Parameters) -> Iterator[tuple[str, float, float]]:
+    """Quantities with uncertainties: what the extrapolation, and another degree of the polynomials, change.
+
+    The largest change over the scales of the rates, or of the forces, stands for all of them: that of one may vanish
+    by accident. None where it is more than `COARSE`.
+    """
+    moving = [k for k, name in enumerate(VARIABLES) if name in TRAITS[best.case].active and name not in ("y", "h")]
+    scales = _rate_scales(p)
+    pressing = _forces(best)
+    weight = p.m * p.g
+    rate_change, force_change = (
+        max(FLOOR, *(abs(a - b) * DOUBT / LIMIT + abs(b - c) for a, b, c in zip(*rows, strict=True)))
+        for rows in (
+            [(each.rates / scales)[moving] for each in (best, fine, lower)],
+            [[force / weight for force in _forces(each).values()] or [0.0] for each in (best, fine, lower)],
+        )
+    )
+    if max(rate_change, force_change) > COARSE:
+        return
+    for k in moving:
+        yield f"rate_{VARIABLES[k]}", float(best.rates[k]), rate_change * float(scales[k])
+    for name, force in pressing.items():
+        yield f"moving_force_{name}", force, force_change * weight
+
+
+def _forces(seen: Sighting) -> dict[str, float]:
+    """The forces that the motion determines, of the contacts that are closed."""
+    named = dict(zip(COMPONENTS, seen.forces.tolist(), strict=True))
+    if seen.case is Case.RR:  # the contacts share the load in ways that Newton's laws don't tell apart
+        A_x, A_y, A_z, B_x, B_y, B_z = named.values()
+        return {"Ax-By": A_x - B_y, "Ay+By": A_y + B_y, "Bx+By": B_x + B_y, "Az": A_z, "Bz": B_z}
+    return {name: force for name, force in named.items() if getattr(seen.case, name[0]) is not Contact.N}
+
+
+def _rate_scales(p: Parameters) -> Array:
+    """Natural sizes of the rates of the eight variables: m s-1, m s-2, rad s-2."""
+    spin = p.g / p.r
+    speed = math.sqrt(p.g * p.R)
+    return np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
+
+
+def _conditions(sighting: Sighting) -> dict[str, Condition]:
+    return {"case": sighting.case.name} | dict(zip(VARIABLES, sighting.x.tolist(), strict=True))

@@ -1,0 +1,217 @@
+"""Growth of slip: a rolling ball is given a slip along one direction; in the first milliseconds it grows or dies out.
+
+gamma, the initial rate of change of the slip along its direction, is taken to a vanishing size of the slip by runs of
+several sizes. A record counts only if, by the engine's own contacts, all of it is in the case in which the ball was to
+slip. States are at random in natural units, and away from stationary ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.measure.field import DOUBT, LIMIT, polynomial, random_state
+from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.runs.tasks import Task
+from compare.statistics import Measured
+from model import Case, Parameters, Trajectory
+from model.arrays import Array
+from model.kinematics import VARIABLES
+
+NAME = "growth"
+SEED = 61
+PUSHES = {
+    (Case.RR, Case.RS): 1,
+    (Case.RR, Case.SR): 1,
+    (Case.RR, Case.SS): 2,
+    (Case.RS, Case.SS): 2,
+    (Case.SR, Case.SS): 2,
+    (Case.NR, Case.NS): 3,
+}
+"""Arrows of Fig. 6 along which a contact begins to slip, and directions out of random states at the quick level."""
+MORE = {Level.QUICK: 1, Level.DEFAULT: 2, Level.FULL: 6}
+"""How many times as many there are at each level."""
+SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
+"""Which of slip_x, slip_y, slip_z a case allows beyond the one it leaves."""
+REFINED = 16
+"""Steps in one of `coarse_step`; one run has twice as many."""
+STEPS, SKIPPED = 18, 3
+"""Steps of a record, and those at its start in which contact forces build up."""
+LARGE, SMALL, BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
+"""Slips at the start in units of `_slip_unit`: so large that they neither end nor turn much in a record; small where
+one contact has to hold, or the ball goes round slowly and the wall carries little; and three where the direction of a
+contact that slips already depends on the size."""
+FLOOR = 1e-3
+"""Least uncertainty in units of g/r: contacts answer within a few steps, see `compare.measure.field.FLOOR`, and a
+derivative at the end of a record is some thirty times as uncertain as one in its middle."""
+STRAIGHT = 1e-4
+"""The same where the direction of slip does not turn and the load does not depend on it."""
+COARSE = 6e-3
+"""Largest uncertainty that counts, in units of (1+j)/j g/r: where a contact is hardly loaded, slip turns too fast."""
+SMOOTH = "without friction at both contacts there is nothing that rolls"
+SIDEWAYS = (0.3, 1.0, 0.3)
+"""A direction of slip that is almost that of the wall's contact alone."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """A rolling state, and the direction of slip along which it is pushed."""
+
+    set: str
+    p: Parameters
+    inner: Case
+    outer: Case
+    x: Array
+    """(8,)"""
+    n: Array
+    """Unit vector (3,) over slip_x, slip_y, slip_z."""
+    by: str = ""
+    """``sideways`` for the direction `SIDEWAYS`; empty for one at random."""
+
+    def task(self, lab: Lab, size: float, times: int = 1) -> Task:
+        """The run with one size of slip, in units of `_slip_unit`, and `times` as many steps."""
+        p, step = self.p, coarse_step(self.p) / REFINED
+        x = self.x.copy()
+        x[3:6] += size * _slip_unit(p, x) * self.n
+        return lab.task(p, x, STEPS * step, step / times, samples=STEPS * times)
+
+    def rate(self, run: Trajectory, times: int = 1) -> Array:
+        """Initial rates of the slip along n by polynomials of degrees 4 and 3, rad s-2; nan if the case was another."""
+        if np.any(run.case[SKIPPED * times :] != self.outer):
+            return np.full(2, np.nan)
+        time, slip = run.time[SKIPPED * times :], run.x[SKIPPED * times :, 3:6] @ self.n
+        return np.array([polynomial(time, slip[:, None], degree, 0.0)[1][0] for degree in (4, 3)])
+
+    @property
+    def conditions(self) -> dict[str, Condition]:
+        """What the growth belongs to."""
+        named: dict[str, Condition] = {"inner": self.inner.name, "outer": self.outer.name, "by": self.by}
+        named |= dict(zip(VARIABLES, self.x.tolist(), strict=True))
+        return named | dict(zip(("n_x", "n_y", "n_z"), self.n.tolist(), strict=True))
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """gamma out of random states, along every arrow; where one contact slips to either side, how they share rolling."""
+    rough = {name: p for name, p in sets.items() if p.mu and p.eta}
+    yield from (Missing(NAME, name, SMOOTH) for name in sets if name not in rough)
+    pushes = [push for name, p in rough.items() for push in _pushes(name, p, MORE[lab.level])]
+    planned = [_tasks(lab, push) for push in pushes]
+    lab.complete([task for tasks in planned for task in tasks])
+    left = Counter[tuple[str, Case, Case]]()
+    before: tuple[Push, Measured] | None = None
+    for push, tasks in zip(pushes, planned, strict=True):
+        value = _growth(push, lab.run(tasks))
+        if value is None:
+            left[push.set, push.inner, push.outer] += 1
+            continue
+        yield _measurement(lab, push, tasks, "gamma", value)
+        if before and before[0].x is push.x:
+            yield _measurement(lab, push, tasks, "filippov_share", _share(*before, push, value))
+        before = push, value
+    for (name, inner, outer), count in left.items():
+        yield Missing(
+            NAME,
+            name,
+            f"{count} slips from {inner.name} to {outer.name} did not stay in {outer.name}, or turned too fast",
+        )
+
+
+def _measurement(lab: Lab, push: Push, tasks: Sequence[Task], quantity: str, value: Measured) -> Measurement:
+    return Measurement(
+        protocol=NAME,
+        quantity=quantity,
+        value=value.value,
+        uncertainty=value.uncertainty,
+        engine=lab.engine.name,
+        set=push.set,
+        parameters=push.p,
+        conditions=push.conditions,
+        runs=tuple(lab.file(task) for task in tasks),
+    )
+
+
+def _share(one: Push, its: Measured, other: Push, value: Measured) -> Measured:
+    """Share of the side of negative slip in rolling, as which the two sides' growths cancel."""
+    plus, minus = (its, value) if one.n.sum() > other.n.sum() else (value, its)
+    both = plus.value + minus.value
+    uncertainty = math.hypot(plus.uncertainty * minus.value, minus.uncertainty * plus.value) / both**2
+    return Measured(plus.value / both, uncertainty)
+
+
+def _sizes(push: Push) -> tuple[float, ...]:
+    if push.inner in (Case.RS, Case.SR):
+        return BESIDE
+    return SMALL if push.outer in (Case.RS, Case.SR) else LARGE
+
+
+def _tasks(lab: Lab, push: Push) -> list[Task]:
+    """Every size, and the smallest with half the step."""
+    sizes = _sizes(push)
+    return [*(push.task(lab, size) for size in sizes), push.task(lab, sizes[-1], 2)]
+
+
+def _growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
+    """gamma for a vanishing size, None if a record was not in the case or is too coarse.
+
+    Its uncertainty is what halving the step and a degree of the polynomials change, and for three sizes a third of
+    what the third one does: the next would change less.
+    """
+    rates = np.array([push.rate(run) for run in runs[:-1]])
+    fine = push.rate(runs[-1], 2)
+    if np.isnan(rates).any() or np.isnan(fine).any():
+        return None
+    *_, before, last = rates[:, 0]
+    value = linear = 2 * last - before
+    if len(rates) == 3:
+        value = (rates[0, 0] - 6 * before + 8 * last) / 3
+    change = fine[0] - last
+    p = push.p
+    floor = (STRAIGHT if push.outer is Case.RS else FLOOR) * p.g / p.r
+    uncertainty = math.hypot(change * DOUBT, fine[0] - fine[1], (value - linear) / 3, floor)
+    if uncertainty > COARSE * (1 + p.j) / p.j * p.g / p.r:
+        return None
+    return Measured(float(value + change * (1 + LIMIT)), uncertainty)
+
+
+def _pushes(name: str, p: Parameters, more: int) -> Iterator[Push]:
+    rng = np.random.default_rng([SEED, *name.encode()])
+    slow = 0.4 / time_unit(p) * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
+    n = np.array(SIDEWAYS) / np.linalg.norm(SIDEWAYS)
+    x = np.array([0.0, 0.0, slow, 0.0, 0.0, 0.0, 0.0, 0.0])
+    yield Push(name, p.replace(omega_0=slow), Case.RR, Case.SS, x, n, "sideways")
+    for (inner, outer), count in PUSHES.items():
+        for _ in range(count * more):
+            x = random_state(inner, p, rng)
+            x[2] = _orbit(inner, outer, p, rng) or x[2]
+            slides = {Case.RS: 4, Case.SR: 3}.get(inner)
+            # A slip that is there already is so fast that a slower one beside it hardly turns it.
+            if inner is Case.RS:
+                x[4] = rng.choice([-1, 1]) * rng.uniform(3.0, 5.0) * _slip_unit(p, x)
+            if inner is Case.SR:  # the faster the ball spins about its radial axis, the faster slip_z sets in
+                x[3] = -rng.uniform(2.0, 3.0) * p.R / p.r * x[2]
+            n = np.zeros(3)
+            free = [k for k in SLIPS[outer] if k + 3 != slides]
+            n[free] = rng.choice([-1, 1], len(free)) * rng.uniform(0.4, 1.0, len(free))
+            omega_0 = float(x[2] * rng.uniform(0.6, 1.4))
+            for side in (1, -1) if len(free) == 1 else (1,):
+                yield Push(name, p.replace(omega_0=omega_0), inner, outer, x, side * n / np.linalg.norm(n))
+
+
+def _orbit(inner: Case, outer: Case, p: Parameters, rng: np.random.Generator) -> float | None:
+    """An omega_c at which both contacts press, in whatever way they rub; None where that of `random_state` will do."""
+    if outer is Case.SR:  # the spin axis turns with the orbit, and the wall alone turns it
+        return float(math.sqrt(rng.uniform(0.4, 0.8) * p.g / (p.j * p.R)))
+    if outer is Case.SS:
+        least, most = p.mu, min(1 / p.eta, 3.0) if p.eta else 3.0
+        return float(math.sqrt((least + rng.uniform(0.3, 0.7) * (most - least)) * p.g / p.R))
+    return None
+
+
+def _slip_unit(p: Parameters, x: Array) -> float:
+    """The slip that the weight, and at the wall the centrifugal force, makes in the unit of time, rad s-1."""
+    return (p.g + p.R * float(x[2]) ** 2) / 2 / p.r * time_unit(p)

@@ -1,0 +1,81 @@
+"""What a protocol works with: an engine, a campaign that keeps its runs, and how much is to be measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from compare.runs.campaign import Campaign, Failure
+from compare.runs.engines import Engine, Settings
+from compare.runs.tasks import Task
+from model import Flow, Parameters, Trajectory
+
+
+class Level(IntEnum):
+    """How much is measured."""
+
+    QUICK = 0
+    DEFAULT = 1
+    FULL = 2
+
+
+@dataclass(frozen=True)
+class Lab:
+    """Where protocols run what they need: every run is carried out once and found again afterwards."""
+
+    campaign: Campaign
+    engine: Engine
+    level: Level
+
+    def task(
+        self,
+        p: Parameters,
+        x0: npt.ArrayLike,
+        t_end: float,
+        step: float,
+        *,
+        flow: Flow | None = None,
+        samples: int = 100,
+        settings: Settings | None = None,
+    ) -> Task:
+        """A run of the engine on trial with a time step in s, in the studies' settings unless others are given."""
+        return Task(
+            engine=self.engine.name,
+            parameters=p,
+            x0=tuple(np.asarray(x0, dtype=float).tolist()),
+            t_end=t_end,
+            flow=flow,
+            settings=settings or self.engine.at(step),
+            sample_interval=max(step, t_end / samples),
+        )
+
+    def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
+        """The trajectories of the tasks, in order; raises for one that failed."""
+        return self.campaign.run(tasks)
+
+    def complete(self, tasks: Sequence[Task]) -> list[Failure]:
+        """Carry out the tasks and return those that failed."""
+        return self.campaign.complete(tasks)
+
+    def file(self, task: Task) -> str:
+        """Name of the task's run file, relative to the results directory."""
+        path = self.campaign.path(task)
+        return f"{path.parent.name}/{path.name}"
+
+
+def time_unit(p: Parameters) -> float:
+    """sqrt(R/g), s: the time in which the ball falls by half of R."""
+    return math.sqrt(p.R / p.g)
+
+
+def coarse_step(p: Parameters) -> float:
+    """A time step in s that resolves `time_unit` about twenty times: a power of two of a millisecond.
+
+    Few sets then need a batch of their own.
+    """
+    return float(1e-3 * 2.0 ** round(math.log2(time_unit(p) / 20e-3)))

@@ -1,0 +1,182 @@
+"""What holds at every instant: contacts that roll, press and rub as Table 3 and (12)-(17) say; and the fluid's drag.
+
+Balls go through the cases of Fig. 2 while the flow rises and falls; the laws are looked at in all samples of a set.
+What an engine's contact solver keeps in every step, (12) and (13), is measured at its worst; what builds up or dies out
+within steps, a contact that begins to roll or friction that turns with the slip, at its typical value, since samples
+right after an impact or a change of case say nothing of the law.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.runs.tasks import Task
+from model import Flow, Parameters, Trajectory
+from model.arrays import Array
+from model.kinematics import slip_velocities
+
+PROTOCOL = "laws"
+REFINE = {Level.QUICK: (4, 8), Level.DEFAULT: (8, 16), Level.FULL: (16, 32)}
+"""The two time steps are these parts of `coarse_step`."""
+LASTS = 768
+"""Length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples."""
+FASTEST = 3.0
+"""The flow rises from rest to this, or falls from it, omega_0 sqrt(R/g)."""
+SLIPS = 0.02
+"""Slip speed over sqrt(g R) above which friction must be that of slipping, whatever case is detected."""
+PRESSES = 0.05
+"""Normal force over the weight above which it is looked at: a contact that carries less may hover."""
+FEWEST = 20
+"""Samples of a law that a set must have."""
+ROUNDING = 100 * float(np.finfo(float).eps)
+FLUIDS: Mapping[str, Mapping[str, float]] = {
+    "steel-in-water": {"nu_f": 1.004e-6, "rho_f": 998.2, "rho_b": 7850.0, "r": 5e-3, "gravity": 9.81},
+    "steel-in-air": {"nu_f": 1.516e-5, "rho_f": 1.204, "rho_b": 7850.0, "r": 5e-3, "gravity": 9.81},
+    "glass-in-glycerine": {"nu_f": 1.18e-3, "rho_f": 1260.0, "rho_b": 2500.0, "r": 8e-3, "gravity": 9.81},
+}
+"""Balls that fall in a fluid, SI."""
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """How far the laws are off, the ratio of friction to normal force, and the speed at which balls sink in a fluid."""
+    tasks = {(name, k): _tasks(lab, p, k) for name, p in sets.items() for k in REFINE[lab.level]}
+    falls = {(name, k): _falls(lab, name, k) for name in FLUIDS for k in REFINE[lab.level]}
+    lab.complete([task for group in (*tasks.values(), *falls.values()) for task in group])
+    for name, p in sets.items():
+        coarse, fine = (deviations(lab.run(tasks[name, k])) for k in REFINE[lab.level])
+        files = tuple(lab.file(task) for task in tasks[name, REFINE[lab.level][1]])
+        for key, value in fine.items():
+            quantity, law, contact = key
+            if math.isnan(value) or math.isnan(coarse[key]):
+                yield Missing(PROTOCOL, name, f"fewer than {FEWEST} samples show at {contact}: {law}")
+                continue
+            yield Measurement(
+                protocol=PROTOCOL, quantity=quantity, value=value, engine=lab.engine.name, set=name, parameters=p,
+                uncertainty=math.hypot(value - coarse[key], ROUNDING),
+                conditions={"law": law, "contact": contact}, runs=files,
+            )  # fmt: skip
+    for name in FLUIDS:
+        yield _sinking(lab, name, [falls[name, k] for k in REFINE[lab.level]])
+
+
+def _tasks(lab: Lab, p: Parameters, refine: int) -> list[Task]:
+    """From rest in a flow that rises; high on the wall in one that falls; and along the floor towards the wall."""
+    unit, step = time_unit(p), coarse_step(p)
+    t_end, fast = LASTS * step, FASTEST / unit
+    up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
+    down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
+    half = Flow.steady(fast / 2)
+    starts: tuple[tuple[Flow, dict[int, float]], ...] = (
+        (up, {}),
+        (down, {0: 2 * p.R, 2: fast}),
+        (half, {2: fast / 3, 6: p.R / 2}),
+    )
+    tasks = []
+    for flow, values in starts:
+        x = np.zeros(8)
+        x[list(values)] = list(values.values())
+        tasks.append(lab.task(p, x, t_end, step / refine, flow=flow, samples=LASTS))
+    return tasks
+
+
+Deviations = dict[tuple[str, str, str], float]
+
+
+def deviations(runs: Sequence[Trajectory]) -> Deviations:
+    """How far runs of one set are from every law, dimensionless: by quantity, law and contact.
+
+    nan where too few samples show it.
+    """
+    found: Deviations = {}
+    for contact in "AB":
+        rows = [_rows(run, contact) for run in runs]
+        normal, friction, limit, against, speed, gap, letter = (np.concatenate(row) for row in zip(*rows, strict=True))
+        slides = (speed > SLIPS) & (normal > PRESSES)
+        closed = letter != "N"
+        found["law", "(12): the contact presses", contact] = float(np.max(-normal, initial=0.0))
+        found["law", "(13): friction is within its limit", contact] = float(np.max(friction - limit, initial=0.0))
+        for law, values in (
+            ("where it rolls it doesn't slip", speed[letter == "R"]),
+            ("where it is closed there is no gap", np.abs(gap[closed])),
+            (f"({14 if contact == 'A' else 15}): friction opposes the slip", against[slides]),
+        ):
+            found["law_in_motion", law, contact] = _typical(values)
+        found["friction_ratio", "friction over normal force", contact] = _typical(friction[slides] / normal[slides])
+    return found
+
+
+def _typical(values: Array) -> float:
+    return float(np.median(values)) if len(values) >= FEWEST else math.nan
+
+
+def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
+    """Normal force, friction, its limit, and its excess over full friction against the slip, all over the weight.
+
+    Then slip speed over sqrt(g R), gap over R and the contact's letter, each (n,).
+    """
+    p, floor = run.header.parameters, contact == "A"
+    force = run.force_A if floor else run.force_B
+    normal, tangent = (force[:, 1], force[:, [0, 2]]) if floor else (force[:, 0], force[:, 1:])
+    v_A, v_B = slip_velocities(run.x, p)
+    slip = v_A[:, [0, 2]] if floor else v_B[:, 1:]
+    speed = np.hypot(*slip.T)
+    direction = slip / np.maximum(speed, np.finfo(float).tiny)[:, None]
+    friction, weight = np.hypot(*tangent.T), p.m * p.g
+    against = np.hypot(*(tangent + friction[:, None] * direction).T)
+    limit = (p.mu if floor else p.eta) * normal
+    letters = np.array([case.name[0 if floor else 1] for case in run.cases])
+    gap = (run.gap_A if floor else run.gap_B) / p.R
+    return (
+        normal / weight,
+        friction / weight,
+        limit / weight,
+        against / weight,
+        speed / math.sqrt(p.g * p.R),
+        gap,
+        letters,
+    )
+
+
+def _ball(name: str) -> Parameters:
+    return Parameters.from_fluid(**FLUIDS[name], R=5 * FLUIDS[name]["r"], mu=0.2, eta=0.2)
+
+
+def _falls(lab: Lab, name: str, refine: int) -> list[Task]:
+    """A ball in the middle of still fluid, off floor and wall, from rest and sinking already."""
+    p = _ball(name)
+    step, speed = coarse_step(p), math.sqrt(p.g * p.R)
+    return [
+        lab.task(p, [100 * p.R, v_y, 0.0, 0.0, 0.0, 0.0, p.R / 2, 0.0], 64 * step, step / refine, samples=64)
+        for v_y in (0.0, -speed)
+    ]
+
+
+def _sinking(lab: Lab, name: str, tasks: Sequence[Sequence[Task]]) -> Measurement:
+    """The speed at which a ball sinks steadily, where its acceleration vanishes, from two falls on either time step."""
+    coarse, fine = (terminal_speed(*lab.run(each)) for each in tasks)
+    scale = abs(fine)
+    # What is left of a fall that has only just begun is a difference of speeds, each of them rounded in every step.
+    run = lab.run(tasks[1])[0]
+    rounding = ROUNDING * scale / (_ball(name).c * float(run.time[-1]))
+    conditions: dict[str, Condition] = {"case": "NN", "by": name, **FLUIDS[name]}
+    return Measurement(
+        protocol=PROTOCOL, quantity="v_y", value=fine, uncertainty=math.hypot(fine - coarse, rounding),
+        engine=lab.engine.name, set=name, parameters=_ball(name), conditions=conditions,
+        runs=tuple(lab.file(task) for task in tasks[1]),
+    )  # fmt: skip
+
+
+def terminal_speed(slow: Trajectory, fast: Trajectory) -> float:
+    """v_y in m/s at which gravity and drag balance, of two falls that differ in speed: their difference dies out alone.
+
+    With a drag proportional to speed, v' = (v_end - v)/T: the fall from rest gains (1 - q) v_end while the difference
+    of the two shrinks to q of what it was.
+    """
+    gap = fast.v_y - slow.v_y
+    lost = (gap[0] - gap[-1]) / gap[0]
+    return float(slow.v_y[0] + (slow.v_y[-1] - slow.v_y[0]) / lost)

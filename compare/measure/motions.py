@@ -1,0 +1,128 @@
+"""Motions through all nine cases: which is it, some milliseconds after a state that the engine itself went through?
+
+Fixed starts, in natural units, are followed and cut into short pieces. A piece begins and ends away from changes of
+case, at each of which friction has to build up or die out; in between there may be any number of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from compare.measure.field import constrained
+from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.record import Condition, Measurement, Missing, Records
+from model import Case, Parameters, Trajectory
+from model.arrays import Array
+from model.kinematics import VARIABLES
+
+NAME = "motions"
+STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
+    # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
+    (0.86, (0.44, 0.06, 2.36, 0.68, 0.15, 0.03, 0.6, 0.25)),
+    # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
+    (1.03, (0.0, 0.0, -1.62, -0.005, 0.47, -0.14, 0.3, -0.12)),
+    # Long stays in cases that those pass in a moment: spun up from rest, slipping at both points, spinning on wall and
+    # floor, slipping down the wall, rolling and sliding on the floor.
+    (1.43, (0.0,) * 8),
+    (1.80, (0.0, 0.0, 1.02, -0.02, 0.03, 0.12, 0.0, 0.0)),
+    (1.07, (0.0, 0.0, 1.07, 0.34, 0.0, 0.0, 0.0, 0.0)),
+    (1.80, (10.0, 0.0, 1.80, 0.0, 0.17, 0.17, 0.0, 0.0)),
+    (0.60, (0.0, 0.0, 0.60, 0.0, 0.1, 0.0, 0.3, 0.0)),
+    (1.20, (0.0, 0.0, 0.40, 0.6, 0.1, -0.5, 0.5, 0.0)),
+)
+"""omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
+LASTS = 6.0
+"""Duration of a motion in units of sqrt(R/g)."""
+REFINED = 16
+"""Steps in one of `coarse_step`, each sampled."""
+PIECES = {Level.QUICK: 12, Level.DEFAULT: 20, Level.FULL: 32}
+"""Pieces of a motion."""
+LENGTH = 40
+"""Samples in a piece."""
+APART = 10
+"""Samples between the ends of a piece and any change of case: a slip dies out and a force builds up in three or so, the
+case is taken to have changed after as many more, and a change comes by a few steps earlier or later than it should."""
+NARROW, SLOW = 1e-4, 1e-3
+"""Least gap of an open contact over R, and least slip of a slipping one over sqrt(g R), at the ends of a piece. An
+unloaded contact may hover, and where two contacts roll one may creep, since how they share the load is not determined.
+"""
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The case at the end of every piece, with the state at its beginning."""
+    starts = [(name, *_start(p, *start)) for name, p in sets.items() for start in STARTS]
+    tasks = []
+    for _, p, x in starts:
+        step = coarse_step(p) / REFINED
+        count = round(LASTS * time_unit(p) / step)
+        tasks.append(lab.task(p, x, count * step, step, samples=count))
+    failed = {failure.task.key: failure.reason for failure in lab.complete(tasks)}
+    seen = set[tuple[str, Case]]()
+    for (name, p, _), task in zip(starts, tasks, strict=True):
+        if task.key in failed:
+            yield Missing(NAME, name, f"a motion {failed[task.key]}")
+            continue
+        (run,) = lab.run([task])
+        for first in pieces(run, PIECES[lab.level]):
+            last = first + LENGTH
+            case = Case(int(run.case[last]))
+            seen.add((name, case))
+            x = constrained(Case(int(run.case[first])), run.x[first], p)
+            conditions: dict[str, Condition] = dict(zip(VARIABLES, x.tolist(), strict=True))
+            yield Measurement(
+                protocol=NAME,
+                quantity="case",
+                value=float(case),
+                uncertainty=0.0,
+                engine=lab.engine.name,
+                set=name,
+                parameters=p,
+                conditions=conditions | {"case": case.name, "time": float(run.time[last] - run.time[first])},
+                runs=(lab.file(task),),
+            )
+    for name in sets:
+        unseen = [case.name for case in Case if (name, case) not in seen]
+        if unseen:
+            yield Missing(NAME, name, f"no piece of a motion ended in {', '.join(unseen)}")
+
+
+def pieces(run: Trajectory, count: int) -> list[int]:
+    """Where pieces begin, about evenly spread: their ends are away from changes of case."""
+    plain = _plain(run)
+    changes = np.flatnonzero(np.diff(run.case)) + 1
+    firsts = np.arange(APART, len(run.time) - LENGTH - APART)
+    near = [np.min(np.abs((firsts + shift)[:, None] - changes), axis=1, initial=len(run.time)) for shift in (0, LENGTH)]
+    firsts = firsts[(near[0] >= APART) & (near[1] >= APART) & plain[firsts] & plain[firsts + LENGTH]]
+    if len(firsts) == 0:
+        return []
+    # As many pieces with a change of case in them as without, as far as there are.
+    inside = np.array([np.any((changes > first) & (changes < first + LENGTH)) for first in firsts])
+    found: set[int] = set()
+    for some in (firsts[inside], firsts[~inside]):
+        if len(some):
+            found |= set(some[np.linspace(0, len(some) - 1, count // 2).round().astype(int)].tolist())
+    return sorted(found)
+
+
+def _plain(run: Trajectory) -> npt.NDArray[np.bool_]:
+    """Whether every open contact is open and every slipping one slips by more than a trace, at every sample (n,)."""
+    p = run.header.parameters
+    plain = np.full(len(run.time), True)
+    for side, gap, speed in (("A", run.y, run.slip_speed_A), ("B", run.h, run.slip_speed_B)):
+        contact = np.array([getattr(case, side).name for case in Case])[run.case]
+        plain &= (contact != "N") | (gap > NARROW * p.R)
+        plain &= (contact != "S") | (speed > SLOW * math.sqrt(p.g * p.R))
+    return plain
+
+
+def _start(p: Parameters, Omega_0: float, state: tuple[float, ...]) -> tuple[Parameters, Array]:
+    unit, speed = time_unit(p), math.sqrt(p.g * p.R)
+    units = np.array([p.R, speed, 1 / unit, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
+    x = np.array(state) * units
+    if x[0] == x[1] == 0 and x[3] == 0 and x[6] > 0:
+        x[5] = -x[7] / p.r  # it rolls on the floor
+    return p.replace(omega_0=Omega_0 / unit), x

@@ -1,0 +1,53 @@
+"""The engine as it comes: the characteristic curve with its own contact parameters, for display beside the study's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from compare.measure.lab import Lab, time_unit
+from compare.measure.record import Measurement, Missing, Records
+from compare.measure.settled import flows, state
+from compare.measure.settling import Start, judged
+from compare.runs import engines
+from model import Parameters
+
+PROTOCOL = "newcomer"
+SET = "reference"
+STEP = 1e-3
+"""Time step, s."""
+LASTS = 40.0
+"""Duration, in units of 1/c."""
+SAMPLES = 1000
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """omega_c and case from rest, with what they drift or swing by the end for an uncertainty."""
+    if SET not in sets:
+        yield Missing(PROTOCOL, next(iter(sets), ""), f"the engine's own settings are measured on {SET} only")
+        return
+    plain, p = replace(lab, engine=engines.NEWCOMER), sets[SET]
+    begins = [Start(SET, p.replace(omega_0=Omega_0 / time_unit(p)), "rest", state()) for Omega_0 in flows(lab.level)]
+    tasks = [plain.task(start.p, start.x0, LASTS / p.c, STEP, samples=SAMPLES) for start in begins]
+    failed = {failure.task.key: failure.reason for failure in plain.complete(tasks)}
+    for start, task in zip(begins, tasks, strict=True):
+        if task.key in failed:
+            yield Missing(PROTOCOL, SET, f"the run at {start.p.omega_0:.4g} rad/s {failed[task.key]}")
+            continue
+        (run,) = plain.run([task])
+        ended = judged(start, task, run)
+        for quantity, value, uncertainty in (
+            ("omega_c", ended.values["omega_c"].value, ended.values["omega_c"].uncertainty),
+            ("case", float(ended.case), 0.0),
+        ):
+            yield Measurement(
+                protocol=PROTOCOL,
+                quantity=quantity,
+                value=value,
+                uncertainty=uncertainty,
+                engine=plain.engine.name,
+                set=SET,
+                parameters=start.p,
+                conditions={"case": ended.case.name, "start": start.name},
+                runs=(plain.file(task),),
+            )

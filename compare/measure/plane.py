@@ -1,0 +1,127 @@
+"""The planes of Figs. 7 and 8: the set of cases in which the ball ends, at points of eta and omega_0.
+
+Points are spread evenly first; more are put where neighbours differ, each kind of border in turn, and among rare ones.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice, zip_longest
+
+import numpy as np
+from scipy.spatial import Delaunay
+from scipy.stats import qmc
+
+from compare.measure.lab import Lab, Level, time_unit
+from compare.measure.record import Measurement, Missing, Records
+from compare.measure.settled import state
+from compare.measure.settling import Settled, Start, family, high, settle
+from model import Parameters
+from model.arrays import Array
+
+PROTOCOL = "plane"
+SET = "reference"
+DRAG = 1.25
+"""Drag c, s-1: states settle within seconds, and slipping still lasts beyond the flow at which the wall can carry."""
+FIGURES = ("fig-7", "fig-8")
+"""mu as it is, and mu = eta."""
+ETA, OMEGA = (0.02, 0.8), (0.45, 3.6)
+"""Ranges of eta and of omega_0 sqrt(R/g)."""
+SPREAD = {Level.QUICK: 28, Level.DEFAULT: 160, Level.FULL: 600}
+"""Points spread evenly over each plane."""
+ADDED = {Level.QUICK: (10, 10), Level.DEFAULT: (60, 60, 60), Level.FULL: (200,) * 5}
+"""Points that are then added, a round at a time."""
+SEED = 7
+SPAN = 20.0
+"""Length of a round, in units of 1/c."""
+RARE = 0.5
+"""A set of cases is rare if it was seen less than this share of what would fall to it evenly."""
+LOOSE = 1000.0
+"""How much less sharply settled a state may be of which only the case counts."""
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is left out."""
+    if SET not in sets:
+        yield Missing(PROTOCOL, next(iter(sets), ""), f"the planes of Figs. 7 and 8 are those of {SET} only")
+        return
+    plane = sets[SET].replace(c=DRAG)
+    points = {figure: spread(SPREAD[lab.level], SEED + k) for k, figure in enumerate(FIGURES)}
+    seen: dict[str, list[tuple[Array, int]]] = {figure: [] for figure in FIGURES}
+    tried: dict[str, set[tuple[float, ...]]] = {figure: set() for figure in FIGURES}
+    out: Counter[str] = Counter()
+    for count in (*ADDED[lab.level], 0):
+        chosen = [(figure, u) for figure in FIGURES for u in points[figure]]
+        starts = [list(_starts(_at(plane, figure, u), figure)) for figure, u in chosen]
+        ended = iter(settle(lab, [each for row in starts for each in row], span=SPAN, loose=LOOSE))
+        for (figure, u), row in zip(chosen, starts, strict=True):
+            states = [next(ended) for _ in row]
+            if any(each.failure for each in states):
+                out[figure] += 1
+                continue
+            seen[figure].append((u, mask(states)))
+            yield _record(lab, figure, states)
+        for figure in FIGURES:
+            tried[figure] |= {tuple(u.tolist()) for u in points[figure]}
+            fresh = (u for u in added(seen[figure]) if tuple(u.tolist()) not in tried[figure])
+            points[figure] = list(islice(fresh, count))
+    for figure, number in out.items():
+        total = number + len(seen[figure])
+        reason = f"{figure}: {number} of {total} points are left out, too close to a change of case to settle"
+        yield Missing(PROTOCOL, SET, reason)
+
+
+def mask(states: Sequence[Settled]) -> int:
+    """The set of cases as a number: bit k for the case of code k."""
+    return sum(1 << case for case in {family(each.case) for each in states})
+
+
+def spread(count: int, seed: int) -> list[Array]:
+    """Points (2,) of the unit square, evenly spread."""
+    return list(qmc.Halton(2, seed=seed).random(count))
+
+
+def added(seen: Sequence[tuple[Array, int]]) -> list[Array]:
+    """Midpoints between neighbours that differ, each kind of border in turn, the longest first; and among rare ones."""
+    if len(seen) < 4:
+        return []
+    places, masks = np.array([u for u, _ in seen]), [m for _, m in seen]
+    often = Counter(masks)
+    rare = {m for m, number in often.items() if number < RARE * len(masks) / len(often)}
+    borders: dict[tuple[int, ...], list[tuple[float, int, int]]] = {}
+    for a, b in {tuple(sorted((int(t[i]), int(t[i - 1])))) for t in Delaunay(places).simplices for i in range(3)}:
+        if masks[a] != masks[b] or masks[a] in rare:
+            length = float(np.hypot(*(places[a] - places[b])))
+            borders.setdefault(tuple(sorted((masks[a], masks[b]))), []).append((-length, a, b))
+    rows = zip_longest(*(sorted(edges) for _, edges in sorted(borders.items())))
+    turns = [edge for row in rows for edge in row if edge]
+    return [(places[a] + places[b]) / 2 for _, a, b in turns]
+
+
+def _at(plane: Parameters, figure: str, u: Array) -> Parameters:
+    eta, Omega_0 = (low + float(share) * (high - low) for share, (low, high) in zip(u, (ETA, OMEGA), strict=True))
+    p = plane.replace(eta=eta, omega_0=Omega_0 / time_unit(plane))
+    return p.replace(mu=eta) if figure == "fig-8" else p
+
+
+def _starts(p: Parameters, figure: str) -> Iterator[Start]:
+    """The blind starts of settled states, and going round at half the speed of the fluid."""
+    yield Start(figure, p, "rest", state())
+    yield Start(figure, p, "half as fast", state(omega_c=p.omega_0 / 2))
+    yield Start(figure, p, "with the fluid", state(omega_c=p.omega_0))
+    yield Start(figure, p, "on the wall", state(y=high(p), omega_c=p.omega_0))
+
+
+def _record(lab: Lab, figure: str, states: Sequence[Settled]) -> Measurement:
+    return Measurement(
+        protocol=PROTOCOL,
+        quantity="cases",
+        value=float(mask(states)),
+        uncertainty=0.0,
+        engine=lab.engine.name,
+        set=SET,
+        parameters=states[0].start.p,
+        conditions={"figure": figure},
+        runs=tuple(lab.file(each.task) for each in states),
+    )

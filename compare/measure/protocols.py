@@ -1,0 +1,43 @@
+"""All protocols, in the order in which they measure."""
+
+from __future__ import annotations
+
+from compare.measure import (
+    bounds,
+    edge,
+    field,
+    growth,
+    hysteresis,
+    impacts,
+    laws,
+    motions,
+    newcomer,
+    plane,
+    rates,
+    settled,
+    slope,
+    thresholds,
+    unloading,
+    watched,
+)
+from compare.measure.programme import Protocol
+
+PROTOCOLS: tuple[Protocol, ...] = (
+    Protocol("settled", settled.measure),
+    Protocol("newcomer", newcomer.measure),
+    Protocol("plane", plane.measure),
+    Protocol("hysteresis", hysteresis.measure, ("settled",)),
+    Protocol("rates", rates.measure, ("settled",)),
+    Protocol("laws", laws.measure),
+    Protocol("thresholds", thresholds.measure),
+    Protocol("edge", edge.measure, ("thresholds",)),
+    Protocol("unloading", unloading.measure, ("thresholds",)),
+    Protocol("field", field.measure),
+    Protocol("growth", growth.measure),
+    Protocol("bounds", bounds.measure, ("thresholds",)),
+    Protocol("watched", watched.measure, ("thresholds",)),
+    Protocol("motions", motions.measure),
+    Protocol("impacts", impacts.measure),
+    Protocol("slope", slope.measure, ("settled", "thresholds")),
+)
+"""Every protocol there is; each goes out only from those before it."""

@@ -1,0 +1,118 @@
+"""What is measured: every quantity with its symbol, unit, and the resolving power that a check of it must have.
+
+A check resolves r if it would notice a prediction that is off by r of the quantity's scale, see
+`compare.claims.claim`. Where what was measured is too coarse for `Quantity.resolves`, the check is inconclusive,
+however well the numbers agree. The ceilings follow from what each protocol can do at its quick level:
+
+* settled states don't depend on the time step, so that only the settling is left, which is waited for down to 1e-8;
+  a slip is a difference of spins ten times its size, a force one of accelerations;
+* a threshold is bracketed, or extrapolated from settled states as near to it as their settling allows;
+* the unstable state between two attractors is what a ball comes to on its border: its oscillation has died out to 1e-4
+  of the spin, and three times that is to be resolved; a ball that is pushed leaves the floor within a time step, which
+  its height of some tenths of a millimetre shows;
+* rates and growths come from short records of the motion and carry the error of a time step, a few tenths of a percent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from model import InputError
+from model.errors import suggestion
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A measured quantity."""
+
+    name: str
+    symbol: str
+    unit: str
+    """SI, as in the HDF5 files."""
+    resolves: float
+    """Largest error of a prediction, over the scale of the quantity, that a check may overlook."""
+
+
+_DETERMINED = {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}
+"""What the balances say of the forces where both contacts roll."""
+_ALL = (
+    Quantity("case", "case", "1", 0.0),
+    Quantity("cases", "cases reached", "1", 0.0),
+    Quantity("omega_c", "ω_c", "rad s-1", 1e-7),
+    Quantity("slip_x", "ω̃_x", "rad s-1", 1e-6),
+    Quantity("slip_y", "ω̃_y", "rad s-1", 1e-6),
+    Quantity("slip_z", "ω̃_z", "rad s-1", 1e-6),
+    Quantity("wall_spin", "ω_x⁰", "rad s-1", 1e-6),
+    Quantity("v_y", "v_y", "m s-1", 1e-6),
+    Quantity("y", "y", "m", 1e-2),
+    *(Quantity(f"force_{c}{a}", f"{c}_{a}", "N", 1e-5) for c in "AB" for a in "xyz"),
+    *(Quantity(f"force_{name}", symbol, "N", 1e-5) for name, symbol in _DETERMINED.items()),
+    *(Quantity(f"moving_force_{c}{a}", f"{c}_{a} in motion", "N", 5e-3) for c in "AB" for a in "xyz"),
+    *(Quantity(f"moving_force_{n}", f"{s} in motion", "N", 5e-3) for n, s in _DETERMINED.items()),
+    Quantity("decay_rate", "−Re λ", "s-1", 2e-2),
+    Quantity("frequency", "Im λ", "rad s-1", 2e-2),
+    Quantity("modes", "number of eigenvalues", "1", 0.0),
+    Quantity("gamma", "γ", "rad s-2", 2e-2),
+    Quantity("filippov_share", "δ", "1", 2e-2),
+    Quantity("gamma_zero", "ω₀ at γ = 0", "rad s-1", 2e-2),
+    Quantity("gamma_slope", "dγ/dω₀", "s-1", 2e-2),
+    Quantity("gamma_zero_square", "ω₀² at γ = 0", "rad2 s-2", 2e-2),
+    Quantity("gamma_slope_square", "dγ/d(ω₀²)", "rad-1", 2e-2),
+    *(
+        Quantity(f"rate_{name}", f"d{symbol}/dt", unit, 5e-3)
+        for name, symbol, unit in (
+            ("v_y", "v_y", "m s-2"),
+            ("omega_c", "ω_c", "rad s-2"),
+            ("slip_x", "ω̃_x", "rad s-2"),
+            ("slip_y", "ω̃_y", "rad s-2"),
+            ("slip_z", "ω̃_z", "rad s-2"),
+            ("v_h", "v_h", "m s-2"),
+        )
+    ),
+    *(
+        Quantity(f"after_{name}", f"{symbol} after", unit, 5e-2)
+        for name, symbol, unit in (
+            ("v_y", "v_y", "m s-1"),
+            ("v_h", "v_h", "m s-1"),
+            ("omega_c", "ω_c", "rad s-1"),
+            ("slip_x", "ω̃_x", "rad s-1"),
+            ("slip_y", "ω̃_y", "rad s-1"),
+            ("slip_z", "ω̃_z", "rad s-1"),
+        )
+    ),
+    Quantity("omega_01", "ω₀₁", "rad s-1", 1e-4),
+    Quantity("omega_02", "ω₀₂", "rad s-1", 1e-4),
+    Quantity("omega_03", "ω₀₃", "rad s-1", 1e-4),
+    Quantity("omega_04", "ω₀₄", "rad s-1", 1e-3),
+    *(
+        Quantity(f"edge_{name}", f"{symbol} on the edge", "rad s-1", resolves)
+        for name, symbol, resolves in (
+            ("omega_c", "ω_c", 1e-3),
+            ("slip_x", "ω̃_x", 1e-3),
+            ("slip_y", "ω̃_y", 1e-3),
+            ("slip_z", "ω̃_z", 1e-3),
+            ("wall_spin", "ω_x⁰", 1e-3),
+        )
+    ),
+    Quantity("folds", "number of folds", "1", 0.0),
+    Quantity("slope", "dω_c/dω₀", "1", 1e-4),
+    Quantity("law", "deviation from the law", "1", 1e-6),
+    Quantity("law_in_motion", "typical deviation from the law", "1", 1e-3),
+    Quantity("friction_ratio", "friction over normal force", "1", 1e-6),
+    Quantity("time", "t", "s", 1e-2),
+    Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
+    Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
+    Quantity("lift", "height of a lifted ball", "m", 5e-2),
+    Quantity("height", "height of a hop", "m", 2e-2),
+    Quantity("impulse", "impulse", "N s", 2e-2),
+    Quantity("share", "share of samples", "1", 3e-2),
+)
+QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}
+"""Every quantity by name."""
+
+
+def quantity(name: str) -> Quantity:
+    """The quantity of a name; `InputError` with a suggestion if there is none."""
+    if name not in QUANTITIES:
+        raise InputError(f"no quantity is called {name!r}{suggestion(name, QUANTITIES)}")
+    return QUANTITIES[name]

@@ -1,0 +1,185 @@
+"""Measurements as data, and the file that keeps them.
+
+A measurement is a number with its standard uncertainty and all that it belongs to: what was measured, by which engine,
+with which parameters, under which named conditions, in which run files. Labels and sentences are made from it and never
+read back. A file holds the measurements of one protocol as columns, one row a measurement: it opens with
+``xarray.open_dataset(path, engine="h5netcdf").to_dataframe()``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from compare.measure.quantities import quantity
+from model import Parameters, StorageError
+from model.files import WholeFile
+from model.trajectory import current_commit, current_versions
+
+SCHEMA = "dualball-measurements"
+SCHEMA_VERSION = 1
+Condition = float | str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """One measured number."""
+
+    protocol: str
+    """The module of `compare.measure` that measured it."""
+    quantity: str
+    """A name of `compare.measure.quantities`."""
+    value: float
+    uncertainty: float
+    """Standard uncertainty, in the unit of the quantity."""
+    engine: str
+    set: str
+    """Name of the parameter set."""
+    parameters: Parameters
+    """With the omega_0 at which it was measured."""
+    conditions: Mapping[str, Condition] = field(default_factory=dict)
+    """What else it depends on, by name; SI units."""
+    runs: tuple[str, ...] = ()
+    """Run files, relative to the results directory."""
+
+    def __post_init__(self) -> None:
+        quantity(self.quantity)
+        for name in ("value", "uncertainty"):  # whole numbers and numpy's come back from a file as floats
+            object.__setattr__(self, name, float(getattr(self, name)))
+
+    @property
+    def unit(self) -> str:
+        """Unit of value and uncertainty."""
+        return quantity(self.quantity).unit
+
+
+@dataclass(frozen=True)
+class Missing:
+    """What a protocol could not measure, and why, in a sentence for the reader."""
+
+    protocol: str
+    set: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Records:
+    """What has been measured so far."""
+
+    measurements: tuple[Measurement, ...] = ()
+    missing: tuple[Missing, ...] = ()
+
+    @classmethod
+    def of(cls, rows: Iterable[Measurement | Missing]) -> Records:
+        """Sort what a protocol yields into the two kinds."""
+        kept = list(rows)
+        return cls(
+            tuple(row for row in kept if isinstance(row, Measurement)),
+            tuple(row for row in kept if isinstance(row, Missing)),
+        )
+
+    def __add__(self, other: Records) -> Records:
+        return Records(self.measurements + other.measurements, self.missing + other.missing)
+
+    def select(
+        self, protocol: str, quantity: str | None = None, where: Callable[[Measurement], bool] = lambda m: True
+    ) -> Iterator[Measurement]:
+        """The measurements of a protocol, of one quantity if it is named, for which `where` holds."""
+        for m in self.measurements:
+            if m.protocol == protocol and quantity in (None, m.quantity) and where(m):
+                yield m
+
+
+def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
+    """Write records, whole or not at all; `about` says what they are (JSON-able). Raises `StorageError`."""
+    columns = _columns(records.measurements)
+    digest = _digest(columns, records.missing)
+    with WholeFile(path) as whole:
+        file = whole.file
+        file.attrs.update(
+            schema=SCHEMA,
+            schema_version=SCHEMA_VERSION,
+            digest=digest,
+            about=json.dumps(dict(about)),
+            missing=json.dumps([dataclasses.asdict(each) for each in records.missing]),
+            versions=json.dumps(dict(current_versions())),
+            commit=current_commit(),
+        )
+        row = file.create_dataset("row", data=np.arange(len(records.measurements)))
+        row.make_scale("row")
+        for name, values in columns.items():
+            kind = h5py.string_dtype() if values and isinstance(values[0], str) else np.dtype(np.float64)
+            dataset = file.create_dataset(name, data=np.array(values, dtype=kind), dtype=kind)
+            dataset.dims[0].attach_scale(row)
+        whole.finish()
+
+
+def load(path: Path) -> Records:
+    """Read what `save` wrote.
+
+    Raises `StorageError`, naming the file, if it is missing, damaged, cut, edited, or of another version.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            attributes = dict(file.attrs)
+            columns = {name: _column(file[name]) for name in file if name != "row"}
+            missing = tuple(Missing(**each) for each in json.loads(attributes["missing"]))
+    except FileNotFoundError as error:
+        raise StorageError(f"cannot read {path}: there is no such file") from error
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError) as error:
+        raise StorageError(f"{path} is damaged: it holds no measurements that can be read") from error
+    if attributes.get("schema") != SCHEMA or attributes.get("schema_version") != SCHEMA_VERSION:
+        raise StorageError(f"{path} does not hold measurements in this program's format")
+    if attributes.get("digest") != _digest(columns, missing):
+        raise StorageError(f"{path} was changed after it was written: measure again, or restore the file")
+    return Records(tuple(_rows(columns)), missing)
+
+
+_OWN = ("protocol", "quantity", "value", "uncertainty", "unit", "engine", "set", "runs")
+_PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
+
+
+def _columns(rows: Sequence[Measurement]) -> dict[str, list[Any]]:
+    """Columns by name; a condition that a row doesn't have is nan, or empty where it is text."""
+    columns: dict[str, list[Any]] = {name: [getattr(m, name) for m in rows] for name in _OWN if name != "runs"}
+    columns["runs"] = [" ".join(m.runs) for m in rows]
+    columns |= {name: [float(getattr(m.parameters, name)) for m in rows] for name in _PARAMETERS}
+    kinds = {name: isinstance(value, str) for m in rows for name, value in m.conditions.items()}
+    for name, text in kinds.items():
+        empty: Condition = "" if text else np.nan
+        values = [m.conditions.get(name, empty) for m in rows]
+        columns[f"at_{name}"] = values if text else [float(value) for value in values]
+    return columns
+
+
+def _column(dataset: h5py.Dataset) -> list[Any]:
+    values = dataset.asstr()[...] if h5py.check_string_dtype(dataset.dtype) else dataset[...]
+    kept: list[Any] = values.tolist()
+    return kept
+
+
+def _rows(columns: Mapping[str, Sequence[Any]]) -> Iterator[Measurement]:
+    names = [name for name in columns if name.startswith("at_")]
+    for k in range(len(columns["value"])):
+        conditions = {name[3:]: columns[name][k] for name in names}
+        yield Measurement(
+            **{name: columns[name][k] for name in _OWN if name not in ("unit", "runs")},
+            runs=tuple(columns["runs"][k].split()),
+            parameters=Parameters(**{name: columns[name][k] for name in _PARAMETERS}),
+            conditions={name: value for name, value in conditions.items() if value != "" and value == value},
+        )
+
+
+def _digest(columns: Mapping[str, Sequence[Any]], missing: Sequence[Missing]) -> str:
+    """Hash of all that is told, to notice a file that was edited."""
+    content = [sorted((name, [repr(v) for v in values]) for name, values in columns.items())]
+    text = json.dumps([content, [dataclasses.astuple(each) for each in missing]])
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,141 @@
+"""Settled states: where the ball ends from fixed starts at fixed flows, with the forces that mechanics determine.
+
+Flows are the same multiples of sqrt(g/R) for every set. States are measured with the coarse step, and once more with
+half of it: what that changes belongs to their uncertainty, as does what different starts make of the same state.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+
+import numpy as np
+
+from compare.measure.lab import Lab, Level, time_unit
+from compare.measure.record import Measurement, Missing, Records
+from compare.measure.settling import GROUPS, Settled, Start, family, high, scale, settle
+from compare.statistics import Measured
+from model import Parameters
+from model.arrays import Array
+
+PROTOCOL = "settled"
+QUICK = (0.43, 0.62, 0.9, 1.13, 1.4, 1.7, 2.05, 2.5, 3.1, 4.2)
+DEFAULT = (
+    0.43,
+    0.51,
+    0.62,
+    0.75,
+    0.9,
+    1.02,
+    1.13,
+    1.26,
+    1.4,
+    1.53,
+    1.7,
+    1.87,
+    2.05,
+    2.27,
+    2.5,
+    2.78,
+    3.1,
+    3.43,
+    3.8,
+    4.2,
+)
+"""Flows, omega_0 sqrt(R/g)."""
+SPIN = 1.0
+"""Spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r."""
+SHARP = {Level.QUICK: 1.0, Level.DEFAULT: 0.1, Level.FULL: 0.1}
+"""How much less than it may a state is to drift, if it can be had."""
+REFINED = 20.0
+"""Length of a round with half the step, in units of 1/c: it goes out from a settled state."""
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The case that every start ends in, and once for every distinct state its values."""
+    begin = [start for name, p in sets.items() for start in starts(name, p, flows(lab.level))]
+    ended = settle(lab, begin, sharp=SHARP[lab.level])
+    yield from unsettled(PROTOCOL, ended)
+    good = [state for state in ended if not state.failure]
+    for state in good:
+        yield _record(lab, state, "case", Measured(float(state.case), 0.0))
+    alike = [list(same) for _, same in groupby(sorted(good, key=_key), key=_key)]
+    refined = settle(lab, [_again(same[0]) for same in alike], refine=2, span=REFINED, sharp=SHARP[lab.level])
+    yield from unsettled(PROTOCOL, refined)
+    for same, fine in zip(alike, refined, strict=True):
+        if not fine.failure and family(fine.case) is family(same[0].case):
+            for quantity, value in combined(fine, same).items():
+                yield _record(lab, fine, quantity, value)
+
+
+def flows(level: Level) -> tuple[float, ...]:
+    """The flows of a level, omega_0 sqrt(R/g)."""
+    return QUICK if level is Level.QUICK else DEFAULT
+
+
+def starts(name: str, p: Parameters, Omegas: Sequence[float]) -> Iterator[Start]:
+    """From rest, going round with the fluid, and so high up on the wall; spinning where the fluid rests."""
+    for Omega_0 in Omegas:
+        q = p.replace(omega_0=Omega_0 / time_unit(p))
+        yield Start(name, q, "rest", state())
+        yield Start(name, q, "with the fluid", state(omega_c=q.omega_0))
+        yield Start(name, q, "on the wall", state(y=high(q), omega_c=q.omega_0))
+    still = p.replace(omega_0=0.0)
+    yield Start(name, still, "spinning", state(slip_y=SPIN / time_unit(p) * p.R / p.r))
+
+
+def state(y: float = 0.0, omega_c: float = 0.0, slip_y: float = 0.0) -> Array:
+    """A state (8,) of which all the rest is zero."""
+    return np.array([y, 0.0, omega_c, 0.0, slip_y, 0.0, 0.0, 0.0])
+
+
+def unsettled(protocol: str, states: Sequence[Settled]) -> Iterator[Missing]:
+    """Those that did not settle, each with what it did last."""
+    for each in states:
+        if each.failure:
+            p = each.start.p
+            yield Missing(
+                protocol,
+                each.start.set,
+                f"not settled from {each.start.name} at omega_0 = {p.omega_0:.4g} rad/s "
+                f"(mu = {p.mu:.4g}, eta = {p.eta:.4g}): {each.failure}",
+            )
+
+
+def combined(fine: Settled, coarse: Sequence[Settled]) -> dict[str, Measured]:
+    """The values with half the step; by group, what step and start change is added to their uncertainty."""
+    found: dict[str, Measured] = {}
+    p = fine.start.p
+    for group in GROUPS:
+        alike = [q for q in group if q in fine.values and all(q in each.values for each in coarse)]
+        changes = [abs(each.values[q].value - fine.values[q].value) / scale(q, p) for each in coarse for q in alike]
+        change = max(changes, default=0.0)
+        for q in alike:
+            own = fine.values[q]
+            found[q] = Measured(own.value, math.hypot(own.uncertainty, change * scale(q, p)))
+    return found
+
+
+def _key(each: Settled) -> tuple[str, float, int]:
+    return each.start.set, each.start.p.omega_0, int(family(each.case))
+
+
+def _again(each: Settled) -> Start:
+    x0 = each.mean.copy()
+    x0[0] = max(each.start.x0[0], 0.0)
+    return Start(each.start.set, each.start.p, each.start.name, x0)
+
+
+def _record(lab: Lab, each: Settled, quantity: str, value: Measured) -> Measurement:
+    return Measurement(
+        protocol=PROTOCOL,
+        quantity=quantity,
+        value=value.value,
+        uncertainty=value.uncertainty,
+        engine=lab.engine.name,
+        set=each.start.set,
+        parameters=each.start.p,
+        conditions={"case": each.case.name, "start": each.start.name},
+        runs=(lab.file(each.task),),
+    )

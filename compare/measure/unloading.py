@@ -1,0 +1,195 @@
+"""Balls that leave the wall or the floor: unloading at omega_02, and a push that lifts a ball (section 5.3).
+
+A ball rides the wall a little above the floor while the flow is suddenly less than what holds it there: when does it
+begin to slip, when does it land, how fast, with what impulse? And a ball that the wall carries beside the floor is
+pushed, upwards or by a little more spin: does it stay off the floor, and how high? Every number is measured with two
+time steps; motions with landings follow the step to first order, so that the difference is the error of the finer one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from compare.measure import onset
+from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.questions import lasting
+from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.settling import Settled, Start, family, high, settle
+from compare.runs.tasks import Task
+from compare.statistics import settled_case
+from model import Parameters, Trajectory
+from model.arrays import Array
+from model.kinematics import VARIABLES
+
+PROTOCOL = "unloading"
+ABOVE, BELOW = 1.02, 0.95
+"""Flows before and after the unloading, in units of the measured omega_02."""
+LIFTED = 1.1
+"""The flow of a ball that is to be pushed, in units of the larger of the flows that hold it on the wall and end rolling
+by lifting."""
+HEIGHT = 0.2
+"""How high over the floor the ball rides, in units of R."""
+PUSH = 1e-2
+"""How hard it is pushed: speed over sqrt(g R), or more spin over its spin on the wall."""
+REFINE = {Level.QUICK: (16, 32), Level.DEFAULT: (32, 64), Level.FULL: (64, 128)}
+"""Time steps, as parts of the coarse one, of motions with a landing that counts; four times as long without."""
+UNLOADING, LIFTING = 5.0, 10.0
+"""Lengths of the runs in units of 1/c."""
+ONSET = (1e-4, 1e-3)
+"""Slip speeds over sqrt(g R) between which the onset of slip is looked for: it grows like the square of the time."""
+BOUNCE = (5, 12)
+"""Steps after a landing between which the ball must have come to rest on the floor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One motion: how it began, and the runs with both steps, the coarser first."""
+
+    set: str
+    name: str
+    p: Parameters
+    x0: Array
+    tasks: Sequence[Task] = field(repr=False)
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Settle a ball on the wall of every set that carries it, and begin from there."""
+    limits = {name: _limit(records, name, ("omega_02",)) for name in sets}
+    begin: list[tuple[str, Start]] = []
+    for name, p in sets.items():
+        if (limit := limits[name]) is None:
+            yield Missing(PROTOCOL, name, "no flow was measured that is the least to hold a ball on the wall")
+            continue
+        flows = {"unloading": ABOVE * limit, "push": LIFTED * max(limit, _limit(records, name, ("omega_03",)) or 0.0)}
+        for kind, omega in flows.items():
+            q = p.replace(omega_0=omega)
+            begin.append((kind, Start(name, q, kind, np.array([high(q), 0.0, omega, 0.0, 0.0, 0.0]))))
+    trials = []
+    for (kind, start), state in zip(
+        begin, settle(lab, [start for _, start in begin], loose=onset.LOOSE[lab.level]), strict=True
+    ):
+        if state.failure:
+            yield Missing(PROTOCOL, start.set, f"no ball to begin with on the wall: {state.failure}")
+        elif kind == "unloading":
+            trials.append(_unloading(lab, state))
+        else:
+            trials += [_push(lab, state, upwards) for upwards in (True, False)]
+    lab.complete([task for trial in trials for task in trial.tasks])
+    yield from _rows(lab, trials)
+
+
+def _limit(records: Records, name: str, quantities: Sequence[str]) -> float | None:
+    found = [m.value for q in quantities for m in records.select("thresholds", q, lambda m: m.set == name)]
+    return found[0] if found else None
+
+
+def _unloading(lab: Lab, state: Settled) -> Trial:
+    p = state.start.p
+    x0 = np.array([HEIGHT * p.R, 0.0, *state.mean[2:4], 0.0, 0.0])
+    return _trial(lab, state, "unloading", p.replace(omega_0=p.omega_0 * BELOW / ABOVE), x0, UNLOADING)
+
+
+def _push(lab: Lab, state: Settled, upwards: bool) -> Trial:
+    p, x = state.start.p, state.mean
+    v_y = PUSH * math.sqrt(p.g * p.R) if upwards else 0.0
+    spin = 0.0 if upwards else PUSH * (x[3] + p.R / p.r * x[2])
+    x0 = np.array([0.0, v_y, x[2], x[3] + spin, 0.0, 0.0])
+    return _trial(lab, state, "push upwards" if upwards else "push by spin", p, x0, LIFTING)
+
+
+def _trial(lab: Lab, state: Settled, name: str, p: Parameters, x0: Array, units: float) -> Trial:
+    """Runs with both steps, sampled at every step where a landing is looked at."""
+    t_end, tasks = lasting(p, units), []
+    for refine in REFINE[lab.level]:
+        lands = name == "unloading"
+        step = coarse_step(p) / (refine if lands else refine // 4)
+        samples = round(t_end / step) if lands else 1000
+        tasks.append(lab.task(p, x0, t_end, step, samples=samples))
+    return Trial(state.start.set, name, p, x0, tasks)
+
+
+def _rows(lab: Lab, trials: Sequence[Trial]) -> Iterator[Measurement | Missing]:
+    """Numbers of all trials; the step counts for each at least as much as for half of the trials."""
+    measured: dict[tuple[str, str, str], list[tuple[Trial, float, float, float]]] = {}
+    for trial in trials:
+        coarse, fine = lab.run(trial.tasks)
+        cases = [family(settled_case(run)) for run in (coarse, fine)]
+        if cases[0] is cases[1]:
+            yield _record(lab, trial, "case", float(cases[1]), 0.0)
+        else:
+            yield Missing(PROTOCOL, trial.set, f"{trial.name}: with half the time step the ball ends up otherwise")
+        numbers = [_unloaded(run) if trial.name == "unloading" else _lifted(run, trial) for run in (coarse, fine)]
+        if not all(numbers):
+            yield Missing(PROTOCOL, trial.set, f"{trial.name}: the ball does not slip and land")
+            continue
+        for key, (value, own) in numbers[1].items():
+            change = abs(numbers[0][key][0] / value - 1)
+            measured.setdefault((trial.name, *key), []).append((trial, value, own, change))
+    for (_, quantity, event), rows in measured.items():
+        usual = float(np.median([change for *_, change in rows]))
+        for trial, value, own, change in rows:
+            yield _record(lab, trial, quantity, value, math.hypot(max(change, usual) * value, own), event=event)
+
+
+def _record(lab: Lab, trial: Trial, quantity: str, value: float, sure: float, **conditions: Condition) -> Measurement:
+    start = {name: float(value) for name, value in zip(VARIABLES, trial.x0, strict=False)}
+    return Measurement(
+        protocol=PROTOCOL,
+        quantity=quantity,
+        value=value,
+        uncertainty=sure,
+        engine=lab.engine.name,
+        set=trial.set,
+        parameters=trial.p,
+        conditions={"start": trial.name, **start, "duration": trial.tasks[0].t_end, **conditions},
+        runs=tuple(lab.file(task) for task in trial.tasks),
+    )
+
+
+Numbers = dict[tuple[str, str], tuple[float, float]]
+"""Value and own uncertainty by quantity and event."""
+
+
+def _unloaded(run: Trajectory) -> Numbers:
+    """Onset of slip, and landing: time, speed and vertical impulse. Empty where it doesn't come to that."""
+    p, step = run.header.parameters, float(run.time[1] - run.time[0])
+    slip = run.slip_speed_B / math.sqrt(p.g * p.R)
+    touches = np.flatnonzero(run.force_A[:, 1] > 0)
+    growing = np.arange(*np.searchsorted(np.maximum.accumulate(slip), ONSET))
+    if not len(touches) or not 1 < touches[0] < len(run.time) - BOUNCE[1] or len(growing) < 10:
+        return {}
+    onsets = [_zero(run.time[growing], np.sqrt(slip[growing]), degree) for degree in (2, 3)]
+    k = int(touches[0]) - 1
+    wait = float(run.y[k] / -run.v_y[k])
+    v_y = float(run.v_y[k] + (run.v_y[k] - run.v_y[k - 1]) / step * wait)
+    after = run.v_y[k + BOUNCE[0] : k + BOUNCE[1]]
+    return {
+        ("time", "slip at B"): (onsets[1], math.hypot(onsets[1] - onsets[0], step / math.sqrt(12))),
+        ("time", "landing"): (float(run.time[k]) + wait, step / math.sqrt(12)),
+        ("landing_speed", "landing"): (v_y, 0.0),
+        ("landing_impulse", "landing"): (p.m * (float(after.mean()) - v_y), p.m * float(np.abs(after).max())),
+    }
+
+
+def _zero(time: Array, values: Array, degree: int) -> float:
+    """When rising values would be zero: time as a polynomial of them."""
+    return float(np.polynomial.Polynomial.fit(values, time, degree)(0.0))
+
+
+def first_top(run: Trajectory) -> float:
+    """Height in m at which v_y first falls to zero, between the samples as under constant acceleration."""
+    k = int(np.argmax(run.v_y < 0))
+    before, after = run.v_y[k - 1], run.v_y[k]
+    wait = (run.time[k] - run.time[k - 1]) * before / (before - after)
+    return float(run.y[k - 1] + before * wait / 2)
+
+
+def _lifted(run: Trajectory, trial: Trial) -> Numbers:
+    """How high it is in the end; after a push upwards, which ends on the floor, how high it came first."""
+    if trial.name == "push upwards":
+        return {("lift", "first top"): (first_top(run), 0.0)}
+    return {("lift", "end"): (float(run.y[-1]), 0.0)}

@@ -1,0 +1,39 @@
+"""``python -m compare.mutants``: try the verdicts, and write the page that says what they notice."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from compare.mutants import trial
+from model import InputError
+from model.files import write_text
+
+
+def main() -> int:
+    """Return 0 if every fault was noticed, 1 if not, 2 where there is nothing to judge."""
+    parser = argparse.ArgumentParser(prog="python -m compare.mutants", description=trial.__doc__)
+    parser.add_argument("directory", type=Path, metavar="DIR", help="results of 'dualball validate --quick'")
+    parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="page to write")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
+    args = parser.parse_args()
+    try:
+        tried = trial.theories(args.directory, args.workers)
+        measured = trial.wrong_engines(args.directory, args.workers) if args.engines else []
+        if args.page:
+            write_text(args.page, trial.page(tried, measured))
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    missed = [each.what for each in (*tried, *measured) if not each.noticed]
+    print(f"{len(tried) + len(measured) - len(missed)} of {len(tried) + len(measured)} faults were noticed")
+    for what in missed:
+        print(f"nobody noticed: {what}")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,88 @@
+"""Wrong engines: MuJoCo with one thing put wrong behind the back of those who measure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+import mjsim
+from compare.runs.engines import ENGINES, MUJOCO, Engine
+from mjsim import ContactSettings, scene, stepping
+from model import Parameters
+
+FAR = 1e6
+"""m"""
+Stretch = Callable[[], AbstractContextManager[Any]]
+
+
+class _Disguised(mjsim.Run):
+    """A run with a fault that lasts as long as it is stepped, and headers that say nothing of it."""
+
+    fault: Stretch = staticmethod(nullcontext)
+
+    def __iter__(self) -> Any:
+        with self.fault():
+            yield from super().__iter__()
+
+
+def _wrong(
+    name: str,
+    ball: Callable[[Parameters], Parameters] = lambda p: p,
+    fault: Stretch = nullcontext,
+    **changes: Any,
+) -> Engine:
+    def stream(
+        parameters: Sequence[Parameters], x0s: Any, t_end: float, flows: Any, settings: Any,
+        sample_interval: float | None, batched: bool, journal: Any,
+    ) -> mjsim.Run:  # fmt: skip
+        assert isinstance(settings, ContactSettings)
+        with fault():
+            run = _Disguised(
+                [ball(p) for p in parameters], x0s, t_end, flows, replace(settings, **changes),
+                sample_interval=sample_interval, batched=batched, journal=journal,
+            )  # fmt: skip
+        run.fault = fault
+        run.headers = [replace(h, parameters=p) for h, p in zip(run.headers, parameters, strict=True)]
+        return run
+
+    return replace(MUJOCO, name=name, stream=stream)
+
+
+def _no_impacts() -> AbstractContextManager[Any]:
+    """Landings are left to the engine's own contacts."""
+    return mock.patch.object(stepping, "_FALL", np.inf)
+
+
+def _no_floor() -> AbstractContextManager[Any]:
+    """The floor is so low that no ball comes to it."""
+    built = scene.build
+
+    def without(p: Parameters, settings: ContactSettings) -> Any:
+        model = built(p, settings)
+        model.geom("floor").pos[2] = -FAR
+        return model
+
+    return mock.patch.object(scene, "build", without)
+
+
+WRONG_ENGINES: tuple[Engine, ...] = (
+    _wrong("floor friction 1 % high", lambda p: p.replace(mu=1.01 * p.mu)),
+    _wrong("wall friction 1 % low", lambda p: p.replace(eta=0.99 * p.eta)),
+    _wrong("inertia 1 % high", lambda p: p.replace(j=1.01 * p.j)),
+    _wrong("drag 1 % high", lambda p: p.replace(c=1.01 * p.c)),
+    _wrong("the floor is missing", fault=_no_floor),
+    _wrong("no servo of the margins", servo=0.0),
+    _wrong("no memory of friction", memory=False),
+    _wrong("forces taken at the beginning of a step", order=1),
+    _wrong("landings left to the contacts", fault=_no_impacts),
+)
+
+
+def register() -> None:
+    """Let tasks name them."""
+    ENGINES.update({each.name: each for each in WRONG_ENGINES})

@@ -1,0 +1,45 @@
+"""The report's pictures: each is drawn once, and kept beside the results with a hash of all that it shows."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from compare.figures.drawing import Drawing
+from compare.runs.tasks import sources
+from model.files import write_text
+
+_PROGRAM = ("model", "analytic", "compare", "compare.runs", "compare.measure", "compare.claims", "compare.figures")
+"""Packages whose constants and functions a picture may show."""
+
+
+def kept(path: Path, drawing: Drawing, data: Any) -> str:
+    """The address of a picture that is its own content: a browser looks into it only to show it.
+
+    The picture in the SVG file `path` is taken if it was made from the same data by the same program, else drawn and
+    written there. Raises what drawing raises, and `StorageError` if it can't be written.
+    """
+    made_from = "\n".join([repr(data), drawing.title, matplotlib.__version__, sources(*_PROGRAM)])
+    mark = f"<!-- {hashlib.sha256(made_from.encode()).hexdigest()} -->"
+    picture = path.read_text("utf-8") if path.is_file() else ""
+    if not picture.endswith(mark):
+        picture = svg(drawing.draw(data)) + mark
+        write_text(path, picture)
+    return f"data:image/svg+xml;base64,{base64.b64encode(picture.encode()).decode()}"
+
+
+def svg(figure: Figure) -> str:
+    """A figure as SVG."""
+    out = io.BytesIO()
+    if any(axes.child_axes for axes in figure.axes):  # second scales know their limits only once they were drawn
+        figure.draw_without_rendering()
+    canvas: Any = FigureCanvasSVG(figure)  # draws once; `Figure.savefig` would do so twice, for the layout
+    canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    return out.getvalue().decode()

@@ -1,0 +1,200 @@
+"""The report: one self-contained page, from verdicts and the measurements behind them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from markdown_it import MarkdownIt
+
+from compare import pages
+from compare.claims.claim import Check, Outcome, Verdict
+from compare.figures.drawing import Drawing, GapError, Material
+from compare.figures.registry import FIGURES, figures_of
+from compare.measure.lab import Level
+from compare.measure.record import Records
+from compare.report import pictures, results, wording
+from compare.report.results import Summary
+from model.errors import StorageError
+from model.files import write_text
+
+ROWS = 50
+"""Checks of a claim that are listed, the worst first; a longer page would open slowly."""
+REASONS = 12
+"""Reasons for what was not measured that are listed for a claim."""
+_OPTIONS = {Level.QUICK: " --quick", Level.DEFAULT: "", Level.FULL: " --full"}
+
+
+def write(material: Material, summary: Summary) -> Path:
+    """Write ``summary.json`` and ``report.html`` into the material's results directory; return the page's path.
+
+    Raises `model.StorageError` if it can't be written.
+    """
+    directory = material.directory
+    results.save(summary, directory)
+    try:
+        (directory / results.FIGURES).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"cannot write to {directory / results.FIGURES}: {error.strerror}") from error
+    path = directory / results.REPORT
+    write_text(path, render(material, summary))
+    return path
+
+
+def render(material: Material, summary: Summary) -> str:
+    """The page as text; what was not run is named in one line, a figure that can't be drawn is a gap."""
+    ran = [verdict for verdict in material.verdicts if verdict.outcome is not Outcome.NOT_RUN]
+    option = _OPTIONS[Level[summary.level]]
+    rows = [_row(material, verdict, option) for verdict in ran]
+    sections = list(dict.fromkeys(row["section"] for row in rows))
+    judged = {row["id"] for row in rows}
+    free = {name: each for name, each in FIGURES.items() if not judged & set(each.claims)}
+    drawn = [
+        _figure(material, name, each) | {"background": each.background or bool(each.claims)}
+        for name, each in free.items()
+    ]
+    return pages.render(
+        "compare.report",
+        "report.html",
+        title=f"{sum(verdict.passed for verdict in ran)} of {len(ran)} claims as expected",
+        headline=wording.headline(ran),
+        lead=_lead(ran),
+        tiles=_tiles(ran, material.records),
+        figures=[each for each in drawn if not each["background"] and not each["gap"]],
+        background=[each for each in drawn if each["background"] and not each["gap"]],
+        sections=[(name, [row for row in rows if row["section"] == name]) for name in sections],
+        total=len(rows),
+        outcomes=sorted({row["outcome"] for row in rows}),
+        not_run=[verdict.claim for verdict in material.verdicts if verdict.outcome is Outcome.NOT_RUN],
+        not_drawn=[f"{each['title']}: {each['gap']}" for each in drawn if each["gap"]],
+        command=f"dualball validate --full -o {material.directory}",
+        errata=errata(),
+        provenance=_provenance(summary),
+    )
+
+
+@cache
+def errata() -> str:
+    """The errata of the paper as HTML; links into the source tree, which a page by itself can't follow, are text."""
+    text = (resources.files("compare.report") / "templates" / "errata.md").read_text("utf-8")
+    made: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
+    made = re.sub(r"<h1>.*?</h1>", "", made)  # the page has a heading for it
+    made = re.sub(r"(</?h)2>", r"\g<1>3>", made)
+    made = re.sub(r'<a href="(?!https?:)[^"]*">(.*?)</a>', r"\1", made)
+    made = made.replace(
+        "<table>", '<div class="scroll" tabindex="0" role="region" aria-label="Errata"><table class="prose">'
+    )
+    return made.replace("</table>", "</table></div>")
+
+
+def _row(material: Material, verdict: Verdict, option: str) -> dict[str, Any]:
+    claim = verdict.claim
+    mark, symbol = wording.MARKS[verdict.outcome]
+    checks = wording.ranked(verdict.checks)
+    figures = figures_of(claim.id) if checks else {}
+    missing = verdict.missing[:REASONS]
+    more = len(verdict.missing) - len(missing)
+    return {
+        "id": claim.id,
+        "section": claim.section,
+        "source": claim.source,
+        "statement": claim.statement,
+        "outcome": verdict.outcome.value,
+        "mark": "other" if verdict.passed and mark == "fail" else mark,
+        "symbol": symbol,
+        "expected": "" if verdict.passed else claim.expected.value,
+        "text": claim.text.value,
+        "reason": claim.reason,
+        "error": verdict.error,
+        "predicted": list(dict.fromkeys(bearing.by for bearing in claim.bearings if bearing.by)),
+        "noticed": wording.noticed(verdict),
+        "worst": wording.worst(verdict),
+        "missing": [*missing, f"and {more} more, see {results.SUMMARY}"] if more else missing,
+        "checks": [_number(material, check) for check in checks[:ROWS]],
+        "total": len(checks),
+        "figures": [_figure(material, name, figure) for name, figure in figures.items()],
+        "repeat": f"dualball validate --claim {claim.id}{option} -o {material.directory}",
+    }
+
+
+def _number(material: Material, check: Check) -> dict[str, Any]:
+    m = check.measurement
+    run = next((name for name in m.runs if (material.directory / name).is_file()), "")
+    return {
+        "good": check.agrees,
+        "coarse": not check.conclusive,
+        "set": m.set,
+        "omega_0": f"{m.parameters.omega_0:.6g}",
+        "conditions": wording.conditions(m.conditions),
+        "engine": m.engine,
+        "symbol": wording.SYMBOLS[m.quantity],
+        "unit": wording.unit(m.unit),
+        "relation": "" if check.relation == "=" else check.relation,
+        "predicted": wording.value(m, check.predicted),
+        "measured": wording.value(m, m.value),
+        "uncertainty": wording.size(m.uncertainty),
+        "deviation": wording.size(check.deviation, "+"),
+        "tolerance": wording.size(check.tolerance),
+        "resolves": wording.size(check.resolves),
+        "run": run,
+        "more": len(m.runs) - 1 if run else 0,
+    }
+
+
+def _figure(material: Material, name: str, drawing: Drawing) -> dict[str, Any]:
+    """A picture with its caption, or why there is none."""
+    shown = {"id": f"figure-{name}", "title": drawing.title, "caption": "", "picture": "", "gap": ""}
+    try:
+        data = drawing.select(material)
+        shown["picture"] = pictures.kept(material.directory / results.FIGURES / f"{name}.svg", drawing, data)
+        shown["caption"] = drawing.caption(data)
+    except (GapError, StorageError) as error:
+        shown["gap"] = str(error)
+    return shown
+
+
+def _lead(ran: Sequence[Verdict]) -> str:
+    what = "A ball rolls and slips round a cylinder. "
+    orbits = [
+        check
+        for verdict in ran
+        for check in verdict.checks
+        if check.measurement.quantity == "omega_c" and verdict.claim.section == "Stationary states"
+    ]
+    orbits = [check for check in orbits if math.isfinite(check.predicted) and check.predicted]
+    if not orbits:
+        return what + "Its closed-form theory by Antali and Stépán is held against simulation."
+    largest = max(abs(check.deviation / check.predicted) for check in orbits)
+    return what + (
+        "Its angular velocity ω_c in stationary states, predicted in closed form by Antali and Stépán, was measured "
+        f"{len(orbits)} times; the largest relative deviation is {largest:.1e}."
+    )
+
+
+def _tiles(ran: Sequence[Verdict], records: Records) -> list[dict[str, str]]:
+    checks = [check for verdict in ran for check in verdict.checks]
+    runs = {name for m in records.measurements for name in m.runs}
+    sets = {m.set for m in records.measurements}
+    return [
+        {"value": f"{sum(verdict.passed for verdict in ran)}/{len(ran)}", "label": "claims as expected"},
+        {"value": f"{sum(check.agrees for check in checks)}/{len(checks)}", "label": "numbers within tolerance"},
+        {"value": f"{sum(check.conclusive for check in checks)}/{len(checks)}", "label": "fine enough to tell"},
+        {"value": str(len(runs)), "label": f"simulations with {len(sets)} parameter sets"},
+    ]
+
+
+def _provenance(summary: Summary) -> Mapping[str, str]:
+    known = summary.provenance
+    return {
+        "made": known.get("created", ""),
+        "level": summary.level.lower(),
+        "versions": ", ".join(f"{name} {version}" for name, version in known.get("versions", {}).items()),
+        "commit": known.get("commit", "") or "not from a checkout",
+        "machine": known.get("machine", ""),
+        "measurements": ", ".join(summary.measurements) or "none",
+    }

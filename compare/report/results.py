@@ -1,0 +1,137 @@
+"""The results directory: run files, measurements, the summary of the verdicts, figures, the report."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from compare.claims.claim import Check, Verdict
+from compare.measure import record
+from compare.measure.lab import Level
+from compare.measure.record import Records
+from model.errors import StorageError
+from model.files import write_text
+from model.trajectory import current_commit, current_versions
+
+SUMMARY, REPORT, RUNS, FIGURES = "summary.json", "report.html", "runs", "figures"
+SCHEMA, SCHEMA_VERSION = "dualball-summary", 3
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a validation came to, as JSON-able data."""
+
+    level: str = Level.QUICK.name
+    measurements: tuple[str, ...] = ()
+    """Files of the measurements that were judged, relative to the results directory."""
+    verdicts: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """By claim id, see `describe`."""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, directory: Path, verdicts: Iterable[Verdict], level: Level, measured: Sequence[Path]) -> Summary:
+        """The verdicts of now on the measurements in the files `measured`."""
+        files = tuple(path.relative_to(directory).as_posix() for path in measured)
+        return cls(level.name, files, {verdict.claim.id: describe(verdict) for verdict in verdicts}, _provenance())
+
+    def records(self, directory: Path) -> Records:
+        """The measurements that were judged, to be judged again; raises `StorageError` for a file that is not whole."""
+        return sum((record.load(directory / name) for name in self.measurements), Records())
+
+
+def describe(verdict: Verdict) -> dict[str, Any]:
+    """A verdict as JSON-able data; a number that is not finite is null."""
+    claim = verdict.claim
+    texts = {name: getattr(claim, name) for name in ("section", "source", "statement", "text", "reason")}
+    return {
+        "id": claim.id,
+        "verdict": verdict.outcome,
+        "expected": claim.expected,
+        "passed": verdict.passed,
+        **texts,
+        "resolving_power": {name: _finite(value) for name, value in verdict.resolving_power.items()},
+        "worst": _finite(verdict.worst),
+        "missing": list(verdict.missing),
+        "error": verdict.error,
+        "checks": [_check(check) for check in verdict.checks],
+    }
+
+
+def _check(check: Check) -> dict[str, Any]:
+    m = check.measurement
+    numbers = ("predicted", "deviation", "tolerance", "scale", "resolves")
+    return {
+        **{name: getattr(m, name) for name in ("protocol", "quantity", "unit", "engine", "set")},
+        "parameters": dataclasses.asdict(m.parameters),
+        "conditions": dict(m.conditions),
+        "measured": _finite(m.value),
+        "uncertainty": _finite(m.uncertainty),
+        "relation": check.relation,
+        **{name: _finite(getattr(check, name)) for name in numbers},
+        "agrees": check.agrees,
+        "conclusive": check.conclusive,
+        "runs": list(m.runs),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def open_directory(directory: Path) -> None:
+    """Make sure that results may be written here.
+
+    Raises `StorageError` if the directory can't be written or holds results of another version of the program.
+    """
+    try:
+        (directory / RUNS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"cannot write to {directory}: {error.strerror}") from error
+    if not os.access(directory, os.W_OK | os.X_OK):
+        raise StorageError(f"cannot write to {directory}: Permission denied")
+    if (directory / SUMMARY).exists():
+        load(directory)
+
+
+def load(directory: Path) -> Summary:
+    """Read the summary; raises `StorageError` if there is none or it is of another version."""
+    path = directory / SUMMARY
+    try:
+        content = json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror}; run 'dualball validate -o {directory}'") from error
+    except ValueError as error:
+        raise StorageError(f"{path} is not JSON: {error}") from error
+    if not isinstance(content, Mapping) or content.get("schema") != SCHEMA:
+        raise StorageError(f"{path} is not a {SCHEMA}")
+    if content.get("schema_version") != SCHEMA_VERSION:
+        raise StorageError(f"{path} is in another format than this program's: choose another directory with --output")
+    version, ours = content.get("provenance", {}).get("versions", {}).get("dualball"), current_versions()["dualball"]
+    if version != ours:
+        raise StorageError(
+            f"{directory} holds results of dualball {version}, this is {ours}: choose another directory with --output"
+        )
+    return Summary(content["level"], tuple(content["measurements"]), content["verdicts"], content["provenance"])
+
+
+def save(summary: Summary, directory: Path) -> None:
+    """Write the summary, whole or not at all."""
+    content = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **dataclasses.asdict(summary)}
+    write_text(directory / SUMMARY, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+def _provenance() -> dict[str, Any]:
+    return {
+        "versions": dict(current_versions()),
+        "commit": current_commit(),
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors",
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }

@@ -1,0 +1,156 @@
+"""Speed as ratios measured within one run: machines differ and are noisy, ratios are not and less so."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import statistics
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from analytic import attractors
+from compare.runs.campaign import Campaign
+from compare.runs.tasks import Task, store
+from compare.runs.workers import Workers, dask, processes
+from mjsim import benchmark
+from model import Parameters
+
+BATCH = 64
+REPEATS = 3
+FINISHED = 10_000
+SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
+"""Slipping at both points: both contacts closed, and friction on its cone."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What `run` found."""
+
+    single: benchmark.Cost
+    """One simulation."""
+    batch: benchmark.Cost
+    """A batch of `BATCH`."""
+    two_over_one: float
+    """Throughput of a campaign with two processes over that with one."""
+    bookkeeping: float
+    """Time a campaign spends on a task beside simulating and storing it, s."""
+    resuming: float
+    """Time to find out that `FINISHED` tasks are done, s."""
+    dask_over_processes: float
+    """Throughput of two Dask workers over that of two processes; nan without Dask."""
+
+    def to_mapping(self) -> dict[str, Any]:
+        """JSON-able data."""
+        return {
+            "single": {**dataclasses.asdict(self.single), "ratio": self.single.ratio},
+            "batch": {**dataclasses.asdict(self.batch), "ratio": self.batch.ratio},
+            "two_over_one": self.two_over_one,
+            "bookkeeping": self.bookkeeping,
+            "resuming": self.resuming,
+            "dask_over_processes": None if math.isnan(self.dask_over_processes) else self.dask_over_processes,
+        }
+
+
+def run() -> Figures:
+    """Measure the loop over bare steps, alone and in a batch; then campaigns."""
+    (state,) = attractors(SLIPPING)
+    x0 = state.x.tolist()
+    two_over_one, dask_over_processes = _campaigns()
+    return Figures(
+        single=benchmark.cost(SLIPPING, x0), batch=benchmark.cost(SLIPPING, x0, BATCH), two_over_one=two_over_one,
+        bookkeeping=_bookkeeping(), resuming=_resuming(), dask_over_processes=dask_over_processes,
+    )  # fmt: skip
+
+
+def table(figures: Figures) -> Table:
+    """The figures for the terminal."""
+    shown = Table(title="Cost of the study's loop", title_justify="left", title_style="bold")
+    for column in ("", "bare mj_step", "whole loop", "ratio"):
+        shown.add_column(column, justify="right" if column else "left")
+    for name, cost in (("one simulation", figures.single), (f"batch of {figures.batch.runs}", figures.batch)):
+        shown.add_row(name, f"{1e6 * cost.bare:.2f} µs", f"{1e6 * cost.whole:.2f} µs", f"{cost.ratio:.2f}")
+    shown.add_row("campaign: two processes over one", "", "", f"{figures.two_over_one:.2f}")
+    shown.add_row("campaign: two Dask workers over two processes", "", "", f"{figures.dask_over_processes:.2f}")
+    shown.add_row("campaign: bookkeeping of a task", "", f"{1e3 * figures.bookkeeping:.1f} ms", "")
+    shown.add_row(f"campaign: resuming {FINISHED} finished tasks", "", f"{figures.resuming:.1f} s", "")
+    return shown
+
+
+def _tasks(count: int, t_end: float) -> list[Task]:
+    """Runs from rest at different omega_0."""
+    sets = [SLIPPING.replace(omega_0=15 + 10 * k / count) for k in range(count)]
+    return [Task(engine="mujoco", parameters=p, x0=(0.0,) * 8, t_end=t_end) for p in sets]
+
+
+def _campaigns() -> tuple[float, float]:
+    """Medians over `REPEATS` of the time with one process over that with two, and of that over two Dask workers'."""
+    tasks = _tasks(2 * BATCH, 2.0)
+    with ExitStack() as stack:
+        kinds: list[Workers] = [processes(1), processes(2), *_dask(stack)]
+        times = [[_timed(kind, tasks) for kind in kinds] for _ in range(REPEATS)]
+    one, two, *others = (statistics.median(column) for column in zip(*times, strict=True))
+    return one / two, two / others[0] if others else math.nan
+
+
+def _dask(stack: ExitStack) -> list[Workers]:
+    try:
+        from distributed import LocalCluster
+    except ImportError:
+        return []
+    cluster: Any = LocalCluster(  # type: ignore[no-untyped-call]
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
+    )  # fmt: skip
+    stack.enter_context(cluster)
+    kind = dask(cluster.scheduler_address)
+    stack.callback(kind.stop, kind.start(), False)
+    return [kind]
+
+
+def _timed(kind: Workers, tasks: list[Task]) -> float:
+    """Time of a campaign whose workers have started and imported what they need."""
+    with tempfile.TemporaryDirectory() as warm, tempfile.TemporaryDirectory() as directory:
+        executor = kind.start()
+        kept = dataclasses.replace(kind, start=lambda: executor, stop=lambda executor, at_once: None)
+        with Campaign(Path(warm), kept, batch=1) as campaign:
+            campaign.complete(_tasks(4, 0.01))
+        start = time.perf_counter()
+        with Campaign(Path(directory), kept) as campaign:
+            campaign.complete(tasks)
+        elapsed = time.perf_counter() - start
+        if isinstance(executor, ProcessPoolExecutor):
+            kind.stop(executor, False)
+    return elapsed
+
+
+def _bookkeeping() -> float:
+    """Median over `REPEATS` of what a task of a campaign in this process takes beyond simulating and storing it."""
+    spent = []
+    with tempfile.TemporaryDirectory() as directory:
+        paths = [Path(directory) / f"{k}.h5" for k in range(BATCH)]
+        store(_tasks(BATCH, 0.01), paths)  # imports and templates
+        for _ in range(REPEATS):
+            start = time.process_time()
+            store(_tasks(BATCH, 0.01), paths)
+            middle = time.process_time()
+            with tempfile.TemporaryDirectory() as runs, Campaign(Path(runs), workers=0) as campaign:
+                campaign.complete(_tasks(BATCH, 0.01))
+            spent.append((time.process_time() - 2 * middle + start) / BATCH)
+    return statistics.median(spent)
+
+
+def _resuming() -> float:
+    with tempfile.TemporaryDirectory() as directory:
+        for task in _tasks(FINISHED, 0.01):
+            (Path(directory) / f"{task.key}.h5").touch()
+        tasks = _tasks(FINISHED, 0.01)
+        start = time.perf_counter()
+        with Campaign(Path(directory), workers=0) as campaign:
+            campaign.complete(tasks)
+        return time.perf_counter() - start

@@ -1,0 +1,143 @@
+"""Many runs in one file: what each settled to, over the parameters it ran with.
+
+``collect`` writes one row a run: parameters as coordinates, and the mean, uncertainty and case over the last part of
+the run. The file opens in xarray with the dimension ``run``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from rich.table import Table
+
+from compare.statistics import settled_case, settled_mean
+from model import Case, InputError, Parameters, StorageError, Trajectory, storage
+from model.files import WholeFile, check_writable
+from model.kinematics import UNITS, VARIABLES
+
+SCHEMA = "dualball-collection"
+SCHEMA_VERSION = 1
+
+
+def collect(directory: Path, output: Path, progress: Callable[[int, int], None] = lambda done, total: None) -> int:
+    """Gather all runs of a directory, whole ones and failed ones, in the order of their names; return their number.
+
+    Raises `StorageError` if there are none, one can't be read, or the output can't be written.
+    """
+    check_writable(output)
+    if not directory.is_dir():
+        raise StorageError(f"cannot read {directory}: there is no such directory")
+    files = sorted(directory.rglob("*.h5"))
+    if not files:
+        raise StorageError(f"there are no runs in {directory}")
+    rows = []
+    for k, file in enumerate(files, start=1):
+        rows.append(_row(file, directory))
+        progress(k, len(files))
+    _write(rows, output)
+    return len(rows)
+
+
+def is_collection(path: Path) -> bool:
+    """Whether a file is what `collect` writes."""
+    try:
+        with h5py.File(path, "r") as file:
+            return bool(file.attrs.get("schema") == SCHEMA)
+    except OSError:
+        return False
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """What a collection holds: number of runs, engines, failures, and the range of every column, JSON-able.
+
+    Raises `StorageError` for a collection that is not whole or of a newer version.
+    """
+    with h5py.File(path, "r") as file:
+        version = file.attrs.get("schema_version")
+        if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
+            raise StorageError(f"{path} is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
+        columns = {name: _own(file, name, path)[...] for name in file}
+    numbers = {name: values for name, values in columns.items() if values.dtype.kind == "f"}
+    failures = [text.decode() for text in columns["failure"] if text]
+    return {
+        "runs": len(columns["run"]),
+        "engines": sorted({text.decode() for text in columns["engine"]}),
+        "cases": {
+            Case(code).name: int((columns["case"] == code).sum()) for code in sorted(set(columns["case"])) if code >= 0
+        },
+        "failures": failures,
+        "varied": [f.name for f in dataclasses.fields(Parameters) if len(set(columns[f.name].tolist())) > 1],
+        "ranges": {
+            name: [float(np.nanmin(v)), float(np.nanmax(v))] for name, v in numbers.items() if np.isfinite(v).any()
+        },
+    }
+
+
+def _own(file: h5py.File, name: str, path: Path) -> h5py.Dataset:
+    if not isinstance(file.get(name, getlink=True), h5py.HardLink) or not isinstance(file[name], h5py.Dataset):
+        raise StorageError(f"{path} is not whole: {name!r} is not a dataset of its own")
+    return file[name]
+
+
+def table(told: dict[str, Any]) -> Table:
+    """The description for the terminal."""
+    rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    rows.add_row("[bold]runs", f"{told['runs']} ({', '.join(told['engines'])}), {len(told['failures'])} failed")
+    rows.add_row("[bold]cases", ", ".join(f"{name}: {count}" for name, count in told["cases"].items()))
+    rows.add_row(
+        "[bold]varied", "\n".join(f"{n} {told['ranges'][n][0]:g} … {told['ranges'][n][1]:g}" for n in told["varied"])
+    )
+    rows.add_row("[bold]omega_c", "{:.9g} … {:.9g} rad s-1".format(*told["ranges"].get("omega_c", [np.nan, np.nan])))
+    return rows
+
+
+def _row(file: Path, directory: Path) -> dict[str, Any]:
+    trajectory = storage.load(file)
+    row: dict[str, Any] = {"run": str(file.relative_to(directory)), "engine": trajectory.header.engine}
+    row |= dataclasses.asdict(trajectory.header.parameters)
+    row |= {"duration": float(trajectory.time[-1]) if len(trajectory.time) else 0.0}
+    row |= {"failure": trajectory.header.failure}
+    return row | settled(trajectory)
+
+
+def settled(trajectory: Trajectory) -> dict[str, Any]:
+    """Mean, standard uncertainty and prevailing case over the last part of a run; nan for a run too short for it."""
+    row: dict[str, Any] = {}
+    for name in VARIABLES:
+        try:
+            mean = settled_mean(trajectory, getattr(trajectory, name))
+        except InputError:  # too few samples for a mean
+            row |= {name: np.nan, f"{name}_uncertainty": np.nan}
+        else:
+            row |= {name: mean.value, f"{name}_uncertainty": mean.uncertainty}
+    return row | {"case": int(settled_case(trajectory)) if len(trajectory.case) else -1}
+
+
+def _write(rows: list[dict[str, Any]], output: Path) -> None:
+    units = {f.name: f.metadata["unit"] for f in dataclasses.fields(Parameters)}
+    units |= dict(zip(VARIABLES, UNITS, strict=True)) | {"duration": "s"}
+    units |= {f"{name}_uncertainty": unit for name, unit in zip(VARIABLES, UNITS, strict=True)}
+    with WholeFile(output) as whole:
+        whole.file.attrs["schema"], whole.file.attrs["schema_version"] = SCHEMA, SCHEMA_VERSION
+        for name in rows[0]:
+            _column(whole.file, name, [row[name] for row in rows], units.get(name, ""))
+        whole.finish()
+
+
+def _column(file: h5py.File, name: str, values: Iterable[Any], units: str) -> None:
+    values = list(values)
+    if isinstance(values[0], str):
+        dataset = file.create_dataset(name, data=np.array(values, dtype=object), dtype=h5py.string_dtype())
+    else:
+        dataset = file.create_dataset(name, data=np.array(values))
+    if units:
+        dataset.attrs["units"] = units
+    if name == "run":
+        dataset.make_scale("run")
+    else:
+        dataset.dims[0].attach_scale(file["run"])

@@ -1,0 +1,191 @@
+"""The engines on trial and the simulators beside them, one record each: all that the rest of the program knows of them.
+
+To add an engine, add a record. It is named in tasks and files by `Engine.name`; nothing else compares names.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy.typing as npt
+
+import analytic
+import mjsim
+from mjsim import ContactSettings
+from mjsim.journal import Journal
+from model import Flow, InputError, Parameters, SimulationError, Trajectory
+from model.errors import suggestion
+
+Settings = ContactSettings | analytic.Settings
+"""Numerical settings of any engine."""
+Simulate = Callable[
+    [Parameters, npt.ArrayLike, float, Flow, Settings, float | None, Callable[[float], None]], Trajectory
+]
+"""parameters, start, duration in s, flow, settings, sample interval in s, progress: one whole run."""
+Stream = Callable[
+    [
+        Sequence[Parameters],
+        Sequence[npt.ArrayLike],
+        float,
+        Sequence[Flow],
+        Settings,
+        float | None,
+        bool,
+        Journal | None,
+    ],
+    mjsim.Run,
+]
+"""The same for many runs that hand out their samples as they come; also whether they share a batch, and a journal."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Engine:
+    """A simulator: how it is run and set, what its results depend on, and its mark in figures.
+
+    One of `simulate` and `stream` is given.
+    """
+
+    name: str
+    settings: type[Settings]
+    options: tuple[str, ...]
+    """Options of the command line that `configure` takes."""
+    configure: Callable[[Mapping[str, float]], Settings]
+    """Settings of a person's run from such options; those not given have their defaults."""
+    at: Callable[[float], Settings]
+    """Settings of a study for a time step in s; engines without a step ignore it."""
+    simulate: Simulate | None = None
+    stream: Stream | None = None
+    sources: tuple[str, ...]
+    """Packages whose sources determine the results."""
+    stands_on: tuple[str, ...]
+    """Libraries whose versions do."""
+    mark: str
+    """Marker of matplotlib."""
+    colour: str
+
+    def configured(self, given: Mapping[str, float]) -> Settings:
+        """`configure`, but an option that belongs to other engines is an `InputError`."""
+        for name in given:
+            if name not in self.options:
+                others = " and ".join(each.name for each in ENGINES.values() if name in each.options)
+                raise InputError(f"--{name} is for {others}, not for {self.name}")
+        return self.configure(given)
+
+
+STUDY_SLIP = 2.0
+"""Slip speed in m/s for which contact in the studies' settings is continuous, under the load of gravity, at mu = 1."""
+
+
+def _mujoco_study(step: float) -> ContactSettings:
+    """One setting for every parameter set, so that all runs of a step share a batch."""
+    rough = Parameters.named("reference").replace(mu=1.0, eta=1.0)
+    return ContactSettings.for_problem(rough, step, STUDY_SLIP)
+
+
+def newcomer(step: float) -> ContactSettings:
+    """MuJoCo's own contact parameters on the joints of this study, and none of the corrections between the steps."""
+    return ContactSettings(
+        timestep=step,
+        solref=(0.02, 1.0),
+        solreffriction=0.02,
+        solimp=0.9,
+        impratio=1.0,
+        servo=0.0,
+        memory=False,
+        order=1,
+    )
+
+
+def _mujoco(
+    parameters: Sequence[Parameters], x0s: Sequence[npt.ArrayLike], t_end: float, flows: Sequence[Flow],
+    settings: Settings, sample_interval: float | None, batched: bool, journal: Journal | None,
+) -> mjsim.Run:  # fmt: skip
+    assert isinstance(settings, ContactSettings)
+    return mjsim.Run(
+        parameters, x0s, t_end, flows, settings, sample_interval=sample_interval, batched=batched, journal=journal
+    )
+
+
+def _unwarned(*given: object) -> mjsim.Run:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that contacts hover with these settings is what is shown
+        return _mujoco(*given)  # type: ignore[arg-type]
+
+
+def _theory(method: str) -> Simulate:
+    def simulate(
+        p: Parameters, x0: npt.ArrayLike, t_end: float, flow: Flow, settings: Settings,
+        sample_interval: float | None, progress: Callable[[float], None],
+    ) -> Trajectory:  # fmt: skip
+        assert isinstance(settings, analytic.Settings)
+        chosen = replace(settings, method=method)
+        try:
+            return analytic.simulate(p, x0, t_end, flow, chosen, sample_interval=sample_interval, progress=progress)
+        except SimulationError as error:
+            return error.trajectory
+
+    return simulate
+
+
+def _time_stepping(given: Mapping[str, float]) -> analytic.Settings:
+    return analytic.Settings(method="time-stepping", **{_STEP.get(name, name): given[name] for name in given})  # type: ignore[arg-type]
+
+
+_STEP = {"timestep": "step"}
+MUJOCO = Engine(
+    name="mujoco",
+    settings=ContactSettings,
+    options=("timestep",),
+    configure=lambda given: ContactSettings.at(given.get("timestep", ContactSettings.timestep)),
+    at=_mujoco_study,
+    stream=_mujoco,
+    sources=("model", "mjsim"),
+    stands_on=("numpy", "mujoco"),
+    mark="o",
+    colour="#0072B2",
+)
+NEWCOMER = replace(
+    MUJOCO,
+    name="mujoco-defaults",
+    configure=lambda given: newcomer(given.get("timestep", ContactSettings.timestep)),
+    at=newcomer,
+    stream=_unwarned,
+    mark="x",
+    colour="#CC79A7",
+)
+EVENT = Engine(
+    name="event",
+    settings=analytic.Settings,
+    options=("rtol", "restitution"),
+    configure=lambda given: analytic.Settings(**given),  # type: ignore[arg-type]
+    at=lambda step: analytic.Settings(),
+    simulate=_theory("event"),
+    sources=("model", "analytic"),
+    stands_on=("numpy", "scipy"),
+    mark="s",
+    colour="#D55E00",
+)
+MOREAU = replace(
+    EVENT,
+    name="time-stepping",
+    options=("timestep", "rtol", "restitution"),
+    configure=_time_stepping,
+    at=lambda step: _time_stepping({"timestep": step}),
+    simulate=_theory("time-stepping"),
+    mark="^",
+    colour="#009E73",
+)
+ENGINES: dict[str, Engine] = {each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU)}
+"""Every engine by name."""
+ALIASES = {"analytic": "event"}
+"""Other names that the command line takes."""
+
+
+def engine(name: str) -> Engine:
+    """The engine of a name; `InputError` with a suggestion if there is none."""
+    name = ALIASES.get(name, name)
+    if name not in ENGINES:
+        raise InputError(f"no engine is called {name!r}{suggestion(name, ENGINES)}; there are {', '.join(ENGINES)}")
+    return ENGINES[name]

@@ -1,0 +1,102 @@
+"""Designs: which parameters to vary, and the tasks that follow."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.runs.tasks import Task
+from model import Flow, InputError, Parameters
+from model.errors import suggestion
+from model.parameters import check_number
+
+FIELDS = tuple(field.name for field in dataclasses.fields(Parameters))
+DIRECTIONS = ("held", "up", "down", "both")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A parameter and its values in order, or the two ends of its range where values are drawn at random."""
+
+    name: str
+    values: tuple[float, ...]
+
+    @classmethod
+    def parse(cls, text: str) -> Axis:
+        """Read ``name=from:to:count``, ``name=from:to`` or ``name=a,b,c``; raises `InputError`."""
+        name, _, rest = text.partition("=")
+        if name not in FIELDS:
+            raise InputError(f"unknown parameter {name!r}{suggestion(name, FIELDS)}; known: {', '.join(FIELDS)}")
+        unit = Parameters.__dataclass_fields__[name].metadata["unit"]
+        parts = rest.replace(":", ",").split(",")
+        numbers = [check_number(name, _number(name, part, unit), unit) for part in parts]
+        if ":" not in rest:
+            return cls(name, tuple(numbers))
+        if len(numbers) not in (2, 3):
+            raise InputError(f"{text!r} is no range: write {name}=from:to:count")
+        first, last = numbers[:2]
+        if first >= last:
+            raise InputError(
+                f"{name} = {first:g}:{last:g} {unit} is in the wrong order: a range runs from low to high "
+                "(to sweep downwards choose --direction down)"
+            )
+        if len(numbers) == 2:
+            return cls(name, (first, last))
+        count = numbers[2]
+        if count != int(count) or count < 2:
+            raise InputError(f"count = {count:g} of {name} is out of range: must be a whole number >= 2")
+        return cls(name, tuple(np.linspace(first, last, int(count)).tolist()))
+
+
+def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
+    """Every combination of the axes' values, the last axis fastest."""
+    for values in itertools.product(*(axis.values for axis in axes)):
+        yield p.replace(**dict(zip((axis.name for axis in axes), values, strict=True)))
+
+
+def random(p: Parameters, axes: Sequence[Axis], count: int, seed: int) -> Iterator[Parameters]:
+    """`count` points that fill the box of the axes' ranges evenly (scrambled Sobol sequence)."""
+    from scipy.stats import qmc  # slow to import, and only needed here
+
+    if count < 1:
+        raise InputError(f"count = {count} of random points is out of range: must be >= 1")
+    for axis in axes:
+        if len(axis.values) != 2:
+            raise InputError(f"a random design needs a range for {axis.name}: write {axis.name}=from:to")
+    low, high = (np.array(end) for end in zip(*(axis.values for axis in axes), strict=True))
+    unit = qmc.Sobol(len(axes), rng=np.random.default_rng(seed)).random(2 ** math.ceil(math.log2(count)))
+    for row in (low + unit[:count] * (high - low)).tolist():
+        yield p.replace(**dict(zip((axis.name for axis in axes), row, strict=True)))
+
+
+def levels(axes: Sequence[Axis], direction: str) -> list[float]:
+    """omega_0 as one run visits it: up, down, or up and down again."""
+    if len(axes) != 1 or axes[0].name != "omega_0":
+        raise InputError(f"direction = {direction!r} sweeps omega_0 within one run: vary omega_0 and nothing else")
+    up = sorted(axes[0].values)
+    return {"up": up, "down": up[::-1], "both": up + up[-2::-1]}[direction]
+
+
+def held(template: Task, points: Iterator[Parameters]) -> list[Task]:
+    """A run of its own at every point."""
+    return [dataclasses.replace(template, parameters=p) for p in points]
+
+
+def staircase(template: Task, omegas: Sequence[float], hold: float) -> Task:
+    """One run that holds each omega_0 for `hold` seconds."""
+    return dataclasses.replace(
+        template, flow=Flow.staircase(omegas, hold), t_end=hold * len(omegas),
+        parameters=template.parameters.replace(omega_0=omegas[0]),
+    )  # fmt: skip
+
+
+def _number(name: str, text: str, unit: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InputError(f"{name} = {text!r} must be a number in {unit}") from error

@@ -1,0 +1,243 @@
+"""One run as data: everything that determines it, its identity, and how each engine carries it out."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import math
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import mjsim
+from compare.runs import engines
+from compare.runs.engines import Engine, Settings
+from mjsim import ContactSettings
+from mjsim.journal import Journal
+from model import Flow, InputError, Parameters, Trajectory, storage
+from model.trajectory import current_versions
+
+LONG = 1e6
+"""Steps from which on a run that hands out its samples keeps a journal and has a worker of its own, without batch."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A run that stands for itself: two tasks with equal `key` give equal data, bit for bit."""
+
+    engine: str
+    """Name of an `compare.runs.engines.Engine`."""
+    parameters: Parameters
+    x0: tuple[float, ...]
+    """Initial state, 6 or 8 entries."""
+    t_end: float
+    """s"""
+    flow: Flow | None = None
+    """omega_0 over time; None for a steady ``parameters.omega_0``."""
+    settings: Settings | None = None
+    """Numerical settings of the engine; None for its defaults."""
+    sample_interval: float | None = None
+    """s; None for a thousandth of t_end."""
+
+    def __post_init__(self) -> None:
+        simulator = self.simulator
+        if self.settings is not None and not isinstance(self.settings, simulator.settings):
+            raise InputError(f"settings of another engine were given to {self.engine!r}")
+
+    @property
+    def simulator(self) -> Engine:
+        """The engine itself; `InputError` if there is none of that name."""
+        return engines.engine(self.engine)
+
+    @property
+    def fluid(self) -> Flow:
+        """omega_0 over time, also where `flow` is None."""
+        return self.flow or Flow.steady(self.parameters.omega_0)
+
+    @functools.cached_property
+    def key(self) -> str:
+        """Hash of all that determines the run: the fields of the task, the program's sources, the engine's version."""
+        text = json.dumps({"task": self.describe(), "code": _code(self.simulator)}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+    def describe(self) -> dict[str, Any]:
+        """The task as JSON-able data."""
+        return {
+            "engine": self.engine,
+            "parameters": dataclasses.asdict(self.parameters),
+            "x0": list(self.x0),
+            "t_end": self.t_end,
+            "flow": self.fluid.to_mapping(),
+            "settings": dataclasses.asdict(self.settings) if self.settings else None,
+            "sample_interval": self.sample_interval,
+        }
+
+    @property
+    def chosen_settings(self) -> Settings:
+        """The settings, also where `settings` is None."""
+        return self.settings or self.simulator.configure({})
+
+    @property
+    def long(self) -> bool:
+        """Whether the run hands out its samples and takes more than `LONG` steps."""
+        settings = self.chosen_settings
+        return isinstance(settings, ContactSettings) and self.t_end / settings.timestep > LONG
+
+    @property
+    def batch_key(self) -> str:
+        """Tasks of equal batch key can be carried out together."""
+        apart = () if self.long else ("parameters", "x0", "flow")
+        shared = {k: v for k, v in self.describe().items() if k not in apart}
+        return json.dumps(shared, sort_keys=True)
+
+
+class OutOfTimeError(RuntimeError):
+    """A run took longer than it may."""
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """How long something may take, in s of real time from its creation."""
+
+    limit: float = math.inf
+    start: float = field(default_factory=time.monotonic)
+
+    def check(self) -> None:
+        """Raise `OutOfTimeError` if it is over."""
+        if time.monotonic() - self.start > self.limit:
+            raise OutOfTimeError(f"it took longer than {self.limit:g} s")
+
+
+def carry_out(tasks: Sequence[Task]) -> list[Trajectory]:
+    """Run tasks of one `Task.batch_key`; a run that breaks down comes back with its failure in the header."""
+    if not tasks[0].simulator.stream:
+        return [_simulated(task, Deadline()) for task in tasks]
+    run = _streaming(tasks)
+    blocks = list(run)
+    return [
+        Trajectory.from_blocks(header, parts, events)
+        for header, parts, events in zip(run.headers, zip(*blocks, strict=True), run.events, strict=True)
+    ]
+
+
+def store(
+    tasks: Sequence[Task], paths: Sequence[Path], limit: float = math.inf, stop: Callable[[], bool] = lambda: False
+) -> list[str]:
+    """Run tasks of one `Task.batch_key` into files; return, per task, why it failed (empty if it is whole).
+
+    A run that breaks down is kept under `failed_path`, until one into the same file is whole. MuJoCo's samples go to
+    their files as they come, and a run of more than `LONG` steps keeps a journal, from which it goes on after having
+    been killed. Once `stop` says so, runs end as if they had broken down, but MuJoCo's keep their journals.
+
+    Raises
+    ------
+    StorageError
+        If a file can't be written.
+    OutOfTimeError
+        If the batch takes longer than `limit` s for each of its runs.
+    """
+    deadline = Deadline(limit * len(tasks))
+    if tasks[0].simulator.stream:
+        reasons = _stream(tasks, paths, deadline, stop)
+    else:
+        reasons = []
+        for task, path in zip(tasks, paths, strict=True):
+            trajectory = _simulated(task, deadline, stop)
+            storage.save(trajectory, path if trajectory.complete else failed_path(path))
+            reasons.append(trajectory.header.failure)
+    for path, reason in zip(paths, reasons, strict=True):
+        if not reason:
+            failed_path(path).unlink(missing_ok=True)
+    return reasons
+
+
+def failed_path(path: Path) -> Path:
+    """Where a run that broke down is kept."""
+    return path.with_suffix(".failed.h5")
+
+
+def journal_path(task: Task, path: Path) -> Path | None:
+    """Where a long run into a file keeps its journal; its name tells the run, for the file's may be any."""
+    return path.with_name(f"{task.key}.journal") if task.long else None
+
+
+def _stream(
+    tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline, stop: Callable[[], bool]
+) -> list[str]:  # fmt: skip
+    kept = journal_path(tasks[0], paths[0]) if len(tasks) == 1 else None
+    journal = Journal(kept) if kept else None
+    try:
+        run = _streaming(tasks, journal)
+    except InputError:  # there is nothing to go on with
+        if journal:
+            journal.discard()
+        raise
+    stopped = ""
+    with ExitStack() as stack:
+        writers = [
+            stack.enter_context(storage.TrajectoryWriter(path, header))
+            for path, header in zip(paths, run.headers, strict=True)
+        ]
+        for blocks in run:
+            deadline.check()
+            for writer, block in zip(writers, blocks, strict=True):
+                writer.append(block)
+            if stop():
+                stopped = f"was stopped at t = {max(block['time'].max(initial=0.0) for block in blocks):g} s"
+                break
+        reasons = [header.failure or stopped for header in run.headers]
+        for writer, reason, events, path in zip(writers, reasons, run.events, paths, strict=True):
+            writer.finish(events, reason, failed_path(path) if reason else path)
+    if journal and not stopped:
+        journal.discard()
+    return reasons
+
+
+def _streaming(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
+    first = tasks[0]
+    assert first.simulator.stream
+    return first.simulator.stream(
+        [task.parameters for task in tasks],
+        [task.x0 for task in tasks],
+        first.t_end,
+        [task.fluid for task in tasks],
+        first.chosen_settings,
+        first.sample_interval,
+        not first.long,
+        journal,
+    )
+
+
+def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool] = lambda: False) -> Trajectory:
+    def check(done: float) -> None:
+        deadline.check()
+        if stop():
+            raise KeyboardInterrupt
+
+    assert task.simulator.simulate
+    return task.simulator.simulate(
+        task.parameters, task.x0, task.t_end, task.fluid, task.chosen_settings, task.sample_interval, check
+    )
+
+
+@functools.cache
+def _code(engine: Engine) -> dict[str, str]:
+    """Digest of the sources that produce an engine's results, and the versions they stand on."""
+    return {"sources": sources(*engine.sources), **{name: current_versions()[name] for name in engine.stands_on}}
+
+
+@functools.cache
+def sources(*packages: str) -> str:
+    """Digest of the sources of packages."""
+    digest = hashlib.sha256()
+    for package in packages:
+        for entry in sorted(resources.files(package).iterdir(), key=lambda entry: entry.name):
+            if entry.name.endswith((".py", ".xml")):
+                digest.update(entry.name.encode() + b"\0" + entry.read_bytes() + b"\0")
+    return digest.hexdigest()

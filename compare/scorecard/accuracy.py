@@ -1,0 +1,224 @@
+"""What MuJoCo reaches with this project's settings, and what it can't do.
+
+Each function runs what it needs in a campaign and returns the rows of one table; `document` writes them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import qmc
+
+import analytic
+from analytic import StationarySolution, rolling_forces
+from compare.runs.campaign import Campaign
+from compare.runs.engines import EVENT, MUJOCO
+from compare.runs.tasks import Task
+from compare.scorecard import trials
+from compare.scorecard.scores import WINDOW
+from compare.scorecard.trials import AT_REST, KICKED, PASSES, ROUGH, SLIPPING, SMOOTH, Held, State
+from mjsim import ContactSettings
+from model import Case, Contact, Parameters
+from model.arrays import Array
+
+Rows = list[list[str]]
+"""A table: its head, then its rows."""
+STEPS = (4e-3, 1e-3)
+"""Time steps of stationary states, s."""
+REACHED = tuple(
+    State(p.replace(omega_0=omega_0), case)
+    for p, case, omegas in (
+        (SMOOTH, Case.RR, (8.0, 12.0)),
+        (SMOOTH, Case.SS, (14.5, 20.0, 25.0, 30.0)),
+        (ROUGH, Case.NR, (25.0,)),
+    )
+    for omega_0 in omegas
+)
+OFF = 1.02
+"""Start near a state, in units of its variables."""
+RANGES = {
+    "R": (0.01, 0.5),
+    "r/R": (0.05, 0.6),
+    "j": (0.1, 0.66),
+    "mu": (0.05, 0.9),
+    "eta": (0.05, 0.6),
+    "g": (1.0, 15.0),
+    "kappa": (0.03, 0.3),
+    "Omega_0": (0.3, 3.0),
+}
+"""Of random parameter sets."""
+LOGARITHMIC = ("R", "kappa", "Omega_0")
+"""Those spread evenly in their logarithms."""
+SEED = 5
+AWAY, LONGEST = 0.03, 200.0
+"""Least relative distance of omega_0 from a threshold, and longest run (s) of a random set: near a threshold nothing
+settles."""
+FINE = (4e-3, 2e-3, 1e-3, 4e-4, 2e-4, 1e-4)
+"""Time steps of the transient, s; from the last three it is extrapolated."""
+MOTIONS = {
+    "slides down the wall, lands, slips at both points, sticks": (0.02, -0.2, 12.0, 30.0, -10.0, 20.0, 0.0, 0.0),
+    "slides on the floor, hits the wall, is lifted, lands, sticks": (0.0, 0.0, 10.0, 1.0, 2.0, 3.0, 0.002, -0.3),
+}
+"""Starts of motions through landings, slip, stick and lift-off, of the reference set."""
+LASTS = 0.7
+"""Their duration, s."""
+
+
+def _mujoco(
+    p: Parameters, x0: Sequence[float], t_end: float, settings: ContactSettings, interval: float | None = None
+) -> Task:
+    return Task(
+        engine=MUJOCO.name, parameters=p, x0=tuple(x0), t_end=t_end, settings=settings, sample_interval=interval
+    )
+
+
+def _near(state: State) -> tuple[float, ...]:
+    """A start off the state in all of its variables; high over the floor where only the wall carries the ball."""
+    x = OFF * state.solution.x
+    x[0] = state.p.R if state.case is Case.NR else 0.0
+    return tuple(x.tolist())
+
+
+def _held(campaign: Campaign, states: Sequence[State], tasks: Sequence[Task]) -> list[Held]:
+    runs = campaign.run(tasks)
+    return [
+        trials.held(run, state, (1 - WINDOW) * task.t_end) for run, state, task in zip(runs, states, tasks, strict=True)
+    ]
+
+
+def _relative_slip(held: Held, state: State) -> float:
+    """Error of slip in units of the ball's orbital speed."""
+    return held.slip / abs(float(state.solution.x[2]) * state.p.R)
+
+
+def reached(campaign: Campaign, states: Sequence[State] = REACHED, steps: Sequence[float] = STEPS) -> Rows:
+    """Errors of stationary states from rest and from near them, the worse of the two."""
+    starts = [(state, x0) for state in states for x0 in (AT_REST, _near(state))]
+    lasts = math.ceil(max(state.forgets for state in states) / (1 - WINDOW))
+    tasks = {h: [_mujoco(s.p, x0, lasts, ContactSettings.at(h)) for s, x0 in starts] for h in steps}
+    campaign.complete(task for each in tasks.values() for task in each)
+    rows = [["state", "η", "h", "ω_c", "slip", "creep (m/s)", "open"]]
+    of_start = [state for state, _ in starts]
+    by_step = {h: _held(campaign, of_start, each) for h, each in tasks.items()}
+    for k, state in enumerate(states):
+        for h, results in by_step.items():
+            pair = results[2 * k : 2 * k + 2]
+            rolls = Contact.R in (state.case.A, state.case.B)
+            rows.append(
+                [
+                    state.name,
+                    f"{state.p.eta:g}",
+                    _milliseconds(h),
+                    number(max(abs(each.omega_c) for each in pair)),
+                    number(max(_relative_slip(each, state) for each in pair)),
+                    number(max(each.creep for each in pair)) if rolls else "–",
+                    f"{max(each.open for each in pair):.1%}",
+                ]
+            )
+    return rows
+
+
+def random_sets(campaign: Campaign, count: int = 32) -> Rows:
+    """Errors of the attracting states of random parameter sets at a step of 1 ms, by case; SR at y = 0 is NR."""
+    states = [State(p, s.case) for p in random_parameters(count) for s in _attractors(p)]
+    tasks = [
+        _mujoco(s.p, _near(s), math.ceil(s.forgets / (1 - WINDOW)), ContactSettings.for_problem(s.p)) for s in states
+    ]
+    errors: dict[Case, list[tuple[float, float, float]]] = {}
+    for state, held in zip(states, _held(campaign, states, tasks), strict=True):
+        errors.setdefault(state.case, []).append((abs(held.omega_c), _relative_slip(held, state), held.open))
+    rows = [["case", "states", "ω_c, median", "ω_c, largest", "slip, median", "slip, largest", "open, largest"]]
+    for case in sorted(errors):
+        table = np.array(errors[case])
+        (omega_c, slip, _), (omega_c_most, slip_most, gaps) = np.median(table, axis=0), table.max(axis=0)
+        cells = [number(value) for value in (omega_c, omega_c_most, slip, slip_most)]
+        rows.append([case.name, str(len(table)), *cells, f"{gaps:.1%}"])
+    return rows
+
+
+def _attractors(p: Parameters) -> list[StationarySolution]:
+    return [solution for solution in analytic.attractors(p) if solution.case is not Case.SR]
+
+
+def random_parameters(count: int) -> list[Parameters]:
+    """Parameter sets in `RANGES`, off the thresholds, with states that settle in time."""
+    kept: list[Parameters] = []
+    design = qmc.Halton(len(RANGES), seed=SEED)
+    while len(kept) < count:
+        (shares,) = design.random(1)
+        v = {
+            name: low * (high / low) ** share if name in LOGARITHMIC else low + share * (high - low)
+            for share, (name, (low, high)) in zip(shares.tolist(), RANGES.items(), strict=True)
+        }
+        unit = math.sqrt(v["g"] / v["R"])
+        direct = {name: v[name] for name in ("R", "j", "mu", "eta", "g")}
+        p = SMOOTH.replace(**direct, r=v["r/R"] * v["R"], c=v["kappa"] * unit, omega_0=v["Omega_0"] * unit)
+        limits = np.array(dataclasses.astuple(analytic.thresholds(p))[:4])
+        ends = [State(p, solution.case).forgets for solution in _attractors(p)]
+        if ends and max(ends) <= LONGEST and not np.any(np.abs(limits / p.omega_0 - 1) < AWAY):
+            kept.append(p)
+    return kept
+
+
+def transient(campaign: Campaign, steps: Sequence[float] = FINE) -> Rows:
+    """Rms errors of the transient with the step, the order from one step to the next, and the extrapolation."""
+    tasks = [_mujoco(SLIPPING.p, KICKED, PASSES, ContactSettings.at(step), PASSES / 100) for step in steps]
+    exact, *runs = campaign.run([trials.EXACT, *tasks])
+    errors = np.array([trials.deviation(run.time, run.x, exact) for run in runs])
+    ratios = np.array(steps[:-1]) / steps[1:]
+    orders = np.log(errors[:-1] / errors[1:]) / np.log(ratios)[:, None]
+    rows = [["h", "ω_c", "order", "slip", "order"]]
+    for step, (omega_c, slip), (first, second) in zip(steps, errors, [("", ""), *_fixed(orders)], strict=True):
+        rows.append([_milliseconds(step), number(omega_c), first, number(slip), second])
+    # The terms of second and third order, from the last three steps.
+    terms = np.array([[1.0, h**2, h**3] for h in steps[-3:]])
+    states = np.stack([run.x for run in runs[-3:]])
+    limit = np.tensordot(np.linalg.inv(terms)[0], states, axes=1)
+    omega_c, slip = trials.deviation(runs[-1].time, limit, exact)
+    return [*rows, ["extrapolated from the last three", number(omega_c), "", number(slip), ""]]
+
+
+def _fixed(values: Array) -> list[tuple[str, ...]]:
+    return [tuple(f"{value:.1f}" for value in row) for row in values]
+
+
+def event_times(campaign: Campaign, steps: Sequence[float] = (1e-3, 5e-4, 2.5e-4, 1e-4)) -> Rows:
+    """Largest error of the times at which the case changes."""
+    rows = [["motion", "h", "changes", "largest error", "in steps"]]
+    for name, x0 in MOTIONS.items():
+        tasks = [_mujoco(SMOOTH, x0, LASTS, ContactSettings.at(step), step) for step in steps]
+        exact, *runs = campaign.run([Task(engine=EVENT.name, parameters=SMOOTH, x0=x0, t_end=LASTS), *tasks])
+        for step, run in zip(steps, runs, strict=True):
+            cells = ["another sequence of cases", ""]
+            if run.events.to_case.tolist() == exact.events.to_case.tolist():
+                error = float(np.abs(run.events.time - exact.events.time).max())
+                cells = [f"{1e3 * error:.2g} ms", f"{error / step:.1f}"]
+            rows.append([name, _milliseconds(step), str(len(exact.events)), *cells])
+    return rows
+
+
+def force_split(campaign: Campaign, omegas: Sequence[float] = (6.0, 10.0, 13.0)) -> Rows:
+    """B_y in two-point rolling, where it may lie anywhere in an interval."""
+    rows = [["ω₀ (rad/s)", "admissible B_y (N)", "no memory", "memory, from 12 % off", "memory, from rest"]]
+    plain, ours = ContactSettings(memory=False, order=1), ContactSettings()
+    for omega_0 in omegas:
+        p = SMOOTH.replace(omega_0=omega_0)
+        least, greatest = (float(end) for end in rolling_forces.admissible_interval(omega_0, p))
+        off = (0.0, 0.0, 0.88 * omega_0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        lasts = math.ceil(State(p, Case.RR).forgets / (1 - WINDOW))
+        runs = campaign.run([_mujoco(p, x0, lasts, s) for s, x0 in ((plain, off), (ours, off), (ours, AT_REST))])
+        forces = [run.force_B[run.time >= (1 - WINDOW) * lasts, 1].mean() for run in runs]
+        rows.append([f"{omega_0:g}", f"{least:.4f} … {greatest:.4f}", *(f"{force:.4f}" for force in forces)])
+    return rows
+
+
+def number(value: float) -> str:
+    """An error for a table: round-off is shown as such, a run without one as diverged."""
+    return "diverged" if math.isnan(value) else "< 1e-14" if value < 1e-14 else f"{value:.1e}"
+
+
+def _milliseconds(step: float) -> str:
+    return f"{1e3 * step:g} ms"

@@ -1,0 +1,145 @@
+"""The formulas of `mjsim.contact_settings` beside what MuJoCo does."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.scorecard import trials
+from compare.scorecard.trials import AT_REST, EPS
+from mjsim import ContactSettings, Run, simulate
+from model import Flow, Trajectory
+
+ROLLING = trials.SMOOTH.replace(omega_0=10.0)
+SLIPPING = trials.SLIPPING.p
+SLIPPING_START = (0.0, 0.0, 13.85, -4.0, 0.0, 10.0)
+"""A start close enough to steady slipping to settle within a few seconds."""
+BRACKET = 0.01
+"""Relative width to which the onset of hovering is bisected."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One formula at one setting."""
+
+    what: str
+    unit: str
+    predicted: float
+    measured: float
+    tolerance: float
+    """Relative: what the formula leaves out, or the measurement can't resolve."""
+
+    @property
+    def error(self) -> float:
+        """Relative."""
+        return self.measured / self.predicted - 1
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the formula holds within the tolerance."""
+        return abs(self.error) <= self.tolerance
+
+
+def rows() -> list[Row]:
+    """Predicted and measured values of every formula, a few settings each."""
+    return [*_depths(), *_margins(), *_creep(), *_hover(), *_decay()]
+
+
+def table() -> list[list[str]]:
+    """The rows as text, with their head."""
+    body = [
+        [r.what, r.unit, f"{r.predicted:.6g}", f"{r.measured:.6g}", f"{r.error:+.0e}", f"{r.tolerance:.0e}"]
+        for r in rows()
+    ]
+    return [["what", "unit", "predicted", "measured", "relative error", "allowed"], *body]
+
+
+def _at(timestep: float, solimp: float, damping: float = 0.5, **changes: float) -> ContactSettings:
+    """Settings with the given impedance and friction damping b_f h."""
+    return ContactSettings.at(timestep, solimp=solimp, solreffriction=2 * timestep / (solimp * damping), **changes)
+
+
+def _turning(timestep: float) -> float:
+    """What steady slipping leaves out: the contact turns within a step, by an angle whose square counts."""
+    return (SLIPPING_START[2] * timestep) ** 2
+
+
+def _depths() -> Iterator[Row]:
+    """Without servo a ball at rest on the floor sinks in by (1 - d) g tc^2, in slipping by less."""
+    still, inside = ROLLING.replace(omega_0=0.0), (*AT_REST[:6], 0.01, 0.0)
+    for timestep, solimp in itertools.product((4e-3, 1e-3), (0.03, 0.3)):
+        settings = _at(timestep, solimp, servo=0.0)
+        setting = f"h = {timestep * 1e3:g} ms, d = {solimp:g}"
+        run, depth = simulate(still, inside, 2.0, settings=settings), settings.margin(still.g)
+        round_off = EPS * still.R / depth * len(run.time)
+        yield Row(f"depth at rest, {setting}", "m", depth, -float(run.gap_A[-1]), round_off)
+        run = simulate(SLIPPING, SLIPPING_START, 10.0, settings=settings)
+        depth = settings.margin(float(run.force_A[-1, 1]) / SLIPPING.m, SLIPPING.mu, float(run.slip_speed_A[-1]))
+        yield Row(f"depth at A in slipping, {setting}", "m", depth, -float(run.gap_A[-1]), _turning(timestep))
+
+
+def _margins() -> Iterator[Row]:
+    """With servo the margin comes to the depth, and the gap to nothing."""
+    for memory, solimp in itertools.product((True, False), (0.03, 0.1)):
+        settings = _at(1e-3, solimp, memory=memory, impratio=30.0)
+        run = Run([SLIPPING], [SLIPPING_START], 10.0, [Flow.steady(SLIPPING.omega_0)], settings, batched=False)
+        *_, (block,) = run
+        for k, (contact, axis, friction) in enumerate((("A", 1, SLIPPING.mu), ("B", 0, SLIPPING.eta))):
+            load, slip = block[-1][f"force_{contact}"][axis] / SLIPPING.m, float(block[-1][f"slip_speed_{contact}"])
+            what = f"margin at {contact} in slipping, d = {solimp:g}{'' if memory else ', no memory'}"
+            margin = settings.margin(load, friction, slip)
+            yield Row(what, "m", margin, float(run.margins[0, k]), _turning(settings.timestep))
+
+
+def _creep() -> Iterator[Row]:
+    """Without memory a rolling contact creeps at R_t f/b_f.
+
+    The solver stops within its tolerance of the least cost, which is quadratic in the force, and impratio times as
+    steep in the friction rows.
+    """
+    for solimp, impratio in itertools.product((0.03, 0.3), (1e3, 1e5)):
+        settings = _at(1e-3, solimp, impratio=impratio, memory=False)
+        run = simulate(ROLLING, (0.0, 0.0, ROLLING.omega_0, 0.0, 0.0, 0.0), 10.0, settings=settings)
+        friction = float(np.hypot(run.force_A[-1, 0], run.force_A[-1, 2])) / ROLLING.m
+        creep, stops = float(settings.creep_speed(friction)), float(np.sqrt(settings.tolerance * impratio))
+        what = f"creep at A in rolling, d = {solimp:g}, impratio = {impratio:g}"
+        yield Row(what, "m s-1", creep, float(run.slip_speed_A[-1]), stops)
+
+
+def _hover() -> Iterator[Row]:
+    """The friction damping b_f from which steady slipping loses contact in some step, by bisection."""
+    for solimp in (0.3, 0.5):
+        low, high = 0.01, 1.0
+        while high - low > BRACKET * high:
+            middle = (low + high) / 2
+            run = _every_step(solimp, middle)
+            closed = np.all((run.force_A[1000:, 1] > 0) & (run.force_B[1000:, 0] > 0))
+            low, high = (middle, high) if closed else (low, middle)
+        run, settings = _every_step(solimp, low), _at(1e-3, solimp, low)
+        load, slip = float(run.force_A[-1, 1]) / SLIPPING.m, float(run.slip_speed_A[-1])
+        limit = low / settings.hover_number(load, SLIPPING.mu, slip)
+        yield Row(f"b_f h from which slipping hovers, d = {solimp:g}", "1", limit, (low + high) / 2, BRACKET)
+
+
+def _every_step(solimp: float, damping: float) -> Trajectory:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="the ball slips")  # that it may hover is the question
+        return simulate(SLIPPING, SLIPPING_START, 3.0, settings=_at(1e-3, solimp, damping), sample_interval=1e-3)
+
+
+def _decay() -> Iterator[Row]:
+    """In rolling a slip velocity dies out by the factor 1 - b_f h A/(A + R_t) a step; drag adds c h."""
+    for damping, impratio in itertools.product((0.2, 0.5), (1e2, 1e5)):
+        settings = _at(1e-3, 0.03, damping, impratio=impratio, memory=False, order=1)
+        p = ROLLING.replace(omega_0=0.0, mu=1.0)
+        # A spin too slow to reach the cone; a friction row at the floor sees A_t = (1 + 1/j)/m.
+        spin = 0.5 * float(settings.regularisation_speed(p.mu * p.g)) / p.r
+        run = simulate(p, (0, 0, 0, 0, 0, spin, 0.01, 0), 0.02, settings=settings, sample_interval=1e-3)
+        share = 1 / (1 + settings.softness / impratio / (1 + 1 / p.j))
+        left = float(run.slip_speed_A[3] / run.slip_speed_A[2])
+        what = f"slip left after a step of rolling, b_f h = {damping:g}, impratio = {impratio:g}"
+        yield Row(what, "1", 1 - damping * share, left, p.c * settings.timestep)

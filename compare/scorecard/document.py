@@ -1,0 +1,100 @@
+"""Write the measured tables of the settings page: ``python -m compare.scorecard.document docs/mujoco-settings.md``.
+
+Each table stands between two lines ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. Runs are kept in a results
+directory and not computed again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from compare.runs import progress
+from compare.runs.campaign import Campaign
+from compare.scorecard import accuracy, confirmation, scores, trials
+from compare.scorecard.accuracy import Rows, number
+from compare.scorecard.scores import ELSEWHERE, Score
+from model import InputError
+from model.files import write_text
+
+STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
+"""Time steps of error against cost, s."""
+QUANTITIES = [*(state.name for state in trials.STATES), trials.TRANSIENT]
+
+
+def write(page: Path, name: str, rows: Rows) -> None:
+    """Put a table where a page has its name; raises `InputError` if it has no place for it."""
+    text = page.read_text("utf-8")
+    begin, end = f"<!-- begin: {name} -->", f"<!-- end: {name} -->"
+    if text.count(begin) != 1 or text.count(end) != 1:
+        raise InputError(f"{page} must have the lines {begin!r} and {end!r} once each")
+    before, rest = text.split(begin)
+    write_text(page, f"{before}{begin}\n{markdown(rows)}\n{end}{rest.split(end)[1]}")
+
+
+def markdown(rows: Rows) -> str:
+    """A table with its head."""
+    head, *body = (f"| {' | '.join(row)} |" for row in rows)
+    return "\n".join([head, f"|{'---|' * len(rows[0])}", *body])
+
+
+def by_method(scored: Sequence[Score]) -> dict[tuple[str, float | None], list[Score]]:
+    """Scores of each method and step, in order."""
+    rows: dict[tuple[str, float | None], list[Score]] = {}
+    for score in scored:
+        rows.setdefault((score.method, score.step), []).append(score)
+    return rows
+
+
+def _errors(scored: Sequence[Score]) -> Rows:
+    """A row for each method: its errors, and the largest share of open samples."""
+    rows = [["settings", *QUANTITIES, "open"]]
+    for (method, _), row in by_method(scored).items():
+        rows.append([method, *(number(score.error) for score in row), f"{max(score.open for score in row):.0%}"])
+    return rows
+
+
+def _frontier(campaign: Campaign) -> Rows:
+    """Error and cost, by method and step."""
+    rows = [["method", "h", *QUANTITIES, "time per simulated time"]]
+    for (method, step), row in by_method([*scores.frontier(campaign, STEPS), *ELSEWHERE]).items():
+        errors = {score.quantity: number(score.error) for score in row}
+        shown = f"{1e3 * step:g} ms" if step else "as it needs"
+        rows.append([method, shown, *(errors.get(each, "") for each in QUANTITIES), f"{row[0].cost:.2g}"])
+    return rows
+
+
+TABLES: dict[str, Callable[[Campaign], Rows]] = {
+    "formulas": lambda campaign: confirmation.table(),
+    "reached": accuracy.reached,
+    "random": accuracy.random_sets,
+    "transient": accuracy.transient,
+    "events": accuracy.event_times,
+    "split": accuracy.force_split,
+    "ablation": lambda campaign: _errors(scores.ladder(campaign)),
+    "frontier": _frontier,
+    "variants": lambda campaign: _errors(scores.variants(campaign)),
+}
+"""The tables by name."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure and write all tables of a page, or those named."""
+    parser = argparse.ArgumentParser(description="Write the measured tables of docs/mujoco-settings.md.")
+    parser.add_argument("page", type=Path, metavar="FILE")
+    parser.add_argument("--only", action="append", choices=list(TABLES), metavar="NAME")
+    parser.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR", help="where runs are kept")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (0: none)")
+    args = parser.parse_args(argv)
+    with progress.shown() as show, Campaign(args.output / "settings", args.workers) as campaign:
+        for name in args.only or TABLES:
+            campaign.report = lambda now, what=name: show(what, now.done, now.total, now.failed)  # type: ignore[misc]
+            write(args.page, name, TABLES[name](campaign))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

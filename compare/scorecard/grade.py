@@ -1,0 +1,200 @@
+"""A score card for contact settings: what a ball that rolls and slips does under them, and what it should do.
+
+The settings run as they are in the study's scene, driven by its drag and wall, but without its corrections. Every
+number stands against closed-form theory or the event-driven simulation, and beside what other settings give.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import analytic
+from compare.runs.tasks import carry_out
+from compare.scorecard import trials
+from compare.scorecard.advice import advice
+from compare.scorecard.contenders import NEWCOMER, OURS, PLAIN, Contender, costs
+from compare.scorecard.native import Native
+from compare.scorecard.plain import without_nan
+from compare.scorecard.trials import AT_REST, KICKED, ROLLING, ROUGH, SLIPPING, SMOOTH, STATES, Held, State
+from mjsim import ContactSettings
+from model import Case, Contact, Parameters, Trajectory
+
+GOOD, GOOD_SPEED = 1e-3, 1e-4
+"""Relative error, and error of a speed in m/s, up to which a number is shown as good."""
+WINDOW = 0.5
+"""Time over which stationary states are averaged, s."""
+AGREES = 0.9
+"""Share of samples in the right case from which a case counts as reproduced."""
+SLIDES = 0.01
+"""Slip speed, in units of sqrt(g R), from which a contact counts as slipping."""
+CARRIES = 0.01
+"""Normal force, in units of m g, from which it counts as closed."""
+ONSET = (1.02, 1.05, 1.1)
+"""omega_0 at which slip is measured, in units of omega_01, to find by extrapolation where it begins."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """Everything measured of one contender."""
+
+    name: str
+    timestep: float
+    cases: dict[str, float]
+    """By case: share of samples in the case in which the event-driven simulation is."""
+    stationary: tuple[Held, ...]
+    omega_01: float
+    """Relative error of the threshold where rolling is lost; nan if slip doesn't begin near it."""
+    transient: float
+    """Relative rms error of omega_c over the transient; nan if the run diverged."""
+    cost: float
+    """Time of a step over that of our defaults."""
+    advice: tuple[str, ...] = ()
+
+    @property
+    def reproduced(self) -> list[str]:
+        """The cases that are reproduced."""
+        return [name for name, share in self.cases.items() if share >= AGREES]
+
+    @property
+    def cost_of_a_second(self) -> float:
+        """Time of a simulated second over that of our defaults."""
+        return self.cost * ContactSettings.timestep / self.timestep
+
+    def of(self, state: State) -> Held:
+        """What was measured of a state."""
+        return next(each for each in self.stationary if each.name == state.name)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """JSON-able data; None for what is missing."""
+        values = dataclasses.asdict(self)
+        plain: dict[str, Any] = without_nan(
+            values | {"reproduced": self.reproduced, "cost_of_a_second": self.cost_of_a_second}
+        )
+        return plain
+
+
+def grade(
+    yours: Native | None,
+    others: Sequence[Contender] = (OURS, PLAIN, NEWCOMER),
+    progress: Callable[[str, int, int], None] = lambda name, done, total: None,
+) -> list[Column]:
+    """Columns of the score card: the given settings first, with advice, then the others.
+
+    Raises `InputError` if MuJoCo refuses the settings.
+    """
+    given = [Contender("yours", yours.loop(), yours)] if yours else []
+    contenders = [*given, *others]
+    columns = []
+    for k, (contender, cost) in enumerate(zip(contenders, costs(contenders), strict=True)):
+        progress(contender.name, k, len(contenders))
+        columns.append(_column(contender, cost))
+    if yours:
+        ours = columns[0]
+        said = advice(yours, ours.of(ROLLING).creep, ours.of(SLIPPING).open)
+        columns[0] = dataclasses.replace(ours, advice=tuple(said))
+    return columns
+
+
+def _column(contender: Contender, cost: float) -> Column:
+    return Column(
+        name=contender.name,
+        timestep=contender.loop.timestep,
+        cases=_cases(contender),
+        stationary=tuple(_held(contender, state) for state in STATES),
+        omega_01=_onset(contender),
+        transient=_transient(contender),
+        cost=cost,
+    )
+
+
+def _held(contender: Contender, state: State) -> Held:
+    return trials.held(_settled(contender, state), state, state.forgets)
+
+
+def _settled(contender: Contender, state: State) -> Trajectory:
+    """The state from rest, sampled in every step once the start is forgotten."""
+    forgotten, step = state.forgets, contender.loop.timestep
+    return contender.run(state.p, AT_REST, forgotten + WINDOW, step, skip=forgotten)
+
+
+def _onset(contender: Contender) -> float:
+    """Relative error of omega_01, from slip_z above it, extrapolated to zero along a parabola."""
+    omega_01 = analytic.thresholds(SMOOTH).omega_01
+    states = [State(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in ONSET]
+    runs = [_settled(contender, state) for state in states]
+    slips = [float(run.slip_z.mean()) if run.complete else math.nan for run in runs]
+    if not all(abs(slip / s.solution.x[5] - 1) < 0.5 for slip, s in zip(slips, states, strict=True)):
+        return math.nan
+    # omega_0 as a function of slip, at no slip.
+    return float(np.polynomial.Polynomial.fit(slips, ONSET, 2)(0.0)) - 1
+
+
+def _transient(contender: Contender) -> float:
+    run = contender.run(SLIPPING.p, KICKED, trials.PASSES, max(0.01, contender.loop.timestep))
+    return trials.deviation(run.time, run.x, _exact())[0] if run.complete else math.nan
+
+
+@functools.cache
+def _exact() -> Trajectory:
+    (run,) = carry_out([trials.EXACT])
+    return run
+
+
+SCENARIOS: dict[Case, tuple[Parameters, tuple[float, ...]]] = {
+    Case.RR: (SMOOTH.replace(omega_0=12.0), (0, 0, 12.0, 0, 0, 0)),
+    Case.RS: (SMOOTH.replace(omega_0=12.0), (0, 0, 6.0, 0, -30.0, 0)),
+    Case.RN: (SMOOTH.replace(omega_0=12.0), (0, 0, 4.0, 0, 0, 0, 0.4 * SMOOTH.R, 0)),
+    Case.SR: (ROUGH, (0, 0, 8.0, -40.0, 0, 0)),
+    Case.SS: (SLIPPING.p, KICKED),
+    Case.SN: (SMOOTH.replace(omega_0=12.0), (0, 0, 4.0, 40.0, 0, 40.0, 0.4 * SMOOTH.R, 0)),
+    Case.NR: (ROUGH.replace(omega_0=25.0), (ROUGH.R, 0, 25.0, -27.0, 0, 0)),
+    Case.NS: (SMOOTH.replace(omega_0=12.0), (SMOOTH.R, 0, 12.0, 0, 0, -10.0)),
+    Case.NN: (SMOOTH.replace(omega_0=12.0), (0.5 * SMOOTH.R, 0, 4.0, 5.0, 5.0, 5.0, 0.4 * SMOOTH.R, 0)),
+}
+"""For each case parameters and a state from which the ball is in it for a while."""
+
+
+@functools.cache
+def _phase(case: Case) -> tuple[float, float]:
+    """Times (s) between which the event-driven simulation of a scenario is in its case, 1 s at most."""
+    truth = analytic.simulate(*SCENARIOS[case], 1.0, sample_interval=1e-3)
+    inside = truth.case == case
+    first = int(np.argmax(inside))
+    last = first + int(np.argmin(inside[first:])) if not inside[first:].all() else len(inside)
+    return float(truth.time[first]), float(truth.time[last - 1])
+
+
+def _cases(contender: Contender) -> dict[str, float]:
+    """By case: share of the samples of its scenario that are in it."""
+    shares = {}
+    for case, (p, x0) in SCENARIOS.items():
+        begin, end = _phase(case)
+        interval = max(contender.loop.timestep, (end - begin) / 200)
+        run = contender.run(p, x0, end, interval)
+        # The first steps press the ball into a soft contact, and the end may come early: a tenth is left out each.
+        margin = 0.1 * (end - begin)
+        judged = (run.time >= begin + margin) & (run.time < end - margin)
+        shares[case.name] = float(_in_case(run, case)[judged].mean()) if run.complete and judged.any() else 0.0
+    return shares
+
+
+def _in_case(run: Trajectory, case: Case) -> npt.NDArray[np.bool_]:
+    """Which samples are in a case, by what moves and what carries; a contact that chatters carries its mean."""
+    p, right = run.header.parameters, np.ones(len(run.time), dtype=bool)
+    for contact, normal, speed in (
+        (case.A, run.force_A[:, 1], run.slip_speed_A),
+        (case.B, run.force_B[:, 0], run.slip_speed_B),
+    ):
+        mean = np.convolve(normal, np.ones(9) / 9, mode="same") if len(normal) >= 9 else normal
+        closed = mean > CARRIES * p.m * p.g
+        slips = speed > SLIDES * math.sqrt(p.g * p.R)
+        right &= ~closed if contact is Contact.N else closed & (slips == (contact is Contact.S))
+    return right

@@ -1,0 +1,106 @@
+"""What a trajectory holds, for a person: in words, as a table, as a plot."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from model import Case, Flow, Parameters, Trajectory, storage
+from model.kinematics import UNITS, VARIABLES
+
+PART = 10_000
+"""Samples that are read at a time, so that a file may be larger than memory."""
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """Parameters, versions, cases over time, events and last state of a stored run, JSON-able.
+
+    Raises `StorageError` for a file that isn't a trajectory or isn't whole.
+    """
+    samples, last = 0, storage.load(path, slice(-1, None))
+    stretches: list[tuple[Case, float, float]] = []
+    for part in _parts(path):
+        samples += len(part.time)
+        for case, start, end in part.phases():
+            if stretches and stretches[-1][0] is case:
+                start = stretches.pop()[1]
+            stretches.append((case, start, end))
+    header, events = last.header, last.events
+    return {
+        "engine": header.engine,
+        "complete": last.complete,
+        "failure": header.failure,
+        "parameters": dataclasses.asdict(header.parameters),
+        "flow": header.flow.to_mapping(),
+        "settings": dict(header.settings),
+        "versions": dict(header.versions),
+        "commit": header.commit,
+        "created": header.created,
+        "samples": samples,
+        "duration": float(last.time[-1]) if samples else 0.0,
+        "cases": [{"case": case.name, "from": start, "to": end} for case, start, end in stretches],
+        "events": [
+            {"time": float(t), "from": Case(a).name, "to": Case(b).name}
+            for t, a, b in zip(events.time, events.from_case, events.to_case, strict=True)
+        ],
+        "last": dict(zip(VARIABLES, last.x[-1].tolist(), strict=True)) if samples else {},
+    }
+
+
+def _parts(path: Path) -> Iterator[Trajectory]:
+    """A stored run, `PART` samples at a time."""
+    first = 0
+    while True:
+        part = storage.load(path, slice(first, first + PART))
+        yield part
+        if len(part.time) < PART:
+            return
+        first += PART
+
+
+def table(about: dict[str, Any], most: int = 20) -> Table:
+    """What `describe` returned as a table of two columns; at most so many phases and events are listed."""
+    rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    rows.add_column(style="bold")
+    rows.add_column()
+    rows.add_row("engine", f"{about['engine']} (" + ", ".join(f"{k} {v}" for k, v in about["versions"].items()) + ")")
+    rows.add_row("made", f"{about['created']} {about['commit'][:12]}".strip())
+    fields = dataclasses.fields(Parameters)
+    units = {f.name: "" if f.metadata["unit"] == "1" else f.metadata["unit"] for f in fields}
+    values = (f"{name} = {about['parameters'][name]:g} {unit}" for name, unit in units.items())
+    rows.add_row("parameters", ", ".join(value.strip() for value in values))
+    rows.add_row("flow", _flow(Flow.from_mapping(about["flow"])))
+    rows.add_row("settings", ", ".join(f"{k} = {_short(v)}" for k, v in about["settings"].items()))
+    rows.add_row("samples", f"{about['samples']} over {about['duration']:g} s")
+    shown = [f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in about["cases"]]
+    rows.add_row("cases", _listed(shown, most))
+    events = [f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in about["events"]]
+    rows.add_row("events", _listed(events, most))
+    last = (
+        f"{name} = {about['last'][name]:.9g} {u}" for name, u in zip(VARIABLES, UNITS, strict=True) if about["last"]
+    )
+    rows.add_row("last state", "\n".join(last))
+    if about["failure"]:
+        rows.add_row("[red]failure", about["failure"])
+    return rows
+
+
+def _flow(flow: Flow) -> str:
+    if flow.is_steady:
+        return f"steady, omega_0 = {flow.value[0]:g} rad/s"
+    return f"{flow.kind}, omega_0 from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within {flow.start[-1]:g} s"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(_short(v) for v in value) + "]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _listed(items: list[str], most: int) -> str:
+    more = f"\n… and {len(items) - most} more" if len(items) > most else ""
+    return ("\n".join(items[:most]) + more) or "none"

@@ -1,0 +1,91 @@
+"""MuJoCo's interactive viewer, with the ball driven by the study's own loop: drag, turning wall, corrections."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mjsim import ContactSettings, recorder, scene
+from mjsim.stepping import Single
+from model import Flow, InputError, Parameters
+from model.kinematics import full_state
+
+FRAME = 1 / 60
+"""Time between two pictures, s."""
+BEHIND = 0.1
+"""How far a slow machine may lag behind before the clock is set back, s."""
+
+
+def view(
+    p: Parameters,
+    x0: npt.ArrayLike,
+    flow: Flow | None = None,
+    settings: ContactSettings | None = None,
+    speed: float = 1.0,
+) -> None:
+    """Open a window and simulate in real time, times `speed`, until it is closed.
+
+    Raises `InputError` if there is no display, or for a speed out of range.
+    """
+    if not speed > 0:
+        raise InputError(f"speed = {speed:g} is out of range: must be > 0")
+    if platform.system() == "Linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise InputError(
+            "there is no display for a window; 'dualball simulate' and 'dualball render' make a film instead"
+        )
+    from mujoco import viewer  # here, because it needs a window system
+
+    settings = settings or ContactSettings.for_problem(p)
+    flow = flow or Flow.steady(p.omega_0)
+    stepper = start(p, x0, flow, settings)
+    try:
+        handle = viewer.launch_passive(stepper.model, stepper.data, show_left_ui=False, show_right_ui=False)
+    except RuntimeError as error:  # macOS needs to be asked in another way
+        raise InputError(f"the viewer does not open: {' '.join(str(error).split())}") from error
+    with handle:
+        run(handle, stepper, flow, settings.timestep, speed)
+
+
+def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> Single:
+    """The simulation, with what only serves contact out of sight."""
+    if settings.coordinates != "polar":
+        raise InputError("the viewer shows coordinates = 'polar' only")
+    model = scene.build(p, settings)
+    model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
+    state = recorder.joint_state(full_state(np.asarray(x0, dtype=float)), 0.0, p)
+    return Single(model, p, settings, state, float(flow(0.5 * settings.timestep)))
+
+
+def run(
+    handle: Any,
+    stepper: Single,
+    flow: Flow,
+    timestep: float,
+    speed: float,
+    clock: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> int:
+    """Step and draw until the window is closed; return the number of steps.
+
+    The simulation follows the clock; where it can't, it runs as fast as it can.
+    """
+    steps, begin = 0, clock()
+    while handle.is_running():
+        frame = clock()
+        due = int((frame - begin) * speed / timestep) - steps
+        most = max(1, int(BEHIND * speed / timestep))
+        if due > most:
+            begin += (due - most) * timestep / speed
+            due = most
+        with handle.lock():
+            stepper.advance(flow((steps + 0.5 + np.arange(due)) * timestep)[:, None])
+        steps += due
+        handle.sync()
+        sleep(max(0.0, FRAME - (clock() - frame)))
+    return steps

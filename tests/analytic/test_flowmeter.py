@@ -1,0 +1,119 @@
+"""The flowmeter's range and characteristic curve, against the stationary solutions themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analytic import (
+    attractors,
+    characteristic_slope,
+    mean_slope,
+    operating_range,
+    reading_range,
+    slope_jump,
+    solution,
+    thresholds,
+    unloading_limit,
+)
+from model import Case, InputError, Parameters
+
+P = Parameters.named("reference")
+ROUGH = Parameters.named("high-wall-friction")
+
+
+@pytest.mark.parametrize("p", [P, ROUGH, P.replace(eta=0.02), P.replace(mu=0.9, eta=0.39)])
+def test_operating_range_is_where_rolling_is_the_only_attractor(p: Parameters) -> None:
+    limit = operating_range(p)
+    for omega_0 in np.linspace(0.02, 0.9999, 9) * limit:
+        assert {s.case for s in attractors(p.replace(omega_0=float(omega_0)))} == {Case.RR}
+    assert {s.case for s in attractors(p.replace(omega_0=limit * 1.0001))} != {Case.RR}
+
+
+@pytest.mark.parametrize("p", [P, ROUGH])
+def test_reading_range(p: Parameters) -> None:
+    """omega_c = omega_0 in every attractor up to it, however far if it is inf, and not beyond."""
+    limit = reading_range(p)
+    for omega_0, reads in ((0.999 * min(limit, 1e3), True), (1.001 * limit, False)):
+        if np.isfinite(omega_0):
+            found = attractors(p.replace(omega_0=omega_0))
+            assert all(np.isclose(s.x[2], omega_0, rtol=1e-12) for s in found) == reads
+
+
+def test_unloading_limit() -> None:
+    """On either side of it a ball on the wall can stay, or not."""
+    limit = unloading_limit(ROUGH)
+    assert operating_range(ROUGH) == limit < thresholds(ROUGH).omega_03
+    for factor, stays in ((0.999, False), (1.001, True)):
+        found = attractors(ROUGH.replace(omega_0=factor * limit))
+        assert (Case.NR in {s.case for s in found}) == stays
+
+
+def test_ranges_at_the_edges() -> None:
+    assert reading_range(ROUGH) == reading_range(P.replace(mu=0.0)) == np.inf
+    assert operating_range(P.replace(mu=0.0)) == 0
+    for ask in (operating_range, reading_range):
+        assert ask(P.replace(c=0.0)) == 0
+    assert np.isnan(unloading_limit(P.replace(eta=0.0)))
+
+
+@pytest.mark.parametrize("trial", range(20))
+def test_characteristic_slope_by_differences(trial: int) -> None:
+    """Central differences of omega_c between neighbouring flows, on SS (error of order step^2) and elsewhere."""
+    rng = np.random.default_rng(trial)
+    p = P.replace(
+        mu=float(rng.uniform(0.05, 1)), j=float(rng.uniform(0.2, 0.6)), c=float(10 ** rng.uniform(-1, 1)),
+    )  # fmt: skip
+    p = p.replace(eta=float(p.j * rng.uniform(0.1, 0.9)))
+    t, h = thresholds(p), 1e-5
+    for omega_0 in (0.5 * t.omega_01, *(t.omega_01 + (t.omega_02 - t.omega_01) * np.array([0.2, 0.5, 0.9]))):
+        below, above = (attractors(p.replace(omega_0=float(omega_0 * f)))[0].x[2] for f in (1 - h, 1 + h))
+        slope = characteristic_slope(p.replace(omega_0=float(omega_0)))
+        assert slope == pytest.approx((above - below) / (2 * h * omega_0), rel=1e-5, abs=1e-9)
+
+
+def test_characteristic_slope_between_omega_02_and_omega_04() -> None:
+    """Two branches: the wall reads the flow, SS doesn't; towards the fold its slope grows without bound."""
+    p = P.replace(omega_0=35.0)
+    with pytest.raises(InputError, match="several branches at omega_0 = 35 rad s-1: choose SR, SS, NR"):
+        characteristic_slope(p)
+    assert characteristic_slope(p, Case.NR) == characteristic_slope(p, Case.SR) == 1.0
+    slopes = [characteristic_slope(P.replace(omega_0=f * thresholds(P).omega_04), Case.SS) for f in (0.9, 0.99, 0.9999)]
+    assert 0 < slopes[0] < slopes[1] < slopes[2]
+    # omega_c - its value at the fold goes with the root of the distance, its slope with the inverse of the root.
+    assert slopes[2] / slopes[1] == pytest.approx(10, rel=0.2)
+    assert characteristic_slope(P.replace(omega_0=-10.0)) == 1.0
+
+
+def test_no_slope_where_nothing_follows_the_flow() -> None:
+    with pytest.raises(InputError, match=r"no motion follows the flow at omega_0 = 12 rad s-1 with c = 0"):
+        characteristic_slope(P.replace(c=0.0, omega_0=12.0))
+
+
+@pytest.mark.parametrize("name", ["reference", "steel-in-water", "air"])
+def test_slope_jumps_at_omega_01(name: str) -> None:
+    """1 just below, next to nothing just above."""
+    p = Parameters.named(name)
+    edge = thresholds(p).omega_01
+    before, after = (characteristic_slope(p.replace(omega_0=edge * f)) for f in (1 - 1e-9, 1 + 1e-9))
+    assert slope_jump(p) == pytest.approx(after - before, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["reference", "steel-in-water"])
+def test_mean_slope(name: str) -> None:
+    """The mean of the slope, integrated over omega_0: evenly spread midpoints err by the square of their distance."""
+    p = Parameters.named(name)
+    t, n = thresholds(p), 100
+    flows = t.omega_01 + (t.omega_02 - t.omega_01) * (np.arange(n) + 0.5) / n
+    slopes = [characteristic_slope(p.replace(omega_0=float(w)), Case.SS) for w in flows]
+    assert mean_slope(p) == pytest.approx(np.mean(slopes), rel=10 / n**2)
+
+
+def test_mean_slope_without_a_fold() -> None:
+    """Below eta_cr SS gains on the fluid again until it meets SR at omega_02."""
+    p = P.replace(eta=0.5 * thresholds(P).eta_cr)
+    t = thresholds(p)
+    near = solution(p.replace(omega_0=t.omega_02 * (1 - 1e-10)), Case.SS).x[2]
+    assert mean_slope(p) == pytest.approx((near - t.omega_01) / (t.omega_02 - t.omega_01), rel=1e-9)
+    with pytest.raises(InputError, match=r"eta = 0\.6 is out of range"):
+        mean_slope(ROUGH)

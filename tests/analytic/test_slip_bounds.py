@@ -1,0 +1,234 @@
+"""The slip bounds of sections 3.2 and 4: as printed, from Newton and Euler by algebra, and at random sets by gamma."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from analytic import dynamics, slip_bounds, slip_stability, thresholds, vector_field
+from analytic.slip_bounds import SlipBound
+from model import Case, InputError, Parameters
+
+P = Parameters.named("reference")
+j, mu, eta, c, g, R, r, w, omega_0 = sp.symbols("j mu eta c g R r w omega_0", positive=True)
+
+
+class Symbols:
+    """Stands for `Parameters`: the bounds are plain arithmetic."""
+
+    m = sp.Integer(1)
+    j, mu, eta, c, g, R, r = j, mu, eta, c, g, R, r
+
+
+def random_sets(count: int, top: float = 1.0) -> list[Parameters]:
+    rng = np.random.default_rng(count)
+    found = []
+    for _ in range(count):
+        R = 10 ** rng.uniform(-2, 0)
+        values = {
+            "mu": rng.uniform(0.02, top), "eta": rng.uniform(0.02, top), "j": rng.uniform(0.1, 2 / 3), "R": R,
+            "r": R * rng.uniform(0.05, 0.9), "c": 10 ** rng.uniform(-2, 1), "g": rng.uniform(1, 15),
+            "m": 10 ** rng.uniform(-3, 1), "omega_0": rng.uniform(-3, 3) * np.sqrt(9.81 / R),
+        }  # fmt: skip
+        found.append(Parameters(**{name: float(value) for name, value in values.items()}))
+    return found
+
+
+def rolling(omega_c: float) -> list[float]:
+    return [0.0, 0.0, omega_c, 0.0, 0.0, 0.0]
+
+
+# --- as printed ------------------------------------------------------------------------------------------------
+
+
+def equal(left: Any, right: Any) -> bool:
+    return bool(sp.simplify(left - right) == 0)
+
+
+def test_zeros_as_printed() -> None:
+    """(61), (66) with eta, (67), (73), (74), (82), (83)."""
+    p: Any = Symbols()
+    assert equal(slip_bounds.nr_to_ns(p).zero, g / (eta * R))
+    assert slip_bounds.rr_to_rs_stationary(p).zero == 0
+    assert equal(slip_bounds.rr_to_sr_stationary(p).zero, g / (j * R))
+    assert equal(slip_bounds.rr_to_ss(p).zero, g / (eta * R) * mu * eta * (eta + 1) / (mu * eta * (1 + j) + j - eta))
+    assert equal(
+        slip_bounds.rr_to_ss(p, -1).zero, g / (eta * R) * mu * eta * (eta - 1) / (mu * eta * (1 + j) + j + eta)
+    )
+    for side in (1, -1):
+        lag = eta / (j * c) * (1 + j) * (1 + 2 * j) * w**2
+        assert equal(slip_bounds.rr_to_rs(p, w, side).zero, w + side * lag)
+        lag = (1 + 2 * j) * mu / (j * R * c) * (g - j * R * w**2)
+        assert equal(slip_bounds.rr_to_sr(p, w, side).zero, w - side * lag)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_from_newton_and_euler(side: int) -> None:
+    """gamma of every bound is the rate of the slip itself, with the forces of the case it leads to."""
+    p: Any = Symbols()
+    spin = g / (j * omega_0 * r) - omega_0 * R / r
+    table: list[tuple[SlipBound, Case, Any, Any, int, list[tuple[Any, Any]]]] = [
+        (slip_bounds.rr_to_rs(p, w, side), Case.RS, w, 0, 4, [(side, 0)]),
+        (slip_bounds.rr_to_rs_stationary(p), Case.RS, omega_0, 0, 4, [(side, 0)]),
+        (slip_bounds.rr_to_sr(p, w, side), Case.SR, w, 0, 3, [(side, 0)]),
+        (slip_bounds.rr_to_sr_stationary(p), Case.SR, omega_0, 0, 3, [(side, 0)]),
+        (slip_bounds.rr_to_ss(p, side), Case.SS, omega_0, 0, 5, [(0, side)] * 2),
+        (slip_bounds.nr_to_ns(p, side), Case.NS, omega_0, spin, 5, [(0, side)]),
+    ]
+    for bound, outer, omega_c, slip_x, row, directions in table:
+        x = [0, 0, omega_c, slip_x, 0, 0, 0, 0]
+        rate = dynamics.newton_euler(outer, x, dynamics.FORCES[outer](x, p, omega_0, *directions), p, omega_0)[row]
+        assert equal(bound.offset + bound.slope * omega_0**bound.power, side * rate), outer
+
+
+# --- against gamma at random sets ------------------------------------------------------------------------------
+
+
+def test_bounds_at_random_sets() -> None:
+    """Zero and slope against (53), from the vector fields, at flows on both sides."""
+    for p in random_sets(50):
+        omega_c = 0.7 * p.omega_0
+        for side in (1, -1):
+            table = [
+                (slip_bounds.rr_to_rs(p, omega_c, side), Case.RS, omega_c, [side]),
+                (slip_bounds.rr_to_rs_stationary(p), Case.RS, None, [side]),
+                (slip_bounds.rr_to_sr(p, omega_c, side), Case.SR, omega_c, [side]),
+                (slip_bounds.rr_to_sr_stationary(p), Case.SR, None, [side]),
+                (slip_bounds.rr_to_ss(p, side), Case.SS, None, [0.0, 0.0, side]),
+            ]
+            for bound, outer, w, n in table:
+                flows = np.array([-1.3, 0.4, 2.1]) * abs(p.omega_0)
+                found = [
+                    float(
+                        slip_stability.gamma(
+                            Case.RR, outer, rolling(flow if w is None else w), n, p.replace(omega_0=flow)
+                        )
+                    )
+                    for flow in flows.tolist()
+                ]
+                scale = abs(bound.offset) + np.abs(bound.slope * flows**bound.power)
+                assert np.all(np.abs(bound.gamma(flows) - found) <= 1e-13 * scale)
+
+
+def test_zero_of_a_bound() -> None:
+    assert SlipBound(1, 3.0, -2.0).zero == 1.5
+    assert SlipBound(1, 3.0, 0.0).zero == np.inf
+
+
+def test_bound_83_contradicts_the_normal_forces() -> None:
+    """For eta > 1 slip along (pi, pi) would grow below a real bound, but not before the wall would pull, (12)."""
+    real = 0
+    for p in random_sets(200, top=3.0):
+        square = slip_bounds.rr_to_ss(p, -1).zero
+        assert (square > 0) == (p.eta > 1)
+        if square > 0:
+            real += 1
+            _, B_x = slip_bounds.normal_forces_rr_to_ss(p, np.linspace(0.0, 1.0, 11) * np.sqrt(square), -1)
+            assert np.all(B_x < 0)
+    assert real > 50
+
+
+def test_bound_82_needs_eta_less_than_j() -> None:
+    """Where (82) has a bound the floor presses there exactly for eta < j."""
+    pressing = 0
+    for p in random_sets(300, top=1.5):
+        square = slip_bounds.rr_to_ss(p).zero
+        if square > 0:
+            A_y, B_x = slip_bounds.normal_forces_rr_to_ss(p, np.sqrt(square))
+            assert (A_y > 0) == (p.eta < p.j)
+            assert B_x > 0
+            pressing += p.eta < p.j
+            if p.eta < p.j:
+                assert np.sqrt(square) == pytest.approx(thresholds(p).omega_01, rel=1e-14)
+    assert pressing > 30
+
+
+# --- NR at any state -------------------------------------------------------------------------------------------
+
+
+def states_of_nr(p: Parameters, count: int) -> np.ndarray:
+    rng = np.random.default_rng(7)
+    unit = np.sqrt(p.g / p.R)
+    x = rng.normal(size=(count, 6)) * [p.R, np.sqrt(p.g * p.R), 2 * unit, 3 * unit * p.R / p.r, 0, 0]
+    x[:, 0] = np.abs(x[:, 0])
+    return x
+
+
+def test_56_at_any_state() -> None:
+    """Against the vector field of NS, with v_y, omega_c, slip_x and beta anything."""
+    for p in random_sets(20):
+        beta = np.linspace(-np.pi, np.pi, 9)
+        n = np.stack([np.sin(beta), np.cos(beta)], axis=-1)
+        for x in states_of_nr(p, 10):
+            found = slip_stability.gamma(Case.NR, Case.NS, x, n, p)
+            scale = (
+                np.abs(slip_bounds.gamma_nr(beta, x, p)).max()
+                + p.g / p.r
+                + abs(x[2]) * (abs(x[3]) + p.R / p.r * abs(x[2]))
+            )
+            assert np.all(np.abs(slip_bounds.gamma_nr(beta, x, p) - found) <= 1e-12 * scale / p.j)
+
+
+def test_56_takes_many_states() -> None:
+    x, beta = states_of_nr(P, 5), np.linspace(0, 6, 7)
+    values = slip_bounds.gamma_nr(beta[:, None], x, P)
+    assert values.shape == (7, 5)
+    assert values[3, 2] == slip_bounds.gamma_nr(beta[3], x[2], P)
+    with pytest.raises(InputError, match="slip_z = 1"):
+        slip_bounds.gamma_nr(0.0, [0.1, 0, 9.0, 0, 0, 1.0], P)
+
+
+def test_58_and_59() -> None:
+    """(57) vanishes at both, they are the extrema, and (59) is the friction cone, in all of X_NR."""
+    p, beta, stable = P.replace(omega_0=20.0, eta=0.5), np.linspace(0, 2 * np.pi, 721), []
+    for x in states_of_nr(p, 100):
+        first, second = slip_bounds.extreme_directions_nr(x, p)
+        values = slip_bounds.gamma_nr(beta, x, p)
+        greatest, least = slip_bounds.gamma_nr(first, x, p), slip_bounds.gamma_nr(second, x, p)
+        # A grid of half a degree misses an extremum by (1/2) (0.25 degrees)^2 = 1e-5 of the swing at most.
+        swing = greatest - least
+        assert greatest >= values.max() - 1e-14 * swing
+        assert least <= values.min() + 1e-14 * swing
+        assert values.max() >= greatest - 1e-5 * swing
+        assert values.min() <= least + 1e-5 * swing
+        assert (greatest < 0 and least < 0) == (slip_stability.stick_margin(Case.NR, x, p) > 0)
+        stable.append(greatest < 0)
+    assert 10 < sum(stable) < 90
+
+
+# --- Filippov --------------------------------------------------------------------------------------------------
+
+
+def test_69() -> None:
+    """f_RR = delta f^- + (1 - delta) f^+, and 0 < delta < 1 exactly where slip dies out on both sides."""
+    inside = []
+    for p in random_sets(200):
+        for outer, row in ((Case.RS, 4), (Case.SR, 3)):
+            for omega_c in (0.9 * p.omega_0, 0.2 * p.omega_0):
+                delta = slip_bounds.filippov_share(outer, omega_c, p)
+                sides = []
+                for side in (-1.0, 1.0):
+                    x = np.array(rolling(omega_c))
+                    x[row] = side * 1e-14 * abs(omega_c)  # (68): a slip that vanishes in round-off
+                    sides.append(vector_field(outer, x, p))
+                mixed = delta * sides[0] + (1 - delta) * sides[1]
+                scale = (abs(delta) + abs(1 - delta)) * np.abs(sides).max()
+                expected = vector_field(Case.RR, rolling(omega_c), p)
+                np.testing.assert_allclose(mixed, expected, atol=1e-12 * scale)
+                growth = [
+                    float(slip_stability.gamma(Case.RR, outer, rolling(omega_c), [side], p)) for side in (-1.0, 1.0)
+                ]
+                both_die, both_grow = max(growth) < 0, min(growth) > 0
+                assert (0 < delta < 1) == (both_die or both_grow)
+                assert not both_grow or (outer is Case.SR and p.j * p.R * omega_c**2 > p.g)
+                inside.append(0 < delta < 1)
+    assert min(sum(inside), len(inside) - sum(inside)) > 50
+
+
+def test_69_is_for_codimension_1() -> None:
+    with pytest.raises(InputError, match="case SS: RR divides the states of RS and SR only"):
+        slip_bounds.filippov_share(Case.SS, 10.0, P)
+    assert slip_bounds.filippov_share(Case.RS, 10.0, P.replace(eta=0.0, omega_0=12.0)) == np.inf

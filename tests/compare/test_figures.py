@@ -1,0 +1,260 @@
+"""Figures: each draws from made-up results without any simulation, says its parameters, and puts points on curves."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import analytic
+import mjsim
+from analytic import thresholds
+from compare.claims.catalogue import CLAIMS
+from compare.claims.claim import Bearing, Check, Claim, Outcome, Verdict
+from compare.figures import bifurcation_diagrams, deviations, gallery, slipping, style, unloading
+from compare.figures.drawing import GapError, Material
+from compare.figures.registry import FIGURES, figures_of
+from compare.measure.record import Measurement, Records
+from compare.runs.engines import ENGINES
+from model import Case, InputError, Parameters, StorageError
+
+DEPENDS = {
+    **dict.fromkeys(
+        ["characteristic", *(f"fig-{k}" for k in (4, 5, 9, 10, 11, 12)), "fig-13-left", "fig-13-right", "unloading"],
+        ("μ", "η", "j", "κ"),
+    ),
+    "ladder": ("μ", "η", "j", "κ"),
+    "frontier": ("μ", "η", "j", "κ"),
+    "fig-7": ("μ", "j", "κ"),
+    "fig-8": ("j", "κ"),
+}
+"""The parameters that a caption must give with their values; those of the other figures depend on none."""
+WITH_SCALES = ["fig-7", "fig-8", "fig-9", "fig-10", "fig-11", "fig-12", "fig-13-left", "fig-13-right"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    method: str
+    quantity: str
+    error: float
+    cost: float = math.nan
+
+
+def measurement(quantity: str, value: float, set: str = "reference", omega_0: float = 10.0, **changes) -> Measurement:
+    given = {
+        "protocol": "settled",
+        "uncertainty": 1e-9,
+        "engine": "mujoco",
+        "conditions": {"case": "RR", "start": "rest"},
+        "parameters": Parameters.named(set).replace(omega_0=omega_0),
+    }
+    return Measurement(quantity=quantity, value=value, set=set, **(given | changes))
+
+
+def verdict(name: str, checks: tuple[Check, ...], outcome: Outcome = Outcome.CONFIRMED) -> Verdict:
+    bearing = Bearing(protocol="settled", quantity="omega_c", predict=lambda m: 1.0)
+    claim = Claim(id=name, section="S", source="(1)", statement="What is stated.", bearings=(bearing,))
+    return Verdict(claim=claim, outcome=outcome, checks=checks)
+
+
+def check(m: Measurement, predicted: float, tolerance: float = 3e-9) -> Check:
+    return Check(measurement=m, predicted=predicted, tolerance=tolerance, scale=1.0)
+
+
+@pytest.fixture(scope="module")
+def material() -> Material:
+    """A few results of every kind that a figure shows."""
+    states = [
+        measurement("omega_c", 10.0),
+        measurement("omega_c", 9.0, engine="mujoco-defaults", protocol="newcomer"),
+        measurement("omega_c", 35.0, omega_0=35.0, conditions={"case": "NR", "start": "on the wall"}),
+        measurement("omega_c", 12.0, "high-wall-friction", 12.0),
+        measurement("omega_c", 40.0, omega_0=40.0, protocol="hysteresis", conditions={"case": "NR", "side": "up"}),
+        measurement("omega_c", 40.0, omega_0=40.0, protocol="hysteresis", conditions={"case": "NR", "side": "down"}),
+        measurement("wall_spin", 50.0, omega_0=10.0),
+    ]
+    plane = [
+        measurement("cases", 129.0, omega_0=omega_0, conditions={"figure": "fig-7"}, protocol="plane")
+        for omega_0 in (8.0, 10.0)
+    ]
+    verdicts = (
+        verdict("fig-7", (check(plane[0], 129.0, 0.0), check(plane[1], 1.0, 0.0))),
+        verdict("prop-1", (check(states[0], 10.0), check(states[1], 10.0))),
+    )
+    scores = tuple(Score(name, "RR at 12", error, 0.1) for name, error in (("a", 0.0), ("b", math.nan), ("c", 1e-3)))
+    return Material(verdicts, Records((*states, *plane)), Path("nowhere"), scores, scores, scores[:1])
+
+
+@pytest.fixture
+def no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever simulates with MuJoCo fails."""
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("a figure simulates")
+
+    monkeypatch.setattr(mjsim, "Run", refuse)
+    monkeypatch.setattr(mjsim, "simulate", refuse)
+
+
+@pytest.mark.parametrize("results", [True, False], ids=["with results", "theory alone"])
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_figure_draws_and_gives_its_parameters(name: str, results: bool, material: Material, no_engine) -> None:
+    drawing = FIGURES[name]
+    if not results and name in ("characteristic", "ladder", "frontier"):
+        with pytest.raises(GapError, match="measured"):
+            drawing.select(Material())
+        return
+    data = drawing.select(material if results else Material())
+    buffer = io.BytesIO()
+    figure = drawing.draw(data)
+    figure.savefig(buffer, format="png", dpi=40)
+    assert buffer.tell() > 1000
+    caption = drawing.caption(data)
+    assert caption.endswith(".")
+    for symbol in DEPENDS.get(name, ()):
+        assert f"{symbol} = " in caption
+    assert name in DEPENDS or drawing.background
+    if name not in DEPENDS:
+        assert not any(f"{symbol} = " in caption for symbol in ("μ", "η", "κ"))
+
+
+@pytest.mark.parametrize("name", WITH_SCALES)
+def test_both_scales(name: str) -> None:
+    """SI on the axes, dimensionless on secondary ones, labelled."""
+    for axes in FIGURES[name].draw(FIGURES[name].select(Material())).axes:
+        assert "rad/s" in axes.get_ylabel()
+        labels = [child.get_xlabel() + child.get_ylabel() for child in axes.child_axes]
+        assert any("sqrt{R/g}" in label for label in labels)
+
+
+@pytest.mark.parametrize("name", ["fig-9", "fig-10", "fig-11", "fig-12"])
+def test_special_points_lie_on_curves(name: str) -> None:
+    """Every black dot is the end of a curve, or on one, within a thousandth of the frame."""
+    (axes,) = FIGURES[name].draw(FIGURES[name].select(Material())).axes
+    lines = [line for line in axes.lines if line.get_linewidth() == 2]
+    dots = [line for line in axes.lines if line.get_marker() == "o"]
+    assert dots
+    frame = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())])
+    for dot in dots:
+        point = np.array([float(np.ravel(v)[0]) for v in (dot.get_xdata(), dot.get_ydata())]) / frame
+        nearest = np.inf
+        for line in lines:
+            xy = np.stack([np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float)], axis=-1) / frame
+            xy = xy[np.isfinite(xy).all(axis=1)]
+            begin, step = xy[:-1], np.diff(xy, axis=0)
+            along = np.clip(np.sum((point - begin) * step, 1) / np.maximum(np.sum(step**2, 1), 1e-300), 0, 1)
+            away = np.linalg.norm(begin + along[:, None] * step - point, axis=1)
+            nearest = min(nearest, np.min(away, initial=np.inf))
+        assert nearest < 1e-3
+
+
+def test_stable_and_unstable_parts_of_figure_10() -> None:
+    """The stable part of SS runs from omega_01 to omega_04, the unstable one from omega_02 to omega_04."""
+    (axes,) = FIGURES["fig-10"].draw(FIGURES["fig-10"].select(Material())).axes
+    t = thresholds(Parameters.named("reference"))
+    parts = [line for line in axes.lines if line.get_color() == style.COLOURS[Case.SS]]
+    assert {line.get_linestyle() for line in parts} == {"-", "--"}
+    for line in parts:
+        begin = t.omega_01 if line.get_linestyle() == "-" else t.omega_02
+        shown = np.isfinite(np.asarray(line.get_ydata(), float))
+        omega_0 = np.asarray(line.get_xdata(), float)[shown]
+        np.testing.assert_allclose([omega_0.min(), omega_0.max()], [begin, t.omega_04], rtol=1e-4)
+
+
+def test_the_hopf_point_of_figure_12_is_marked() -> None:
+    (axes,) = FIGURES["fig-12"].draw(FIGURES["fig-12"].select(Material())).axes
+    assert {"P3", "NF2", "NT1", "F", "H"} <= {text.get_text() for text in axes.texts}
+    assert "Hopf" in FIGURES["fig-12"].caption(bifurcation_diagrams.Diagram("fig-12", bifurcation_diagrams.RELEASED))
+
+
+@pytest.mark.parametrize("name", ["fig-4", "fig-5"])
+def test_the_path_of_slip_bends_and_ends_as_the_paper_says(name: str) -> None:
+    run = FIGURES[name].select(Material()).motion.load()
+    path = np.stack([run.slip_z, run.slip_y], axis=-1)
+    first = path[0] / np.linalg.norm(path[0])
+    across = np.abs(path @ np.array([-first[1], first[0]])).max()
+    assert across > 0.1 * slipping.SLIP
+    assert (run.cases[-1] is Case.NR) == (name == "fig-4")
+    assert (np.linalg.norm(path[-1]) > slipping.SLIP) == (name == "fig-5")
+
+
+def test_the_bistable_region_is_named() -> None:
+    for name in ("fig-7", "fig-8"):
+        (axes,) = FIGURES[name].draw(FIGURES[name].select(Material())).axes
+        assert any("bistable" in text.get_text() for text in axes.texts)
+
+
+def test_points_not_as_predicted_are_crossed(material: Material) -> None:
+    data = FIGURES["fig-7"].select(material)
+    (axes,) = FIGURES["fig-7"].draw(data).axes
+    (cross,) = (line for line in axes.lines if line.get_label() == "not as predicted")
+    assert [float(x) for x in cross.get_ydata()] == [10.0]
+    assert "1 crossed" in FIGURES["fig-7"].caption(data)
+
+
+def test_measured_states_have_their_engines_marks(material: Material) -> None:
+    """MuJoCo's defaults stand beside the study's settings."""
+    axes = FIGURES["characteristic"].draw(FIGURES["characteristic"].select(material)).axes[0]
+    shown = {line.get_marker(): line.get_color() for line in axes.lines}
+    for engine in ("mujoco", "mujoco-defaults"):
+        assert shown[ENGINES[engine].mark] == ENGINES[engine].colour
+
+
+def test_deviations_are_drawn_over_tolerance() -> None:
+    m = measurement("omega_c", 10.0)
+    far = dataclasses.replace(check(m, 10.0), predicted=9.0)
+    made = Material((verdict("x", (check(m, 10.0 - 1.5e-9), far)),))
+    drawing = deviations.of("x")
+    (axes,) = drawing.draw(drawing.select(made)).axes
+    points = [line for line in axes.lines if line.get_marker() == "o"]
+    assert [float(v) for line in points for v in line.get_xdata()] == pytest.approx([0.5], rel=1e-6)
+    assert sum(len(line.get_xdata()) for line in axes.lines if line.get_marker() == ">") == 1
+    assert "μ = 0.2" in drawing.caption(drawing.select(made))
+    with pytest.raises(GapError):
+        drawing.select(Material((verdict("x", (check(measurement("case", 0.0), 0.0, 0.0),)),)))
+
+
+def test_the_fall_shows_cases_and_impact() -> None:
+    figure = FIGURES["unloading"].draw(FIGURES["unloading"].select(Material()))
+    assert {"NR", "NS", "SR", "RR"} <= {text.get_text() for text in figure.axes[0].texts}
+    assert {"$v_y$ (m/s)", "gap (µm)"} <= {axes.get_ylabel() for axes in figure.axes}
+
+
+def test_a_fall_that_did_not_happen_is_a_gap() -> None:
+    p = Parameters.named("reference")
+    run = analytic.simulate(p, [0, 0, p.omega_0, 0, 0, 0], 0.1)
+    motion = dataclasses.replace(FIGURES["unloading"].select(Material()).motion, load=lambda: run)
+    with pytest.raises(GapError, match="never landed"):
+        unloading.draw(unloading.Fall("event", p, motion))
+
+
+def test_claims_have_their_own_figures_or_deviations() -> None:
+    assert list(figures_of("slip-NR-NS")) == ["fig-4", "fig-5", "claim-slip-NR-NS"]
+    assert list(figures_of("fig-13-right")) == ["fig-13-right", "unloading"]
+    assert list(figures_of("prop-1")) == ["claim-prop-1"]
+    assert {name for drawing in FIGURES.values() for name in drawing.claims} <= {claim.id for claim in CLAIMS}
+
+
+def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen = {name: FIGURES[name] for name in ("fig-6", "ladder")}
+    monkeypatch.setattr(gallery, "FIGURES", chosen)
+    assert dict(gallery.write(tmp_path, Material(), ("svg", "png"))) == {
+        "fig-6": "",
+        "ladder": "not drawn: the ladder of settings was not measured",
+    }
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-6.png", "fig-6.svg"]
+    assert "dimension of the state space" in (tmp_path / "captions.txt").read_text("utf-8")
+    with pytest.raises(InputError, match="bmp"):
+        list(gallery.write(tmp_path, Material(), ("bmp",)))
+    (tmp_path / "file").touch()
+    with pytest.raises(StorageError):
+        list(gallery.write(tmp_path / "file", Material()))
+
+
+def test_every_case_has_its_colour() -> None:
+    assert set(style.COLOURS) == set(Case)
+    assert len(set(style.COLOURS.values())) == len(Case)

@@ -1,0 +1,143 @@
+"""A verdict is computed from the numbers, and can be lost in every way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+import compare.claims.judge
+from compare.claims.claim import COVERAGE, Bearing, Claim, Outcome, Relation, Text
+from compare.claims.judge import judge, remembered, select
+from compare.measure.quantities import quantity
+from compare.measure.record import Measurement, Missing, Records
+from compare.statistics import Measured
+from model import InputError, Parameters
+
+P = Parameters.named("reference")
+FINE = quantity("omega_c").resolves / 10
+"""Relative uncertainty with which a check of omega_c resolves enough."""
+
+
+def measured(value: float, uncertainty: float, name: str = "omega_c") -> Records:
+    m = Measurement(
+        protocol="settled",
+        quantity=name,
+        value=value,
+        uncertainty=uncertainty,
+        engine="mujoco",
+        set="mine",
+        parameters=P,
+    )
+    return Records((m,))
+
+
+def claim(bearing: Bearing | None = None) -> Claim:
+    bearing = bearing or Bearing(protocol="settled", quantity="omega_c", predict=lambda m: m.parameters.omega_0)
+    return Claim(id="it", section="Stationary states", source="(1)", statement="It goes round.", bearings=(bearing,))
+
+
+def outcome(of: Claim, records: Records) -> Outcome:
+    return judge([of], records)[0].outcome
+
+
+def test_what_agrees_is_confirmed() -> None:
+    assert outcome(claim(), measured(P.omega_0, FINE)) is Outcome.CONFIRMED
+
+
+def test_what_deviates_is_refuted() -> None:
+    assert outcome(claim(), measured(P.omega_0 * (1 + 1e-5), FINE)) is Outcome.REFUTED
+
+
+def test_what_is_too_coarse_is_inconclusive_however_well_it_agrees() -> None:
+    assert outcome(claim(), measured(P.omega_0, 0.01 * P.omega_0)) is Outcome.INCONCLUSIVE
+
+
+def test_what_deviates_is_refuted_even_if_it_is_coarse() -> None:
+    assert outcome(claim(), measured(2 * P.omega_0, 0.01 * P.omega_0)) is Outcome.REFUTED
+
+
+def test_without_measurements_it_was_not_run_and_the_reason_is_kept() -> None:
+    records = Records((), (Missing("settled", "mine", "nothing settles"), Missing("other", "mine", "no matter")))
+    (verdict,) = judge([claim()], records)
+    assert verdict.outcome is Outcome.NOT_RUN
+    assert verdict.missing == ("mine: nothing settles",)
+
+
+def test_a_measurement_that_is_not_a_number_refutes() -> None:
+    assert outcome(claim(), measured(math.nan, FINE)) is Outcome.REFUTED
+
+
+def test_a_state_that_theory_does_not_know_refutes() -> None:
+    def unknown(m: Measurement) -> float:
+        raise LookupError("no such state")
+
+    (verdict,) = judge([claim(replace(claim().bearings[0], predict=unknown))], measured(1.0, FINE))
+    assert verdict.outcome is Outcome.REFUTED
+    assert verdict.worst == math.inf
+
+
+def test_a_theory_that_breaks_down_loses_its_own_claim_only() -> None:
+    def broken(m: Measurement) -> float:
+        raise ZeroDivisionError("float division by zero")
+
+    verdicts = judge([claim(replace(claim().bearings[0], predict=broken)), claim()], measured(P.omega_0, FINE))
+    assert [v.outcome for v in verdicts] == [Outcome.ERROR, Outcome.CONFIRMED]
+    assert "division by zero" in verdicts[0].error
+
+
+@pytest.mark.parametrize(("relation", "agrees"), [(Relation.AT_MOST, -1), (Relation.AT_LEAST, 1)])
+def test_relations(relation: Relation, agrees: int) -> None:
+    of = claim(replace(claim().bearings[0], relation=relation))
+    assert outcome(of, measured(P.omega_0 * (1 + agrees), FINE)) is Outcome.CONFIRMED
+    assert outcome(of, measured(P.omega_0 * (1 - agrees / 2), FINE)) is Outcome.REFUTED
+
+
+def test_a_prediction_may_be_uncertain_itself() -> None:
+    of = claim(replace(claim().bearings[0], predict=lambda m: Measured(m.parameters.omega_0 + 1e-7, 1e-7)))
+    (verdict,) = judge([of], measured(P.omega_0, FINE / 100))
+    assert verdict.outcome is Outcome.CONFIRMED
+    assert verdict.checks[0].tolerance == pytest.approx(COVERAGE * 1e-7, rel=1e-3)
+
+
+def test_what_must_be_equal_has_no_tolerance() -> None:
+    of = claim(Bearing(protocol="settled", quantity="cases", predict=lambda m: 5.0))
+    assert outcome(of, measured(5.0, 0.0, "cases")) is Outcome.CONFIRMED
+    assert outcome(of, measured(4.0, 0.0, "cases")) is Outcome.REFUTED
+
+
+def test_resolving_power_is_the_error_of_theory_that_would_be_noticed() -> None:
+    records = measured(P.omega_0, FINE)
+    (verdict,) = judge([claim()], records)
+    power = verdict.resolving_power["omega_c"]
+    for error, noticed in ((0.9 * power, Outcome.CONFIRMED), (1.1 * power, Outcome.REFUTED)):
+        wrong = replace(claim().bearings[0], predict=lambda m, error=error: m.parameters.omega_0 * (1 + error))
+        assert outcome(claim(wrong), records) is noticed
+
+
+def test_predictions_are_forgotten_between_judgements(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compare.claims.judge, "_remembered", [])
+    theory = {"omega_c": P.omega_0}
+    predict = remembered(lambda m: theory["omega_c"])
+    of = claim(Bearing(protocol="settled", quantity="omega_c", predict=lambda m: predict(m.parameters)))
+    assert outcome(of, measured(P.omega_0, FINE)) is Outcome.CONFIRMED
+    theory["omega_c"] *= 1.01
+    assert outcome(of, measured(P.omega_0, FINE)) is Outcome.REFUTED
+
+
+def test_an_unknown_quantity_is_refused_when_a_claim_is_made() -> None:
+    with pytest.raises(InputError, match="omega_c"):
+        Bearing(protocol="settled", quantity="omega_cc", predict=lambda m: 0.0)
+
+
+def test_only_what_is_formal_goes_without_measurements() -> None:
+    with pytest.raises(ValueError, match="formal"):
+        Claim(id="it", section="", source="", statement="", algebra=lambda: [], text=Text.PRINTED)
+    with pytest.raises(ValueError, match="formal"):
+        Claim(id="it", section="", source="", statement="")
+
+
+def test_an_unknown_claim_is_refused_with_a_suggestion() -> None:
+    with pytest.raises(InputError, match="did you mean"):
+        select([claim(), replace(claim(), id="prop-1")], ["prop-2"])

@@ -1,0 +1,130 @@
+"""What holds at every instant: deviations are noticed one by one, and the drag is that of Stokes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analytic import stokes
+from compare.claims import laws as claims
+from compare.claims.claim import Outcome, Verdict
+from compare.claims.judge import judge
+from compare.measure import laws
+from compare.measure.lab import Lab, Level
+from compare.measure.record import Measurement, Missing, Records
+from compare.runs.campaign import Campaign
+from compare.runs.engines import MUJOCO
+from model import Case, Flow, Parameters, Trajectory
+from model.trajectory import SAMPLE, Events, Header
+
+P = Parameters.named("high-wall-friction")
+SAMPLES = 50
+
+
+def sliding(**changes: Any) -> Trajectory:
+    """A ball that slips at both points as (14) and (15) say, with some of it changed."""
+    rng = np.random.default_rng(4)
+    block = np.zeros(SAMPLES, SAMPLE)
+    block["time"] = np.linspace(0.0, 1.0, SAMPLES)
+    slips = rng.uniform(5.0, 20.0, (3, SAMPLES))
+    block["slip_x"], block["slip_y"], block["slip_z"] = slips
+    block["case"] = Case.SS
+    w_x, w_y, w_z = slips
+    normal = P.m * P.g * rng.uniform(0.5, 1.0, SAMPLES)
+    for name, coefficient, first, second in (("force_A", P.mu, w_z, -w_x), ("force_B", P.eta, -w_z, w_y)):
+        friction = -coefficient * normal * np.stack([first, second]) / np.hypot(first, second)
+        rows = (friction[0], normal, friction[1]) if name == "force_A" else (normal, *friction)
+        block[name] = np.stack(rows, axis=-1)
+    header = Header("mujoco", P, Flow.steady(1.0))
+    return replace(Trajectory.from_blocks(header, [block], Events()), **changes)
+
+
+def values(run: Trajectory) -> dict[tuple[str, str], float]:
+    return {(law.split(":")[0], contact): value for (_, law, contact), value in laws.deviations([run]).items()}
+
+
+def test_a_motion_that_obeys_the_laws_shows_no_deviation() -> None:
+    found = values(sliding())
+    for contact, coefficient, number in (("A", P.mu, "(14)"), ("B", P.eta, "(15)")):
+        assert found["(12)", contact] == 0.0
+        assert found["(13)", contact] <= laws.ROUNDING
+        assert found[number, contact] <= laws.ROUNDING
+        assert found["friction over normal force", contact] == pytest.approx(coefficient, rel=laws.ROUNDING)
+        # Nothing rolls: that law has no samples.
+        assert np.isnan(found["where it rolls it doesn't slip", contact])
+
+
+def test_every_deviation_is_measured() -> None:
+    run = sliding()
+    weight = P.m * P.g
+    pulling = run.force_A.copy()
+    pulling[7, 1] = -0.1 * weight
+    assert values(sliding(force_A=pulling))["(12)", "A"] == pytest.approx(0.1)
+    strong = values(sliding(force_B=run.force_B * [1.0, 1.01, 1.01]))
+    assert strong["friction over normal force", "B"] == pytest.approx(1.01 * P.eta)
+    assert strong["(13)", "B"] > 1e-3 * P.eta
+    weak = values(sliding(force_A=run.force_A * [0.99, 1.0, 0.99]))
+    assert weak["friction over normal force", "A"] == pytest.approx(0.99 * P.mu)
+    assert values(sliding(force_B=run.force_B * [1.0, -1.0, 1.0]))["(15)", "B"] > 0.1 * P.eta
+    assert values(sliding(gap_A=np.full(SAMPLES, 1e-3 * P.R)))["where it is closed there is no gap", "A"] == (
+        pytest.approx(1e-3)
+    )
+    slow = sliding(slip_z=1e-3 * run.slip_z, slip_x=1e-3 * run.slip_x, case=np.full(SAMPLES, Case.RS, np.int8))
+    assert values(slow)["where it rolls it doesn't slip", "A"] > 0
+
+
+def law(quantity: str, value: float, uncertainty: float, contact: str = "A") -> Measurement:
+    return Measurement(
+        protocol="laws", quantity=quantity, value=value, uncertainty=uncertainty, engine="mujoco", set="mine",
+        parameters=P, conditions={"law": "a law", "contact": contact},
+    )  # fmt: skip
+
+
+def table_3(*rows: Measurement) -> Verdict:
+    (claim,) = (claim for claim in claims.CLAIMS if claim.id == "table-3")
+    return judge([claim], Records(rows))[0]
+
+
+def test_laws_are_judged() -> None:
+    good = (law("law", 0.0, 1e-14), law("friction_ratio", P.mu, 1e-9), law("friction_ratio", P.eta, 1e-9, "B"))
+    assert table_3(*good).outcome is Outcome.CONFIRMED
+    for bad in (
+        law("law", 1e-6, 1e-14), law("law_in_motion", 1e-3, 1e-5), law("friction_ratio", 1.01 * P.mu, 1e-9),
+        law("friction_ratio", P.mu, 1e-9, "B"),
+    ):  # fmt: skip
+        assert table_3(*good, bad).outcome is Outcome.REFUTED
+    assert table_3(*good, law("law_in_motion", 0.0, 1e-2)).outcome is Outcome.INCONCLUSIVE
+
+
+def test_laws_and_drag_are_measured_with_mujoco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(laws, "LASTS", 256)
+    lab = Lab(Campaign(tmp_path, workers=0), MUJOCO, Level.QUICK)
+    rows = list(laws.measure(lab, {"reference": Parameters.named("reference")}, Records()))
+    records = Records.of(rows)
+    for verdict in judge(claims.CLAIMS, records):
+        assert verdict.outcome is Outcome.CONFIRMED, verdict.claim.id
+    assert all(isinstance(row, Missing | Measurement) for row in rows)
+    right = stokes.sinking_speed
+    monkeypatch.setattr(stokes, "sinking_speed", lambda **fluid: 1.0001 * right(**fluid))
+    (drag,) = (verdict for verdict in judge(claims.CLAIMS, records) if verdict.claim.id == "eq-10")
+    assert drag.outcome is Outcome.REFUTED
+
+
+def test_a_drag_coefficient_that_disagrees_with_stokes_is_noticed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    of_fluid = Parameters.from_fluid
+
+    def wrong(**values: float) -> Parameters:
+        p = of_fluid(**values)
+        return p.replace(c=1.01 * p.c)
+
+    monkeypatch.setattr(Parameters, "from_fluid", wrong)
+    lab = Lab(Campaign(tmp_path, workers=0), MUJOCO, Level.QUICK)
+    records = Records.of(laws.measure(lab, {}, Records()))
+    (drag,) = (verdict for verdict in judge(claims.CLAIMS, records) if verdict.claim.id == "eq-10")
+    assert drag.outcome is Outcome.REFUTED

@@ -1,0 +1,86 @@
+"""Wrong theories are believed everywhere for a while, and forgotten without a trace."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import analytic
+from analytic import dynamics, stationary
+from compare.claims import stationary as claims
+from compare.claims.claim import Outcome
+from compare.measure.lab import Lab, Level
+from compare.mutants import engines, trial
+from compare.mutants.engines import WRONG_ENGINES
+from compare.mutants.exchange import WrongTheory, believed, scaled
+from compare.mutants.theories import THEORIES
+from compare.runs.campaign import Campaign
+from compare.runs.engines import ENGINES, MUJOCO
+from model import Case, Parameters
+
+P = Parameters.named("reference").replace(omega_0=25.0)
+
+
+def test_there_are_many() -> None:
+    assert len(THEORIES) >= 40
+    assert len(WRONG_ENGINES) >= 8
+    assert len({wrong.what for wrong in THEORIES}) == len(THEORIES)
+
+
+@pytest.mark.parametrize("wrong", THEORIES, ids=lambda wrong: wrong.what)
+def test_each_replaces_a_function_that_exists_and_gives_it_back(wrong: WrongTheory) -> None:
+    module = importlib.import_module(wrong.module)
+    right = getattr(module, wrong.function)
+    with believed(wrong):
+        assert getattr(module, wrong.function) is not right
+    assert getattr(module, wrong.function) is right
+
+
+def test_a_fault_shows_wherever_the_function_is_known_by_name() -> None:
+    doubled = WrongTheory("", "analytic.stationary", "attractors", lambda right: lambda p: 2 * right(p))
+    right = analytic.attractors(P)
+    with believed(doubled):
+        assert len(analytic.attractors(P)) == len(stationary.attractors(P)) == 2 * len(right)
+    assert len(analytic.attractors(P)) == len(right)
+
+
+def test_a_fault_shows_in_tables_of_functions() -> None:
+    x = [0.0, 0.0, 12.0, 1.0, 2.0, 3.0, 0.0, 0.0]
+    right = np.array(dynamics.forces(Case.SS, x, P, P.omega_0))
+    with believed(WrongTheory("", "analytic.dynamics", "_ss", scaled(1.5, 1))):
+        wrong = np.array(dynamics.forces(Case.SS, x, P, P.omega_0))
+    assert wrong[1] == 1.5 * right[1]
+    assert np.array_equal(np.delete(wrong, 1), np.delete(right, 1))
+
+
+def test_a_theory_that_raises_is_given_back_too() -> None:
+    right = stationary.attractors
+    with pytest.raises(ZeroDivisionError), believed(THEORIES[0]):
+        raise ZeroDivisionError
+    assert stationary.attractors is right
+    assert claims.analytic.attractors is right
+
+
+@pytest.mark.parametrize("wrong", WRONG_ENGINES, ids=lambda wrong: wrong.name)
+def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(
+    wrong: engines.Engine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("compare.runs.engines.ENGINES", dict(ENGINES) | {wrong.name: wrong})
+    start, runs = [0.02, 0.0, 14.0, -1.0, 2.0, 7.0, 0.0, 0.0], {}
+    with Campaign(tmp_path, workers=0) as campaign:
+        for engine in (MUJOCO, wrong):
+            lab = Lab(campaign, engine, Level.QUICK)
+            (runs[engine.name],) = lab.run([lab.task(P, start, 0.4, 4e-3)])
+    right, other = runs[MUJOCO.name], runs[wrong.name]
+    assert other.header.parameters == right.header.parameters == P
+    assert np.abs(other.x - right.x).max() > 1e-6
+
+
+def test_the_page_names_what_nobody_noticed() -> None:
+    page = trial.page([trial.Trial("ω₀₁ high", ()), trial.Trial("ω₀₂ high", (("table-5-P2", Outcome.REFUTED),))], [])
+    assert "1 of 2 noticed" in page
+    assert "| ω₀₁ high | **nobody** |" in page
+    assert "| ω₀₂ high | table-5-P2 |" in page

@@ -1,0 +1,201 @@
+"""Whole spectra from pushes: exact on linear motions, honest on bent ones, and judged."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import analytic
+from compare.claims import stability
+from compare.claims.claim import Outcome
+from compare.claims.judge import judge
+from compare.measure import rates
+from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.record import Measurement, Records
+from compare.runs.campaign import Campaign
+from compare.runs.engines import MUJOCO
+from compare.statistics import exponents, matched, propagator
+from model import Case, Parameters
+from model.arrays import Array
+from model.kinematics import VARIABLES
+
+P = Parameters.named("reference")
+EPS = float(np.finfo(float).eps)
+
+
+def linear(J: Array, interval: float, count: int = 200) -> Array:
+    """D(t) = exp(J t) at `count` samples."""
+    return np.stack([expm(J * interval * k) for k in range(count)])
+
+
+def mixed(*values: complex) -> Array:
+    """A matrix with these eigenvalues, none of its variables by itself; of a pair, one is given."""
+    blocks = [[[v.real, v.imag], [-v.imag, v.real]] if v.imag else [[v.real]] for v in map(complex, values)]
+    size = sum(len(block) for block in blocks)
+    J, at = np.zeros((size, size)), 0
+    for block in blocks:
+        J[at : at + len(block), at : at + len(block)] = block
+        at += len(block)
+    V = np.random.default_rng(1).normal(size=(size, size))
+    return np.asarray(V @ J @ np.linalg.inv(V))
+
+
+@pytest.mark.parametrize(
+    "values", [(-0.5,), (0.0, -0.7), (-400.0, -30.0, -0.3 + 7j), (0.0, 20j, -0.2, -1.0, -6.0), (3.0, -1.0)]
+)
+def test_all_exponents_of_a_linear_motion_are_measured(values: tuple[complex, ...]) -> None:
+    J, interval = mixed(*values), 1e-3
+    D = linear(J, interval)
+    found = exponents(lambda lag: propagator(D, lag), interval, len(D) // 3)
+    wanted = np.linalg.eigvals(J).astype(complex)
+    # The normal equations square the condition of the record; the least logarithm is over one interval.
+    rounding = EPS * np.linalg.cond(np.concatenate(D, axis=1)) ** 2 / interval
+    assert np.abs(matched(wanted, found) - found).max() <= 10 * rounding
+
+
+def test_a_long_lag_makes_slow_exponents_sharper() -> None:
+    J, interval, noise = mixed(-0.5, -20.0), 1e-3, 1e-7
+    D = linear(J, interval, 400)
+    D = D + noise * np.random.default_rng(2).normal(size=D.shape)
+
+    def error(longest: int) -> float:
+        found = exponents(lambda lag: propagator(D, lag), interval, longest)
+        return float(np.abs(found + 0.5).min())
+
+    assert error(128) < error(1)
+
+
+def state(case: Case, omega_0: float = 20.0) -> rates.State:
+    p = P.replace(omega_0=omega_0)
+    return rates.State("mine", p, case, np.zeros(8))
+
+
+def test_what_depends_on_the_size_of_the_push_and_on_the_step_is_extrapolated() -> None:
+    leaning = state(Case.SR)
+    lasts, samples = rates.RECORD
+    interval, step = lasts * coarse_step(leaning.p) / samples, coarse_step(leaning.p) / 16
+    J, other = mixed(-1.0, -5.0), mixed(2.0, 1.0)
+    bent = 0.05
+
+    def answer(size: float, h: float) -> Array:
+        return linear(J + (bent * size + (5.0 * h) ** 2) * other, interval)
+
+    coarse, large, small = (answer(size, h) for size, h in zip((0.05, 0.1, 0.05), (2 * step, step, step), strict=True))
+    found, uncertainty = rates.spectrum(leaning, (coarse, large, small), step)
+    wanted = matched(np.linalg.eigvals(J).astype(complex), found)
+    plain = np.linalg.eigvals(J + bent * 0.05 * other).astype(complex)
+    assert np.all(np.abs(found - wanted) <= 3 * uncertainty)
+    assert np.abs(found - wanted).max() < np.abs(matched(plain, found) - wanted).max() / 10
+
+
+def test_a_run_counts_up_to_where_the_ball_leaves_the_case(tmp_path: Path) -> None:
+    lab = Lab(Campaign(tmp_path, workers=0), MUJOCO, Level.QUICK)
+    slow = P.replace(omega_0=1.0)
+    (run,) = lab.run([lab.task(slow, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, P.R / 2, -0.5], 0.2, 1e-3)])
+    first = run.cases[1]
+    assert first in (Case.RN, Case.SN)
+    assert len(set(run.cases)) > 1
+    assert all(case is first for case in run.cases[1 : rates.stays(run, first)])
+    assert run.cases[rates.stays(run, first)] is not first
+
+
+def spectra(*cases: tuple[Case, float, Parameters]) -> Records:
+    """What a perfect engine would measure."""
+    rows = []
+    for case, omega_0, base in cases:
+        p = base.replace(omega_0=omega_0)
+        (found,) = (s for s in analytic.stationary_solutions(p) if s.case is case and (s.stable or case is Case.SR))
+        values = [*found.eigenvalues, *([0.0j] if case is Case.NS else [])]
+
+        def row(
+            quantity: str, value: float, sure: float, p: Parameters = p, case: Case = case, **of: float
+        ) -> Measurement:
+            return Measurement(
+                protocol="rates", quantity=quantity, value=value, uncertainty=sure, engine="mujoco", set="mine",
+                parameters=p, conditions={"case": case.name, **of},
+            )  # fmt: skip
+
+        rows.append(row("modes", len(values), 0.0))
+        slowest_first = sorted((v for v in values if v.imag >= 0), key=lambda v: -v.real)
+        for mode, value in enumerate(slowest_first, start=1):
+            sure = 1e-4 * (abs(value) or 1.0)
+            rows.append(row("decay_rate", -value.real, sure, mode=mode, frequency=value.imag))
+            rows.append(row("frequency", value.imag, sure, mode=mode, decay_rate=-value.real))
+    return Records(tuple(rows))
+
+
+ROUGH = Parameters.named("high-wall-friction")
+ALL = (
+    (Case.RR, 8.0, P),
+    (Case.RS, 0.0, P),
+    (Case.SR, 18.5, ROUGH),
+    (Case.SR, 28.0, ROUGH),
+    (Case.SS, 20.0, P),
+    (Case.NR, 28.0, ROUGH),
+    (Case.NS, 15.0, P),
+)
+
+
+def test_the_right_theory_is_confirmed() -> None:
+    for verdict in judge(stability.CLAIMS, spectra(*ALL)):
+        assert verdict.outcome is Outcome.CONFIRMED, verdict.claim.id
+
+
+@pytest.mark.parametrize("factor", [1.02, 0.98])
+def test_eigenvalues_that_are_two_per_cent_off_are_noticed_in_every_case(
+    monkeypatch: pytest.MonkeyPatch, factor: float
+) -> None:
+    records, right = spectra(*ALL), analytic.stationary_solutions
+    monkeypatch.setattr(
+        analytic, "stationary_solutions",
+        lambda p: [dataclasses.replace(s, eigenvalues=factor * s.eigenvalues) for s in right(p)],
+    )  # fmt: skip
+    for verdict in judge(stability.CLAIMS, records):
+        assert verdict.outcome is Outcome.REFUTED, verdict.claim.id
+
+
+def test_an_eigenvalue_too_many_or_too_few_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    records, right = spectra((Case.SS, 20.0, P)), analytic.stationary_solutions
+    (claim,) = (claim for claim in stability.CLAIMS if claim.id == "prop-4-rate")
+    for change in (lambda v: v[:-1], lambda v: np.append(v, v[-1])):
+        monkeypatch.setattr(
+            analytic, "stationary_solutions",
+            lambda p, change=change: [dataclasses.replace(s, eigenvalues=change(s.eigenvalues)) for s in right(p)],
+        )  # fmt: skip
+        assert judge([claim], records)[0].outcome is Outcome.REFUTED
+
+
+def test_a_state_that_theory_calls_unstable_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    records, right = spectra((Case.SS, 20.0, P)), analytic.stationary_solutions
+    (claim,) = (claim for claim in stability.CLAIMS if claim.id == "prop-4-rate")
+    unstable = analytic.Stability.UNSTABLE
+    monkeypatch.setattr(
+        analytic, "stationary_solutions", lambda p: [dataclasses.replace(s, stability=unstable) for s in right(p)]
+    )
+    assert judge([claim], records)[0].outcome is Outcome.REFUTED
+
+
+def test_the_rate_of_rolling_and_of_spinning_is_measured_with_mujoco(tmp_path: Path) -> None:
+    p = P.replace(omega_0=0.6 / time_unit(P))
+    values = {name: p.omega_0 if name == "omega_c" else 0.0 for name in VARIABLES[1:6]}
+    before = Records(
+        tuple(
+            Measurement(
+                protocol="settled", quantity=name, value=value, uncertainty=0.0, engine="mujoco", set="mine",
+                parameters=p, conditions={"case": "RR", "start": "rest"},
+            )
+            for name, value in values.items()
+        )
+    )  # fmt: skip
+    lab = Lab(Campaign(tmp_path, workers=0), MUJOCO, Level.QUICK)
+    records = Records.of(rates.measure(lab, {"mine": P}, before))
+    verdicts = {verdict.claim.id: verdict for verdict in judge(stability.CLAIMS, records)}
+    for name, quantities in (("prop-1-rate", 3), ("prop-2", 5)):
+        assert verdicts[name].outcome is Outcome.CONFIRMED
+        assert len(verdicts[name].checks) == quantities
+    assert verdicts["prop-4-rate"].outcome is Outcome.NOT_RUN
+    assert any("SS" in reason for reason in verdicts["prop-4-rate"].missing)

@@ -1,0 +1,109 @@
+"""Measurements come back from their files as they were, and a file that was touched is refused by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+
+from compare.measure import record
+from compare.measure.record import Measurement, Missing, Records
+from model import InputError, Parameters, StorageError
+
+P = Parameters.named("reference")
+
+
+def measurement(quantity: str = "omega_c", value: float = 11.9, **conditions: record.Condition) -> Measurement:
+    return Measurement(
+        protocol="settled",
+        quantity=quantity,
+        value=value,
+        uncertainty=1e-9,
+        engine="mujoco",
+        set="reference",
+        parameters=P,
+        conditions=conditions,
+        runs=("runs/a.h5", "runs/b.h5"),
+    )
+
+
+RECORDS = Records(
+    (measurement(case="RR", start="rest"), measurement("force_Ay", 0.1, case="SS", y=0.25), measurement("case", 4), measurement("slip_x", np.float64(0.1), mode=1)),
+    (Missing("settled", "reference", "it never settles"),),
+)
+
+
+def test_a_file_gives_back_what_was_saved(tmp_path: Path) -> None:
+    record.save(RECORDS, tmp_path / "settled.h5", {"level": "QUICK"})
+    assert record.load(tmp_path / "settled.h5") == RECORDS
+
+
+def test_no_measurements_are_measurements_too(tmp_path: Path) -> None:
+    only_missing = Records((), RECORDS.missing)
+    record.save(only_missing, tmp_path / "none.h5", {})
+    assert record.load(tmp_path / "none.h5") == only_missing
+
+
+def test_xarray_reads_it_as_a_table(tmp_path: Path) -> None:
+    record.save(RECORDS, tmp_path / "settled.h5", {})
+    with xarray.open_dataset(tmp_path / "settled.h5", engine="h5netcdf") as data:
+        table = data.to_dataframe()
+    assert list(table.quantity) == ["omega_c", "force_Ay", "case", "slip_x"]
+    assert table.unit[1] == "N"
+    assert list(table.omega_0) == [P.omega_0] * 4
+    assert np.isnan(table.at_y[0])
+
+
+def test_a_file_that_was_edited_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "settled.h5"
+    record.save(RECORDS, path, {})
+    with h5py.File(path, "r+") as file:
+        file["value"][0] = 12.0
+    with pytest.raises(StorageError, match=r"settled\.h5 was changed after it was written"):
+        record.load(path)
+
+
+def test_a_file_that_was_cut_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "settled.h5"
+    record.save(RECORDS, path, {})
+    content = path.read_bytes()
+    for length in range(0, len(content), len(content) // 7):
+        path.write_bytes(content[:length])
+        with pytest.raises(StorageError, match=r"settled\.h5"):
+            record.load(path)
+
+
+def test_bytes_that_were_exchanged_are_noticed_or_harmless(tmp_path: Path) -> None:
+    path, generator, refusals = tmp_path / "settled.h5", np.random.default_rng(1), []
+    record.save(RECORDS, path, {})
+    content = path.read_bytes()
+    for _ in range(200):
+        damaged = bytearray(content)
+        start = int(generator.integers(len(content)))
+        damaged[start : start + 8] = generator.bytes(8)
+        path.write_bytes(damaged)
+        try:
+            assert record.load(path) == RECORDS
+        except StorageError as error:
+            refusals.append(str(error))
+    assert refusals
+    assert all("settled.h5" in text for text in refusals)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StorageError, match="no such file"):
+        record.load(tmp_path / "nothing.h5")
+
+
+def test_an_unknown_quantity_is_refused() -> None:
+    with pytest.raises(InputError, match="omega_c"):
+        measurement("omega_d")
+
+
+def test_select() -> None:
+    assert [m.quantity for m in RECORDS.select("settled")] == ["omega_c", "force_Ay", "case", "slip_x"]
+    assert [m.value for m in RECORDS.select("settled", "force_Ay")] == [0.1]
+    assert not list(RECORDS.select("settled", where=lambda m: m.value > 100))

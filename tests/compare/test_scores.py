@@ -1,0 +1,108 @@
+"""The ladder of settings and error against cost: what is tried, from where, and what comes out as data."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.runs.campaign import Campaign
+from compare.runs.tasks import carry_out
+from compare.scorecard import scores, settings, trials
+from compare.scorecard.scores import Score
+from compare.scorecard.trials import ROLLING, SLIPPING, STATES
+from mjsim import ContactSettings
+from model import Trajectory
+
+STEP = 4e-3
+
+
+@pytest.fixture(scope="module")
+def exact() -> Trajectory:
+    (run,) = carry_out([trials.EXACT])
+    return run
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> Campaign:
+    return Campaign(tmp_path, workers=0)
+
+
+def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time() -> None:
+    rungs = settings.ladder(1e-3)
+    assert rungs[-1] == ContactSettings()
+    names = [settings.name(each) for each in rungs]
+    assert len(set(names)) == len(names)
+    contact = {"solref", "solreffriction", "solimp", "impratio"}  # one thing: what makes it stiff and continuous
+    for low, high in itertools.pairwise(rungs):
+        changed = {f.name for f in dataclasses.fields(low) if getattr(low, f.name) != getattr(high, f.name)}
+        assert len(changed) == 1 or changed == contact
+
+
+@pytest.mark.parametrize("step", [1e-3, STEP])
+def test_settings_are_named_after_what_they_are(step: float) -> None:
+    assert settings.name(ContactSettings.at(step)) == "ours"
+    assert settings.name(ContactSettings.at(step, memory=False, impratio=10.0)) == "ours, impratio 10, memory off"
+    assert settings.name(settings.newcomer(step)) == "MuJoCo's defaults"
+    for ways in (settings.rivals(step), settings.variants(step)):
+        assert len({settings.name(each) for each in ways}) == len(ways)
+
+
+def test_no_run_begins_where_it_should_end() -> None:
+    for state, task in zip(STATES, scores.tasks(ContactSettings.at(STEP)), strict=False):
+        assert task.parameters == state.p
+        assert abs(task.x0[2] / state.solution.x[2] - 1) > 0.01
+
+
+def test_errors_are_those_of_the_run(exact: Trajectory) -> None:
+    """A run of the slipping state, with known errors put in."""
+    task = dataclasses.replace(trials.EXACT, x0=tuple(SLIPPING.solution.x.tolist()), t_end=0.1)
+    (run,) = carry_out([task])
+    off = dataclasses.replace(run, omega_c=1.01 * run.omega_c, slip_z=run.slip_z + 2.0, force_B=0 * run.force_B)
+    held = trials.held(off, SLIPPING, 0.05)
+    assert held.omega_c == pytest.approx(0.01)
+    assert held.slip == pytest.approx(2.0 * SLIPPING.p.r)
+    assert held.open == 1
+    broken = dataclasses.replace(run, header=dataclasses.replace(run.header, failure="diverged"))
+    assert math.isnan(trials.held(broken, SLIPPING, 0.05).omega_c)
+    scaled = exact.x * np.where(np.arange(8) == 2, 1.001, 1.0)
+    omega_c, slip = trials.deviation(exact.time, scaled, exact)
+    assert omega_c == pytest.approx(1e-3)
+    assert slip == 0
+
+
+def test_ladder_as_records(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    rungs = settings.ladder(STEP)
+    monkeypatch.setattr(settings, "ladder", lambda step: [rungs[3], rungs[-1]])
+    found = scores.ladder(campaign, STEP)
+    assert [score.quantity for score in found] == 2 * [*(state.name for state in STATES), trials.TRANSIENT]
+    poor, ours = found[: len(found) // 2], found[len(found) // 2 :]
+    for worse, better in zip(poor, ours, strict=True):
+        assert better.error < worse.error
+        assert better.open == 0
+    plain = json.loads(json.dumps([score.to_mapping() for score in found]))
+    assert plain[0]["method"] == settings.name(rungs[3])
+    assert plain[0]["cost"] is None  # JSON has no nan
+    assert repr([Score.from_mapping(values) for values in plain]) == repr(found)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_run_that_breaks_down_has_no_error(campaign: Campaign) -> None:
+    """Known to diverge: a pyramidal cone with a low impedance."""
+    wild = ContactSettings.at(STEP, solimp=0.1, solreffriction=20 * STEP, cone="pyramidal", memory=False, order=1)
+    found = scores.scores(campaign, [wild])
+    assert all(math.isnan(score.error) for score in found if score.quantity == ROLLING.name)
+
+
+def test_frontier_has_a_cost_that_is_measured_once(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settings, "rivals", lambda step: [ContactSettings.at(step)])
+    monkeypatch.setattr(scores, "BATCH", 2)
+    found = scores.frontier(campaign, [STEP])
+    assert {(score.method, score.step) for score in found} == {("ours", STEP), ("time-stepping", STEP), ("event", None)}
+    assert all(score.cost > 0 for score in found)
+    assert scores.frontier(campaign, [STEP]) == found

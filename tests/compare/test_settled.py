@@ -1,0 +1,183 @@
+"""Protocols of stationary states, on one set with so much drag that everything settles at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import analytic
+from compare.measure import hysteresis, newcomer, plane, settled, settling, slope
+from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.quantities import quantity
+from compare.measure.record import Measurement, Missing, Records
+from compare.runs import engines
+from compare.runs.campaign import Campaign
+from model import Case, Parameters
+
+THICK = Parameters.named("reference").replace(c=10.0)
+FLOWS = (0.6, 1.4, 2.0, 2.6)
+"""Flows, omega_0 sqrt(R/g): one at which the ball rolls, two at which it slips, one at which the wall carries it."""
+
+
+def _lab(directory: Path) -> Lab:
+    return Lab(Campaign(directory, workers=0), engines.MUJOCO, Level.QUICK)
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    return _lab(tmp_path_factory.mktemp("runs"))
+
+
+@pytest.fixture(scope="module")
+def records(lab: Lab) -> Records:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settled, "QUICK", FLOWS)
+        return Records.of(settled.measure(lab, {"thick": THICK}, Records()))
+
+
+def _values(records: Records, Omega_0: float, case: Case) -> dict[str, Measurement]:
+    omega_0 = Omega_0 / time_unit(THICK)
+    return {
+        m.quantity: m
+        for m in records.select("settled")
+        if m.parameters.omega_0 == omega_0 and m.conditions["case"] == case.name and m.quantity != "case"
+    }
+
+
+class TestSettled:
+    def test_every_start_has_its_case(self, records: Records) -> None:
+        assert not records.missing
+        seen = {
+            (round(m.parameters.Omega_0, 3), m.conditions["start"]): Case(int(m.value))
+            for m in records.select("settled", "case")
+        }
+        assert len(seen) == 3 * len(FLOWS) + 1
+        assert seen[0.6, "rest"] is seen[0.6, "with the fluid"] is Case.RR
+        assert seen[1.4, "rest"] is seen[2.0, "rest"] is Case.SS
+        assert seen[2.6, "rest"] is Case.NR
+        assert [seen[flow, "on the wall"] for flow in FLOWS] == [Case.NS, Case.NS, Case.NS, Case.NR]
+
+    def test_rolling_has_the_sums_of_its_forces_only(self, records: Records) -> None:
+        values = _values(records, 0.6, Case.RR)
+        assert {q for q in values if q.startswith("force")} == set(settling.SUMS)
+        weight = THICK.m * THICK.g
+        assert values["force_Ay+By"].value == pytest.approx(weight, abs=3 * values["force_Ay+By"].uncertainty)
+
+    def test_a_ball_on_the_wall_carries_its_own_way_round(self, records: Records) -> None:
+        values = _values(records, 2.6, Case.NR)
+        pressed = THICK.m * THICK.R * values["omega_c"].value ** 2
+        assert values["force_Bx"].value == pytest.approx(pressed, rel=1e-6)
+        assert values["force_Ay"].value == 0.0
+
+    def test_a_sinking_ball_balances_weight_friction_and_drag(self, records: Records) -> None:
+        values = _values(records, 1.4, Case.NS)
+        drag = -THICK.m * THICK.c * values["v_y"].value
+        assert drag + values["force_By"].value == pytest.approx(THICK.m * THICK.g, rel=1e-6)
+        assert values["force_By"].value == pytest.approx(THICK.eta * values["force_Bx"].value, rel=1e-9)
+
+    def test_values_resolve_what_they_should(self, records: Records) -> None:
+        for m in records.select("settled", where=lambda m: m.quantity != "case"):
+            assert 0 < 3 * m.uncertainty <= quantity(m.quantity).resolves * settling.scale(m.quantity, m.parameters)
+
+    def test_what_does_not_settle_is_missing(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(settled, "QUICK", (0.6,))
+        monkeypatch.setattr(settling, "ROUNDS", 1)
+        monkeypatch.setattr(settling, "SOLVED", 1e-3)
+        found = Records.of(settled.measure(lab, {"thick": THICK}, Records()))
+        assert not found.measurements
+        assert all(isinstance(each, Missing) and "still drifts" in each.reason for each in found.missing)
+        assert len(found.missing) == 4
+
+    def test_states_of_different_steps_share_what_separates_them(self, records: Records) -> None:
+        # Half of the step is measured from the mean of the whole: the difference is part of the uncertainty.
+        m = _values(records, 1.4, Case.SS)["omega_c"]
+        solved = settling.SOLVED / (THICK.c * coarse_step(THICK)) * m.parameters.omega_0
+        assert m.uncertainty >= solved
+
+
+class TestSteadyMean:
+    def test_an_exponential_approach_is_within_its_uncertainty(self) -> None:
+        t = np.arange(1000) / 1000
+        for rate in (3.0, 10.0, 30.0):
+            means, uncertain = settling.steady_mean(np.array([2.0 + np.exp(-rate * t)]), 500)
+            assert abs(means[0] - 2.0) <= 3 * uncertain[0]
+
+    def test_an_oscillation_is_passed_over(self) -> None:
+        t = np.arange(1000) / 1000
+        for turns in (20.3, 31.7, 47.1):
+            means, _ = settling.steady_mean(np.array([2.0 + np.sin(2 * np.pi * turns * t + 1.0)]), 500)
+            # (TAPER/2)!^2/(pi m^(TAPER+1)) for m periods in the window.
+            assert abs(means[0] - 2.0) <= 24**2 / (np.pi * (turns / 2 - 4) ** (settling.TAPER + 1))
+
+
+class TestOthers:
+    def test_slopes_are_one_for_what_follows_the_fluid(self, lab: Lab, records: Records) -> None:
+        found = Records.of(slope.measure(lab, {"thick": THICK}, records))
+        by_case = {str(m.conditions["case"]): m for m in found.measurements}
+        assert set(by_case) == {"RR", "SS", "NR"}
+        for name in ("RR", "NR"):
+            assert by_case[name].value == pytest.approx(1.0, abs=3 * by_case[name].uncertainty)
+        assert abs(by_case["SS"].value - 1.0) > 0.1
+
+    def test_the_jump_is_looked_for_where_slipping_was_seen_to_begin(self, lab: Lab) -> None:
+        onset = Measurement(
+            protocol="onset",
+            quantity="omega_01",
+            value=analytic.thresholds(THICK).omega_01,
+            uncertainty=1e-6,
+            engine="mujoco",
+            set="thick",
+            parameters=THICK,
+        )
+        (only,) = slope.measure(lab, {"thick": THICK}, Records((onset,)))
+        if isinstance(only, Measurement):
+            assert only.value == pytest.approx(-1.0, abs=3 * only.uncertainty)
+        else:
+            assert "jump" in only.reason
+
+    def test_the_flow_is_raised_and_lowered(self, lab: Lab, records: Records) -> None:
+        found = Records.of(hysteresis.measure(lab, {"thick": THICK}, records))
+        sides = {str(m.conditions["side"]) for m in found.select("hysteresis", "case")}
+        assert sides == {"up", "down"}
+        first, *_, last = found.select("hysteresis", "case")
+        assert first.value == last.value == Case.RR
+        assert last.conditions["before"] == "SS"
+        assert Case.NR in {Case(int(m.value)) for m in found.select("hysteresis", "case")}
+
+    def test_no_loop_without_a_change_from_slipping_to_riding(self, lab: Lab) -> None:
+        (only,) = hysteresis.measure(lab, {"thick": THICK}, Records())
+        assert isinstance(only, Missing)
+
+    def test_the_newcomer_is_another_engine(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(settled, "QUICK", (0.6,))
+        rows = list(newcomer.measure(lab, {"reference": THICK}, Records()))
+        assert {row.engine for row in rows if isinstance(row, Measurement)} == {engines.NEWCOMER.name}
+        (only,) = newcomer.measure(lab, {"mine": THICK}, Records())
+        assert isinstance(only, Missing)
+
+
+class TestPlane:
+    def test_points_are_added_at_borders_each_kind_in_turn(self) -> None:
+        seen = [(u, 1 if u[0] < 0.5 else 2 if u[1] < 0.5 else 4) for u in plane.spread(60, 1)]
+        added = plane.added(seen)[:12]
+        assert len(added) == 12
+        # Between points that differ: near one of the two lines.
+        assert all(abs(u[0] - 0.5) < 0.25 or abs(u[1] - 0.5) < 0.25 for u in added)
+        assert any(u[0] > 0.6 for u in added)
+        assert any(u[0] < 0.6 and u[1] > 0.6 for u in added)
+
+    def test_a_few_points_are_measured(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(plane, "SPREAD", {Level.QUICK: 2})
+        monkeypatch.setattr(plane, "ADDED", {Level.QUICK: ()})
+        monkeypatch.setattr(plane, "DRAG", 10.0)
+        rows = list(plane.measure(lab, {"reference": THICK}, Records()))
+        masks = [row for row in rows if isinstance(row, Measurement)]
+        assert {m.conditions["figure"] for m in masks} <= set(plane.FIGURES)
+        assert len(masks) + sum(isinstance(row, Missing) for row in rows) >= 2
+        for m in masks:
+            assert int(m.value) & (1 << Case.NR | 1 << Case.NS)  # what starts on the wall stays or sinks
+
+    def test_sr_counts_as_nr(self) -> None:
+        assert settling.family(Case.SR) is Case.NR
