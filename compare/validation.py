@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Claim, Outcome, Verdict
+from compare.claims.claim import Outcome, Verdict
 from compare.claims.judge import judge, select
 from compare.figures.drawing import Material
 from compare.measure import programme, record
@@ -72,7 +73,7 @@ def validate(
             waiting = {protocol.name for protocol in ahead}
             for claim in [each for each in todo if not waiting & each.protocols]:
                 todo.remove(claim)
-                verdicts[claim.id] = _verdict(claim, records, broken)
+                verdicts[claim.id] = _verdict(judge([claim], records)[0], broken)
                 announce(verdicts[claim.id])
             if not ahead:
                 break
@@ -87,7 +88,7 @@ def validate(
             progress("ladder of settings, error against cost", 0, 1, 0)
             scoreboard.write(campaign, output)
     files = [path for protocol in PROTOCOLS if (path := kept / f"{protocol.name}.h5").exists()]
-    _judged(output, level, files, report)
+    _judged(output, level, files, report, broken)
     return [verdicts[claim.id] for claim in chosen]
 
 
@@ -116,9 +117,11 @@ def stored_material(directory: Path) -> Material:
     return material(directory, judge(CLAIMS, records), records)
 
 
-def _judged(directory: Path, level: Level, files: Sequence[Path], report: bool) -> list[Verdict]:
+def _judged(
+    directory: Path, level: Level, files: Sequence[Path], report: bool, broken: Mapping[str, str] | None = None
+) -> list[Verdict]:
     records = sum((record.load(path) for path in files), Records())
-    verdicts = judge(CLAIMS, records)
+    verdicts = [_verdict(verdict, broken or {}) for verdict in judge(CLAIMS, records)]
     summary = Summary.of(directory, verdicts, level, files)
     if report:
         from compare.report import report as page  # here, because drawing takes a second to load
@@ -129,11 +132,10 @@ def _judged(directory: Path, level: Level, files: Sequence[Path], report: bool) 
     return verdicts
 
 
-def _verdict(claim: Claim, records: Records, broken: Mapping[str, str]) -> Verdict:
-    errors = [why for name, why in broken.items() if name in claim.protocols]
-    if errors:
-        return Verdict(claim=claim, outcome=Outcome.ERROR, error="; ".join(errors))
-    return judge([claim], records)[0]
+def _verdict(judged: Verdict, broken: Mapping[str, str]) -> Verdict:
+    """The verdict, or that one of the protocols of its claim broke down."""
+    errors = [why for name, why in broken.items() if name in judged.claim.protocols]
+    return replace(judged, outcome=Outcome.ERROR, error="; ".join(errors)) if errors else judged
 
 
 def _progress(show: Show, protocol: Protocol) -> Callable[[Progress], None]:

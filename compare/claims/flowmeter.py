@@ -159,8 +159,17 @@ CLAIMS = (
         id="unloading-limit",
         section=SECTION,
         source="Section 5.3, (85)",
-        statement="The wall carries the ball at flows above ω₀₂; below, it slips and sinks.",
-        bearings=(_settled("case", _unloads, _on_wall),),
+        statement="The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and sinks.",
+        bearings=(
+            _settled("case", _unloads, _on_wall),
+            Bearing(
+                protocol="thresholds",
+                quantity="omega_02",
+                predict=lambda m: analytic.unloading_limit(m.parameters),
+                when=lambda m: m.conditions["side"] == "from above",
+                by="analytic.unloading_limit",
+            ),
+        ),
     ),
     Claim(
         id="fig-13-left",

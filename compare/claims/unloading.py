@@ -112,19 +112,4 @@ CLAIMS = (
         statement="A small push lifts the ball from SR to NR, where it stays off the floor.",
         bearings=(_bearing("case", _case, start="push"), _bearing("lift", _lift)),
     ),
-    Claim(
-        id="unloading-limit",
-        section=SECTION,
-        source="section 5.3",
-        statement="A ball on the wall stays there as long as ω₀ is above ω₀₂, the limit of operation at unloading.",
-        bearings=(
-            Bearing(
-                protocol="thresholds",
-                quantity="omega_02",
-                predict=lambda m: analytic.unloading_limit(m.parameters),
-                when=lambda m: m.conditions["side"] == "from above",
-                by="analytic.unloading_limit",
-            ),
-        ),
-    ),
 )

@@ -68,27 +68,21 @@ def draw(strips: Strips) -> Figure:
         axes.axvspan(-band, band, color=grey, lw=0, zorder=0)
     axes.axvline(0, **style.GUIDE)
     many = len(strips.checks) > _MANY
-    for row, name in enumerate(names):
-        alike = [c for c in strips.checks if c.measurement.quantity == name]
-        # Neighbours one above the other, so that few points lie upon each other.
-        lanes = row + 0.6 * ((np.arange(len(alike)) * 0.618 + 0.5) % 1 - 0.5) * (len(alike) > 1)
-        for engine in engines:
-            chosen = np.array([c.measurement.engine == engine for c in alike])
-            ratio = np.array([c.deviation / c.tolerance for c in alike])[chosen]
-            mark, colour = (ENGINES[engine].mark, ENGINES[engine].colour) if engine in ENGINES else ("D", "0.3")
-            look: dict[str, Any] = {
-                "color": colour,
-                "mfc": "none" if many else "white",
-                "ls": "none",
-                "rasterized": many,
-            }
-            within, at = np.abs(ratio) <= _WIDEST, lanes[chosen]
-            axes.plot(ratio[within], at[within], marker=mark, ms=3 if many else 4.5, label=engine, **look)
-            for side, arrow in ((-1, "<"), (1, ">")):
-                beyond = side * ratio > _WIDEST
-                axes.plot(
-                    np.full(beyond.sum(), side * _WIDEST), at[beyond], marker=arrow, ms=7, color="#B3261E", ls="none"
-                )
+    row = np.array([names.index(c.measurement.quantity) for c in strips.checks])
+    # Neighbours one above the other, so that few points lie upon each other; one that is alone in the middle.
+    alone = np.bincount(row)[row] == 1
+    lanes = row + np.where(alone, 0.0, 0.6 * ((np.arange(len(row)) * 0.618 + 0.5) % 1 - 0.5))
+    ratio = np.array([c.deviation / c.tolerance for c in strips.checks])
+    within = np.abs(ratio) <= _WIDEST
+    for engine in engines:
+        own = within & [c.measurement.engine == engine for c in strips.checks]
+        mark, colour = (ENGINES[engine].mark, ENGINES[engine].colour) if engine in ENGINES else ("D", "0.3")
+        look: dict[str, Any] = {"ms": 3, "mfc": "none"} if many else {"ms": 4.5, "mfc": "white"}
+        axes.plot(ratio[own], lanes[own], marker=mark, color=colour, ls="none", label=engine, rasterized=many, **look)
+    for side, arrow in ((-1, "<"), (1, ">")):
+        beyond = side * ratio > _WIDEST
+        at = np.full(beyond.sum(), side * _WIDEST)
+        axes.plot(at, lanes[beyond], marker=arrow, ms=7, color="#B3261E", ls="none", rasterized=many)
     axes.set_yticks(range(len(names)), [quantity(name).symbol for name in names])
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xlim(-1.08 * _WIDEST, 1.08 * _WIDEST)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,7 +61,7 @@ class Search:
 def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
     """Narrow every search down to its width, or as far as runs show it, all of them together, round by round.
 
-    With `careful` the last round is done once more with half the time step, which gives `Bracket.shift`.
+    With `careful` the ends of the brackets are asked once more with half the time step, see `Bracket.shift`.
     """
     found = [search.begin for search in searches]
     before = list(found)
@@ -70,26 +70,30 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
         for k, bracket in zip(todo, _round(lab, [searches[k] for k in todo], [found[k] for k in todo]), strict=True):
             before[k], found[k] = found[k], bracket
         todo = [k for k in todo if found[k].high - found[k].low < (before[k].high - before[k].low) / 2]
-    if not careful:
-        return found
-    again = _round(lab, searches, before, FINER)
-    return [Bracket(b.low, b.high, b.runs, b.tasks, _between(b, more)) for b, more in zip(found, again, strict=True)]
+    return _checked(lab, searches, found, before) if careful else found
 
 
-def _between(one: Bracket, other: Bracket) -> float:
-    """Distance of two brackets, 0 where they overlap by half or more."""
-    apart = abs(one.low + one.high - other.low - other.high) / 2
-    return apart if apart > (one.high - one.low) / 2 else 0.0
+def _checked(
+    lab: Lab, searches: Sequence[Search], found: Sequence[Bracket], before: Sequence[Bracket]
+) -> list[Bracket]:
+    """Ask at the ends of the brackets with half the time step; one that doesn't hold is as wide as that before it."""
+    tasks = [s.task(v, b, FINER) for s, b in zip(searches, found, strict=True) for v in (b.low, b.high)]
+    runs = lab.run(tasks)
+    answers = [(s.answer(low), s.answer(high)) for s, low, high in zip(searches, runs[::2], runs[1::2], strict=True)]
+    return [
+        replace(bracket, shift=wide.high - wide.low) if low is False or high is True else bracket
+        for bracket, wide, (low, high) in zip(found, before, answers, strict=True)
+    ]
 
 
-def _round(lab: Lab, searches: Sequence[Search], brackets: Sequence[Bracket], care: Care = USUAL) -> list[Bracket]:
+def _round(lab: Lab, searches: Sequence[Search], brackets: Sequence[Bracket]) -> list[Bracket]:
     """Ask inside every bracket; once more, for longer, where the run doesn't show the answer."""
     asked = [(s, b, v) for s, b in zip(searches, brackets, strict=True) for v in _inside(b)]
-    tasks = [s.task(v, b, care) for s, b, v in asked]
+    tasks = [s.task(v, b, USUAL) for s, b, v in asked]
     runs = lab.run(tasks)
     answers = [s.answer(run) for (s, _, _), run in zip(asked, runs, strict=True)]
     open_ = [k for k, answer in enumerate(answers) if answer is None]
-    longer = [asked[k][0].task(asked[k][2], asked[k][1], Care(LONGER.time, care.refine)) for k in open_]
+    longer = [asked[k][0].task(asked[k][2], asked[k][1], LONGER) for k in open_]
     for k, task, run in zip(open_, longer, lab.run(longer), strict=True):
         tasks[k], runs[k], answers[k] = task, run, asked[k][0].answer(run)
     rows = [slice(n * SECTIONS, (n + 1) * SECTIONS) for n in range(len(searches))]

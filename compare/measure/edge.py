@@ -38,7 +38,7 @@ REACH = 5e-3
 """Half the length of a later line, in those parts."""
 TOGETHER = 2e-3
 """The distance up to which two runs count as being together, in those parts."""
-CYCLES = {Level.QUICK: 3, Level.DEFAULT: 4, Level.FULL: 6}
+CYCLES = {Level.QUICK: 4, Level.DEFAULT: 5, Level.FULL: 6}
 """Lines for each edge."""
 
 

@@ -39,7 +39,7 @@ LASTS = 6.0
 """Duration of a motion in units of sqrt(R/g)."""
 REFINED = 16
 """Steps in one of `coarse_step`, each sampled."""
-PIECES = {Level.QUICK: 12, Level.DEFAULT: 20, Level.FULL: 32}
+PIECES = {Level.QUICK: 6, Level.DEFAULT: 20, Level.FULL: 32}
 """Pieces of a motion."""
 LENGTH = 40
 """Samples in a piece."""

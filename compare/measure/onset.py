@@ -38,7 +38,7 @@ from model.arrays import Array
 
 GRID: Array = np.linspace(0.3, 4.5, 15)
 """Flows at which every set is looked at, in units of sqrt(g/R)."""
-WIDTH = {Level.QUICK: 1e-5, Level.DEFAULT: 1e-6, Level.FULL: 5e-7}
+WIDTH = {Level.QUICK: 5e-5, Level.DEFAULT: 1e-6, Level.FULL: 5e-7}
 """Relative width to which a change of the contacts is bracketed."""
 ROUGH_WIDTH = 1e-2
 """The same where only the neighbourhood is wanted."""
@@ -75,7 +75,7 @@ class Map:
 
 def look(lab: Lab, sets: Mapping[str, Parameters]) -> dict[str, Map]:
     """Run every set at every flow of the grid from each kind of start."""
-    begin: dict[str, tuple[From, float]] = {"rest": (rest, 20), "rolling": (rolling, 5), "wall": (wall, 20)}
+    begin: dict[str, tuple[From, float]] = {"rest": (rest, 20), "rolling": (rolling, 5), "wall": (wall, 12)}
     tasks = {
         (name, kind, k): held(lab, p, omega, start(p, omega), units)
         for name, p in sets.items()

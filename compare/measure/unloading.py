@@ -21,11 +21,13 @@ from compare.measure.record import Condition, Measurement, Missing, Records
 from compare.measure.settling import Settled, Start, family, high, settle
 from compare.runs.tasks import Task
 from compare.statistics import settled_case
-from model import Parameters, Trajectory
+from model import Case, Parameters, Trajectory
 from model.arrays import Array
 from model.kinematics import VARIABLES
 
 PROTOCOL = "unloading"
+LANDING, UNLOADED, UPWARDS, BY_SPIN = "unloading until it lands", "unloading", "push upwards", "push by spin"
+"""Names of the trials."""
 ABOVE, BELOW = 1.02, 0.95
 """Flows before and after the unloading, in units of the measured omega_02."""
 LIFTED = 1.1
@@ -37,8 +39,8 @@ PUSH = 1e-2
 """How hard it is pushed: speed over sqrt(g R), or more spin over its spin on the wall."""
 REFINE = {Level.QUICK: (16, 32), Level.DEFAULT: (32, 64), Level.FULL: (64, 128)}
 """Time steps, as parts of the coarse one, of motions with a landing that counts; four times as long without."""
-UNLOADING, LIFTING = 5.0, 10.0
-"""Lengths of the runs in units of 1/c."""
+UNLOADING, SETTLING = 2.5, 6.0
+"""Lengths of the runs in units of 1/c: of an unloading until after the landing, and of all others."""
 ONSET = (1e-4, 1e-3)
 """Slip speeds over sqrt(g R) between which the onset of slip is looked for: it grows like the square of the time."""
 BOUNCE = (5, 12)
@@ -75,7 +77,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         if state.failure:
             yield Missing(PROTOCOL, start.set, f"no ball to begin with on the wall: {state.failure}")
         elif kind == "unloading":
-            trials.append(_unloading(lab, state))
+            trials += [_unloading(lab, state, landing) for landing in (True, False)]
         else:
             trials += [_push(lab, state, upwards) for upwards in (True, False)]
     lab.complete([task for trial in trials for task in trial.tasks])
@@ -87,10 +89,10 @@ def _limit(records: Records, name: str, quantities: Sequence[str]) -> float | No
     return found[0] if found else None
 
 
-def _unloading(lab: Lab, state: Settled) -> Trial:
+def _unloading(lab: Lab, state: Settled, landing: bool) -> Trial:
     p = state.start.p
     x0 = np.array([HEIGHT * p.R, 0.0, *state.mean[2:4], 0.0, 0.0])
-    return _trial(lab, state, "unloading", p.replace(omega_0=p.omega_0 * BELOW / ABOVE), x0, UNLOADING)
+    return _trial(lab, state, LANDING if landing else UNLOADED, p.replace(omega_0=p.omega_0 * BELOW / ABOVE), x0)
 
 
 def _push(lab: Lab, state: Settled, upwards: bool) -> Trial:
@@ -98,17 +100,15 @@ def _push(lab: Lab, state: Settled, upwards: bool) -> Trial:
     v_y = PUSH * math.sqrt(p.g * p.R) if upwards else 0.0
     spin = 0.0 if upwards else PUSH * (x[3] + p.R / p.r * x[2])
     x0 = np.array([0.0, v_y, x[2], x[3] + spin, 0.0, 0.0])
-    return _trial(lab, state, "push upwards" if upwards else "push by spin", p, x0, LIFTING)
+    return _trial(lab, state, UPWARDS if upwards else BY_SPIN, p, x0)
 
 
-def _trial(lab: Lab, state: Settled, name: str, p: Parameters, x0: Array, units: float) -> Trial:
+def _trial(lab: Lab, state: Settled, name: str, p: Parameters, x0: Array) -> Trial:
     """Runs with both steps, sampled at every step where a landing is looked at."""
-    t_end, tasks = lasting(p, units), []
+    t_end, tasks = lasting(p, UNLOADING if name == LANDING else SETTLING), []
     for refine in REFINE[lab.level]:
-        lands = name == "unloading"
-        step = coarse_step(p) / (refine if lands else refine // 4)
-        samples = round(t_end / step) if lands else 1000
-        tasks.append(lab.task(p, x0, t_end, step, samples=samples))
+        step = coarse_step(p) / (refine if name == LANDING else refine // 4)
+        tasks.append(lab.task(p, x0, t_end, step, samples=round(t_end / step) if name == LANDING else 1000))
     return Trial(state.start.set, name, p, x0, tasks)
 
 
@@ -117,13 +117,10 @@ def _rows(lab: Lab, trials: Sequence[Trial]) -> Iterator[Measurement | Missing]:
     measured: dict[tuple[str, str, str], list[tuple[Trial, float, float, float]]] = {}
     for trial in trials:
         coarse, fine = lab.run(trial.tasks)
-        cases = [family(settled_case(run)) for run in (coarse, fine)]
-        if cases[0] is cases[1]:
-            yield _record(lab, trial, "case", float(cases[1]), 0.0)
-        else:
-            yield Missing(PROTOCOL, trial.set, f"{trial.name}: with half the time step the ball ends up otherwise")
-        numbers = [_unloaded(run) if trial.name == "unloading" else _lifted(run, trial) for run in (coarse, fine)]
-        if not all(numbers):
+        if trial.name != LANDING:
+            yield _ended(lab, trial, *(family(settled_case(run)) for run in (coarse, fine)))
+        numbers = [_numbers(trial.name, run) for run in (coarse, fine)]
+        if numbers[0].keys() != numbers[1].keys() or (trial.name == LANDING and not numbers[1]):
             yield Missing(PROTOCOL, trial.set, f"{trial.name}: the ball does not slip and land")
             continue
         for key, (value, own) in numbers[1].items():
@@ -133,6 +130,12 @@ def _rows(lab: Lab, trials: Sequence[Trial]) -> Iterator[Measurement | Missing]:
         usual = float(np.median([change for *_, change in rows]))
         for trial, value, own, change in rows:
             yield _record(lab, trial, quantity, value, math.hypot(max(change, usual) * value, own), event=event)
+
+
+def _ended(lab: Lab, trial: Trial, coarse: Case, fine: Case) -> Measurement | Missing:
+    if coarse is fine:
+        return _record(lab, trial, "case", float(fine), 0.0)
+    return Missing(PROTOCOL, trial.set, f"{trial.name}: with half the time step the ball ends up otherwise")
 
 
 def _record(lab: Lab, trial: Trial, quantity: str, value: float, sure: float, **conditions: Condition) -> Measurement:
@@ -154,7 +157,16 @@ Numbers = dict[tuple[str, str], tuple[float, float]]
 """Value and own uncertainty by quantity and event."""
 
 
-def _unloaded(run: Trajectory) -> Numbers:
+def _numbers(name: str, run: Trajectory) -> Numbers:
+    """What a trial shows; of a push upwards, after which the ball falls on the floor first, how high it came first."""
+    if name == LANDING:
+        return _landed(run)
+    if name == UPWARDS:
+        return {("lift", "first top"): (first_top(run), 0.0)}
+    return {("lift", "end"): (float(run.y[-1]), 0.0)} if name == BY_SPIN else {}
+
+
+def _landed(run: Trajectory) -> Numbers:
     """Onset of slip, and landing: time, speed and vertical impulse. Empty where it doesn't come to that."""
     p, step = run.header.parameters, float(run.time[1] - run.time[0])
     slip = run.slip_speed_B / math.sqrt(p.g * p.R)
@@ -186,10 +198,3 @@ def first_top(run: Trajectory) -> float:
     before, after = run.v_y[k - 1], run.v_y[k]
     wait = (run.time[k] - run.time[k - 1]) * before / (before - after)
     return float(run.y[k - 1] + before * wait / 2)
-
-
-def _lifted(run: Trajectory, trial: Trial) -> Numbers:
-    """How high it is in the end; after a push upwards, which ends on the floor, how high it came first."""
-    if trial.name == "push upwards":
-        return {("lift", "first top"): (first_top(run), 0.0)}
-    return {("lift", "end"): (float(run.y[-1]), 0.0)}

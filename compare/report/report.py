@@ -166,10 +166,10 @@ def _lead(ran: Sequence[Verdict]) -> str:
         for check in verdict.checks
         if check.measurement.quantity == "omega_c" and verdict.claim.section == "Stationary states"
     ]
-    orbits = [check for check in orbits if math.isfinite(check.predicted) and check.predicted]
+    orbits = [check for check in orbits if math.isfinite(check.predicted) and check.scale > 0]
     if not orbits:
         return what + "Its closed-form theory by Antali and Stépán is held against simulation."
-    largest = max(abs(check.deviation / check.predicted) for check in orbits)
+    largest = max(abs(check.deviation / check.scale) for check in orbits)
     return what + (
         "Its angular velocity ω_c in stationary states, predicted in closed form by Antali and Stépán, was measured "
         f"{len(orbits)} times; the largest relative deviation is {largest:.1e}."

@@ -31,7 +31,12 @@ def measurement(quantity: str = "omega_c", value: float = 11.9, **conditions: re
 
 
 RECORDS = Records(
-    (measurement(case="RR", start="rest"), measurement("force_Ay", 0.1, case="SS", y=0.25), measurement("case", 4), measurement("slip_x", np.float64(0.1), mode=1)),
+    (
+        measurement(case="RR", start="rest"),
+        measurement("force_Ay", 0.1, case="SS", y=0.25),
+        measurement("case", 4),
+        measurement("slip_x", np.float64(0.1), mode=1),
+    ),
     (Missing("settled", "reference", "it never settles"),),
 )
 

@@ -1,0 +1,208 @@
+"""Thresholds: bisection and extrapolation on functions with known answers, the protocol on one set, and the claims."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import analytic
+from compare.claims import bifurcations
+from compare.claims.claim import Outcome
+from compare.claims.judge import judge
+from compare.measure import onset, thresholds
+from compare.measure.brackets import FINER, LONGER, Bracket, Search, narrow
+from compare.measure.edge import Edge, _falls_behind
+from compare.measure.extrapolation import turning, vanishing
+from compare.measure.lab import Lab, Level
+from compare.measure.questions import held, keeps_on, rolling, settles, slides, stays_rolling
+from compare.measure.record import Measurement, Records
+from compare.measure.sets import sets
+from compare.runs.campaign import Campaign
+from compare.runs.engines import MUJOCO
+from compare.statistics import Measured
+from model import Case, Parameters
+
+REFERENCE = Parameters.named("reference")
+NUMBERS = SimpleNamespace(run=list)
+"""Stands for a lab whose tasks are their own runs."""
+
+
+def test_bisection_closes_in_on_the_change():
+    search = Search(Bracket(0.0, 1.0), lambda v, b, care: v, lambda v: v < math.pi / 10, 1e-6)
+    (found,) = narrow(NUMBERS, [search])
+    assert found.low < math.pi / 10 < found.high
+    assert found.high - found.low <= 1e-6
+    assert found.shift == 0
+
+
+def test_undecided_runs_are_repeated_and_else_left_open():
+    def answer(run):
+        value, care = run
+        if abs(value - 0.5) < 0.1:
+            return value < 0.47 if care is LONGER and value < 0.47 else None
+        return value < 0.5
+
+    search = Search(Bracket(0.0, 1.0), lambda v, b, care: (v, care), answer, 1e-3)
+    (found,) = narrow(NUMBERS, [search], careful=False)
+    assert found.low < 0.47 <= 0.5 < found.high
+    assert found.high - found.low > 0.1
+
+
+def test_a_change_that_moves_with_the_time_step_is_uncertain():
+    def task(value, bracket, care):
+        return value, 0.31 if care is FINER else 0.3
+
+    (found,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), task, lambda run: run[0] < run[1], 1e-4)])
+    assert found.low < 0.3 < found.high
+    assert found.shift > 0
+    assert found.place.uncertainty >= found.shift
+
+
+def test_an_end_that_was_never_asked_shows():
+    (found,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), lambda v, b, care: v, lambda v: True, 0.5)], careful=False)
+    assert found.runs[1] is None
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6])
+def test_extrapolated_zero_is_as_sure_as_it_says(noise):
+    where = 2.0 * (1 + onset.NEAR)
+    values = [Measured(math.sin(w - 2) * (1 + w), noise) for w in where]
+    found = vanishing(where, values)
+    assert abs(found.value - 2.0) < 3 * found.uncertainty
+    assert found.uncertainty < 1e-4
+
+
+def test_extrapolated_maximum_is_as_sure_as_it_says():
+    slip = 1 + np.sqrt(onset.TURNS)  # its maximum is at slip = 1, with a cubic part
+    where = 3 - (slip - 1) ** 2 * (1 + 0.5 * (slip - 1) + 0.2 * (slip - 1) ** 2)
+    found = turning(where, [Measured(-float(s), 1e-9) for s in slip])
+    assert abs(found.value - 3) < 3 * found.uncertainty
+    assert found.uncertainty < 1e-3
+
+
+def test_a_line_has_no_maximum():
+    where = np.linspace(1.0, 2.0, 6)[::-1]
+    assert not math.isfinite(turning(where, [Measured(float(w), 0.0) for w in where]).value)
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
+        yield Lab(campaign, MUJOCO, Level.QUICK)
+
+
+def _ran(lab, p, omega, x0, units=5.0):
+    return lab.run([held(lab, p, omega, x0, units)])[0]
+
+
+def test_the_engine_begins_to_slip_at_omega_01(lab):
+    omega_01 = analytic.thresholds(REFERENCE).omega_01
+    for side, stays in ((-1, True), (1, False)):
+        omega = omega_01 * (1 + side * 1e-5)
+        assert stays_rolling(_ran(lab, REFERENCE, omega, rolling(REFERENCE, omega))) is stays
+
+
+def test_the_wall_lets_go_at_omega_02(lab):
+    omega_02 = analytic.thresholds(REFERENCE).omega_02
+    for side in (-1, 1):
+        p = REFERENCE.replace(omega_0=omega_02 * (1 + side * 1e-5))
+        x = analytic.solution(p, Case.NR, formal=True).x.copy()
+        x[0] = p.R
+        assert slides(_ran(lab, p, p.omega_0, x)) is (side < 0)
+
+
+def test_what_runs_away_beyond_the_fold_does_not_settle(lab):
+    omega_04 = analytic.thresholds(REFERENCE).omega_04
+    p = REFERENCE.replace(omega_0=0.99 * omega_04)
+    x = analytic.solution(p, Case.SS).x
+    assert settles(_ran(lab, p, 0.985 * omega_04, x, 20.0))
+    away = _ran(lab, p, 1.02 * omega_04, x, 20.0)
+    assert settles(away) is False
+    assert not keeps_on(away)
+
+
+def test_edge_tells_by_the_way_a_run_still_goes():
+    slipping, lifted = np.eye(8)[2] * 10.0, np.eye(8)[2] * 30.0
+    edge = Edge("reference", REFERENCE, slipping, lifted, slipping, (0.0, 1.0))
+    for rate, falls in ((-0.1, True), (0.1, False)):
+        assert _falls_behind(SimpleNamespace(time=np.arange(101), omega_c=25 + rate * np.arange(101)), edge) is falls
+    for end, falls in ((10.0, True), (30.0, False)):
+        assert _falls_behind(SimpleNamespace(time=np.arange(101), omega_c=np.full(101, end)), edge) is falls
+
+
+def test_protocol_on_a_set_without_fold(lab, monkeypatch):
+    monkeypatch.setattr(onset, "WIDTH", {Level.QUICK: 1e-3})
+    name = "thick-fluid"
+    p = sets(Level.QUICK)[name]
+    records = Records.of(thresholds.measure(lab, {name: p}, Records()))
+    found = {(m.quantity, m.conditions.get("by")) for m in records.measurements}
+    assert len(found) == 6
+    assert {quantity for quantity, _ in found} == {"omega_01", "omega_02", "folds"}
+    assert any("no omega_04" in each.reason for each in records.missing)
+    verdicts = {v.claim.id: v for v in judge(bifurcations.CLAIMS, records)}
+    for claim in ("table-5-P3", "table-5-P2", "eta-critical"):
+        assert all(check.agrees for check in verdicts[claim].checks), claim
+    assert verdicts["table-5-F"].outcome is Outcome.NOT_RUN
+
+
+def _measured(quantity, value, protocol="thresholds", p=REFERENCE, **conditions):
+    return Measurement(
+        protocol=protocol, quantity=quantity, value=value, uncertainty=1e-6 * abs(value), engine="mujoco",
+        set="reference", parameters=p, conditions=conditions,
+    )  # fmt: skip
+
+
+def _records():
+    t = analytic.thresholds(REFERENCE)
+    rough = Parameters.named("high-wall-friction")
+    by = {"side": "from above", "by": "hand"}
+    p = REFERENCE.replace(omega_0=(t.omega_02 + t.omega_04) / 2)
+    x = analytic.solution(p, Case.SS, stable=False).x
+    return Records(
+        (
+            _measured("omega_01", t.omega_01, **by),
+            _measured("omega_02", t.omega_02, **by),
+            _measured("omega_04", t.omega_04, **by),
+            _measured("omega_03", analytic.thresholds(rough).omega_03, p=rough, **by),
+            _measured("omega_02", t.omega_02, "edge", **by),
+            dataclasses.replace(_measured("folds", 1.0), uncertainty=0.0),
+            _measured("edge_omega_c", x[2], "edge", p, case="SS"),
+            _measured("edge_slip_x", x[3], "edge", p, case="SS"),
+        )
+    )
+
+
+def test_claims_agree_with_the_right_theory():
+    assert {v.outcome for v in judge(bifurcations.CLAIMS, _records())} == {Outcome.CONFIRMED}
+
+
+@pytest.mark.parametrize(
+    ("name", "claims"),
+    [
+        ("omega_01", {"table-5-P3"}),
+        ("omega_02", {"table-5-P2", "table-5-NF2"}),
+        ("omega_03", {"table-5-NT1"}),
+        ("omega_04", {"table-5-F"}),
+    ],
+)
+def test_claims_notice_a_threshold_that_is_a_little_off(monkeypatch, name, claims):
+    records, right = _records(), analytic.thresholds
+
+    def wrong(p):
+        t = right(p)
+        return dataclasses.replace(t, **{name: getattr(t, name) * (1 + 1e-4)})
+
+    monkeypatch.setattr(analytic, "thresholds", wrong)
+    assert {v.claim.id for v in judge(bifurcations.CLAIMS, records) if v.outcome is Outcome.REFUTED} == claims
+
+
+def test_claims_notice_a_wrong_critical_friction_and_a_missing_branch(monkeypatch):
+    records, right, solution = _records(), analytic.thresholds, analytic.solution
+    monkeypatch.setattr(analytic, "thresholds", lambda p: dataclasses.replace(right(p), eta_cr=0.3))
+    monkeypatch.setattr(analytic, "solution", lambda p, case, stable: solution(p, case, stable=True))
+    refuted = {v.claim.id for v in judge(bifurcations.CLAIMS, records) if v.outcome is Outcome.REFUTED}
+    assert refuted == {"eta-critical", "sub-branches"}

@@ -1,0 +1,65 @@
+"""Unloading and pushes: numbers read off theory's own runs, and the claims."""
+
+from __future__ import annotations
+
+import pytest
+
+import analytic
+from compare.claims import unloading as claims
+from compare.claims.claim import Outcome
+from compare.claims.judge import judge
+from compare.measure import unloading
+from compare.measure.lab import Lab, Level
+from compare.measure.record import Measurement, Records
+from compare.measure.sets import sets
+from compare.runs.campaign import Campaign
+from compare.runs.engines import MUJOCO
+
+NAME = "thick-fluid"
+P = sets(Level.QUICK)[NAME]
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    limit = Measurement(
+        protocol="thresholds", quantity="omega_02", value=analytic.thresholds(P).omega_02, uncertainty=1e-5,
+        engine="mujoco", set=NAME, parameters=P, conditions={"side": "from above", "by": "hand"},
+    )  # fmt: skip
+    with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
+        lab, known = Lab(campaign, MUJOCO, Level.QUICK), Records((limit,))
+        return known + Records.of(unloading.measure(lab, {NAME: P}, known))
+
+
+def test_everything_is_measured(records):
+    assert not records.missing
+    numbers = {(m.quantity, m.conditions.get("event")) for m in records.select("unloading")}
+    assert len(numbers) == 7
+
+
+def test_theory_and_engine_agree(records):
+    assert {v.claim.id: v.outcome for v in judge(claims.CLAIMS, records)} == dict.fromkeys(
+        ("fig-13-right", "push", "unloading-limit"), Outcome.CONFIRMED
+    )
+
+
+def test_claims_notice_a_theory_with_other_friction(records, monkeypatch):
+    right = analytic.simulate
+    monkeypatch.setattr(
+        analytic, "simulate", lambda p, *args, **more: right(p.replace(eta=1.01 * p.eta), *args, **more)
+    )
+    outcomes = {v.claim.id: v.outcome for v in judge(claims.CLAIMS, records)}
+    assert outcomes["fig-13-right"] is Outcome.REFUTED
+
+
+def test_claims_notice_a_theory_with_other_inertia(records, monkeypatch):
+    right = analytic.simulate
+    monkeypatch.setattr(analytic, "simulate", lambda p, *args, **more: right(p.replace(j=1.02 * p.j), *args, **more))
+    outcomes = {v.claim.id: v.outcome for v in judge(claims.CLAIMS, records)}
+    assert outcomes["push"] is Outcome.REFUTED
+
+
+def test_first_top_lies_between_samples():
+    run = analytic.simulate(P, [0.05, 1.0, 0, 0, 0, 0, 0.01, 0], 0.5, sample_interval=0.01)
+    fine = analytic.simulate(P, [0.05, 1.0, 0, 0, 0, 0, 0.01, 0], 0.5, sample_interval=1e-4)
+    # Between samples 10 ms apart only the change of the acceleration is left out, c per second of it.
+    assert unloading.first_top(run) == pytest.approx(float(fine.y.max()), abs=P.g * 0.01**2 * P.c * 0.01)
