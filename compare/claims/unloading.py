@@ -13,12 +13,15 @@ from compare.claims.judge import remembered
 from compare.measure.record import Measurement
 from compare.measure.settling import family
 from compare.measure.unloading import first_top
+from compare.statistics import Measured
 from model import Case, Contact, Parameters, SimulationError, Trajectory
 from model.kinematics import VARIABLES
 
 SECTION = "Flowmeter"
 PROTOCOL = "unloading"
 SAMPLES = 2000
+STEPS = 100
+"""Steps of the integrator up to an event, about, whose errors may be of one sign."""
 
 
 @remembered
@@ -80,12 +83,23 @@ def _lift(m: Measurement) -> float:
     return float(run.y[-1]) if m.conditions["event"] == "end" else first_top(run)
 
 
+def _sure(predict: Callable[[Measurement], float]) -> Callable[[Measurement], Measured]:
+    """A predicted number with the uncertainty of the integrator; a case has none."""
+
+    def predicted(m: Measurement) -> Measured:
+        value = predict(m)
+        sure = 0.0 if predict is _case else STEPS * analytic.Settings().rtol * abs(value)
+        return Measured(value, sure)
+
+    return predicted
+
+
 def _bearing(quantity: str, predict: Callable[[Measurement], float], event: str = "", start: str = "") -> Bearing:
     def when(m: Measurement) -> bool:
         begun, conditions = str(m.conditions["start"]), m.conditions
         return begun.startswith(start) and (not event or conditions["event"] == event)
 
-    return Bearing(protocol=PROTOCOL, quantity=quantity, predict=predict, when=when, by="analytic.simulate")
+    return Bearing(protocol=PROTOCOL, quantity=quantity, predict=_sure(predict), when=when, by="analytic.simulate")
 
 
 CLAIMS = (

@@ -26,19 +26,21 @@ from model import Case, Parameters, Trajectory
 from model.arrays import Array
 
 PROTOCOL = "edge"
-CLOSING = (0.05, 0.1, 0.2, 0.4)
+CLOSING = (0.1, 0.17, 0.26, 0.38)
 """Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
-PARTS = {Level.QUICK: (0.3,), Level.DEFAULT: (*CLOSING, 0.7), Level.FULL: (*CLOSING, 0.55, 0.7, 0.85)}
+PARTS = {Level.QUICK: (0.3,), Level.DEFAULT: (*CLOSING, 0.6), Level.FULL: (*CLOSING, 0.45, 0.6, 0.8)}
 """The flows at each set; at the quick level that with most drag, which settles soonest, has `CLOSING`."""
 TIME = {Level.QUICK: 20.0, Level.DEFAULT: 60.0, Level.FULL: 60.0}
 """How long a ball has to leave the edge, in units of 1/c."""
-FIRST, NEXT = 3e-4, 2e-5
+ROUGHLY = 10.0
+"""How much more than values that are held against theory themselves the two states may drift."""
+FIRST, NEXT = 3e-4, 2.5e-6
 """Widths of the last brackets on the first line and on the others, in parts of the distance of the attractors."""
 REACH = 5e-3
 """Half the length of a later line, in those parts."""
 TOGETHER = 2e-3
 """The distance up to which two runs count as being together, in those parts."""
-CYCLES = {Level.QUICK: 4, Level.DEFAULT: 5, Level.FULL: 6}
+CYCLES = {Level.QUICK: 3, Level.DEFAULT: 4, Level.FULL: 6}
 """Lines for each edge."""
 
 
@@ -52,6 +54,8 @@ class Edge:
     """The settled states on either side, (8,)."""
     lifted: Array
     centre: Array
+    line: Array
+    """Direction and unit of the line."""
     reach: tuple[float, float]
     """The part of the line that is searched, from its centre, in units of the distance of the states."""
     found: Bracket | None = None
@@ -59,11 +63,6 @@ class Edge:
     """How far the crossing is from that of the line before; None for the first line, and after one without crossing."""
     stretched: int = 0
     """How many lines were too short since the last crossing."""
-
-    @property
-    def line(self) -> Array:
-        """Direction and unit of the line."""
-        return self.lifted - self.slipping
 
     @property
     def crossing(self) -> Array:
@@ -117,7 +116,7 @@ def _lines(
         for q in (sets[name].replace(omega_0=float(omega)) for omega in omegas)
         for kind, start in (("rest", rest), ("wall", wall))
     ]
-    states, edges, missing = settle(lab, begin), [], []
+    states, edges, missing = settle(lab, begin, loose=ROUGHLY), [], []
     for slipping, lifted in zip(states[::2], states[1::2], strict=True):
         name, q = slipping.start.set, slipping.start.p
         if slipping.failure or lifted.failure or (slipping.case, family(lifted.case)) != (Case.SS, Case.NR):
@@ -125,7 +124,7 @@ def _lines(
             missing.append(Missing(PROTOCOL, name, why))
         else:
             low, high = (_grounded(state.mean) for state in (slipping, lifted))
-            edges.append(Edge(name, q, low, high, low, (0.0, 1.0)))
+            edges.append(Edge(name, q, low, high, low, high - low, (0.0, 1.0)))
     return edges, missing
 
 
@@ -178,7 +177,7 @@ def _falls_behind(run: Trajectory, edge: Edge) -> bool:
 
 
 def _onward(edge: Edge) -> Edge:
-    """A line through the mean of the time in which the last two runs have stayed together."""
+    """A line through the mean of the time in which the last two runs have stayed together, the way they part."""
     if edge.found is None:
         return edge
     low, high = (run.x for run in edge.found.runs if run is not None)
@@ -187,8 +186,10 @@ def _onward(edge: Edge) -> Edge:
     length = max(together - together // 4, 1)
     weights = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER
     mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
+    parting = _grounded((high - low)[together - 1])
+    line = parting * float(edge.line @ edge.line) / float(parting @ edge.line)
     reach = REACH * 4.0**edge.stretched
-    return replace(edge, centre=_grounded(mean), reach=(-reach, reach))
+    return replace(edge, centre=_grounded(mean), line=line, reach=(-reach, reach))
 
 
 def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement]:

@@ -127,7 +127,7 @@ def test_what_runs_away_beyond_the_fold_does_not_settle(lab):
 
 def test_edge_tells_by_the_way_a_run_still_goes():
     slipping, lifted = np.eye(8)[2] * 10.0, np.eye(8)[2] * 30.0
-    edge = Edge("reference", REFERENCE, slipping, lifted, slipping, (0.0, 1.0))
+    edge = Edge("reference", REFERENCE, slipping, lifted, slipping, lifted - slipping, (0.0, 1.0))
     for rate, falls in ((-0.1, True), (0.1, False)):
         assert _falls_behind(SimpleNamespace(time=np.arange(101), omega_c=25 + rate * np.arange(101)), edge) is falls
     for end, falls in ((10.0, True), (30.0, False)):
