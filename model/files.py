@@ -1,19 +1,30 @@
-"""Files that are whole or not there at all."""
+"""Files that are whole or not there at all, and that are read only as they were written.
+
+Every HDF5 file of the program ends with the SHA-256 checksum of all that comes before, which HDF5 itself ignores. It is
+compared before HDF5 looks at the file: on damaged metadata the library may hang, and give wrong numbers.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import io
 import os
 import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
 import h5py
 
-from model.errors import StorageError
+from model.errors import InputError, StorageError
 
 _SUFFIX = ".part"
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_SEAL = b"\ndualball sha256 "
+_TRAILER = len(_SEAL) + 64
+_BLOCK = 1 << 20
 
 
 class WholeFile:
@@ -56,10 +67,12 @@ class WholeFile:
         self._check()
 
     def finish(self, path: str | Path | None = None) -> None:
-        """Close the file and give it its name, or another in the same directory."""
+        """Close the file, add its checksum and give it its name, or another in the same directory."""
         self.file.close()
         self._check()
         try:
+            self._disk.write(_SEAL + _checksum(self._disk, self._disk.seek(0, os.SEEK_END)))
+            self._check()
             os.fsync(self._disk.fileno())
             self._disk.close()
             self._temporary.replace(path or self.path)
@@ -75,8 +88,8 @@ class WholeFile:
 class _Disk(io.FileIO):
     """A file that remembers the first refusal of the operating system instead of raising it.
 
-    HDF5 can't close a file that it could not write: it crashes the process (HDF5 1.14, disk full). So it never
-    hears of the refusal; the writer asks for it after each flush.
+    HDF5 can't close a file that it could not write: it crashes the process (HDF5 1.14, disk full). So the error is
+    kept here, and `WholeFile` raises it after each flush.
     """
 
     refusal: OSError | None = None
@@ -97,6 +110,68 @@ class _Disk(io.FileIO):
         except OSError as error:
             self.refusal = self.refusal or error
             return size or 0
+
+
+@contextmanager
+def reading(path: str | Path) -> Iterator[h5py.File]:
+    """An HDF5 file that `WholeFile` wrote, open for reading.
+
+    Raises `StorageError`, in one line that names the file, if it is missing, damaged, cut, changed, or foreign; an
+    `InputError` or error of HDF5 within the context becomes one, too.
+    """
+    if not Path(path).is_file():
+        raise StorageError(f"cannot read {path}: there is no such file")
+    try:
+        with Path(path).open("rb") as content:
+            _check_seal(content)
+        with h5py.File(path, "r") as file:
+            yield file
+    except InputError as error:
+        raise StorageError(f"cannot read {path}: {error}") from error
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror or _first_line(error)}") from error
+    except (RuntimeError, LookupError, ValueError, TypeError, AttributeError, OverflowError, MemoryError) as error:
+        raise StorageError(f"cannot read {path}: it does not hold what it should ({_first_line(error)})") from error
+
+
+def dataset(file: h5py.File, name: str) -> h5py.Dataset:
+    """The dataset of that name, stored in this very file: links out of it are not followed.
+
+    Raises `StorageError`, for `reading` to add the name of the file.
+    """
+    if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+        raise StorageError(f"it has no dataset {name!r} of its own")
+    stored = file[name]
+    if not isinstance(stored, h5py.Dataset) or stored.external or stored.is_virtual:
+        raise StorageError(f"{name!r} is not a dataset of its own")
+    return stored
+
+
+def _check_seal(content: BinaryIO) -> None:
+    size = content.seek(0, os.SEEK_END) - _TRAILER
+    content.seek(0)
+    if content.read(len(_SIGNATURE)) != _SIGNATURE:
+        raise StorageError("it is not an HDF5 file")
+    content.seek(max(size, 0))
+    trailer = content.read()
+    if not trailer.startswith(_SEAL):
+        raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
+    if trailer != _SEAL + _checksum(content, size):
+        raise StorageError("it is damaged (its content does not match its checksum)")
+
+
+def _checksum(content: BinaryIO, size: int) -> bytes:
+    """Of the first `size` bytes."""
+    digest = hashlib.sha256()
+    content.seek(0)
+    for start in range(0, size, _BLOCK):
+        digest.update(content.read(min(_BLOCK, size - start)))
+    content.seek(size)
+    return digest.hexdigest().encode()
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).strip() or type(error).__name__).splitlines()[0]
 
 
 def check_writable(path: str | Path) -> None:
@@ -130,7 +205,7 @@ def remove_leftovers(directory: Path) -> None:
 
 
 def _temporary(path: Path) -> Path:
-    """A name beside a file's that tells whose it is."""
+    """A name beside a file's, with the machine and process that write it."""
     return path.with_name(f".{path.name}.{_host()}.{os.getpid()}{_SUFFIX}")
 
 

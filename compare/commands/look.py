@@ -10,7 +10,7 @@ from compare.report import results
 from compare.runs import collection
 from compare.view import inspection
 from mjsim import ContactSettings
-from model import storage
+from model import InputError, storage
 
 
 def add(commands: options.Commands) -> None:
@@ -73,6 +73,8 @@ def figures(args: argparse.Namespace) -> int:
 def inspect(args: argparse.Namespace) -> int:
     """Describe a run or a collection."""
     if collection.is_collection(args.file):
+        if args.plot:
+            raise InputError(f"{args.file} is a collection: only a run can be drawn")
         options.show(collection.describe(args.file), collection.table, args.json)
         return 0
     if args.plot:

@@ -9,7 +9,6 @@ read back. A file holds the measurements of one protocol as columns, one row a m
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,7 +20,7 @@ import numpy as np
 
 from compare.measure.quantities import quantity
 from model import Parameters, StorageError
-from model.files import WholeFile
+from model.files import WholeFile, dataset, reading
 from model.trajectory import current_commit, current_versions
 
 SCHEMA = "dualball-measurements"
@@ -101,13 +100,11 @@ class Records:
 def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
     """Write records, whole or not at all; `about` says what they are (JSON-able). Raises `StorageError`."""
     columns = _columns(records.measurements)
-    digest = _digest(columns, records.missing)
     with WholeFile(path) as whole:
         file = whole.file
         file.attrs.update(
             schema=SCHEMA,
             schema_version=SCHEMA_VERSION,
-            digest=digest,
             about=json.dumps(dict(about)),
             missing=json.dumps([dataclasses.asdict(each) for each in records.missing]),
             versions=json.dumps(dict(current_versions())),
@@ -117,30 +114,22 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
         row.make_scale("row")
         for name, values in columns.items():
             kind = h5py.string_dtype() if values and isinstance(values[0], str) else np.dtype(np.float64)
-            dataset = file.create_dataset(name, data=np.array(values, dtype=kind), dtype=kind)
-            dataset.dims[0].attach_scale(row)
+            column = file.create_dataset(name, data=np.array(values, dtype=kind), dtype=kind)
+            column.dims[0].attach_scale(row)
         whole.finish()
 
 
 def load(path: Path) -> Records:
     """Read what `save` wrote.
 
-    Raises `StorageError`, naming the file, if it is missing, damaged, cut, edited, or of another version.
+    Raises `StorageError`, naming the file, if it is missing, damaged, cut, changed, or of another version.
     """
-    try:
-        with h5py.File(path, "r") as file:
-            attributes = dict(file.attrs)
-            columns = {name: _column(file[name]) for name in file if name != "row"}
-            missing = tuple(Missing(**each) for each in json.loads(attributes["missing"]))
-    except FileNotFoundError as error:
-        raise StorageError(f"cannot read {path}: there is no such file") from error
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError) as error:
-        raise StorageError(f"{path} is damaged: it holds no measurements that can be read") from error
-    if attributes.get("schema") != SCHEMA or attributes.get("schema_version") != SCHEMA_VERSION:
-        raise StorageError(f"{path} does not hold measurements in this program's format")
-    if attributes.get("digest") != _digest(columns, missing):
-        raise StorageError(f"{path} was changed after it was written: measure again, or restore the file")
-    return Records(tuple(_rows(columns)), missing)
+    with reading(path) as file:
+        if file.attrs.get("schema") != SCHEMA or file.attrs.get("schema_version") != SCHEMA_VERSION:
+            raise StorageError("it does not hold measurements in this program's format")
+        columns = {name: _column(dataset(file, name)) for name in file if name != "row"}
+        missing = tuple(Missing(**each) for each in json.loads(file.attrs["missing"]))
+        return Records(tuple(_rows(columns)), missing)
 
 
 _OWN = ("protocol", "quantity", "value", "uncertainty", "unit", "engine", "set", "runs")
@@ -160,8 +149,8 @@ def _columns(rows: Sequence[Measurement]) -> dict[str, list[Any]]:
     return columns
 
 
-def _column(dataset: h5py.Dataset) -> list[Any]:
-    values = dataset.asstr()[...] if h5py.check_string_dtype(dataset.dtype) else dataset[...]
+def _column(stored: h5py.Dataset) -> list[Any]:
+    values = stored.asstr()[...] if h5py.check_string_dtype(stored.dtype) else stored[...]
     kept: list[Any] = values.tolist()
     return kept
 
@@ -176,10 +165,3 @@ def _rows(columns: Mapping[str, Sequence[Any]]) -> Iterator[Measurement]:
             parameters=Parameters(**{name: columns[name][k] for name in _PARAMETERS}),
             conditions={name: value for name, value in conditions.items() if value != "" and value == value},
         )
-
-
-def _digest(columns: Mapping[str, Sequence[Any]], missing: Sequence[Missing]) -> str:
-    """Hash of all that is told, to notice a file that was edited."""
-    content = [sorted((name, [repr(v) for v in values]) for name, values in columns.items())]
-    text = json.dumps([content, [dataclasses.astuple(each) for each in missing]])
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -114,12 +114,18 @@ def load(directory: Path) -> Summary:
         raise StorageError(f"{path} is not a {SCHEMA}")
     if content.get("schema_version") != SCHEMA_VERSION:
         raise StorageError(f"{path} is in another format than this program's: choose another directory with --output")
-    version, ours = content.get("provenance", {}).get("versions", {}).get("dualball"), current_versions()["dualball"]
+    try:
+        Level[content["level"]]
+        files = tuple(str(name) for name in content["measurements"])
+        summary = Summary(content["level"], files, dict(content["verdicts"]), dict(content["provenance"]))
+        version, ours = summary.provenance["versions"]["dualball"], current_versions()["dualball"]
+    except (KeyError, TypeError, ValueError) as error:
+        raise StorageError(f"{path} is damaged: it is not what a validation writes") from error
     if version != ours:
         raise StorageError(
             f"{directory} holds results of dualball {version}, this is {ours}: choose another directory with --output"
         )
-    return Summary(content["level"], tuple(content["measurements"]), content["verdicts"], content["provenance"])
+    return summary
 
 
 def save(summary: Summary, directory: Path) -> None:

@@ -13,11 +13,12 @@ from typing import Any
 
 import h5py
 import numpy as np
+import numpy.typing as npt
 from rich.table import Table
 
 from compare.statistics import settled_case, settled_mean
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
-from model.files import WholeFile, check_writable
+from model.files import WholeFile, check_writable, dataset, reading
 from model.kinematics import UNITS, VARIABLES
 
 SCHEMA = "dualball-collection"
@@ -44,12 +45,9 @@ def collect(directory: Path, output: Path, progress: Callable[[int, int], None] 
 
 
 def is_collection(path: Path) -> bool:
-    """Whether a file is what `collect` writes."""
-    try:
-        with h5py.File(path, "r") as file:
-            return bool(file.attrs.get("schema") == SCHEMA)
-    except OSError:
-        return False
+    """Whether a file is what `collect` writes; raises `StorageError` if it can't be read."""
+    with reading(path) as file:
+        return bool(file.attrs.get("schema") == SCHEMA)
 
 
 def describe(path: Path) -> dict[str, Any]:
@@ -57,11 +55,14 @@ def describe(path: Path) -> dict[str, Any]:
 
     Raises `StorageError` for a collection that is not whole or of a newer version.
     """
-    with h5py.File(path, "r") as file:
+    with reading(path) as file:
         version = file.attrs.get("schema_version")
         if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
-            raise StorageError(f"{path} is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
-        columns = {name: _own(file, name, path)[...] for name in file}
+            raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
+        return _described({name: dataset(file, name)[...] for name in file})
+
+
+def _described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
     numbers = {name: values for name, values in columns.items() if values.dtype.kind == "f"}
     failures = [text.decode() for text in columns["failure"] if text]
     return {
@@ -76,12 +77,6 @@ def describe(path: Path) -> dict[str, Any]:
             name: [float(np.nanmin(v)), float(np.nanmax(v))] for name, v in numbers.items() if np.isfinite(v).any()
         },
     }
-
-
-def _own(file: h5py.File, name: str, path: Path) -> h5py.Dataset:
-    if not isinstance(file.get(name, getlink=True), h5py.HardLink) or not isinstance(file[name], h5py.Dataset):
-        raise StorageError(f"{path} is not whole: {name!r} is not a dataset of its own")
-    return file[name]
 
 
 def table(told: dict[str, Any]) -> Table:
@@ -132,12 +127,12 @@ def _write(rows: list[dict[str, Any]], output: Path) -> None:
 def _column(file: h5py.File, name: str, values: Iterable[Any], units: str) -> None:
     values = list(values)
     if isinstance(values[0], str):
-        dataset = file.create_dataset(name, data=np.array(values, dtype=object), dtype=h5py.string_dtype())
+        column = file.create_dataset(name, data=np.array(values, dtype=object), dtype=h5py.string_dtype())
     else:
-        dataset = file.create_dataset(name, data=np.array(values))
+        column = file.create_dataset(name, data=np.array(values))
     if units:
-        dataset.attrs["units"] = units
+        column.attrs["units"] = units
     if name == "run":
-        dataset.make_scale("run")
+        column.make_scale("run")
     else:
-        dataset.dims[0].attach_scale(file["run"])
+        column.dims[0].attach_scale(file["run"])

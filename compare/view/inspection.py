@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
-from model import Case, Flow, Parameters, Trajectory, storage
+from model import Case, Flow, Parameters, storage
 from model.kinematics import UNITS, VARIABLES
 
 PART = 10_000
@@ -21,11 +20,11 @@ def describe(path: Path) -> dict[str, Any]:
 
     Raises `StorageError` for a file that isn't a trajectory or isn't whole.
     """
-    samples, last = 0, storage.load(path, slice(-1, None))
+    samples = 0
     stretches: list[tuple[Case, float, float]] = []
-    for part in _parts(path):
-        samples += len(part.time)
-        for case, start, end in part.phases():
+    for last in storage.parts(path, PART):
+        samples += len(last.time)
+        for case, start, end in last.phases():
             if stretches and stretches[-1][0] is case:
                 start = stretches.pop()[1]
             stretches.append((case, start, end))
@@ -49,17 +48,6 @@ def describe(path: Path) -> dict[str, Any]:
         ],
         "last": dict(zip(VARIABLES, last.x[-1].tolist(), strict=True)) if samples else {},
     }
-
-
-def _parts(path: Path) -> Iterator[Trajectory]:
-    """A stored run, `PART` samples at a time."""
-    first = 0
-    while True:
-        part = storage.load(path, slice(first, first + PART))
-        yield part
-        if len(part.time) < PART:
-            return
-        first += PART
 
 
 def table(about: dict[str, Any], most: int = 20) -> Table:

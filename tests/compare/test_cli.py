@@ -194,7 +194,7 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str], name: str) -> Non
         ("sweep --vary eta=0.1,0.2,0.3 --random 4", "a random design needs a range for eta"),
         ("collect absent", "cannot read absent: there is no such directory"),
         ("inspect absent.h5", "cannot read absent.h5: there is no such file"),
-        ("inspect broken.toml", "broken.toml is not a whole HDF5 file"),
+        ("inspect broken.toml", "cannot read broken.toml: it is not an HDF5 file"),
         ("validate --claim prop1", "no claim is called 'prop1'"),
         ("validate -o broken.toml", "cannot write to broken.toml"),
         ("report absent", "cannot read absent/summary.json: No such file or directory"),

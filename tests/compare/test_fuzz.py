@@ -1,49 +1,185 @@
-"""Mutated files: a clear error or the right result each time, never a traceback, a hang or a file elsewhere."""
+"""Damaged files: one clear line or the right result, never a traceback, a wrong number or a file elsewhere."""
 
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
 from compare.commands import cli
+from compare.measure import record
+from compare.measure.lab import Level
+from compare.measure.record import Measurement, Missing, Records
+from compare.report import results
+from compare.runs import collection
+from compare.runs.engines import ENGINES
 from model import InputError, Parameters, StorageError, storage
-from model.trajectory import Trajectory, columns
+from model.files import WholeFile
 
-MUTATIONS = 2000
+ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.slow)])
+"""Mutations of one file."""
+P = Parameters.named("reference")
 
 
 def mutated(data: bytes, rng: np.random.Generator) -> bytes:
-    """A few bytes changed, removed, repeated or inserted."""
+    """A few bits flipped, stretches of bytes changed, zeroed, removed or doubled, the end cut off, words inserted."""
     content = bytearray(data)
-    for _ in range(rng.integers(1, 6)):
+    for _ in range(rng.integers(1, 4)):
         at = int(rng.integers(0, len(content) + 1))
-        kind = rng.integers(4)
-        length = int(rng.integers(1, 9))
-        if kind == 0:
-            content[at : at + 1] = rng.bytes(1)
-        elif kind == 1:
-            del content[at : at + length]
-        elif kind == 2:
-            content[at:at] = content[at : at + length]
-        else:
-            content[at:at] = rng.choice(
-                [b"=", b"\n", b"nan", b"-", b"1e999", b"[x]", b'"', b"\x00", b"\xff", b"0x", b"inf"]
-            )
+        stretch = slice(at, at + int(rng.integers(1, 33)))
+        length = len(content[stretch])
+        match int(rng.integers(7)):
+            case 0:
+                content[at : at + 1] = bytes(byte ^ 1 << int(rng.integers(8)) for byte in content[at : at + 1])
+            case 1:
+                content[stretch] = rng.bytes(length)
+            case 2:
+                content[stretch] = bytes(length)
+            case 3:
+                del content[stretch]
+            case 4:
+                content[at:at] = content[stretch]
+            case 5 if rng.integers(4) == 0:
+                del content[at:]
+            case _:
+                content[at:at] = rng.choice([b"=", b"\n", b"nan", b"-", b"1e999", b"[x]", b'"', b"\0", b"\xff", b"inf"])
     return bytes(content)
 
 
-def test_toml(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A file of every kind, by what it is."""
+    made = tmp_path_factory.mktemp("whole")
+    kept = {name: made / "runs" / f"{name}.h5" for name in ENGINES} | {"collection": made / "all.h5"}
+    kept |= {"measurements": made / "measurements" / "settled.h5"}
+    (made / "runs").mkdir()
+    (made / "measurements").mkdir()
+    for name in ENGINES:
+        assert cli.main(["simulate", "--engine", name, "--time", "0.05", "-o", str(kept[name]), "--json"]) == 0
+    collection.collect(made / "runs", kept["collection"])
+    measured = [
+        Measurement(protocol="settled", quantity=quantity, value=value, uncertainty=1e-9, engine="mujoco",
+                    set="reference", parameters=P, conditions={"case": "RR", "y": 0.1}, runs=("runs/a.h5",))
+        for quantity, value in (("omega_c", 11.9), ("force_Ay", 0.1))
+    ]  # fmt: skip
+    record.save(Records(tuple(measured), (Missing("settled", "x", "it never settles"),)), kept["measurements"], {})
+    return kept
+
+
+def whole(path: Path) -> list[dict[str, Any]]:
+    """All that a run file says, read at once."""
+    return [vars(storage.load(path))]
+
+
+def parts(path: Path) -> list[dict[str, Any]]:
+    """The same, read in parts."""
+    return [vars(part) for part in storage.parts(path, 400)]
+
+
+READERS: list[tuple[str, Callable[[Path], Any]]] = [
+    *((name, read) for name in ENGINES for read in (whole, parts)),
+    ("collection", collection.is_collection),
+    ("collection", collection.describe),
+    ("measurements", record.load),
+]
+
+
+@ENOUGH
+@pytest.mark.parametrize(("kind", "read"), READERS)
+def test_damage_is_one_line(
+    tmp_path: Path, files: dict[str, Path], kind: str, read: Callable[[Path], Any], count: int
+) -> None:
+    rng = np.random.default_rng(2)
+    good, path = files[kind].read_bytes(), tmp_path / "bad.h5"
+    for _ in range(count):
+        content = mutated(good, rng)
+        path.write_bytes(content)
+        if content == good:  # zeros zeroed
+            read(path)
+            continue
+        with pytest.raises(StorageError) as caught:
+            read(path)
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["bad.h5"]
+
+
+def results_of(measurements: Path) -> Path:
+    """A results directory with these measurements, before they are damaged."""
+    directory = measurements.parents[1]
+    results.save(results.Summary.of(directory, [], Level.QUICK, [measurements]), directory)
+    return directory
+
+
+@pytest.mark.parametrize(
+    ("kind", "command"),
+    [
+        *((name, "inspect FILE") for name in ENGINES),
+        ("event", "inspect FILE --plot DIRECTORY/plot.png"),
+        ("event", "render FILE -o DIRECTORY/picture.png"),
+        ("event", "collect RUNS -o DIRECTORY/all.h5"),
+        ("collection", "inspect FILE"),
+        ("measurements", "inspect FILE"),
+        ("measurements", "judge RESULTS"),
+        ("measurements", "report RESULTS"),
+        ("measurements", "figures --results RESULTS -o DIRECTORY"),
+    ],
+)
+def test_every_command_names_the_damaged_file(
+    tmp_path: Path, files: dict[str, Path], capsys: pytest.CaptureFixture[str], kind: str, command: str
+) -> None:
+    path = tmp_path / "results" / "measurements" / "bad.h5"
+    path.parent.mkdir(parents=True)
+    content = bytearray(files[kind].read_bytes())
+    content[len(content) // 2] ^= 16
+    path.write_bytes(content)
+    places = {"FILE": path, "DIRECTORY": tmp_path, "RUNS": path.parent, "RESULTS": results_of(path)}
+    capsys.readouterr()
+    for word, place in places.items():
+        command = command.replace(word, str(place))
+    assert cli.main(command.split()) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    reason = "it is damaged (its content does not match its checksum)"
+    assert err == f"dualball: error: cannot read {path}: {reason}\n"
+
+
+@pytest.mark.parametrize("count", [30, pytest.param(500, marks=pytest.mark.slow)])
+def test_a_damaged_summary_is_one_line(
+    tmp_path: Path, files: dict[str, Path], capsys: pytest.CaptureFixture[str], count: int
+) -> None:
+    path = tmp_path / "measurements" / "settled.h5"
+    path.parent.mkdir()
+    path.write_bytes(files["measurements"].read_bytes())
+    summary = results_of(path) / results.SUMMARY
+    good, rng, refusals = summary.read_bytes(), np.random.default_rng(3), []
+    for _ in range(count):
+        summary.write_bytes(mutated(good, rng))
+        try:
+            stored = results.load(tmp_path)
+            stored.records(tmp_path)
+        except StorageError as error:
+            refusals.append(str(error))
+        else:  # what is not a reference to measurements is made anew by judging
+            assert set(stored.measurements) <= {"measurements/settled.h5"}
+    assert len(refusals) > count / 2
+    assert not any("\n" in message for message in refusals)
+
+
+@ENOUGH
+def test_toml(tmp_path: Path, count: int) -> None:
     rng = np.random.default_rng(1)
-    Parameters.named("reference").save(tmp_path / "good.toml")
+    P.save(tmp_path / "good.toml")
     good = (tmp_path / "good.toml").read_bytes()
     fluid = (Path(__file__).parents[2] / "model/parameter_sets/steel-in-water.toml").read_bytes()
     path = tmp_path / "bad.toml"
     refused = []
-    for k in range(MUTATIONS // 2):
+    for k in range(count):
         content = mutated(good if k % 2 else fluid, rng)
         path.write_bytes(content)
         try:
@@ -54,42 +190,38 @@ def test_toml(tmp_path: Path) -> None:
             values = tomllib.loads(content.decode())
             for name in set(values) - {"fluid"}:
                 assert getattr(p, name) == values[name]
-    assert MUTATIONS // 4 < len(refused) < MUTATIONS // 2
+    assert count / 2 < len(refused) < count
     assert not any("\n" in message for message in refused)
     assert {entry.name for entry in tmp_path.iterdir()} == {"good.toml", "bad.toml"}
 
 
-def test_hdf5(tmp_path: Path) -> None:
-    rng = np.random.default_rng(2)
-    assert cli.main(["simulate", "--time", "0.05", "-o", str(tmp_path / "good.h5"), "--json"]) == 0
-    good = (tmp_path / "good.h5").read_bytes()
-    right = storage.load(tmp_path / "good.h5")
-    path = tmp_path / "bad.h5"
-    refused = []
-    for _ in range(MUTATIONS // 2):
-        path.write_bytes(mutated(good, rng))
-        try:
-            found = storage.load(path)
-        except StorageError as error:
-            refused.append(str(error))
-        else:  # a byte that nothing depends on, or numbers that differ: shapes and types are those of a trajectory
-            assert len(found.time) <= 2 * len(right.time)
-            assert all(getattr(found, name).dtype == getattr(right, name).dtype for name in columns(Trajectory))
-    assert len(refused) > MUTATIONS // 4
-    assert not any("\n" in message for message in refused)
-    assert {entry.name for entry in tmp_path.iterdir()} == {"good.h5", "bad.h5"}
+def outside(secret: Path) -> Iterator[tuple[str, Callable[[h5py.File], None]]]:
+    """Ways to let a dataset be read from another file."""
 
-
-def test_nothing_in_a_file_is_followed_or_executed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    secret = tmp_path / "secret.h5"
-    with h5py.File(secret, "w") as file:
-        file["x"] = np.arange(51.0)
-    assert cli.main(["simulate", "--time", "0.05", "-o", str(tmp_path / "run.h5"), "--json"]) == 0
-    with h5py.File(tmp_path / "run.h5", "r+") as file:
-        del file["y"]
+    def virtual(file: h5py.File) -> None:
         layout = h5py.VirtualLayout((51,), float)
         layout[:] = h5py.VirtualSource(secret, "x", (51,))
         file.create_virtual_dataset("y", layout)
-    capsys.readouterr()
+
+    def link(file: h5py.File) -> None:
+        file["y"] = h5py.ExternalLink(secret, "x")
+
+    def external(file: h5py.File) -> None:
+        file.create_dataset("y", (51,), float, external=[(str(secret), 0, 51 * 8)])
+
+    yield from {"virtual": virtual, "link": link, "external": external}.items()
+
+
+@pytest.mark.parametrize("way", ["virtual", "link", "external"])
+def test_nothing_in_a_file_is_followed(
+    tmp_path: Path, files: dict[str, Path], capsys: pytest.CaptureFixture[str], way: str
+) -> None:
+    secret = tmp_path / "secret.h5"
+    with h5py.File(secret, "w") as file:
+        file["x"] = np.arange(51.0)
+    with WholeFile(tmp_path / "run.h5", files["event"].read_bytes()) as crafted:  # with a checksum that fits
+        del crafted.file["y"]
+        dict(outside(secret))[way](crafted.file)
+        crafted.finish()
     assert cli.main(["inspect", str(tmp_path / "run.h5")]) == 2
-    assert "'y' is not a dataset of its own" in capsys.readouterr().err
+    assert "'y'" in capsys.readouterr().err

@@ -67,7 +67,7 @@ def test_a_file_that_was_edited_is_refused(tmp_path: Path) -> None:
     record.save(RECORDS, path, {})
     with h5py.File(path, "r+") as file:
         file["value"][0] = 12.0
-    with pytest.raises(StorageError, match=r"settled\.h5 was changed after it was written"):
+    with pytest.raises(StorageError, match=r"settled\.h5: it is cut short, changed"):
         record.load(path)
 
 
@@ -94,7 +94,7 @@ def test_bytes_that_were_exchanged_are_noticed_or_harmless(tmp_path: Path) -> No
             assert record.load(path) == RECORDS
         except StorageError as error:
             refusals.append(str(error))
-    assert refusals
+    assert len(refusals) > 190  # eight bytes that happen to be what they were are rare
     assert all("settled.h5" in text for text in refusals)
 
 

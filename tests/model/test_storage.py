@@ -10,6 +10,7 @@ import pytest
 import xarray
 
 from model import Case, Events, Flow, Header, Parameters, StorageError, Trajectory, storage
+from model.files import WholeFile, reading
 from model.trajectory import SAMPLE, columns
 
 
@@ -148,14 +149,67 @@ def test_every_truncation_is_refused(tmp_path: Path) -> None:
 def edit(tmp_path: Path, change) -> Path:
     path = tmp_path / "run.h5"
     storage.save(make(), path)
-    with h5py.File(path, "r+") as file:
-        change(file)
+    with WholeFile(path, path.read_bytes()) as whole:
+        change(whole.file)
+        whole.finish()
     return path
 
 
 def replace(file: h5py.File, name: str, value: object) -> None:
     del file[name]
     file[name] = value
+
+
+def test_a_file_that_was_changed_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    storage.save(make(), path)
+    with h5py.File(path, "r+") as file:
+        file["y"][0] = 1.0
+    with pytest.raises(StorageError, match=r"run\.h5: it is cut short, changed, or not of this program"):
+        storage.load(path)
+
+
+def test_one_bit_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    storage.save(make(), path)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(StorageError, match=r"run\.h5: it is damaged"):
+        storage.load(path)
+
+
+@pytest.mark.parametrize(("content", "says"), [(b"", "not an HDF5 file"), (b"m = 1\n" * 40, "not an HDF5 file")])
+def test_another_format_is_named(tmp_path: Path, content: bytes, says: str) -> None:
+    (tmp_path / "run.h5").write_bytes(content)
+    with pytest.raises(StorageError, match=says):
+        storage.load(tmp_path / "run.h5")
+
+
+@pytest.mark.parametrize("size", [1, 7, 50, 51])
+def test_a_run_is_read_in_parts(tmp_path: Path, size: int) -> None:
+    trajectory = make(50, 2)
+    storage.save(trajectory, tmp_path / "run.h5")
+    parts = list(storage.parts(tmp_path / "run.h5", size))
+    assert {len(part.time) for part in parts[:-1]} <= {size}
+    assert all(len(part.events) == 2 for part in parts)
+    for name in columns(Trajectory):
+        joined = np.concatenate([getattr(part, name) for part in parts])
+        np.testing.assert_array_equal(joined, getattr(trajectory, name))
+
+
+def test_a_run_without_samples_is_one_part(tmp_path: Path) -> None:
+    storage.save(make(0), tmp_path / "run.h5")
+    (part,) = storage.parts(tmp_path / "run.h5", 10)
+    assert_same(part, make(0))
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyError, OSError, TypeError, OverflowError, MemoryError])
+def test_whatever_goes_wrong_inside_a_file_names_it(tmp_path: Path, error: type[Exception]) -> None:
+    storage.save(make(), tmp_path / "run.h5")
+    with pytest.raises(StorageError, match=r"cannot read .*run\.h5: .*first") as caught, reading(tmp_path / "run.h5"):
+        raise error("first\nsecond")
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
