@@ -1,4 +1,4 @@
-"""The HDF5 form of a trajectory: one run a file, flat, whole or not there at all.
+"""The HDF5 form of a trajectory: one run a file, flat, whole or not there at all; and the same in memory for xarray.
 
 `TrajectoryWriter` appends blocks of samples while a simulation runs, to a temporary name that becomes the final one
 only when the file is whole. `load` and `parts` trust nothing they read: links that lead out of the file are refused,
@@ -14,18 +14,21 @@ import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 import numpy as np
 import numpy.typing as npt
 
 from model.cases import Case
-from model.errors import StorageError
+from model.errors import InputError, StorageError
 from model.files import WholeFile, dataset, reading
 from model.flow import Flow
 from model.parameters import Parameters
 from model.trajectory import AXES, SAMPLE, Events, Header, Trajectory, columns
+
+if TYPE_CHECKING:
+    import xarray
 
 SCHEMA = "dualball-trajectory"
 SCHEMA_VERSION = 1
@@ -100,8 +103,8 @@ def _empty() -> bytes:
     with h5py.File(content, "w", track_order=True) as file:
         file.attrs["schema"] = SCHEMA
         file.attrs["schema_version"] = SCHEMA_VERSION
-        axis = file.create_dataset("axis", data=np.array(AXES, dtype="S1"))
-        _describe(axis, {"units": "1", "long_name": "axes of the co-rotating frame: x inwards, y up, z along"})
+        axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
+        axis.attrs.update(_AXIS)
         axis.make_scale("axis")
         for table, scale_name, rename in ((Trajectory, "time", str), (Events, "event_time", _event_name)):
             for name, meta in columns(table).items():
@@ -121,8 +124,24 @@ def _create_column(file: h5py.File, name: str, meta: Mapping[str, Any]) -> h5py.
         name, (0, *shape), _CASE_ENUM if meta.get("dtype") is np.int8 else np.float64,
         maxshape=(None, *shape), chunks=(_CHUNK, *shape), compression="gzip", shuffle=True,
     )  # fmt: skip
-    _describe(column, meta)
+    column.attrs.update(_attributes(meta))
     return column
+
+
+def to_xarray(trajectory: Trajectory) -> xarray.Dataset:
+    """What xarray reads from the stored file of a trajectory; raises `InputError` if xarray isn't installed."""
+    try:
+        import xarray  # here, because it is optional and takes a second to load
+    except ImportError as error:
+        raise InputError("to_xarray() needs xarray: pip install 'dualball[xarray]'") from error
+    variables: dict[str, Any] = {"axis": ("axis", list(AXES), _AXIS), "mjcf": ((), trajectory.header.mjcf)}
+    for name, meta in columns(Trajectory).items():
+        variables[name] = (("time", "axis")[: 1 + len(meta["shape"])], getattr(trajectory, name), _attributes(meta))
+    for name, meta in columns(Events).items():
+        dimensions = ("event_time", "axis")[: 1 + len(meta["shape"])]
+        variables[_event_name(name)] = (dimensions, getattr(trajectory.events, name), _attributes(meta))
+    schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
+    return xarray.Dataset(variables, attrs=schema | _header_attributes(trajectory.header))
 
 
 def load(path: str | Path) -> Trajectory:
@@ -227,13 +246,16 @@ def _read_column(file: h5py.File, name: str, meta: Mapping[str, Any], part: slic
     return np.asarray(column[part], dtype=dtype)
 
 
-def _describe(column: h5py.Dataset, meta: Mapping[str, Any]) -> None:
-    for key in ("units", "long_name", "equation"):
-        if meta.get(key):
-            column.attrs[key] = meta[key]
+def _attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
+    """The attributes of a stored column."""
+    attributes = {key: meta[key] for key in ("units", "long_name", "equation") if meta[key]}
     if meta.get("dtype") is np.int8:  # the CF convention's names of the codes, for readers that drop the HDF5 enum
-        column.attrs["flag_values"] = np.array([case.value for case in Case], np.int8)
-        column.attrs["flag_meanings"] = " ".join(case.name for case in Case)
+        attributes["flag_values"] = np.array([case.value for case in Case], np.int8)
+        attributes["flag_meanings"] = " ".join(case.name for case in Case)
+    return attributes
+
+
+_AXIS = {"units": "1", "long_name": "axes of the co-rotating frame: x inwards, y up, z along"}
 
 
 def _event_name(column: str) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,9 @@ from model.arrays import Array
 from model.cases import Case
 from model.flow import Flow
 from model.parameters import Parameters
+
+if TYPE_CHECKING:
+    import xarray
 
 AXES = ("x", "y", "z")
 """The paper's axes: x radially inwards, y upwards, z along the orbit."""
@@ -136,6 +139,15 @@ class Trajectory:
     def complete(self) -> bool:
         """Whether the run reached its end."""
         return not self.header.failure
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The trajectory as xarray opens its file: units, names of the cases, events, where it comes from.
+
+        Raises `InputError` if xarray, an optional dependency, isn't installed.
+        """
+        from model import storage  # here, because it builds on this module
+
+        return storage.to_xarray(self)
 
     @classmethod
     def from_blocks(cls, header: Header, blocks: Iterable[npt.NDArray[np.void]], events: Events) -> Self:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray
 
-from model import Case, Events, Flow, Header, Parameters, StorageError, Trajectory, storage
+from model import Case, Events, Flow, Header, InputError, Parameters, StorageError, Trajectory, storage
 from model.files import WholeFile, reading
 from model.trajectory import SAMPLE, columns
 
@@ -68,6 +68,21 @@ def test_xarray_opens_it_with_axes_units_and_cases(tmp_path: Path) -> None:
         names = data.case.flag_meanings.split()
         assert [names[code] for code in data.case.values] == [case.name for case in trajectory.cases]
         assert json.loads(data.parameters)["R"] == 0.05
+
+
+@pytest.mark.parametrize(("n", "events", "failure"), [(50, 2, ""), (0, 0, "diverged"), (1, 0, "")])
+def test_in_memory_xarray_sees_what_it_reads_from_the_file(tmp_path: Path, n: int, events: int, failure: str) -> None:
+    trajectory = make(n, events, failure)
+    storage.save(trajectory, tmp_path / "run.h5")
+    with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as stored:
+        xarray.testing.assert_identical(trajectory.to_xarray(), stored)
+    np.testing.assert_array_equal(trajectory.to_xarray().force_B.sel(axis="y"), trajectory.force_B[:, 1])
+
+
+def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(InputError, match=r"pip install 'dualball\[xarray\]'"):
+        make().to_xarray()
 
 
 def test_plain_h5py_shows_the_enum(tmp_path: Path) -> None:
