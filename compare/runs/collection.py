@@ -1,13 +1,14 @@
 """Many runs in one file: what each settled to, over the parameters it ran with.
 
-``collect`` writes one row a run: parameters as coordinates, and the mean, uncertainty and case over the last part of
-the run. The file opens in xarray with the dimension ``run``.
+``collect`` writes one row a run: its parameters, and the mean, uncertainty and case over the last part of the run. The
+file opens in xarray with the dimension ``run``, along which the parameters that vary are coordinates.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,25 +24,50 @@ from model.kinematics import UNITS, VARIABLES
 
 SCHEMA = "dualball-collection"
 SCHEMA_VERSION = 1
+NAMED = 5
+"""Files that can't be gathered and are named one by one."""
 
 
 def collect(directory: Path, output: Path, progress: Callable[[int, int], None] = lambda done, total: None) -> int:
     """Gather all runs of a directory, whole ones and failed ones, in the order of their names; return their number.
 
-    Raises `StorageError` if there are none, one can't be read, or the output can't be written.
+    Raises `StorageError` if there are none, the output can't be written, or, with their names, some can't be read or
+    hold the same run twice.
     """
     check_writable(output)
     if not directory.is_dir():
         raise StorageError(f"cannot read {directory}: there is no such directory")
-    files = sorted(directory.rglob("*.h5"))
+    files = sorted(file for file in directory.rglob("*.h5") if _may_be_run(file, output))
     if not files:
         raise StorageError(f"there are no runs in {directory}")
-    rows = []
+    rows, problems, known = [], [], dict[str, Path]()
     for k, file in enumerate(files, start=1):
-        rows.append(_row(file, directory))
+        try:
+            trajectory = storage.load(file)
+        except StorageError as error:
+            problems.append(str(error))
+        else:
+            if (first := known.setdefault(_identity(trajectory), file)) is not file:
+                problems.append(f"{first} and {file} hold the same run")
+            rows.append(_row(trajectory, file.relative_to(directory)))
         progress(k, len(files))
+    if problems:
+        more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
+        raise StorageError("; ".join(problems[:NAMED]) + more)
     _write(rows, output)
     return len(rows)
+
+
+def _may_be_run(file: Path, output: Path) -> bool:
+    """Not the collection of the last time, nor a segment of the journal of a run that goes on."""
+    return file.parent.suffix != ".journal" and file.resolve() != output.resolve()
+
+
+def _identity(trajectory: Trajectory) -> str:
+    """All that determines a run, as text."""
+    header = dataclasses.asdict(dataclasses.replace(trajectory.header, created="", failure=""))
+    header["flow"] = trajectory.header.flow.to_mapping()
+    return json.dumps(header, sort_keys=True, default=dict)
 
 
 def is_collection(path: Path) -> bool:
@@ -72,28 +98,32 @@ def _described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
             Case(code).name: int((columns["case"] == code).sum()) for code in sorted(set(columns["case"])) if code >= 0
         },
         "failures": failures,
-        "varied": [f.name for f in dataclasses.fields(Parameters) if len(set(columns[f.name].tolist())) > 1],
+        "varied": _varied(columns),
         "ranges": {
             name: [float(np.nanmin(v)), float(np.nanmax(v))] for name, v in numbers.items() if np.isfinite(v).any()
         },
     }
 
 
-def table(told: dict[str, Any]) -> Table:
+def _varied(columns: Mapping[str, Iterable[Any]]) -> list[str]:
+    """Names of the parameters that are not the same in all runs."""
+    return [f.name for f in dataclasses.fields(Parameters) if len(set(columns[f.name])) > 1]
+
+
+def table(about: dict[str, Any]) -> Table:
     """The description for the terminal."""
     rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-    rows.add_row("[bold]runs", f"{told['runs']} ({', '.join(told['engines'])}), {len(told['failures'])} failed")
-    rows.add_row("[bold]cases", ", ".join(f"{name}: {count}" for name, count in told["cases"].items()))
+    rows.add_row("[bold]runs", f"{about['runs']} ({', '.join(about['engines'])}), {len(about['failures'])} failed")
+    rows.add_row("[bold]cases", ", ".join(f"{name}: {count}" for name, count in about["cases"].items()))
     rows.add_row(
-        "[bold]varied", "\n".join(f"{n} {told['ranges'][n][0]:g} … {told['ranges'][n][1]:g}" for n in told["varied"])
+        "[bold]varied", "\n".join(f"{n} {about['ranges'][n][0]:g} … {about['ranges'][n][1]:g}" for n in about["varied"])
     )
-    rows.add_row("[bold]omega_c", "{:.9g} … {:.9g} rad s-1".format(*told["ranges"].get("omega_c", [np.nan, np.nan])))
+    rows.add_row("[bold]omega_c", "{:.9g} … {:.9g} rad s-1".format(*about["ranges"].get("omega_c", [np.nan, np.nan])))
     return rows
 
 
-def _row(file: Path, directory: Path) -> dict[str, Any]:
-    trajectory = storage.load(file)
-    row: dict[str, Any] = {"run": str(file.relative_to(directory)), "engine": trajectory.header.engine}
+def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
+    row: dict[str, Any] = {"run": str(name), "engine": trajectory.header.engine}
     row |= dataclasses.asdict(trajectory.header.parameters)
     row |= {"duration": float(trajectory.time[-1]) if len(trajectory.time) else 0.0}
     row |= {"failure": trajectory.header.failure}
@@ -117,15 +147,18 @@ def _write(rows: list[dict[str, Any]], output: Path) -> None:
     units = {f.name: f.metadata["unit"] for f in dataclasses.fields(Parameters)}
     units |= dict(zip(VARIABLES, UNITS, strict=True)) | {"duration": "s"}
     units |= {f"{name}_uncertainty": unit for name, unit in zip(VARIABLES, UNITS, strict=True)}
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
+    varied = _varied(columns)
     with WholeFile(output) as whole:
         whole.file.attrs["schema"], whole.file.attrs["schema_version"] = SCHEMA, SCHEMA_VERSION
-        for name in rows[0]:
-            _column(whole.file, name, [row[name] for row in rows], units.get(name, ""))
+        for name, values in columns.items():
+            column = _column(whole.file, name, values, units.get(name, ""))
+            if varied and name not in ("run", *varied):
+                column.attrs["coordinates"] = " ".join(varied)  # the CF convention's way to say what it is over
         whole.finish()
 
 
-def _column(file: h5py.File, name: str, values: Iterable[Any], units: str) -> None:
-    values = list(values)
+def _column(file: h5py.File, name: str, values: Sequence[Any], units: str) -> h5py.Dataset:
     if isinstance(values[0], str):
         column = file.create_dataset(name, data=np.array(values, dtype=object), dtype=h5py.string_dtype())
     else:
@@ -136,3 +169,4 @@ def _column(file: h5py.File, name: str, values: Iterable[Any], units: str) -> No
         column.make_scale("run")
     else:
         column.dims[0].attach_scale(file["run"])
+    return column

@@ -1,0 +1,93 @@
+"""Collections: varied parameters as coordinates, and what can't be gathered is named."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from compare.commands import cli
+from compare.runs import collection
+from compare.runs.campaign import Campaign
+from compare.runs.tasks import Task
+from model import Parameters, StorageError
+
+P = Parameters.named("reference")
+OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
+
+
+@pytest.fixture(scope="module")
+def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The runs of a grid."""
+    directory = tmp_path_factory.mktemp("grid")
+    sets = [P.replace(omega_0=omega, eta=eta) for omega in OMEGAS for eta in ETAS]
+    with Campaign(directory, workers=0) as campaign:
+        assert not campaign.complete(Task(engine="event", parameters=p, x0=(0.0,) * 8, t_end=0.1) for p in sets)
+    return directory
+
+
+@pytest.fixture
+def runs(grid: Path, tmp_path: Path) -> Path:
+    """A copy of them, to be damaged."""
+    return Path(shutil.copytree(grid, tmp_path / "runs"))
+
+
+def test_varied_parameters_are_coordinates(grid: Path, tmp_path: Path) -> None:
+    assert collection.collect(grid, tmp_path / "all.h5") == 6
+    with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
+        assert set(data.coords) == {"run", "omega_0", "eta"}
+        assert data.omega_0.dims == ("run",)
+        assert data.omega_0.units == "rad s-1"
+        table = data.omega_c.set_index(run=["omega_0", "eta"]).unstack("run")
+        np.testing.assert_array_equal(table.omega_0, OMEGAS)
+        np.testing.assert_array_equal(table.eta, ETAS)
+        assert np.isfinite(table).all()
+        assert set(data.mu.values) == {P.mu}
+    assert collection.describe(tmp_path / "all.h5")["varied"] == ["eta", "omega_0"]
+
+
+def test_a_single_run_varies_nothing(runs: Path, tmp_path: Path) -> None:
+    for path in sorted(runs.glob("*.h5"))[1:]:
+        path.unlink()
+    assert collection.collect(runs, tmp_path / "all.h5") == 1
+    with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
+        assert set(data.coords) == {"run"}
+
+
+def test_the_same_run_twice_is_refused_by_name(runs: Path, tmp_path: Path) -> None:
+    first = min(runs.glob("*.h5"))
+    (runs / "copies").mkdir()
+    shutil.copy(first, runs / "copies" / "copy.h5")
+    with pytest.raises(StorageError) as caught:
+        collection.collect(runs, tmp_path / "all.h5")
+    assert str(caught.value) == f"{first} and {runs / 'copies' / 'copy.h5'} hold the same run"
+    assert not (tmp_path / "all.h5").exists()
+
+
+@pytest.mark.parametrize(("damaged", "named"), [(2, 2), (6, 5)])
+def test_what_cannot_be_read_is_named(runs: Path, tmp_path: Path, damaged: int, named: int) -> None:
+    paths = sorted(runs.glob("*.h5"))[:damaged]
+    for path in paths:
+        path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(StorageError) as caught:
+        collection.collect(runs, tmp_path / "all.h5")
+    assert [str(path) in str(caught.value) for path in paths] == [k < named for k in range(damaged)]
+    assert ("and 1 more" in str(caught.value)) == (damaged > named)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_no_run_is_left_out(runs: Path) -> None:
+    """The collection of the last time, and the journal of a run that goes on."""
+    (runs / "x.journal").mkdir()
+    (runs / "x.journal" / "000000.h5").touch()
+    assert collection.collect(runs, runs / "all.h5") == 6
+    assert collection.collect(runs, runs / "all.h5") == 6
+
+
+def test_a_collection_is_not_drawn(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    collection.collect(runs, runs / "all.h5")
+    assert cli.main(["inspect", str(runs / "all.h5"), "--plot", str(runs / "plot.png")]) == 2
+    assert "only a run can be drawn" in capsys.readouterr().err
