@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from model import InputError
 from model.errors import suggestion
-from model.parameters import check_number
+from model.parameters import POSITIVE, Range, check_number
 
 METHODS = ("event", "time-stepping")
 LEAVING = ("infeasible", "slip-stability")
@@ -55,14 +54,9 @@ class Settings:
                 )
         if not isinstance(self.initial_impact, bool):
             raise InputError(f"initial_impact = {self.initial_impact!r} must be true or false")
-        self._check("rtol", "1", 100 * _EPS, 1e-2, f">= {100 * _EPS:.3g} and <= 0.01")
-        self._check("atol", "1", _EPS**2, 1e-2, f">= {_EPS**2:.3g} and <= 0.01")
-        self._check("step", "s", math.ulp(0.0), math.inf, "> 0")
-        self._check("restitution", "1", 0.0, 1.0, ">= 0 and <= 1")
-
-    def _check(self, name: str, unit: str, low: float, high: float, allowed: str) -> None:
-        if getattr(self, name) is None and name in ("atol", "step"):
-            return
-        value = check_number(name, getattr(self, name), unit)
-        if not low <= value <= high:
-            raise InputError(f"{name} = {value:g} {unit} is out of range: must be {allowed}")
+        check_number("rtol", self.rtol, "1", Range(100 * _EPS, 1e-2))
+        check_number("restitution", self.restitution, "1", Range(0.0, 1.0))
+        if self.atol is not None:
+            check_number("atol", self.atol, "1", Range(_EPS**2, 1e-2))
+        if self.step is not None:
+            check_number("step", self.step, "s", POSITIVE)

@@ -30,7 +30,7 @@ import numpy.typing as npt
 from model import InputError, Parameters
 from model.arrays import Array
 from model.errors import suggestion
-from model.parameters import check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
 
 CONES = ("elliptic", "pyramidal")
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
@@ -57,7 +57,7 @@ class ContactSettings:
     solimp: float = 1e-3
     """Impedance d, one value at every depth."""
     impratio: float = 3e3
-    """How much stiffer the friction rows are than the normal row."""
+    """How much stiffer the friction rows are than the normal row; beyond 1e7 the solver fails."""
     memory: bool = True
     """Whether the friction force of the last step shifts the surface velocity, so that rolling doesn't creep."""
     servo: float = 0.01
@@ -77,19 +77,19 @@ class ContactSettings:
     noslip_iterations: int = 0
 
     def __post_init__(self) -> None:
-        self._check_range("timestep", self.timestep, "s", "> 0")
+        check_number("timestep", self.timestep, "s", POSITIVE)
         if len(self.solref) != 2:
             raise InputError(f"solref = {self.solref!r} must be two numbers, time constant (s) and damping ratio")
-        self._check_range("solref time constant", self.solref[0], "s", "> 0")
-        self._check_range("solref damping ratio", self.solref[1], "1", "> 0")
-        self._check_range("solreffriction", self.solreffriction, "s", "> 0")
-        self._check_range("solimp", self.solimp, "1", ">= 0.0001 and <= 0.9999", 1e-4, 0.9999)
-        self._check_range("impratio", self.impratio, "1", ">= 0.1 and <= 1e7 (beyond, the solver fails)", 0.1, 1e7)
-        self._check_range("servo", self.servo, "s", ">= 0", 0.0)
-        self._check_range("tolerance", self.tolerance, "1", ">= 0", 0.0)
-        self._check_range("iterations", self.iterations, "1", ">= 1", 1)
-        self._check_range("noslip_iterations", self.noslip_iterations, "1", ">= 0", 0)
-        self._check_range("facets", self.facets, "1", ">= 3 and <= 2000", 3, 2000)
+        check_number("solref time constant", self.solref[0], "s", POSITIVE)
+        check_number("solref damping ratio", self.solref[1], "1", POSITIVE)
+        check_number("solreffriction", self.solreffriction, "s", POSITIVE)
+        check_number("solimp", self.solimp, "1", Range(1e-4, 0.9999))
+        check_number("impratio", self.impratio, "1", Range(0.1, 1e7))
+        check_number("servo", self.servo, "s", NOT_NEGATIVE)
+        check_number("tolerance", self.tolerance, "1", NOT_NEGATIVE)
+        check_number("iterations", self.iterations, "1", Range(1, whole=True))
+        check_number("noslip_iterations", self.noslip_iterations, "1", Range(0, whole=True))
+        check_number("facets", self.facets, "1", Range(3, 2000, whole=True))
         for name, value, known in (
             ("cone", self.cone, CONES), ("integrator", self.integrator, INTEGRATORS),
             ("coordinates", self.coordinates, ("polar", "free")), ("wall", self.wall, ("tangent", "prism")),
@@ -118,14 +118,6 @@ class ContactSettings:
                 f"solreffriction {self.solreffriction:g} s and servo {self.servo:g} s allow at most "
                 f"{self.largest_timestep:g} s"
             )
-
-    @staticmethod
-    def _check_range(
-        name: str, value: float, unit: str, allowed: str, low: float = 0.0, high: float = math.inf
-    ) -> None:
-        number = check_number(name, value, unit)
-        if number < low or number > high or (allowed == "> 0" and number == 0):
-            raise InputError(f"{name} = {number:g} {unit} is out of range: must be {allowed}")
 
     @property
     def largest_timestep(self) -> float:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from model.arrays import Array
 from model.errors import InputError
-from model.parameters import check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, check_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +55,14 @@ class Flow:
     @classmethod
     def ramp(cls, omega_start: float, omega_end: float, duration: float, t_start: float = 0.0) -> Self:
         """From omega_start to omega_end linearly within `duration` seconds from t_start, held on either side."""
-        if check_number("duration", duration, "s") <= 0:
-            raise InputError(f"duration = {duration:g} s is out of range: a ramp must take > 0 s")
-        if check_number("t_start", t_start, "s") < 0:
-            raise InputError(f"t_start = {t_start:g} s is out of range: must be >= 0 s")
+        check_number("duration", duration, "s", POSITIVE)
+        check_number("t_start", t_start, "s", NOT_NEGATIVE)
         return cls.sampled([t_start, t_start + duration], [omega_start, omega_end], kind="ramp")
 
     @classmethod
     def staircase(cls, levels: Sequence[float], hold: float) -> Self:
         """Each level in turn held for `hold` seconds, the last one for ever."""
-        if check_number("hold", hold, "s") <= 0:
-            raise InputError(f"hold = {hold:g} s is out of range: a stair must take > 0 s")
+        check_number("hold", hold, "s", POSITIVE)
         return cls._pieces("staircase", [hold * k for k in range(len(levels))], levels, [0.0] * len(levels))
 
     @classmethod

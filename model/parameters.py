@@ -7,6 +7,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from importlib import resources
 from pathlib import Path
 from typing import Any, Self
@@ -18,13 +19,64 @@ from model.errors import InputError, StorageError, suggestion
 _SETS = resources.files("model") / "parameter_sets"
 
 
-def _quantity(symbol: str, unit: str, meaning: str, allowed: str, low: float, high: float = math.inf) -> Any:
-    """Declare a parameter; `allowed` is the range as a person reads it, `low` is open when it says so."""
-    return dataclasses.field(
-        metadata={
-            "symbol": symbol, "unit": unit, "meaning": meaning, "allowed": allowed, "low": low, "high": high,
-        }
-    )  # fmt: skip
+@dataclass(frozen=True)
+class Range:
+    """The numbers from `low` to `high`; without `low` itself if `open`, only whole ones if `whole`."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    open: bool = False
+    whole: bool = False
+
+    def __contains__(self, number: float) -> bool:
+        inside = self.low < number <= self.high if self.open else self.low <= number <= self.high
+        return inside and (not self.whole or number == round(number))
+
+    def __str__(self) -> str:
+        """As a person reads it: ``> 0 and <= 2/3``."""
+        ends = ((">" if self.open else ">=", self.low), ("<=", self.high))
+        limits = " and ".join(f"{sign} {_shown(end)}" for sign, end in ends if math.isfinite(end))
+        return f"{'a whole number' * self.whole} {limits}".strip() or "any"
+
+
+ANY = Range()
+POSITIVE = Range(0.0, open=True)
+NOT_NEGATIVE = Range(0.0)
+
+
+def check_number(name: str, value: Any, unit: str, allowed: Range = ANY, meaning: str = "") -> float:
+    """Return `value` as a float; `InputError` if it is not a finite real number in the allowed range."""
+    if isinstance(value, bool) or not hasattr(value, "__float__"):
+        raise InputError(f"{name} = {value!r} must be a number in {unit}")
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} = {value!r} must be a number in {unit}") from error
+    if not math.isfinite(number):
+        raise InputError(f"{name} = {number} {unit} must be finite")
+    if number not in allowed:
+        raise InputError(f"{name} = {number:g} {unit} is out of range: {f'{meaning} must'.strip()} be {allowed}")
+    return number
+
+
+def parse_number(name: str, text: str, unit: str, allowed: Range = ANY) -> float:
+    """The number that a text is; `InputError` as for `check_number`."""
+    try:
+        number = float(text)
+    except ValueError as error:
+        raise InputError(f"{name} = {text!r} must be a number in {unit}") from error
+    return check_number(name, number, unit, allowed)
+
+
+def _shown(number: float) -> str:
+    """Short and exact where that can be: 0.1, 2/3."""
+    fraction = Fraction(number).limit_denominator(9)
+    return f"{number:g}" if float(f"{number:g}") == number or float(fraction) != number else str(fraction)
+
+
+def _quantity(symbol: str, unit: str, meaning: str, allowed: Range) -> Any:
+    """Declare a parameter."""
+    return dataclasses.field(metadata={"symbol": symbol, "unit": unit, "meaning": meaning, "allowed": allowed})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,26 +89,20 @@ class Parameters:
         If a value is not a finite number in its range; the message names field, value, unit and range.
     """
 
-    m: float = _quantity("m", "kg", "mass of the ball", "> 0", 0.0)
-    r: float = _quantity("r", "m", "radius of the ball", "> 0", 0.0)
-    R: float = _quantity("R", "m", "radius of the centre's orbit; the vessel's radius is R + r", "> 0", 0.0)
-    j: float = _quantity("j", "1", "dimensionless moment of inertia", "> 0 and <= 2/3", 0.0, 2.0 / 3.0)
-    mu: float = _quantity("μ", "1", "friction coefficient between ball and floor (A)", ">= 0", 0.0)
-    eta: float = _quantity("η", "1", "friction coefficient between ball and wall (B)", ">= 0", 0.0)
-    g: float = _quantity("g", "m s-2", "gravitational acceleration reduced by buoyancy", "> 0", 0.0)
-    c: float = _quantity("c", "s-1", "viscous drag coefficient over mass", ">= 0", 0.0)
-    omega_0: float = _quantity("ω₀", "rad s-1", "angular velocity of the fluid", "any", -math.inf)
+    m: float = _quantity("m", "kg", "mass of the ball", POSITIVE)
+    r: float = _quantity("r", "m", "radius of the ball", POSITIVE)
+    R: float = _quantity("R", "m", "radius of the centre's orbit; the vessel's radius is R + r", POSITIVE)
+    j: float = _quantity("j", "1", "dimensionless moment of inertia", Range(0.0, 2.0 / 3.0, open=True))
+    mu: float = _quantity("μ", "1", "friction coefficient between ball and floor (A)", NOT_NEGATIVE)
+    eta: float = _quantity("η", "1", "friction coefficient between ball and wall (B)", NOT_NEGATIVE)
+    g: float = _quantity("g", "m s-2", "gravitational acceleration reduced by buoyancy", POSITIVE)
+    c: float = _quantity("c", "s-1", "viscous drag coefficient over mass", NOT_NEGATIVE)
+    omega_0: float = _quantity("ω₀", "rad s-1", "angular velocity of the fluid", ANY)
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            value = check_number(field.name, getattr(self, field.name), field.metadata["unit"])
-            low, allowed = field.metadata["low"], field.metadata["allowed"]
-            below = value <= low if allowed.startswith("> ") else value < low
-            if below or value > field.metadata["high"]:
-                raise InputError(
-                    f"{field.name} = {value:g} {field.metadata['unit']} is out of range: "
-                    f"{field.metadata['meaning']} must be {allowed}"
-                )
+            unit, allowed, meaning = (field.metadata[key] for key in ("unit", "allowed", "meaning"))
+            value = check_number(field.name, getattr(self, field.name), unit, allowed, meaning)
             object.__setattr__(self, field.name, value)
 
     @property
@@ -92,8 +138,7 @@ class Parameters:
             ("nu_f", nu_f, "m2 s-1"), ("rho_f", rho_f, "kg m-3"), ("rho_b", rho_b, "kg m-3"),
             ("r", r, "m"), ("gravity", gravity, "m s-2"),
         ):  # fmt: skip
-            if check_number(name, value, unit) <= 0:
-                raise InputError(f"{name} = {value:g} {unit} is out of range: must be > 0")
+            check_number(name, value, unit, POSITIVE)
         if rho_b <= rho_f:
             raise InputError(
                 f"rho_b = {rho_b:g} kg m-3 is out of range: a ball not denser than the fluid "
@@ -163,19 +208,6 @@ class Parameters:
             Path(path).write_text(tomli_w.dumps(dataclasses.asdict(self)), "utf-8")
         except OSError as error:
             raise StorageError(f"cannot write parameters to {path}: {error.strerror}") from error
-
-
-def check_number(name: str, value: Any, unit: str) -> float:
-    """Return `value` as a float; `InputError` if it is not a finite real number."""
-    if isinstance(value, bool) or not hasattr(value, "__float__"):
-        raise InputError(f"{name} = {value!r} must be a number in {unit}")
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} = {value!r} must be a number in {unit}") from error
-    if not math.isfinite(number):
-        raise InputError(f"{name} = {number} {unit} must be finite")
-    return number
 
 
 def _refuse_unknown(given: Mapping[str, Any], known: list[str], kind: str) -> None:

@@ -22,6 +22,7 @@ from compare.scorecard.native import Native
 from model import Flow, InputError, Parameters, StorageError
 from model.errors import suggestion
 from model.kinematics import UNITS, VARIABLES
+from model.parameters import Range, check_number, parse_number
 
 Parser = argparse.ArgumentParser
 Commands = Any
@@ -126,8 +127,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 def workers(args: argparse.Namespace) -> int | Workers:
     """What the options of `add_workers` name."""
-    if args.workers < 0:
-        raise InputError(f"workers = {args.workers} is out of range: must be >= 0")
+    check_number("workers", args.workers, "processes", Range(0, whole=True))
     return dask(args.scheduler) if args.scheduler else int(args.workers)
 
 
@@ -147,10 +147,7 @@ def start(args: argparse.Namespace) -> np.ndarray:
         if name not in VARIABLES:
             raise InputError(f"unknown state variable {name!r}{suggestion(name, VARIABLES)}")
         k = VARIABLES.index(name)
-        try:
-            x[k] = float(value)
-        except ValueError as error:
-            raise InputError(f"{name} = {value!r} must be a number in {UNITS[k]}") from error
+        x[k] = parse_number(name, value, UNITS[k])
     return x
 
 

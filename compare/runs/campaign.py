@@ -22,6 +22,7 @@ from compare.runs.tasks import OutOfTimeError, Task, failed_path, store
 from compare.runs.workers import Workers, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
 from model.files import remove_leftovers, write_text
+from model.parameters import POSITIVE, Range, check_number
 
 BATCH = 64
 """Runs in one MuJoCo batch: where the engine's cost a step stops falling."""
@@ -71,10 +72,9 @@ class Campaign:
             self._workers = None if self.workers == 0 else processes(self.workers)
         else:
             self._workers = self.workers
-        if self.batch < 1:
-            raise InputError(f"batch = {self.batch} is out of range: must be >= 1")
-        if not self.limit > 0:
-            raise InputError(f"limit = {self.limit:g} s is out of range: must be > 0")
+        check_number("batch", self.batch, "runs", Range(1, whole=True))
+        if self.limit != math.inf:
+            check_number("limit", self.limit, "s", POSITIVE)
         self.directory = Path(self.directory).resolve()
         try:
             self.directory.mkdir(parents=True, exist_ok=True)

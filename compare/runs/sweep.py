@@ -13,7 +13,7 @@ import numpy as np
 from compare.runs.tasks import Task
 from model import Flow, InputError, Parameters
 from model.errors import suggestion
-from model.parameters import check_number
+from model.parameters import Range, check_number, parse_number
 
 FIELDS = tuple(field.name for field in dataclasses.fields(Parameters))
 DIRECTIONS = ("held", "up", "down", "both")
@@ -33,24 +33,21 @@ class Axis:
         if name not in FIELDS:
             raise InputError(f"unknown parameter {name!r}{suggestion(name, FIELDS)}; known: {', '.join(FIELDS)}")
         unit = Parameters.__dataclass_fields__[name].metadata["unit"]
-        parts = rest.replace(":", ",").split(",")
-        numbers = [check_number(name, _number(name, part, unit), unit) for part in parts]
         if ":" not in rest:
-            return cls(name, tuple(numbers))
-        if len(numbers) not in (2, 3):
+            return cls(name, tuple(parse_number(name, part, unit) for part in rest.split(",")))
+        low, high, *count = rest.split(":")
+        if len(count) > 1:
             raise InputError(f"{text!r} is no range: write {name}=from:to:count")
-        first, last = numbers[:2]
+        first, last = (parse_number(name, end, unit) for end in (low, high))
         if first >= last:
             raise InputError(
                 f"{name} = {first:g}:{last:g} {unit} is in the wrong order: a range runs from low to high "
                 "(to sweep downwards choose --direction down)"
             )
-        if len(numbers) == 2:
+        if not count:
             return cls(name, (first, last))
-        count = numbers[2]
-        if count != int(count) or count < 2:
-            raise InputError(f"count = {count:g} of {name} is out of range: must be a whole number >= 2")
-        return cls(name, tuple(np.linspace(first, last, int(count)).tolist()))
+        points = int(parse_number(f"count of {name}", count[0], "points", Range(2, whole=True)))
+        return cls(name, tuple(np.linspace(first, last, points).tolist()))
 
 
 def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
@@ -63,8 +60,7 @@ def random(p: Parameters, axes: Sequence[Axis], count: int, seed: int) -> Iterat
     """`count` points that fill the box of the axes' ranges evenly (scrambled Sobol sequence)."""
     from scipy.stats import qmc  # slow to import, and only needed here
 
-    if count < 1:
-        raise InputError(f"count = {count} of random points is out of range: must be >= 1")
+    check_number("random", count, "points", Range(1, whole=True))
     for axis in axes:
         if len(axis.values) != 2:
             raise InputError(f"a random design needs a range for {axis.name}: write {axis.name}=from:to")
@@ -93,10 +89,3 @@ def staircase(template: Task, omegas: Sequence[float], hold: float) -> Task:
         template, flow=Flow.staircase(omegas, hold), t_end=hold * len(omegas),
         parameters=template.parameters.replace(omega_0=omegas[0]),
     )  # fmt: skip
-
-
-def _number(name: str, text: str, unit: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InputError(f"{name} = {text!r} must be a number in {unit}") from error

@@ -18,6 +18,7 @@ from types import FrameType
 from typing import Any
 
 from model import InputError
+from model.parameters import Range, check_number
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -37,8 +38,7 @@ class Workers:
 
 def processes(count: int) -> Workers:
     """`count` processes of this machine, one BLAS thread each; raises `InputError` for a bad count."""
-    if count < 1:
-        raise InputError(f"workers = {count} is out of range: must be >= 1")
+    check_number("workers", count, "processes", Range(1, whole=True))
 
     def start() -> Executor:
         for name in _THREADS:  # inherited by the workers; numpy reads it when they import it

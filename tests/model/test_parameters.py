@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from model import InputError, Parameters, StorageError
+from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, Range, check_number, parse_number
 
 FIELDS = [f.name for f in dataclasses.fields(Parameters)]
 positive = st.floats(1e-9, 1e9)
@@ -91,7 +92,7 @@ def test_a_bad_value_is_named_with_unit_and_range(name: str, reference: Paramete
             reference.replace(**{name: value})
         message = str(caught.value)
         assert message.startswith(f"{name} = {value:g} {field.metadata['unit']}")
-        assert field.metadata["allowed"] in message
+        assert str(field.metadata["allowed"]) in message
         assert "\n" not in message
     for value in (math.nan, math.inf, -math.inf):
         with pytest.raises(InputError, match=rf"^{name} = .*must be finite"):
@@ -99,6 +100,36 @@ def test_a_bad_value_is_named_with_unit_and_range(name: str, reference: Paramete
     for value in ("0.2", None, True, [0.2], 1j):
         with pytest.raises(InputError, match=f"^{name} = .*must be a number in"):
             reference.replace(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("allowed", "inside", "outside", "words"),
+    [
+        (ANY, [-1e300, 0], [], "any"),
+        (POSITIVE, [5e-324, 1e300], [0, -1], "> 0"),
+        (NOT_NEGATIVE, [0, 0.5], [-5e-324], ">= 0"),
+        (Range(0.1, 2 / 3), [0.1, 2 / 3], [math.nextafter(0.1, 0), math.nextafter(2 / 3, 1)], ">= 0.1 and <= 2/3"),
+        (Range(high=1e-7), [-1, 1e-7], [1], "<= 1e-07"),
+        (Range(2, whole=True), [2, 3.0], [2.5, 1], "a whole number >= 2"),
+        (Range(whole=True), [-3], [0.5], "a whole number"),
+    ],
+)
+def test_ranges(allowed: Range, inside: list[float], outside: list[float], words: str) -> None:
+    assert str(allowed) == words
+    for number in inside:
+        assert check_number("x", number, "m", allowed) == number
+        assert parse_number("x", repr(number), "m", allowed) == number
+    for number in outside:
+        with pytest.raises(InputError) as caught:
+            check_number("x", number, "m", allowed, "length of the rod")
+        assert str(caught.value) == f"x = {number:g} m is out of range: length of the rod must be {words}"
+        with pytest.raises(InputError, match=r"^x = .* m is out of range: must be "):
+            parse_number("x", repr(number), "m", allowed)
+
+
+def test_text_that_is_no_number() -> None:
+    with pytest.raises(InputError, match=r"^x = '5 cm' must be a number in m$"):
+        parse_number("x", "5 cm", "m")
 
 
 def test_edges_of_the_ranges_are_inside(reference: Parameters) -> None:
