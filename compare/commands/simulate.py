@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     task = Task(
         engine=args.engine.name,
         parameters=options.parameters(args),
-        x0=tuple(options.start(args).tolist()),
+        x0=options.start(args),
         t_end=args.time,
         flow=options.flow(args),
         sample_interval=args.sample_interval,

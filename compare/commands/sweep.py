@@ -76,7 +76,7 @@ def _tasks(args: argparse.Namespace) -> list[Task]:
     template = Task(
         engine=args.engine.name,
         parameters=p,
-        x0=tuple(options.start(args).tolist()),
+        x0=options.start(args),
         t_end=args.time,
         settings=options.settings(args),
     )

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-import numpy as np
 import numpy.typing as npt
 
 from compare.runs.campaign import Campaign, Failure
@@ -47,7 +46,7 @@ class Lab:
         return Task(
             engine=self.engine.name,
             parameters=p,
-            x0=tuple(np.asarray(x0, dtype=float).tolist()),
+            x0=x0,
             t_end=t_end,
             flow=flow,
             settings=settings or self.engine.at(step),

@@ -15,12 +15,16 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 import mjsim
 from compare.runs import engines
 from compare.runs.engines import Engine, Settings
 from mjsim import ContactSettings
 from mjsim.journal import Journal
 from model import Flow, InputError, Parameters, Trajectory, storage
+from model.kinematics import full_state
 from model.trajectory import current_versions
 
 LONG = 1e6
@@ -34,8 +38,8 @@ class Task:
     engine: str
     """Name of an `compare.runs.engines.Engine`."""
     parameters: Parameters
-    x0: tuple[float, ...]
-    """Initial state, 6 or 8 entries."""
+    x0: npt.ArrayLike
+    """Initial state, 6 or 8 entries in the order of `model.kinematics.VARIABLES`; kept as a tuple of 8."""
     t_end: float
     """s"""
     flow: Flow | None = None
@@ -49,6 +53,10 @@ class Task:
         simulator = self.simulator
         if self.settings is not None and not isinstance(self.settings, simulator.settings):
             raise InputError(f"settings of another engine were given to {self.engine!r}")
+        state = full_state(np.asarray(self.x0, dtype=float))
+        if state.ndim != 1:
+            raise InputError(f"x0 is one state, not {len(state)}")
+        object.__setattr__(self, "x0", tuple(state.tolist()))
 
     @property
     def simulator(self) -> Engine:
@@ -71,7 +79,7 @@ class Task:
         return {
             "engine": self.engine,
             "parameters": dataclasses.asdict(self.parameters),
-            "x0": list(self.x0),
+            "x0": self.x0,
             "t_end": self.t_end,
             "flow": self.fluid.to_mapping(),
             "settings": dataclasses.asdict(self.settings) if self.settings else None,

@@ -75,6 +75,10 @@ def test_every_input_is_part_of_the_identity() -> None:
         Task(engine="mujoco", parameters=p, x0=REST, t_end=0.2, flow=Flow.ramp(1, 2, 1)),
     ]
     assert len({task.key, *(other.key for other in others)}) == 1 + len(others)
+    rest = (list(REST), np.zeros(8), np.zeros(6), [0] * 6)
+    assert {Task(engine="event", parameters=p, x0=x0, t_end=0.2) for x0 in rest} == {
+        Task(engine="event", parameters=p, x0=REST, t_end=0.2)
+    }
     same = Task(engine="mujoco", parameters=p, x0=REST, t_end=0.2, flow=Flow.steady(p.omega_0))
     assert same.key == task.key
 
@@ -251,6 +255,19 @@ def test_bad_campaigns(tmp_path: Path) -> None:
         Campaign(tmp_path / "file")
     with pytest.raises(InputError, match=r"no engine is called 'mujuco' \(did you mean 'mujoco'\?\)"):
         Task(engine="mujuco", parameters=Parameters.named("reference"), x0=REST, t_end=1)
+
+
+@pytest.mark.parametrize(
+    ("x0", "says"),
+    [
+        ((0.0, 1.0), r"a state has 6 entries .* or 8"),
+        (np.zeros((2, 6)), "x0 is one state, not 2"),
+        ((0, 0, float("nan"), 0, 0, 0), "omega_c = nan rad s-1 must be finite"),
+    ],
+)
+def test_bad_starts(x0: object, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        Task(engine="mujoco", parameters=Parameters.named("reference"), x0=x0, t_end=1)
 
 
 LONG_PROGRAM = """
