@@ -43,7 +43,7 @@ class WholeFile:
         except OSError as error:
             raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
         self._disk.write(template)
-        if self._disk.refusal:
+        if self._disk.error:
             self._disk.close()
             self._temporary.unlink(missing_ok=True)
             self._check()
@@ -81,34 +81,34 @@ class WholeFile:
         self._finished = True
 
     def _check(self) -> None:
-        if self._disk.refusal:
-            raise StorageError(f"cannot write {self.path}: {self._disk.refusal.strerror}") from self._disk.refusal
+        if self._disk.error:
+            raise StorageError(f"cannot write {self.path}: {self._disk.error.strerror}") from self._disk.error
 
 
 class _Disk(io.FileIO):
-    """A file that remembers the first refusal of the operating system instead of raising it.
+    """A file that stores the first write error instead of raising it.
 
     HDF5 can't close a file that it could not write: it crashes the process (HDF5 1.14, disk full). So the error is
     kept here, and `WholeFile` raises it after each flush.
     """
 
-    refusal: OSError | None = None
+    error: OSError | None = None
 
     def write(self, data: Any) -> int:
         view = memoryview(data).cast("B")
         done = 0
         try:
-            while self.refusal is None and done < len(view):
+            while self.error is None and done < len(view):
                 done += super().write(view[done:])
         except OSError as error:
-            self.refusal = error
+            self.error = error
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
         try:
             return super().truncate(size)
         except OSError as error:
-            self.refusal = self.refusal or error
+            self.error = self.error or error
             return size or 0
 
 

@@ -35,13 +35,13 @@ def _column(units: str, long_name: str, equation: str = "", shape: tuple[int, ..
 @functools.cache
 def current_versions() -> Mapping[str, str]:
     """Versions of the packages that determine a result, and of Python."""
-    found = {"python": platform.python_version()}
+    versions = {"python": platform.python_version()}
     for name in ("dualball", "mujoco", "numpy", "scipy"):
         try:
-            found[name] = metadata.version(name)
+            versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            versions[name] = "not installed"
+    return versions
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""Speed as ratios measured within one run: machines differ and are noisy, ratios are not and less so."""
+"""Speed as ratios measured within one run: they depend less on the machine and its load than times do."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
 
 @dataclass(frozen=True)
 class Figures:
-    """What `run` found."""
+    """What `run` measured."""
 
     single: benchmark.Cost
     """One simulation."""

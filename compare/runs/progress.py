@@ -39,8 +39,8 @@ def _live() -> Iterator[Show]:
         line = bar.add_task("", total=None, failed="")
 
         def show(what: str, done: int, total: int, failed: int) -> None:
-            told = f"[red]{failed} failed" if failed else ""
-            bar.update(line, description=what, completed=done, total=total, failed=told)
+            failures = f"[red]{failed} failed" if failed else ""
+            bar.update(line, description=what, completed=done, total=total, failed=failures)
 
         yield show
 

@@ -36,7 +36,7 @@ class Task:
     """A run that stands for itself: two tasks with equal `key` give equal data, bit for bit."""
 
     engine: str
-    """Name of an `compare.runs.engines.Engine`."""
+    """Name of a `compare.runs.engines.Engine`."""
     parameters: Parameters
     x0: npt.ArrayLike
     """Initial state, 6 or 8 entries in the order of `model.kinematics.VARIABLES`; kept as a tuple of 8."""
@@ -171,7 +171,7 @@ def failed_path(path: Path) -> Path:
 
 
 def journal_path(task: Task, path: Path) -> Path | None:
-    """Where a long run into a file keeps its journal; its name tells the run, for the file's may be any."""
+    """Where a long run into a file keeps its journal, under its `Task.key`, since the file may have any name."""
     return path.with_name(f"{task.key}.journal") if task.long else None
 
 

@@ -82,7 +82,7 @@ def dask(address: str) -> Workers:
 
 @contextmanager
 def interrupts() -> Iterator[Callable[[], bool]]:
-    """A function that tells whether Ctrl-C was pressed, instead of an exception; the second time it is one again."""
+    """A function that says whether Ctrl-C was pressed; only the second Ctrl-C raises `KeyboardInterrupt`."""
     pressed = False
 
     def press(number: int, frame: FrameType | None) -> None:
