@@ -88,7 +88,7 @@ def validate(
             progress("ladder of settings, error against cost", 0, 1, 0)
             scoreboard.write(campaign, output)
     files = [path for protocol in PROTOCOLS if (path := kept / f"{protocol.name}.h5").exists()]
-    _judged(output, level, files, report, broken)
+    _write(output, level, files, report, verdicts)
     return [verdicts[claim.id] for claim in chosen]
 
 
@@ -101,7 +101,7 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None) -> 
     chosen = {claim.id for claim in select(CLAIMS, claims)}
     summary = results.load(directory)
     files = [directory / name for name in summary.measurements]
-    return [v for v in _judged(directory, Level[summary.level], files, report=True) if v.claim.id in chosen]
+    return [v for v in _write(directory, Level[summary.level], files, True, {}) if v.claim.id in chosen]
 
 
 def material(directory: Path, verdicts: Sequence[Verdict], records: Records) -> Material:
@@ -117,11 +117,13 @@ def stored_material(directory: Path) -> Material:
     return material(directory, judge(CLAIMS, records), records)
 
 
-def _judged(
-    directory: Path, level: Level, files: Sequence[Path], report: bool, broken: Mapping[str, str] | None = None
+def _write(
+    directory: Path, level: Level, files: Sequence[Path], report: bool, known: Mapping[str, Verdict]
 ) -> list[Verdict]:
+    """Judge what isn't known yet, and write summary and report; return the verdicts on all claims."""
     records = sum((record.load(path) for path in files), Records())
-    verdicts = [_verdict(verdict, broken or {}) for verdict in judge(CLAIMS, records)]
+    others = {v.claim.id: v for v in judge([claim for claim in CLAIMS if claim.id not in known], records)}
+    verdicts = [known.get(claim.id) or others[claim.id] for claim in CLAIMS]
     summary = Summary.of(directory, verdicts, level, files)
     if report:
         from compare.report import report as page  # here, because drawing takes a second to load
