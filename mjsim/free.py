@@ -1,14 +1,15 @@
 """The ball on a free joint, for comparison with the joint chain.
 
 A free ball takes the curve of the wall from the engine: the more independent witness and the less accurate one, since
-MuJoCo leaves the turning of the contact frame out of what drives the contact (J' v). It may cross the axis.
+MuJoCo leaves the turning of the contact frame out of what drives the contact (J' v). It may cross the axis. Of what is
+done between the steps only drag, the turning of the wall and the servo of the margins apply to it.
 """
 
 from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import mujoco
@@ -16,6 +17,7 @@ import numpy as np
 
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
+from mjsim.corrections import followed
 from mjsim.stepping import Stepper
 from model import Parameters
 from model.arrays import Array
@@ -25,14 +27,25 @@ _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 class Free(Stepper):
-    """Simulations of free balls, one after the other."""
+    """Simulations of free balls, one after the other; arguments as for `mjsim.stepping.Polar`."""
 
     def __init__(
         self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
-        states: Sequence[Array], theta_0: float,
+        x0s: Sequence[Array], theta_0: float,
     ) -> None:  # fmt: skip
-        self._balls = [_Ball(*each, settings, theta_0) for each in zip(models, parameters, states, strict=True)]
-        self.margins = np.zeros((len(models), 2))
+        self._balls = [_Ball(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
+        self.margins, self.axis = np.zeros((2, len(models))), np.full(len(models), np.inf)
+
+    def advance(self, omega_0: Iterable[Array], row: Array | None = None) -> None:
+        for fluid in omega_0:
+            for k, (ball, omega) in enumerate(zip(self._balls, fluid.tolist(), strict=True)):
+                if row is not None:
+                    row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = ball.joint_coordinates()
+                ball.step(omega)
+                if row is not None:
+                    row[k, recorder.SENSORS :] = ball.data.sensordata
+                self.margins[:, k] = ball.model.pair_margin[:2]
+            row = None
 
     def state(self) -> dict[str, Array]:
         return {
@@ -46,19 +59,7 @@ class Free(Stepper):
         for k, ball in enumerate(self._balls):
             mujoco.mj_setState(ball.model, ball.data, state["integration"][k], _INTEGRATION)
             ball.theta = float(state["theta"][k])
-            ball.model.pair_margin[:] = state["margins"][k]
-
-    def sample(self, omega_0: Array, row: Array) -> None:
-        for ball, omega, part in zip(self._balls, omega_0, row, strict=True):
-            split = recorder.NQ + recorder.NV
-            part[: recorder.NQ], part[recorder.NQ : split] = ball.joint_coordinates()
-            ball.steps([float(omega)])
-            part[split:] = ball.data.sensordata
-
-    def advance(self, omega_0: Array) -> None:
-        for ball, omegas, margins in zip(self._balls, omega_0.T, self.margins, strict=True):
-            ball.steps(omegas.tolist())
-            margins[:] = ball.model.pair_margin[:2]
+            ball.model.pair_margin[:2] = state["margins"][:, k]
 
 
 class _Ball:
@@ -70,26 +71,22 @@ class _Ball:
         self.data.qpos[:] = np.concatenate([world.position, world.quaternion])
         self.data.qvel[:] = np.concatenate([world.velocity, world.angular_velocity_body])
         self._turns = settings.wall == "tangent"
+        self._reach = settings.touching(p.g)
 
-    def steps(self, omega_0: list[float]) -> None:
-        """Take a step for each value of omega_0."""
-        model, data, p = self.model, self.data, self._p
-        qpos, qvel, force, margins = data.qpos, data.qvel, data.qfrc_applied, model.pair_margin
-        mc, gain, reach = p.m * p.c, self._settings.servo_gain, self._settings.touching(p.g)
-        for omega in omega_0:
-            x, y, z, *_ = qpos.tolist()
-            v_x, v_y, v_z, *_ = qvel.tolist()
-            force[0], force[1], force[2] = -mc * (v_x + omega * y), -mc * (v_y - omega * x), -mc * v_z
-            rho = math.hypot(x, y)
-            azimuth = self._unwrap(math.atan2(y, x))
-            if self._turns:
-                data.mocap_quat[0] = (math.cos(azimuth / 2), 0.0, 0.0, math.sin(azimuth / 2))
-            if gain:
-                if z - p.r < reach:
-                    margins[0] = max(0.0, margins[0] - gain * (z - p.r))
-                if p.R - rho < reach:
-                    margins[1] = max(0.0, margins[1] - gain * (p.R - rho))
-            mujoco.mj_step(model, data)
+    def step(self, omega_0: float) -> None:
+        """Take a step."""
+        data, p, mc, gain = self.data, self._p, self._p.m * self._p.c, self._settings.servo_gain
+        x, y, z, *_ = data.qpos.tolist()
+        v_x, v_y, v_z, *_ = data.qvel.tolist()
+        data.qfrc_applied[:3] = -mc * (v_x + omega_0 * y), -mc * (v_y - omega_0 * x), -mc * v_z  # (9)
+        self._unwrap(math.atan2(y, x))
+        if self._turns:
+            data.mocap_quat[0] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
+        if gain:
+            for contact, gap in enumerate((z - p.r, p.R - math.hypot(x, y))):
+                if gap < self._reach:
+                    self.model.pair_margin[contact] = followed(self.model.pair_margin[contact], gap, gain)
+        mujoco.mj_step(self.model, data)
 
     def joint_coordinates(self) -> tuple[Array, Array]:
         """The state as coordinates of the joint chain, with the orientation upright."""
@@ -98,13 +95,13 @@ class _Ball:
         mujoco.mju_quat2Mat(rotation, qpos[3:7])
         world = WorldState(qpos[:3].copy(), qpos[3:7].copy(), qvel[:3].copy(), rotation.reshape(3, 3) @ qvel[3:6])
         x, azimuth = from_world(world, self._p)
-        return recorder.joint_state(x, self._unwrap(float(azimuth)), self._p)
+        self._unwrap(float(azimuth))
+        return recorder.joint_state(x, self.theta, self._p)
 
-    def _unwrap(self, azimuth: float) -> float:
-        """Take the turn of this azimuth that is nearest to the last one; nan in a run that has diverged."""
+    def _unwrap(self, azimuth: float) -> None:
+        """Take the turn of this azimuth that is nearest to the last one; leave it in a run that has diverged."""
         if math.isfinite(azimuth):
             self.theta = azimuth + math.tau * round((self.theta - azimuth) / math.tau)
-        return self.theta
 
     def integration_state(self) -> Array:
         """All that the engine carries from one step to the next."""

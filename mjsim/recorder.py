@@ -13,7 +13,9 @@ from model.trajectory import SAMPLE
 
 NQ, NV, NSENSOR = 7, 6, 28
 """Sizes of the scene: (azimuth, inward, upward, quaternion), their velocities, two contact sensors."""
-_FOUND, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11), slice(12, 14)
+SENSORS = NQ + NV
+"""Where the sensors begin in a raw sample."""
+_COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11), slice(12, 14)
 
 
 def joint_state(x: Array, theta: float, p: Parameters) -> tuple[Array, Array]:
@@ -41,11 +43,12 @@ def state(qpos: Array, qvel: Array, p: Parameters) -> Array:
     return np.stack([y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h], axis=-1)
 
 
-def samples(time: Array, qpos: Array, qvel: Array, sensors: Array, p: Parameters, lead: float) -> npt.NDArray[np.void]:
-    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), qpos (n, 7), qvel (n, 6), sensors (n, 28).
+def samples(time: Array, raw: Array, p: Parameters, lead: float) -> npt.NDArray[np.void]:
+    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), raw (n, 41).
 
     Positions and sensors belong to a moment `lead` seconds after that of the velocities.
     """
+    qpos, qvel, sensors = np.split(raw, [NQ, SENSORS], axis=1)
     axes = frame(qpos[:, 0])
     qpos = np.concatenate([qpos[:, :3] - lead * qvel[:, :3], qpos[:, 3:]], axis=1)
     block = np.zeros(len(time), SAMPLE)
@@ -56,11 +59,11 @@ def samples(time: Array, qpos: Array, qvel: Array, sensors: Array, p: Parameters
     speeds = slip_speeds(x, p)
     for k, (contact, distance) in enumerate((("A", x[:, 0]), ("B", x[:, 6]))):
         sensor = sensors[:, 14 * k : 14 * (k + 1)]
-        found = sensor[:, _FOUND] > 0
+        touches = sensor[:, _COUNT] > 0
         block[f"force_{contact}"] = np.einsum("nab,nb->na", axes, _world_force(sensor))
         # Apart, the engine has no contact to report on: the coordinates say how far, and how fast.
-        block[f"gap_{contact}"] = np.where(found, sensor[:, _DIST], distance)
-        block[f"slip_speed_{contact}"] = np.where(found, np.hypot(*sensor[:, _SLIP].T), speeds[k])
+        block[f"gap_{contact}"] = np.where(touches, sensor[:, _DIST], distance)
+        block[f"slip_speed_{contact}"] = np.where(touches, np.hypot(*sensor[:, _SLIP].T), speeds[k])
     return block
 
 

@@ -35,37 +35,30 @@ def spec(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) ->
     Raises `InputError` if the file can't be read or lacks one of the named elements.
     """
     spec = _read(Path(scene))
-    found = {kind: {name: _find(spec, kind, name, scene) for name in names} for kind, names in _ELEMENTS.items()}
+    named = {kind: {name: _find(spec, kind, name, scene) for name in names} for kind, names in _ELEMENTS.items()}
     _set_options(spec.option, p, settings)
-    _set_geometry(found["body"], found["geom"], found["joint"], p)
+    _set_geometry(named["body"], named["geom"], named["joint"], p)
     for name, friction in (("A", p.mu), ("B", p.eta)):
-        _set_pair(found["pair"][name], friction, settings)
+        _set_pair(named["pair"][name], friction, settings)
     if settings.coordinates == "free":
-        for joint in found["joint"].values():
+        for joint in named["joint"].values():
             spec.delete(joint)
-        found["body"]["ball"].add_freejoint(name="free")
+        named["body"]["ball"].add_freejoint(name="free")
     if settings.wall == "prism":
-        _replace_wall(spec, found, p, settings)
+        _replace_wall(spec, named, p, settings)
     return spec
 
 
-def build(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -> Any:
-    """The scene compiled to an `mujoco.MjModel`; raises as `spec`."""
+def build(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -> tuple[Any, str]:
+    """The scene compiled to an `mujoco.MjModel`, and as the MJCF text that is simulated; raises as `spec`."""
     filled = spec(p, settings, scene)
     try:
         model = filled.compile()
     except ValueError as error:
         raise InputError(f"MuJoCo cannot compile {scene}: {_one_line(error)}") from error
-    # The engine looks at surface velocities only if one was there at compile time, or if told.
+    # Without one in the scene, the engine looks at surface velocities only if this flag says so.
     model.flg_surfacevel = settings.shifts_surfaces
-    return model
-
-
-def mjcf(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -> str:
-    """The scene as the MJCF text that is simulated; raises as `spec`."""
-    filled = spec(p, settings, scene)
-    filled.compile()
-    return str(filled.to_xml())
+    return model, str(filled.to_xml())
 
 
 def _read(scene: Path) -> Any:
@@ -113,9 +106,9 @@ def _set_geometry(body: dict[str, Any], geom: dict[str, Any], joint: dict[str, A
     geom["vessel"].size = (p.R + p.r, height, 0.0)
 
 
-def _replace_wall(spec: Any, found: dict[str, dict[str, Any]], p: Parameters, settings: ContactSettings) -> None:
+def _replace_wall(spec: Any, named: dict[str, dict[str, Any]], p: Parameters, settings: ContactSettings) -> None:
     """Put a regular prism of fixed planes, tangent to the vessel's cylinder, in the place of the wall."""
-    wall = found["geom"]["wall"]
+    wall = named["geom"]["wall"]
     for facet in range(settings.facets):
         azimuth = 2 * math.pi * facet / settings.facets
         outwards = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
@@ -126,10 +119,10 @@ def _replace_wall(spec: Any, found: dict[str, dict[str, Any]], p: Parameters, se
         geom.alt.type, geom.alt.zaxis = mujoco.mjtOrientation.mjORIENTATION_ZAXIS, -outwards
         _set_pair(spec.add_pair(name=f"B{facet}", geomname1=geom.name, geomname2="ball"), p.eta, settings)
     # Where two facets meet, the one that carries more is reported.
-    sensor = found["sensor"]["B"]
+    sensor = named["sensor"]["B"]
     sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_BODY, "world"
     sensor.intprm[1] = _MAXFORCE
-    spec.delete(found["pair"]["B"])
+    spec.delete(named["pair"]["B"])
     spec.delete(wall)
 
 

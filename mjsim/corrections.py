@@ -1,0 +1,142 @@
+"""What is corrected between MuJoCo's steps, in the words of mechanics.
+
+MuJoCo takes forces at the beginning of a step and lets contact be soft. Each block of `corrections` takes out one
+consequence of that. None knows a solution of the problem: each is built from what the last step gave, and vanishes
+where motion and forces are steady.
+
+Every quantity is a float for one run and an array with an entry for each run of a batch; the same lines serve both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from mjsim.contact_settings import ContactSettings
+from model import Parameters
+
+Quantity = Any
+"""A float, or an array with an entry for each run."""
+
+_SLIDES = 9.0
+"""A contact slides if its speed is over three times the change in a step (squares); a slip that ends dies out faster."""
+
+
+class Ball(NamedTuple):
+    """What the corrections need of a ball and of the settings."""
+
+    R: Quantity
+    r: Quantity
+    drag: Quantity
+    """m c, kg s-1."""
+    mass_ahead: Quantity
+    """m times `ahead`, kg."""
+    inertia_ahead: Quantity
+    """j m r^2 times `ahead`, kg m2."""
+    memory: Quantity
+    """R_t/b_f, surface velocity per friction force, m s-1 N-1."""
+    ahead: Quantity
+    """Where in a step forces are taken, in steps after its beginning: 1/2, or 0 where the engine's order is kept."""
+    lag: Quantity
+    """How many steps after that friction takes its direction by itself."""
+
+    @classmethod
+    def of(cls, p: Parameters, settings: ContactSettings) -> Ball:
+        """The values of one run."""
+        ahead = settings.midpoint
+        return cls(
+            p.R, p.r, p.m * p.c, p.m * ahead, p.j * p.m * p.r**2 * ahead,
+            settings.memory_gain(p.m), ahead, settings.friction_lag,
+        )  # fmt: skip
+
+
+class Motion(NamedTuple):
+    """What the corrections look at: a change of it over the last step goes on in the next."""
+
+    v_z: Quantity
+    """Speed along the orbit, rho omega_c, m s-1."""
+    v_h: Quantity
+    v_y: Quantity
+    A_x: Quantity
+    A_z: Quantity
+    B_y: Quantity
+    B_z: Quantity
+    """Slip velocities at A and B (5), m s-1."""
+    coriolis: Quantity
+    centripetal: Quantity
+    """omega_c v_h and omega_c v_z, m s-2."""
+    turning_x: Quantity
+    turning_z: Quantity
+    """omega_c o_z and omega_c o_x, s-2."""
+
+
+def motion(
+    rho: Quantity, r: Quantity,
+    omega_c: Quantity, v_h: Quantity, v_y: Quantity, o_x: Quantity, o_y: Quantity, o_z: Quantity,
+) -> Motion:  # fmt: skip
+    """The motion at the distance rho from the axis; the spin o along the paper's axes, o_y less omega_c."""
+    v_z, roll_z = rho * omega_c, r * o_z
+    return Motion(
+        v_z, v_h, v_y,
+        v_h + roll_z, v_z - r * o_x, v_y - roll_z, v_z + r * (o_y + omega_c),
+        omega_c * v_h, omega_c * v_z, omega_c * o_z, omega_c * o_x,
+    )  # fmt: skip
+
+
+def corrections(
+    now: Motion, last: Motion, rho: Quantity, omega_0: Quantity,
+    contact: Sequence[Quantity], normals: Sequence[Quantity], ball: Ball,
+) -> tuple[tuple[Quantity, ...], tuple[Quantity, ...]]:  # fmt: skip
+    """What drives a step that begins with the motion `now`, a step after `last`.
+
+    Parameters
+    ----------
+    contact, normals : generalised contact force and normal forces (A_y, B_x) of the last step, N and N m
+
+    Returns
+    -------
+    generalised forces of the joints (torque about the axis, inward, upward, moments about x, y, z), N and N m
+    velocities of the surfaces (floor along z, x, wall along y, z), m s-1
+    """
+    ahead = ball.ahead
+
+    # Drag (9) at mid step: -m c (v - v_fluid). Of the last step's change as much again lies `ahead` till then.
+    drag_z = -ball.drag * (now.v_z + ahead * (now.v_z - last.v_z) - rho * omega_0)
+    drag_h = -ball.drag * (now.v_h + ahead * (now.v_h - last.v_h))
+    drag_y = -ball.drag * (now.v_y + ahead * (now.v_y - last.v_y))
+
+    # Inertial forces at mid step. In the co-rotating frame they are 2 m omega_c v_h along the orbit and
+    # -m omega_c v_z inwards, and I omega_c (-o_z, 0, o_x) on the spin. The engine has them as they are at the
+    # beginning of the step; what they grow by till its middle is added.
+    inertial_z = 2 * ball.mass_ahead * (now.coriolis - last.coriolis)
+    inertial_h = -ball.mass_ahead * (now.centripetal - last.centripetal)
+    moment_x = -ball.inertia_ahead * (now.turning_x - last.turning_x)
+    moment_z = ball.inertia_ahead * (now.turning_z - last.turning_z)
+
+    # Direction of sliding friction at mid step. The engine opposes friction to the slip that there would be 1/b_f after
+    # the beginning of the step. A surface that moves by what slip changes from the middle till then takes the
+    # difference out; only where a contact truly slides, since a slip that ends must end.
+    A_x, A_z, B_y, B_z = now.A_x - last.A_x, now.A_z - last.A_z, now.B_y - last.B_y, now.B_z - last.B_z
+    lag_A = ball.lag * (_SLIDES * (A_x * A_x + A_z * A_z) < now.A_x * now.A_x + now.A_z * now.A_z)
+    lag_B = ball.lag * (_SLIDES * (B_y * B_y + B_z * B_z) < now.B_y * now.B_y + now.B_z * now.B_z)
+
+    # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
+    # that speed for the last step's friction f leaves only the change of f to creep. The friction forces follow from
+    # contact = (., A_x + B_x, A_y + B_y, -r A_z, r B_z, .).
+    memory, (_, inward, upward, about_x, about_y, _), (A_normal, B_normal) = ball.memory, contact, normals
+    floor_z = lag_A * A_z - memory / ball.r * about_x
+    floor_x = lag_A * A_x + memory * (inward - B_normal)
+    wall_y = lag_B * B_y + memory * (upward - A_normal)
+    wall_z = lag_B * B_z + memory / ball.r * about_y
+
+    forces = rho * (drag_z + inertial_z), drag_h + inertial_h, drag_y, moment_x, 0.0, moment_z
+    return forces, (floor_z, floor_x, wall_y, wall_z)
+
+
+def followed(margin: Quantity, gap: Quantity, gain: float) -> Quantity:
+    """Servo of a margin: it takes a share `gain` of the gap, not below 0, until the gap is zero.
+
+    The contact point lies midway in the overlap, so that a ball that sinks in rolls on a shorter lever.
+    """
+    left = margin - gain * gap
+    return left * (left > 0)

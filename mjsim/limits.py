@@ -1,0 +1,66 @@
+"""What a run may be asked for: refused or warned of before anything is simulated."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+
+from mjsim.contact_settings import ContactSettings
+from model import Flow, InputError, Parameters
+from model.arrays import Array
+from model.kinematics import slip_speeds
+from model.parameters import check_number
+
+
+def check_start(x: Array, p: Parameters, settings: ContactSettings) -> None:
+    """Refuse a full state on or beyond the axis, where polar coordinates end.
+
+    Warn if contact can't be continuous at its slip speeds, taking the load of gravity for both contacts.
+    """
+    if settings.coordinates == "polar" and x[6] >= p.R:
+        raise InputError(f"h = {x[6]:g} m is out of range: must be < R = {p.R:g} m")
+    for contact, friction, speed, gap in zip("AB", (p.mu, p.eta), slip_speeds(x, p), (x[0], x[6]), strict=True):
+        fastest = settings.fastest_slip(p.g, friction)
+        if abs(gap) < settings.touching(p.g) and speed > fastest:
+            warnings.warn(
+                f"the ball slips at {speed:.3g} m s-1 at {contact} at the start, but with these settings contact "
+                f"is continuous only up to {fastest:.3g} m s-1; ContactSettings.for_problem finds softer ones",
+                stacklevel=4,
+            )
+
+
+def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float) -> None:
+    """Refuse a step beyond half the shortest time of the problem.
+
+    A contact of the engine needs a time constant of two steps. Within it an acceleration a may not move the ball by the
+    size of the vessel, a (2 h)^2 <= R: gravity's, a = g, asks for 2 h <= sqrt(R/g), and that of the orbit,
+    a = R omega_0^2, for 2 h <= 1/omega_0. Drag, extrapolated to mid step, leaves z of a speed in a step, where
+    z^2 - (1 - 3/2 c h) z - c h/2 = 0; that is stable up to c h = 1, and 2 h <= 1/c keeps to half of it.
+    """
+    times = np.append(flow.breakpoints[flow.breakpoints < t_end], [0.0, t_end])
+    # Just before and after the jumps: between them omega_0 is linear.
+    fastest = float(np.abs(flow(np.append(times, np.nextafter(times, -np.inf)))).max())
+    scales = {"sqrt(R/g)": math.sqrt(p.R / p.g) if p.g else math.inf}
+    scales |= {"1/omega_0": 1 / fastest if fastest else math.inf, "1/c": 1 / p.c if p.c else math.inf}
+    name, shortest = min(scales.items(), key=lambda scale: scale[1])
+    if timestep > shortest / 2:
+        raise InputError(
+            f"timestep = {timestep:g} s is out of range: must be <= {shortest / 2:.3g} s, half of {name}, "
+            "the shortest time of the problem"
+        )
+
+
+def sampling(t_end: float, timestep: float, sample_interval: float | None) -> tuple[int, int]:
+    """Steps between samples and number of samples, both ends included."""
+    if check_number("t_end", t_end, "s") < timestep:
+        raise InputError(f"t_end = {t_end:g} s is out of range: must be at least one time step, {timestep:g} s")
+    if sample_interval is None:
+        sample_interval = max(t_end / 1000, timestep)
+    if check_number("sample_interval", sample_interval, "s") < timestep * (1 - 1e-9):
+        raise InputError(
+            f"sample_interval = {sample_interval:g} s is out of range: must be at least one time step, {timestep:g} s"
+        )
+    steps = max(1, round(sample_interval / timestep))
+    return steps, math.floor(t_end / (steps * timestep) + 1e-9) + 1
