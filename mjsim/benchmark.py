@@ -12,10 +12,10 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from mjsim import recorder, scene
+from mjsim import scene
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run
-from mjsim.stepping import Single
+from mjsim.stepping import Polar
 from model import Flow, Parameters
 from model.kinematics import full_state
 
@@ -44,9 +44,10 @@ def cost(
     stands, by a single assignment a step.
     """
     settings = settings or ContactSettings()
-    state = recorder.joint_state(full_state(np.asarray(x0, dtype=float)), 0.0, p)
-    settled = Single(scene.build(p, settings), p, settings, state, p.omega_0)
-    settled.advance(np.full((500, 1), p.omega_0))
+    model, _ = scene.build(p, settings)
+    omega_0 = np.full((500, 1), p.omega_0)
+    settled = Polar([model], [p], settings, [full_state(np.asarray(x0, dtype=float))], 0.0, omega_0[0], batched=False)
+    settled.advance(omega_0)
     bare, whole = [_bare(settled, runs, steps)], []
     for _ in range(repeats):
         loop = Run(
@@ -63,7 +64,7 @@ def cost(
     return Cost(runs, statistics.median(bare) / each, statistics.median(whole) / each, statistics.median(ratios))
 
 
-def _bare(settled: Single, runs: int, steps: int) -> float:
+def _bare(settled: Polar, runs: int, steps: int) -> float:
     """Time in s of the given steps with no more around them than a loop."""
     model, data = settled.model, settled.data
     if runs == 1:

@@ -1,4 +1,4 @@
-"""Which kinematic case is it? Told from slip speed and force over several samples, with hysteresis.
+"""Which kinematic case is it? Detected from slip speed and force over several samples, with hysteresis.
 
 A contact is open where it carries no force. A closed one slips where it uses the whole of the friction and moves faster
 than a dead band; it rolls where either is clearly not so; in between it is what it was. A state counts only if it
@@ -13,12 +13,13 @@ import numpy.typing as npt
 from mjsim.contact_settings import ContactSettings
 from model import Case, Contact, Events, Parameters
 from model.arrays import Array
+from model.trajectory import SAMPLE
 
 PERSISTENCE = 3
 """Samples a contact must stay in a state for it to count."""
 
 _LETTERS = (Contact.R, Contact.S, Contact.N)
-_R, _S, _N, _AS_BEFORE = 0, 1, 2, 3
+_R, _S, _N, _AS_BEFORE, _UNKNOWN = range(5)
 _CODES = np.array([[Case.of(A, B) for B in _LETTERS] for A in _LETTERS], dtype=np.int8)
 _SATURATED, _FREE = 1e-6, 1e-4
 """How far from its Coulomb value friction may be for slipping, and must be for rolling, relative."""
@@ -29,33 +30,43 @@ class Classifier:
 
     def __init__(self, p: Parameters, settings: ContactSettings) -> None:
         self._p, self._settings = p, settings
-        self._waiting: list[npt.NDArray[np.void]] = []
-        self._A, self._B = _Persistent(), _Persistent()
+        self._samples = np.empty(0, SAMPLE)
+        self._letters = np.empty((2, 0), dtype=np.intp)
+        """Samples that wait, and the letters of A and B that they show by themselves."""
+        self._shown, self._states = np.array([_R, _R]), np.array([_UNKNOWN, _UNKNOWN])
+        """The newest letters shown, and those of the newest sample that is decided."""
         self._changes: list[tuple[float, int, int]] = []
-        self._last: int | None = None
 
     def add(self, block: npt.NDArray[np.void], last: bool) -> npt.NDArray[np.void]:
         """Take in the next samples, dtype `model.trajectory.SAMPLE`; return those that are decided, with their case.
 
         With `last` all are, since no more will come.
         """
-        if len(block):
-            self._waiting.append(block)
+        letters = np.concatenate([self._letters, self._shown_by(block)], axis=1)
+        samples = np.concatenate([self._samples, block])
+        A, B = (_lasting(own, int(state), last) for own, state in zip(letters, self._states, strict=True))
+        count = min(len(A), len(B))
+        if count:
+            samples["case"][:count] = _CODES[A[:count], B[:count]]
+            self._note_changes(samples[:count])
+            self._states = np.array([A[count - 1], B[count - 1]])
+        self._samples, self._letters = samples[count:], letters[:, count:]
+        return samples[:count]
+
+    def _shown_by(self, block: npt.NDArray[np.void]) -> npt.NDArray[np.intp]:
+        """The letters (2, n) that samples show by themselves; between the bands that of the sample before."""
         A, B = block["force_A"], block["force_B"]
         normal = np.stack([A[:, 1], B[:, 0]])
         friction = np.stack([np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])])
-        letters = self._letters(normal, friction, np.stack([block["slip_speed_A"], block["slip_speed_B"]]))
-        self._A.add(letters[0])
-        self._B.add(letters[1])
-        count = min(self._A.decide(last), self._B.decide(last))
-        waiting = np.concatenate(self._waiting) if self._waiting else block
-        done, self._waiting = waiting[:count], [waiting[count:]]
-        done["case"] = _CODES[self._A.take(count), self._B.take(count)]
-        self._note_changes(done)
-        return done
+        letters = self._judge(normal, friction, np.stack([block["slip_speed_A"], block["slip_speed_B"]]))
+        letters = np.concatenate([self._shown[:, None], letters], axis=1)
+        known = np.maximum.accumulate(np.where(letters == _AS_BEFORE, 0, np.arange(letters.shape[1])), axis=1)
+        letters = np.take_along_axis(letters, known, axis=1)
+        self._shown = letters[:, -1]
+        return letters[:, 1:]
 
-    def _letters(self, normal: Array, friction: Array, speed: Array) -> npt.NDArray[np.intp]:
-        """What each sample by itself says of the contacts; all arrays of shape (2, n), A before B."""
+    def _judge(self, normal: Array, friction: Array, speed: Array) -> npt.NDArray[np.intp]:
+        """What each sample by itself says of the contacts; all arrays of shape (2, n), in the order A, B."""
         p, settings = self._p, self._settings
         limit = np.array([[p.mu], [p.eta]]) * normal
         # A friction force of which one step can build up only a part leaves, while it changes slowly, a creep far
@@ -73,12 +84,9 @@ class Classifier:
 
     def _note_changes(self, done: npt.NDArray[np.void]) -> None:
         case = done["case"].astype(int)
-        if len(case) == 0:
-            return
-        before = np.concatenate([[case[0] if self._last is None else self._last], case[:-1]])
-        for k in np.flatnonzero(before != case):
-            self._changes.append((float(done["time"][k]), int(before[k]), int(case[k])))
-        self._last = int(case[-1])
+        before = case[0] if self._states[0] == _UNKNOWN else _CODES[tuple(self._states)]
+        for k in np.flatnonzero(np.diff(case, prepend=before)):
+            self._changes.append((float(done["time"][k]), int(case[k - 1] if k else before), int(case[k])))
 
     @property
     def events(self) -> Events:
@@ -93,47 +101,20 @@ class Classifier:
         )  # fmt: skip
 
 
-class _Persistent:
-    """Letters of one contact, where what doesn't last is replaced by what was before (or, at the start, comes next)."""
+def _lasting(letters: npt.NDArray[np.intp], state: int, last: bool) -> npt.NDArray[np.intp]:
+    """Letters where those that don't last are replaced by what was before, or by what comes first in an unknown state.
 
-    def __init__(self) -> None:
-        self._letters = np.empty(0, dtype=np.intp)
-        self._decided = 0
-        self._newest, self._state = _R, -1
-
-    def add(self, letters: npt.NDArray[np.intp]) -> None:
-        """Append letters; one that says "as before" becomes the one before."""
-        known = np.maximum.accumulate(np.where(letters == _AS_BEFORE, -1, np.arange(len(letters))))
-        letters = np.where(known < 0, self._newest, letters[known])
-        self._newest = int(letters[-1]) if len(letters) else self._newest
-        self._letters = np.concatenate([self._letters, letters])
-
-    def decide(self, last: bool) -> int:
-        """Replace what doesn't last; return how many letters, from the first, are final."""
-        letters = self._letters
-        bounds = self._decided + np.flatnonzero(np.diff(letters[self._decided :])) + 1
-        starts, stops = [self._decided, *bounds.tolist()], [*bounds.tolist(), len(letters)]
-        for start, stop in zip(starts, stops, strict=True):
-            letter = int(letters[start]) if start < stop else self._state
-            if stop - start >= PERSISTENCE:
-                self._state = letter
-            elif letter != self._state and stop == len(letters) and not last:
-                break  # it may yet last
-            elif self._state < 0:
-                self._state = self._first(start, letter)
-            letters[start:stop] = self._state
-            self._decided = stop
-        return self._decided
-
-    def _first(self, start: int, otherwise: int) -> int:
-        """The first letter from `start` on that lasts."""
-        for k in range(start, len(self._letters) - PERSISTENCE + 1):
-            if np.all(self._letters[k : k + PERSISTENCE] == self._letters[k]):
-                return int(self._letters[k])
-        return otherwise
-
-    def take(self, count: int) -> npt.NDArray[np.intp]:
-        """Hand out the first letters, which must be final."""
-        taken, self._letters = self._letters[:count], self._letters[count:]
-        self._decided -= count
-        return taken
+    All of them if they are the `last`, else up to where more letters may change the answer.
+    """
+    if len(letters) == 0:
+        return letters
+    starts = np.flatnonzero(np.diff(letters, prepend=-1))
+    lengths, values = np.diff(starts, append=len(letters)), letters[starts]
+    lasts = (lengths >= PERSISTENCE) | (values == state)
+    if state == _UNKNOWN:
+        if not (lasts.any() or last):
+            return letters[:0]
+        state = int(values[np.argmax(lasts)])  # the first that lasts, or the first of all
+    latest = np.maximum.accumulate(np.where(lasts, np.arange(len(values)), -1))
+    decided = np.repeat(np.where(latest < 0, state, values[latest]), lengths)
+    return decided if last or lasts[-1] else decided[: starts[-1]]

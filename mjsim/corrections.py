@@ -19,7 +19,7 @@ Quantity = Any
 """A float, or an array with an entry for each run."""
 
 _SLIDES = 9.0
-"""A contact slides if its speed is over three times the change in a step (squares); a slip that ends dies out faster."""
+"""A contact slides if its speed squared is over this times that of its change in a step; slip that ends dies faster."""
 
 
 class Ball(NamedTuple):
@@ -39,6 +39,8 @@ class Ball(NamedTuple):
     """Where in a step forces are taken, in steps after its beginning: 1/2, or 0 where the engine's order is kept."""
     lag: Quantity
     """How many steps after that friction takes its direction by itself."""
+    gain: Quantity
+    """Share of a gap that the servo takes off a margin in a step; 0 without servo."""
 
     @classmethod
     def of(cls, p: Parameters, settings: ContactSettings) -> Ball:
@@ -46,7 +48,7 @@ class Ball(NamedTuple):
         ahead = settings.midpoint
         return cls(
             p.R, p.r, p.m * p.c, p.m * ahead, p.j * p.m * p.r**2 * ahead,
-            settings.memory_gain(p.m), ahead, settings.friction_lag,
+            settings.memory_gain(p.m), ahead, settings.friction_lag, settings.servo_gain,
         )  # fmt: skip
 
 
@@ -133,7 +135,7 @@ def corrections(
     return forces, (floor_z, floor_x, wall_y, wall_z)
 
 
-def followed(margin: Quantity, gap: Quantity, gain: float) -> Quantity:
+def followed(margin: Quantity, gap: Quantity, gain: Quantity) -> Quantity:
     """Servo of a margin: it takes a share `gain` of the gap, not below 0, until the gap is zero.
 
     The contact point lies midway in the overlap, so that a ball that sinks in rolls on a shorter lever.

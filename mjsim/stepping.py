@@ -6,23 +6,18 @@ upright, so that forces and velocities of the ball's joint are along the paper's
 ahead of velocities (leapfrog).
 
 Arrays have the runs in the last axis and contacts in the order A, B. One run by itself is stepped in plain floats,
-which beat arrays of one.
+which beat arrays of one; where numba is installed, `mjsim.compiled` beats both.
 """
 
 from __future__ import annotations
 
-import functools
-import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-import mujoco
 import numpy as np
 import numpy.typing as npt
-from mujoco.batch import MODEL_FIELDS, Batch
 
-from mjsim import recorder
+from mjsim import backend, recorder
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, Motion, corrections, followed, motion
 from model import Parameters
@@ -78,21 +73,26 @@ class Polar(Stepper):
         self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
         x0s: Sequence[Array], theta_0: float, omega_0: Array, batched: bool = True,
     ) -> None:  # fmt: skip
-        self._settings, self._engine = settings, _batch(models) if batched else _alone(models[0])
+        self._settings, self._compiled = settings, backend.compiled()
+        self._form = backend.ARRAYS if batched or self._compiled else backend.FLOATS
+        self._engine = backend.batch(models) if batched else backend.single(models[0])
         self.model, self.data = models[0], self._engine.data
         self._take_views()
-        self._ball = Ball(*self._floats(np.array([Ball.of(p, settings) for p in parameters]).T))
+        self._balls = np.array([Ball.of(p, settings) for p in parameters]).T
+        self._ball = Ball(*self._quantities(self._balls))
         self._reach = np.array([settings.touching(p.g) for p in parameters])
         self._radius = np.array([p.R for p in parameters])
         self.axis, self._steps = np.full(len(models), np.inf), 0
         start = [recorder.joint_state(x, theta_0, p) for x, p in zip(x0s, parameters, strict=True)]
         self._qpos[:], self._qvel[:] = (np.stack(part, axis=-1) for part in zip(*start, strict=True))
         self._qpos[:3] += settings.lead * self._qvel[:3]
-        self._last = self._motion(self._qvel)
+        # Floats or arrays of the present form; compiled code makes them rows of an array.
+        self._last: Motion | Array = self._motion(self._qvel)
+        self._now: Motion | Array = self._last
         self._settle(omega_0)
 
     def _take_views(self) -> None:
-        array, lean = self._engine.array, self._engine.lean
+        array, lean = self._engine.array, self._form.lean
         self._qpos, self._qvel, self._sensors = array("qpos"), array("qvel"), array("sensordata")
         self._gaps, self._speeds = self._qpos[_GAPS], self._qvel[_GAPS]
         self._acceleration, self._smooth = array("qacc"), array("qacc_smooth")
@@ -105,60 +105,79 @@ class Polar(Stepper):
         self._upright = lean(np.outer([1.0, 0, 0, 0], np.ones(self._qpos.shape[1])))
         self._outputs = array("qfrc_constraint"), self._sensors[_NORMALS]
         self._latest = self._contact = tuple(lean(output) for output in self._outputs)
+        self._written = self._qpos, self.margins, *self._driven
+        self._spare: Array = np.empty((len(Motion._fields), self._qpos.shape[1]))
         carried = ("qpos", "qvel", "qacc_warmstart", "pair_margin", "geom_surfacevel")
         self._carried = {name: array(name) for name in carried}
 
     def advance(self, omega_0: Iterable[Array], row: Array | None = None) -> None:
-        read, step, some = self._engine.read, self._engine.step, self._engine.some
-        gain, place, margins = self._settings.servo_gain, self._place, self._lean_margins
         for fluid in omega_0:
             if row is not None:
                 row[:, : recorder.NQ], row[:, recorder.NQ : recorder.SENSORS] = self._qpos.T, self._qvel.T
-            load_A, load_B = read(self._contact[1])
-            if some(load_A * load_B == 0):
-                self._watch(fluid, load_A, load_B)
-            if gain:
-                _, gap_B, gap_A = read(place)
-                margin_A, margin_B = read(margins)
-                margins[0], margins[1] = followed(margin_A, gap_A, gain), followed(margin_B, gap_B, gain)
-            self._prepare(fluid)
-            step()
+            if not self._drive(fluid, watched=False):
+                self._watch(fluid)
+                self._drive(fluid, watched=True)
+            self._engine.step()
             self._last, self._contact, self._steps = self._now, self._latest, self._steps + 1
             if row is not None:
                 row[:, recorder.SENSORS :], row = self._sensors.T, None
 
+    def _drive(self, fluid: Array, watched: bool) -> bool:
+        """Let the margins follow the gaps and set what drives the next step.
+
+        Do nothing and return False if some contact carried nothing in the last step and has not been `watched`.
+        """
+        if self._compiled:
+            last, now = np.asarray(self._last), self._spare
+            done = self._compiled(watched, fluid, self._balls, last, *self._contact, self._qvel, now, *self._written)
+            if done:
+                self._now, self._spare = now, last
+            return done
+        read, margins, gain = self._form.read, self._lean_margins, self._ball.gain
+        load_A, load_B = read(self._contact[1])
+        if not watched and self._form.some(load_A * load_B == 0):
+            return False
+        if self._settings.servo:
+            _, h, y = read(self._place)
+            margin_A, margin_B = read(margins)
+            margins[0], margins[1] = followed(margin_A, y, gain), followed(margin_B, h, gain)
+        self._prepare(fluid)
+        return True
+
     def _prepare(self, fluid: Array) -> None:
         """Set the wall and everything that drives the next step."""
-        engine, ball, turn, applied, floor, wall = self._engine, self._ball, *self._driven
-        theta, h, _ = engine.read(self._place)
-        turn[0], turn[3] = engine.cos(theta / 2), engine.sin(theta / 2)
+        form, ball, turn, applied, floor, wall = self._form, self._ball, *self._driven
+        theta, h, _ = form.read(self._place)
+        turn[0], turn[3] = form.cos(theta / 2), form.sin(theta / 2)
         self._orientation[:] = self._upright
         contact, normals = self._contact
         rho = ball.R - h
-        self._now = motion(rho, ball.r, *engine.read(self._velocity))
+        self._now = now = motion(rho, ball.r, *form.read(self._velocity))
+        last: Any = self._last
         forces, (floor[0], floor[1], wall[0], wall[1]) = corrections(
-            self._now, self._last, rho, engine.one(fluid), engine.read(contact), engine.read(normals), ball
+            now, last, rho, form.one(fluid), form.read(contact), form.read(normals), ball
         )
         applied[0], applied[1], applied[2], applied[3], _, applied[5] = forces
 
-    def _watch(self, fluid: Array, load_A: Any, load_B: Any) -> None:
+    def _watch(self, fluid: Array) -> None:
         """See whether a ball that lacks a contact reaches the axis within a step, or has come down on the contact."""
-        _, h, y = self._engine.read(self._place)
-        _, v_h, *_ = self._engine.read(self._velocity)
-        if self._engine.some(self._ball.R - h <= self._settings.timestep * v_h):
+        load_A, load_B = self._form.read(self._contact[1])
+        _, h, y = self._form.read(self._place)
+        _, v_h, *_ = self._form.read(self._velocity)
+        if self._form.some(self._ball.R - h <= self._settings.timestep * v_h):
             reaches = self._radius - self._qpos[1] <= self._settings.timestep * self._qvel[1]
             self.axis[reaches] = np.minimum(self.axis[reaches], self._steps * self._settings.timestep)
-        if self._settings.servo and self._engine.some((load_A == 0) & (y < 0) | (load_B == 0) & (h < 0)):
+        if self._settings.servo and self._form.some((load_A == 0) & (y < 0) | (load_B == 0) & (h < 0)):
             self._land(fluid)
 
     def _motion(self, qvel: Array) -> Motion:
         """The motion with other velocities (6, runs) at the present place."""
-        _, h, _ = self._engine.read(self._place)
-        return motion(self._ball.R - h, self._ball.r, *self._floats(qvel))
+        _, h, _ = self._form.read(self._place)
+        return motion(self._ball.R - h, self._ball.r, *self._quantities(qvel))
 
-    def _floats(self, rows: Array) -> Any:
-        """The rows of an array (n, runs) in the form in which quantities are."""
-        return self._engine.read(self._engine.lean(rows))
+    def _quantities(self, rows: Array) -> Any:
+        """The rows of an array (n, runs) as quantities."""
+        return self._form.read(self._form.lean(rows))
 
     def _settle(self, omega_0: Array) -> None:
         """Find the margins, friction forces and accelerations that belong to the first state, at a fixed time."""
@@ -180,21 +199,28 @@ class Polar(Stepper):
         the surface, and `mj_forward` gives the impulses at both contacts at a fixed time, while the margins are
         adjusted until neither contact approaches or rebounds.
         """
-        settings, timestep, normals = self._settings, self._settings.timestep, np.atleast_2d(self._contact[1].T).T
+        settings, timestep, last = self._settings, self._settings.timestep, Motion(*self._last)
+        normals = self._rows(self._contact[1])
         lands = (normals == 0) & (self._gaps < 0) & (self._speeds * timestep < -_FALL * self._reach)
         if not lands.any():
             return
+        self._last = last
         self._gaps[lands] = 0.0
-        # A flight has let the servo take the margin: the load asks for one.
-        last = np.array([self._last.v_y, self._last.v_h]).reshape(2, -1)
-        asked = settings.margin(1.0) * (last - self._speeds) / timestep
+        # In flight the servo has taken the margin; the load asks for one.
+        asked = settings.margin(1.0) * (self._rows(np.array([last.v_y, last.v_h])) - self._speeds) / timestep
         self.margins[:] = np.where(lands & (self.margins == 0), np.maximum(_TOUCH, asked), self.margins)
-
         runs = np.flatnonzero(lands.any(axis=0))
-        touches = ((normals > 0) | (self._gaps <= 0))[:, runs]
+        self._stop(runs, ((normals > 0) | (self._gaps <= 0))[:, runs], omega_0)
+        # The jump is over: nothing of it goes on in the next step.
+        landed = np.where(lands.any(axis=0), np.array(self._motion(self._qvel)), np.array(last))
+        self._last = Motion(*self._form.read(landed))
+
+    def _stop(self, runs: npt.NDArray[np.intp], touches: npt.NDArray[np.bool_], omega_0: Array) -> None:
+        """Apply the impulses that stop the given runs at the contacts that touch, (2, n), if there are such."""
+        settings, timestep = self._settings, self._settings.timestep
         before, margins, solref = self._speeds[:, runs], self.margins[:, runs], self._solref[:, runs]
         kept, tried = ([self._rows(part) for part in self._contact] for _ in range(2))
-        self._contact = tuple(self._engine.lean(rows) for rows in tried)
+        self._contact = tuple(self._form.lean(rows) for rows in tried)
         self._solref[:, runs] = solref * _UNDAMPED
         for _ in range(_ROUNDS):
             self._prepare(omega_0)
@@ -210,79 +236,22 @@ class Polar(Stepper):
         stopped = (rests | ~touches).all(axis=0)
         self._qvel[:, runs[stopped]] += jump[:, stopped]
         self.margins[:, runs], self._solref[:, runs] = margins, solref
-        self._contact = tuple(self._engine.lean(rows) for rows in kept)
-        # The jump is over: nothing of it goes on in the next step.
-        landed = np.where(lands.any(axis=0), np.array(self._motion(self._qvel)), np.array(self._last))
-        self._last = Motion(*self._engine.read(landed))
+        self._contact = tuple(self._form.lean(rows) for rows in kept)
 
     def _rows(self, lean: Array) -> Array:
-        """A copy with the runs in the last axis."""
-        return lean.reshape(len(lean), -1).copy()
+        """A copy of a lean array with the runs in the last axis."""
+        return np.array(lean).reshape(len(lean), -1)
 
     def state(self) -> dict[str, Array]:
         constraint, normals = self._contact
-        more = {"constraint": constraint, "normals": normals, "last": self._last, "axis": self.axis}
-        return {name: np.array(values) for name, values in (self._carried | more | {"steps": self._steps}).items()}
+        more = {"constraint": constraint, "normals": normals, "last": np.array(self._last)}
+        state = {name: self._rows(values) for name, values in (self._carried | more).items()}
+        return state | {"axis": self.axis.copy(), "steps": np.array(self._steps)}
 
     def restore(self, state: dict[str, Array]) -> None:
         for name, values in self._carried.items():
             values[...] = state[name]
         # What the engine puts out can't be written back: until its next step, the copies stand in for it.
-        self._contact = state["constraint"], state["normals"]
-        self._last = Motion(*self._engine.read(state["last"]))
+        self._contact = tuple(self._form.lean(state[name]) for name in ("constraint", "normals"))
+        self._last = Motion(*self._quantities(state["last"]))
         self.axis[:], self._steps = state["axis"], int(state["steps"])
-
-
-@dataclass(frozen=True)
-class _Engine:
-    """What the loop uses of MuJoCo, and how quantities are written: floats alone, arrays in a batch."""
-
-    data: Any
-    array: Callable[[str], Array]
-    """A field of the data or the model, as a view of shape (n, runs)."""
-    step: Callable[[], Any]
-    forward: Callable[[npt.NDArray[np.intp] | None], Any]
-    """`mj_forward` for the given runs, or all."""
-    lean: Callable[[Array], Array]
-    """The view without the axis of the runs, if there is but one run."""
-    read: Callable[[Array], Any]
-    """Quantities of a lean view, which stay as they are."""
-    one: Callable[[Array], Any]
-    some: Callable[[Any], bool]
-    cos: Callable[[Any], Any]
-    sin: Callable[[Any], Any]
-
-
-def _alone(model: Any) -> _Engine:
-    data = mujoco.MjData(model)
-    return _Engine(
-        data,
-        lambda name: np.asarray(getattr(data if hasattr(data, name) else model, name)).reshape(-1, 1),
-        functools.partial(mujoco.mj_step, model, data),
-        lambda runs: mujoco.mj_forward(model, data),
-        lambda rows: rows[..., 0],
-        np.ndarray.tolist,
-        np.ndarray.item,
-        bool,
-        math.cos,
-        math.sin,
-    )
-
-
-def _batch(models: Sequence[Any]) -> _Engine:
-    batch = Batch(models[0], nsim=len(models), nthread=1)
-    for name in MODEL_FIELDS:
-        owner, _, field = name.rpartition(".")
-        values = [np.asarray(getattr(getattr(model, owner) if owner else model, field)) for model in models]
-        if any(not np.array_equal(values[0], value) for value in values[1:]):
-            batch.expand(name)[:] = np.stack(values)
-
-    def array(name: str) -> Array:
-        values = batch.expand(name) if name in MODEL_FIELDS else batch.bind(name)
-        values = values[:, 0] if name == "mocap_quat" else values
-        return values.reshape(len(models), -1).T
-
-    return _Engine(
-        None, array, batch.step, batch.forward, lambda rows: rows, np.ndarray.copy, lambda omega_0: omega_0,
-        np.ndarray.any, np.cos, np.sin,
-    )  # fmt: skip

@@ -63,9 +63,9 @@ def _no_floor() -> AbstractContextManager[Any]:
     built = scene.build
 
     def without(p: Parameters, settings: ContactSettings) -> Any:
-        model = built(p, settings)
+        model, mjcf = built(p, settings)
         model.geom("floor").pos[2] = -FAR
-        return model
+        return model, mjcf
 
     return mock.patch.object(scene, "build", without)
 

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from compare.scorecard.native import Native
 from compare.scorecard.trials import KICKED, SLIPPING
 from mjsim import ContactSettings, recorder, scene
-from mjsim.free import Free
-from mjsim.stepping import Single, Stepper
+from mjsim.engine import start
+from mjsim.stepping import Stepper
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.kinematics import full_state
 
@@ -34,11 +34,9 @@ class Contender:
 
     def start(self, p: Parameters, x0: npt.ArrayLike) -> Stepper:
         """A simulation from a state."""
-        model = self.native.build(p, self.loop) if self.native else scene.build(p, self.loop)
+        model = self.native.build(p, self.loop) if self.native else scene.build(p, self.loop)[0]
         x = full_state(np.asarray(x0, dtype=float))
-        if self.loop.coordinates == "free":
-            return Free([model], [p], self.loop, [x], 0.0)
-        return Single(model, p, self.loop, recorder.joint_state(x, 0.0, p), p.omega_0)
+        return start([model], [p], self.loop, [x], 0.0, np.full(1, p.omega_0), batched=False)
 
     def run(self, p: Parameters, x0: npt.ArrayLike, t_end: float, interval: float, skip: float = 0.0) -> Trajectory:
         """Samples from about `skip` to `t_end`, every `interval` s, up to where the run diverges; without cases."""
@@ -47,15 +45,13 @@ class Contender:
         count = int((t_end - skip) / (every * h)) + 1
         stepper = self.start(p, x0)
         stepper.advance(np.full((before, 1), p.omega_0))
-        rows = np.empty((count, recorder.NQ + recorder.NV + recorder.NSENSOR))
+        rows = np.empty((count, recorder.SENSORS + recorder.NSENSOR))
         for row in rows:
-            stepper.sample(np.full(1, p.omega_0), row[None])
-            stepper.advance(np.full((every - 1, 1), p.omega_0))
+            stepper.advance(np.full((every, 1), p.omega_0), row[None])
         with np.errstate(invalid="ignore"):
             sound = rows[np.logical_and.accumulate((np.abs(rows) < _HUGE).all(axis=1))]
         times = (before + every * np.arange(len(sound), dtype=float)) * h
-        qpos, qvel, sensors = np.split(sound, [recorder.NQ, recorder.NQ + recorder.NV], axis=1)
-        block = recorder.samples(times, qpos, qvel, sensors, p, self.loop.lead)
+        block = recorder.samples(times, sound, p, self.loop.lead)
         failure = "" if len(sound) == count else "diverged"
         header = Header("mujoco", p, Flow.steady(p.omega_0), self.loop.to_mapping(), failure=failure)
         return Trajectory.from_blocks(header, [block], Events())

@@ -23,7 +23,7 @@ def spec(run: Trajectory) -> Any:
     is not valid or has no ball.
     """
     p = run.header.parameters
-    mjcf = run.header.mjcf or scene.mjcf(p, ContactSettings())
+    mjcf = run.header.mjcf or scene.build(p, ContactSettings())[1]
     try:
         made = mujoco.MjSpec.from_string(mjcf)
     except ValueError as error:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from mjsim import ContactSettings, recorder, scene
-from mjsim.stepping import Single
+from mjsim import ContactSettings, limits, scene
+from mjsim.stepping import Polar
 from model import Flow, InputError, Parameters
 from model.kinematics import full_state
 
@@ -52,19 +52,22 @@ def view(
         run(handle, stepper, flow, settings.timestep, speed)
 
 
-def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> Single:
+def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings) -> Polar:
     """The simulation, with what only serves contact out of sight."""
     if settings.coordinates != "polar":
         raise InputError("the viewer shows coordinates = 'polar' only")
-    model = scene.build(p, settings)
+    x = full_state(np.asarray(x0, dtype=float))
+    limits.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))
+    limits.check_start(x, p, settings)
+    model, _ = scene.build(p, settings)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
-    state = recorder.joint_state(full_state(np.asarray(x0, dtype=float)), 0.0, p)
-    return Single(model, p, settings, state, float(flow(0.5 * settings.timestep)))
+    omega_0 = flow([0.5 * settings.timestep])
+    return Polar([model], [p], settings, [x], 0.0, omega_0, batched=False)
 
 
 def run(
     handle: Any,
-    stepper: Single,
+    stepper: Polar,
     flow: Flow,
     timestep: float,
     speed: float,

@@ -127,7 +127,7 @@ def test_settings_come_through_to_the_engine() -> None:
 def test_a_scene_of_our_own_is_read_back(tmp_path: Path) -> None:
     settings = ContactSettings.at(5e-4)
     path = tmp_path / "scene.xml"
-    path.write_text(scene.mjcf(Parameters.named("reference"), settings))
+    path.write_text(scene.build(Parameters.named("reference"), settings)[1])
     found = native.read(path)
     assert (found.timestep, found.cone, found.impratio) == (5e-4, "elliptic", settings.impratio)
     for touch in (found.A, found.B):

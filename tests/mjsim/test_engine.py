@@ -96,6 +96,57 @@ def test_divergence_stops_a_run_and_keeps_what_there_is() -> None:
     assert len(sound.time) == 101
 
 
+def test_a_run_that_reaches_the_axis_says_so() -> None:
+    """No fluid, no friction, 0.1 m/s straight inwards from a gap of R/5: at the axis after 0.4 s.
+
+    Nothing acts on the ball along its way, and the check looks one step ahead.
+    """
+    p = P.replace(omega_0=0.0, c=0.0, mu=0.0, eta=0.0)
+    away, still = [0, 0, 0, 0, 0, 0, 0.2 * p.R, 0.1], [0, 0, 0, 0, 0, 0, 0.2 * p.R, 0]
+    settings, arrives = ContactSettings(), 0.8 * p.R / 0.1
+    with pytest.raises(
+        SimulationError, match=r"reached the vessel's axis at t = .* s, where polar coordinates end"
+    ) as e:
+        mjsim.simulate(p, away, 0.6, settings=settings, sample_interval=0.01)
+    alone = e.value.trajectory
+    batch, sound = mjsim.simulate_many([p, p], [away, still], 0.6, settings=settings, sample_interval=0.01)
+    assert sound.complete
+    for run in (alone, batch):
+        time = float(run.header.failure.split("t = ")[1].split(" s")[0])
+        assert arrives - 2 * settings.timestep <= time <= arrives
+        np.testing.assert_allclose(run.time, np.arange(0, time, 0.01), rtol=0, atol=1e-12)
+        assert np.all(run.h < p.R)
+
+
+def test_a_ball_that_passes_by_the_axis_goes_on() -> None:
+    """Without friction a straight line at R/3 from the axis: rho^2 = b^2 + (a - v t)^2."""
+    p = P.replace(omega_0=0.0, c=0.0, mu=0.0, eta=0.0)
+    a, b, v = 0.8 * p.R, p.R / 3, 0.2
+    rho = np.hypot(a, b)
+    x0 = [0, 0, v * b / rho**2, 0, 0, 0, p.R - rho, v * a / rho]
+    run = mjsim.simulate(p, x0, 0.35, settings=ContactSettings(), sample_interval=0.01)
+    # The azimuth turns by up to v/b h in a step.
+    np.testing.assert_allclose(p.R - run.h, np.hypot(b, a - v * run.time), rtol=v / b * 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "flow", "shortest", "name"),
+    [
+        ({"omega_0": 1.0, "c": 1.0}, None, np.sqrt(P.R / P.g), r"sqrt\(R/g\)"),
+        ({"omega_0": -25.0, "c": 1.0}, None, 1 / 25, "1/omega_0"),
+        ({"omega_0": 1.0, "c": 1.0}, Flow.ramp(1.0, 50.0, 0.05), 1 / 50, "1/omega_0"),
+        ({"omega_0": 1.0, "c": 100.0}, None, 1 / 100, "1/c"),
+    ],
+)
+def test_a_step_too_large_for_the_problem_is_refused(changes, flow, shortest, name) -> None:
+    p, x0 = P.replace(**changes), np.zeros(6)
+    words = rf"timestep = .* s is out of range: must be <= .* s, half of {name}, the shortest time of the problem"
+    with pytest.raises(InputError, match=words):
+        mjsim.simulate(p, x0, 0.1, flow, ContactSettings.at(0.51 * shortest))
+    run = mjsim.simulate(p, x0, 0.1, flow, ContactSettings.at(0.49 * shortest))
+    assert run.complete
+
+
 def test_slip_too_fast_for_continuous_contact_is_said() -> None:
     """A contact hovers where mu b_f v > (1 - d)/d g; a spin of 700 rad/s slips at 7 m/s, this allows 1.6."""
     settings = ContactSettings(solimp=0.03, solreffriction=2e-3 / 0.03)
@@ -110,11 +161,12 @@ def test_slip_too_fast_for_continuous_contact_is_said() -> None:
         ({"t_end": -1.0}, "t_end = -1 s"),
         ({"t_end": 1.0, "sample_interval": 1e-5}, "sample_interval = 1e-05 s"),
         ({"t_end": float("nan")}, "t_end"),
+        ({"t_end": 1.0, "x0": [0, 0, 1, 0, 0, 0, 0.06, 0]}, r"h = 0.06 m is out of range: must be < R = 0.05 m"),
     ],
 )
 def test_bad_arguments(arguments, words) -> None:
     with pytest.raises(InputError, match=words):
-        mjsim.simulate(P, [0, 0, 1, 0, 0, 0], **arguments)
+        mjsim.simulate(**{"p": P, "x0": [0, 0, 1, 0, 0, 0]} | arguments)
 
 
 def test_slipping_converges_at_second_order() -> None:
