@@ -52,44 +52,31 @@ class Ball(NamedTuple):
         )  # fmt: skip
 
 
-class Motion(NamedTuple):
-    """What the corrections look at: a change of it over the last step goes on in the next."""
+class Velocity(NamedTuple):
+    """Velocities of the ball's joints, along the paper's axes; o_y is the spin less omega_c."""
 
-    v_z: Quantity
-    """Speed along the orbit, rho omega_c, m s-1."""
+    omega_c: Quantity
     v_h: Quantity
     v_y: Quantity
-    A_x: Quantity
-    A_z: Quantity
-    B_y: Quantity
-    B_z: Quantity
-    """Slip velocities at A and B (5), m s-1."""
-    coriolis: Quantity
-    centripetal: Quantity
-    """omega_c v_h and omega_c v_z, m s-2."""
-    turning_x: Quantity
-    turning_z: Quantity
-    """omega_c o_z and omega_c o_x, s-2."""
+    o_x: Quantity
+    o_y: Quantity
+    o_z: Quantity
 
 
-def motion(
-    rho: Quantity, r: Quantity,
-    omega_c: Quantity, v_h: Quantity, v_y: Quantity, o_x: Quantity, o_y: Quantity, o_z: Quantity,
-) -> Motion:  # fmt: skip
-    """The motion at the distance rho from the axis; the spin o along the paper's axes, o_y less omega_c."""
-    v_z, roll_z = rho * omega_c, r * o_z
-    return Motion(
-        v_z, v_h, v_y,
-        v_h + roll_z, v_z - r * o_x, v_y - roll_z, v_z + r * (o_y + omega_c),
-        omega_c * v_h, omega_c * v_z, omega_c * o_z, omega_c * o_x,
-    )  # fmt: skip
+def slip(v: Velocity, rho: Quantity, r: Quantity) -> tuple[Quantity, ...]:
+    """Velocities (5) of the ball's surface, A_x, A_z, B_y, B_z, at the distance rho from the axis; linear in v."""
+    omega_c, v_h, v_y, o_x, o_y, o_z = v
+    along, roll = rho * omega_c, r * o_z
+    return v_h + roll, along - r * o_x, v_y - roll, along + r * (o_y + omega_c)
 
 
 def corrections(
-    now: Motion, last: Motion, rho: Quantity, omega_0: Quantity,
+    v: Velocity, last: Velocity, rho: Quantity, omega_0: Quantity,
     contact: Sequence[Quantity], normals: Sequence[Quantity], ball: Ball,
 ) -> tuple[tuple[Quantity, ...], tuple[Quantity, ...]]:  # fmt: skip
-    """What drives a step that begins with the motion `now`, a step after `last`.
+    """What drives a step that begins with the velocities v, a step after `last`.
+
+    Positions are half a step ahead, so that rho is already that at mid step.
 
     Parameters
     ----------
@@ -101,26 +88,31 @@ def corrections(
     velocities of the surfaces (floor along z, x, wall along y, z), m s-1
     """
     ahead = ball.ahead
+    change = Velocity(
+        v.omega_c - last.omega_c, v.v_h - last.v_h, v.v_y - last.v_y,
+        v.o_x - last.o_x, v.o_y - last.o_y, v.o_z - last.o_z,
+    )  # fmt: skip
 
     # Drag (9) at mid step: -m c (v - v_fluid). Of the last step's change as much again lies `ahead` till then.
-    drag_z = -ball.drag * (now.v_z + ahead * (now.v_z - last.v_z) - rho * omega_0)
-    drag_h = -ball.drag * (now.v_h + ahead * (now.v_h - last.v_h))
-    drag_y = -ball.drag * (now.v_y + ahead * (now.v_y - last.v_y))
+    drag_z = -ball.drag * rho * (v.omega_c + ahead * change.omega_c - omega_0)
+    drag_h = -ball.drag * (v.v_h + ahead * change.v_h)
+    drag_y = -ball.drag * (v.v_y + ahead * change.v_y)
 
     # Inertial forces at mid step. In the co-rotating frame they are 2 m omega_c v_h along the orbit and
-    # -m omega_c v_z inwards, and I omega_c (-o_z, 0, o_x) on the spin. The engine has them as they are at the
+    # -m rho omega_c^2 inwards, and I omega_c (-o_z, 0, o_x) on the spin. The engine has them with the velocities of the
     # beginning of the step; what they grow by till its middle is added.
-    inertial_z = 2 * ball.mass_ahead * (now.coriolis - last.coriolis)
-    inertial_h = -ball.mass_ahead * (now.centripetal - last.centripetal)
-    moment_x = -ball.inertia_ahead * (now.turning_x - last.turning_x)
-    moment_z = ball.inertia_ahead * (now.turning_z - last.turning_z)
+    inertial_z = 2 * ball.mass_ahead * (v.omega_c * v.v_h - last.omega_c * last.v_h)
+    inertial_h = -ball.mass_ahead * rho * (v.omega_c * v.omega_c - last.omega_c * last.omega_c)
+    moment_x = -ball.inertia_ahead * (v.omega_c * v.o_z - last.omega_c * last.o_z)
+    moment_z = ball.inertia_ahead * (v.omega_c * v.o_x - last.omega_c * last.o_x)
 
     # Direction of sliding friction at mid step. The engine opposes friction to the slip that there would be 1/b_f after
     # the beginning of the step. A surface that moves by what slip changes from the middle till then takes the
     # difference out; only where a contact truly slides, since a slip that ends must end.
-    A_x, A_z, B_y, B_z = now.A_x - last.A_x, now.A_z - last.A_z, now.B_y - last.B_y, now.B_z - last.B_z
-    lag_A = ball.lag * (_SLIDES * (A_x * A_x + A_z * A_z) < now.A_x * now.A_x + now.A_z * now.A_z)
-    lag_B = ball.lag * (_SLIDES * (B_y * B_y + B_z * B_z) < now.B_y * now.B_y + now.B_z * now.B_z)
+    v_Ax, v_Az, v_By, v_Bz = slip(v, rho, ball.r)
+    A_x, A_z, B_y, B_z = slip(change, rho, ball.r)
+    lag_A = ball.lag * (_SLIDES * (A_x * A_x + A_z * A_z) < v_Ax * v_Ax + v_Az * v_Az)
+    lag_B = ball.lag * (_SLIDES * (B_y * B_y + B_z * B_z) < v_By * v_By + v_Bz * v_Bz)
 
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
     # that speed for the last step's friction f leaves only the change of f to creep. The friction forces follow from

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from mjsim import backend, recorder
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, Motion, corrections, followed, motion
+from mjsim.corrections import Ball, Velocity, corrections, followed
 from model import Parameters
 from model.arrays import Array
 
@@ -86,9 +86,7 @@ class Polar(Stepper):
         start = [recorder.joint_state(x, theta_0, p) for x, p in zip(x0s, parameters, strict=True)]
         self._qpos[:], self._qvel[:] = (np.stack(part, axis=-1) for part in zip(*start, strict=True))
         self._qpos[:3] += settings.lead * self._qvel[:3]
-        # Floats or arrays of the present form; compiled code makes them rows of an array.
-        self._last: Motion | Array = self._motion(self._qvel)
-        self._now: Motion | Array = self._last
+        self._last[:] = self._qvel
         self._settle(omega_0)
 
     def _take_views(self) -> None:
@@ -106,9 +104,10 @@ class Polar(Stepper):
         self._outputs = array("qfrc_constraint"), self._sensors[_NORMALS]
         self._latest = self._contact = tuple(lean(output) for output in self._outputs)
         self._written = self._qpos, self.margins, *self._driven
-        self._spare: Array = np.empty((len(Motion._fields), self._qpos.shape[1]))
+        self._last: Array = np.empty(self._qvel.shape)  # the velocities a step ago
+        self._lean_last = lean(self._last)
         carried = ("qpos", "qvel", "qacc_warmstart", "pair_margin", "geom_surfacevel")
-        self._carried = {name: array(name) for name in carried}
+        self._carried = {name: array(name) for name in carried} | {"last": self._last}
 
     def advance(self, omega_0: Iterable[Array], row: Array | None = None) -> None:
         for fluid in omega_0:
@@ -117,8 +116,9 @@ class Polar(Stepper):
             if not self._drive(fluid, watched=False):
                 self._watch(fluid)
                 self._drive(fluid, watched=True)
+            self._last[:] = self._qvel
             self._engine.step()
-            self._last, self._contact, self._steps = self._now, self._latest, self._steps + 1
+            self._contact, self._steps = self._latest, self._steps + 1
             if row is not None:
                 row[:, recorder.SENSORS :], row = self._sensors.T, None
 
@@ -128,11 +128,7 @@ class Polar(Stepper):
         Do nothing and return False if some contact carried nothing in the last step and has not been `watched`.
         """
         if self._compiled:
-            last, now = np.asarray(self._last), self._spare
-            done = self._compiled(watched, fluid, self._balls, last, *self._contact, self._qvel, now, *self._written)
-            if done:
-                self._now, self._spare = now, last
-            return done
+            return self._compiled(watched, fluid, self._balls, self._last, self._qvel, *self._contact, *self._written)
         read, margins, gain = self._form.read, self._lean_margins, self._ball.gain
         load_A, load_B = read(self._contact[1])
         if not watched and self._form.some(load_A * load_B == 0):
@@ -150,12 +146,10 @@ class Polar(Stepper):
         theta, h, _ = form.read(self._place)
         turn[0], turn[3] = form.cos(theta / 2), form.sin(theta / 2)
         self._orientation[:] = self._upright
+        velocity, last = Velocity(*form.read(self._velocity)), Velocity(*form.read(self._lean_last))
         contact, normals = self._contact
-        rho = ball.R - h
-        self._now = now = motion(rho, ball.r, *form.read(self._velocity))
-        last: Any = self._last
         forces, (floor[0], floor[1], wall[0], wall[1]) = corrections(
-            now, last, rho, form.one(fluid), form.read(contact), form.read(normals), ball
+            velocity, last, ball.R - h, form.one(fluid), form.read(contact), form.read(normals), ball
         )
         applied[0], applied[1], applied[2], applied[3], _, applied[5] = forces
 
@@ -169,11 +163,6 @@ class Polar(Stepper):
             self.axis[reaches] = np.minimum(self.axis[reaches], self._steps * self._settings.timestep)
         if self._settings.servo and self._form.some((load_A == 0) & (y < 0) | (load_B == 0) & (h < 0)):
             self._land(fluid)
-
-    def _motion(self, qvel: Array) -> Motion:
-        """The motion with other velocities (6, runs) at the present place."""
-        _, h, _ = self._form.read(self._place)
-        return motion(self._ball.R - h, self._ball.r, *self._quantities(qvel))
 
     def _quantities(self, rows: Array) -> Any:
         """The rows of an array (n, runs) as quantities."""
@@ -189,7 +178,7 @@ class Polar(Stepper):
             if settings.servo:
                 lower = self.margins - self._acceleration[_GAPS] / (settings.solimp * settings.k)
                 np.maximum(lower, 0.0, out=self.margins, where=touching)
-            self._last = self._motion(self._qvel - timestep * self._acceleration)
+            self._last[:] = self._qvel - timestep * self._acceleration
 
     def _land(self, omega_0: Array) -> None:
         """Stop balls that came down on a contact which carried nothing in the last step.
@@ -199,21 +188,17 @@ class Polar(Stepper):
         the surface, and `mj_forward` gives the impulses at both contacts at a fixed time, while the margins are
         adjusted until neither contact approaches or rebounds.
         """
-        settings, timestep, last = self._settings, self._settings.timestep, Motion(*self._last)
-        normals = self._rows(self._contact[1])
+        settings, timestep, normals = self._settings, self._settings.timestep, self._rows(self._contact[1])
         lands = (normals == 0) & (self._gaps < 0) & (self._speeds * timestep < -_FALL * self._reach)
         if not lands.any():
             return
-        self._last = last
         self._gaps[lands] = 0.0
         # In flight the servo has taken the margin; the load asks for one.
-        asked = settings.margin(1.0) * (self._rows(np.array([last.v_y, last.v_h])) - self._speeds) / timestep
+        asked = settings.margin(1.0) * (self._last[_GAPS] - self._speeds) / timestep
         self.margins[:] = np.where(lands & (self.margins == 0), np.maximum(_TOUCH, asked), self.margins)
         runs = np.flatnonzero(lands.any(axis=0))
         self._stop(runs, ((normals > 0) | (self._gaps <= 0))[:, runs], omega_0)
-        # The jump is over: nothing of it goes on in the next step.
-        landed = np.where(lands.any(axis=0), np.array(self._motion(self._qvel)), np.array(last))
-        self._last = Motion(*self._form.read(landed))
+        self._last[:, runs] = self._qvel[:, runs]  # the jump is over: nothing of it goes on in the next step
 
     def _stop(self, runs: npt.NDArray[np.intp], touches: npt.NDArray[np.bool_], omega_0: Array) -> None:
         """Apply the impulses that stop the given runs at the contacts that touch, (2, n), if there are such."""
@@ -244,7 +229,7 @@ class Polar(Stepper):
 
     def state(self) -> dict[str, Array]:
         constraint, normals = self._contact
-        more = {"constraint": constraint, "normals": normals, "last": np.array(self._last)}
+        more = {"constraint": constraint, "normals": normals}
         state = {name: self._rows(values) for name, values in (self._carried | more).items()}
         return state | {"axis": self.axis.copy(), "steps": np.array(self._steps)}
 
@@ -253,5 +238,4 @@ class Polar(Stepper):
             values[...] = state[name]
         # What the engine puts out can't be written back: until its next step, the copies stand in for it.
         self._contact = tuple(self._form.lean(state[name]) for name in ("constraint", "normals"))
-        self._last = Motion(*self._quantities(state["last"]))
         self.axis[:], self._steps = state["axis"], int(state["steps"])

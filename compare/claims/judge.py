@@ -27,9 +27,14 @@ def remembered(function: F) -> F:
 
 def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:
     """The verdicts on claims, in their order; each stands for itself, whatever becomes of the others."""
+    forget()
+    return [verdict(claim, records) for claim in claims]
+
+
+def forget() -> None:
+    """Forget all predictions."""
     for cached in _remembered:
         cached.cache_clear()
-    return [verdict(claim, records) for claim in claims]
 
 
 def verdict(claim: Claim, records: Records) -> Verdict:

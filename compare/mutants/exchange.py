@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import sys
 from collections.abc import Callable, Iterator
@@ -82,6 +83,7 @@ def in_case(case: Case, change: Callable[[Function], Function]) -> Callable[[Fun
 
 def given(change: Callable[[Parameters], Parameters]) -> Callable[[Function], Function]:
     """It takes other parameters for those of the ball."""
+    change = functools.cache(change)
 
     def wrong(right: Function) -> Function:
         return lambda *args, **named: right(*(change(a) if isinstance(a, Parameters) else a for a in args), **named)

@@ -7,16 +7,19 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+import signal
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
+from types import FrameType
 
 from compare import validation
 from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Outcome, Verdict
-from compare.claims.judge import judge
+from compare.claims.claim import Claim, Outcome, Verdict
+from compare.claims.judge import forget, judge, verdict
 from compare.measure.lab import Level
 from compare.measure.record import Records
 from compare.mutants import engines
@@ -26,6 +29,10 @@ from compare.mutants.theories import THEORIES
 from compare.report import results
 
 Outcomes = Mapping[str, Outcome]
+PROVING = frozenset({"settled", "laws", "field", "impacts"})
+"""Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in contact and landing."""
+PATIENCE = 8.0
+"""Processor time that the predictions of a claim may take under a wrong theory, s; several times what they need."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +46,22 @@ class Trial:
 
 def theories(directory: Path, processes: int = 2) -> list[Trial]:
     """Every wrong theory, judged on the measurements stored in a results directory."""
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        return list(pool.map(functools.partial(_theory, directory), range(len(THEORIES))))
+    return _tried(functools.partial(_theory, directory), len(THEORIES), processes)
 
 
 def wrong_engines(directory: Path, processes: int = 2) -> list[Trial]:
-    """Every wrong engine, measured anew at the quick level; runs are kept in the directory, each engine's apart."""
+    """Every wrong engine, measured anew by the protocols of `PROVING`; runs are kept, each engine's apart."""
+    return _tried(functools.partial(_engine, directory), len(WRONG_ENGINES), processes)
+
+
+def _tried(one: Callable[[int], Trial], count: int, processes: int) -> list[Trial]:
+    """The trials by number, each shown on standard error as soon as it is there."""
+    tried = []
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        return list(pool.map(functools.partial(_engine, directory), range(len(WRONG_ENGINES))))
+        for trial in pool.map(one, range(count)):
+            print(f"{trial.what}: {_told(trial)}", file=sys.stderr, flush=True)
+            tried.append(trial)
+    return tried
 
 
 def page(tried: Sequence[Trial], measured: Sequence[Trial]) -> str:
@@ -80,9 +95,24 @@ def _stored(directory: Path) -> tuple[Records, Outcomes]:
 
 def _theory(directory: Path, number: int) -> Trial:
     records, right = _stored(directory)
+    forget()
     with believed(THEORIES[number]):
-        found = _outcomes(judge(CLAIMS, records))
-    return Trial(THEORIES[number].what, _changed(right, found))
+        verdicts = [_patiently(claim, records) for claim in CLAIMS]
+    return Trial(THEORIES[number].what, _changed(right, _outcomes(verdicts)))
+
+
+def _patiently(claim: Claim, records: Records) -> Verdict:
+    """The verdict; an error if it takes too long, as when a wrong theory never comes to the end of a motion."""
+    signal.signal(signal.SIGVTALRM, _too_long)
+    signal.setitimer(signal.ITIMER_VIRTUAL, PATIENCE)
+    try:
+        return verdict(claim, records)
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+
+
+def _too_long(number: int, frame: FrameType | None) -> None:
+    raise TimeoutError(f"the predictions took longer than {PATIENCE:g} s")
 
 
 def _engine(directory: Path, number: int) -> Trial:
@@ -90,7 +120,8 @@ def _engine(directory: Path, number: int) -> Trial:
     wrong = WRONG_ENGINES[number]
     _, right = _stored(directory)
     apart = directory / "wrong-engines" / f"{number}"
-    verdicts = validation.validate(apart, level=Level.QUICK, engine=wrong, workers=0, report=False)
+    claims = [claim.id for claim in CLAIMS if claim.protocols and claim.protocols <= PROVING]
+    verdicts = validation.validate(apart, level=Level.QUICK, claims=claims, engine=wrong, workers=0, report=False)
     return Trial(wrong.name, _changed(right, _outcomes(verdicts)))
 
 

@@ -42,8 +42,8 @@ def classified(block, sizes):
 @pytest.mark.parametrize("sizes", [[1000], [1] * 1000, [2, 5] * 200])
 def test_all_nine_cases_and_their_changes(sizes) -> None:
     cases = [case for case in Case for _ in range(2 * PERSISTENCE)]
-    found, events = classified(made(cases), sizes)
-    np.testing.assert_array_equal(found, cases)
+    cases_detected, events = classified(made(cases), sizes)
+    np.testing.assert_array_equal(cases_detected, cases)
     np.testing.assert_array_equal(events.to_case, list(Case)[1:])
     np.testing.assert_array_equal(events.from_case, list(Case)[:-1])
     np.testing.assert_array_equal(events.time, np.arange(1, 9) * 2 * PERSISTENCE)
@@ -52,8 +52,8 @@ def test_all_nine_cases_and_their_changes(sizes) -> None:
 @pytest.mark.parametrize("sizes", [[1000], [1] * 1000])
 def test_single_samples_change_nothing(sizes) -> None:
     cases = [Case.SS] * 10 + [Case.NS] + [Case.SS] * 4 + [Case.NS, Case.SS] * 10
-    found, events = classified(made(cases), sizes)
-    np.testing.assert_array_equal(found, Case.SS)
+    cases_detected, events = classified(made(cases), sizes)
+    np.testing.assert_array_equal(cases_detected, Case.SS)
     assert len(events) == 0
 
 
