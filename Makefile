@@ -17,7 +17,7 @@ validate: $(VENV)/installed
 
 mutants: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet
-	$(BIN)/python -m compare.mutants results --engines --page docs/mutants.md
+	$(BIN)/python -m compare.mutants results --engines --least 0.95 --page docs/mutants.md
 
 test: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist loadgroup
@@ -27,7 +27,7 @@ test-all: $(VENV)/installed-dev
 
 verdicts: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet -o $(RESULTS)
-	$(BIN)/python -m compare.mutants $(RESULTS)
+	$(BIN)/python -m compare.mutants $(RESULTS) --least 0.95
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

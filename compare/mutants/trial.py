@@ -1,7 +1,7 @@
 """Trying the verdicts: which claims notice a wrong theory, and which a wrong engine?
 
 ``python -m compare.mutants DIR`` judges the stored measurements of a validation by every wrong theory; with
-``--engines`` it also measures with every wrong engine. It exits with 1 if one of them goes unnoticed.
+``--engines`` it also measures with every wrong engine. It exits with 1 if more of them go unnoticed than may.
 """
 
 from __future__ import annotations

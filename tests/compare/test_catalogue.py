@@ -1,0 +1,53 @@
+"""Claims and protocols fit together."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from compare.claims.catalogue import CLAIMS
+from compare.claims.claim import Text
+from compare.measure.lab import Level
+from compare.measure.programme import needed
+from compare.measure.protocols import PROTOCOLS
+from compare.measure.sets import COUNT, sets
+
+SHOWN = {"newcomer"}
+"""Measured for a figure only: nothing is claimed of MuJoCo's defaults."""
+
+
+def test_names_are_unique() -> None:
+    for names in ([claim.id for claim in CLAIMS], [protocol.name for protocol in PROTOCOLS]):
+        assert max(Counter(names).values()) == 1
+
+
+def test_every_protocol_bears_on_a_claim_and_every_claim_has_its_protocols() -> None:
+    used = {name for claim in CLAIMS for name in claim.protocols}
+    assert used == {protocol.name for protocol in PROTOCOLS} - SHOWN
+
+
+def test_protocols_come_after_what_they_need() -> None:
+    for k, protocol in enumerate(PROTOCOLS):
+        assert set(protocol.needs) <= {earlier.name for earlier in PROTOCOLS[:k]}
+        assert needed(PROTOCOLS, [protocol.name])[-1] is protocol
+
+
+def test_what_is_corrected_or_expected_to_fail_says_why() -> None:
+    for claim in CLAIMS:
+        if claim.text is Text.CORRECTED or claim.expected != "confirmed":
+            assert claim.reason, claim.id
+
+
+def test_sets_are_many_and_different() -> None:
+    quick, default = sets(Level.QUICK), sets(Level.DEFAULT)
+    assert len(quick) >= 6
+    assert len(default) == COUNT[Level.DEFAULT] >= 24
+    assert {name: default[name] for name in quick} == quick
+    for chosen in (quick, default):
+        rows = chosen.values()
+        assert any(p.mu > p.eta for p in rows)
+        assert any(p.mu < p.eta for p in rows)
+        assert any(p.eta > p.j for p in rows)
+        assert any(p.eta < p.c**2 * p.R / (4 * p.g * p.mu**2) for p in rows)  # below eta_cr (87): no fold
+        assert any(p.c**2 * p.R / (4 * p.g * p.mu**2) < p.eta < p.j for p in rows)
+        assert len({p.j for p in rows}) > 4
+        assert len({p.r / p.R for p in rows}) > 4
