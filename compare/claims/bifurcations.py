@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import analytic
@@ -76,6 +77,10 @@ def _folds(m: Measurement) -> float:
     return float(p.eta > _thresholds(p).eta_cr)
 
 
+def _has_fold(m: Measurement) -> float:
+    return float(math.isfinite(_thresholds(m.parameters).omega_04))
+
+
 def _number_of_folds(m: Measurement) -> float:
     try:
         return float(bifurcation.number_of_folds(m.parameters))
@@ -115,7 +120,12 @@ CLAIMS = (
         _at("omega_03", side="from below"),
         _at("omega_03", side="from above"),
     ),
-    _claim("F", "The stable branch of slipping at both points ends in a fold at ω₀₄.", _at("omega_04")),
+    _claim(
+        "F",
+        "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
+        _at("omega_04"),
+        Bearing(protocol=THRESHOLDS, quantity="folds", predict=_has_fold, by="analytic.thresholds: omega_04"),
+    ),
     Claim(
         id="sub-branches",
         section=SECTION,

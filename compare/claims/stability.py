@@ -8,7 +8,7 @@ from compare.claims.claim import Bearing, Claim, Relation, Text
 from compare.claims.judge import remembered
 from compare.measure.lab import time_unit
 from compare.measure.record import Measurement
-from model import Case, Parameters
+from model import Case, InputError, Parameters
 
 SECTION = "Stability"
 PROTOCOL = "rates"
@@ -84,6 +84,16 @@ def bearings(case: Case) -> tuple[Bearing, ...]:
     )
 
 
+def _leaning_rate(m: Measurement) -> float:
+    """- Re of the nearest of the modes of a ball that leans on the floor, s-1; LookupError if it can't lean."""
+    try:
+        values, _ = analytic.leaning_modes(m.parameters)
+    except InputError as error:
+        raise LookupError(str(error)) from error
+    nearest_mode = min(values, key=lambda value: abs(complex(value.real, abs(value.imag)) - eigenvalue(m)))
+    return -float(nearest_mode.real)
+
+
 def _leaning(grows: bool) -> Bearing:
     """The slowest decay of SR is one above omega_03 and none below."""
 
@@ -117,7 +127,13 @@ CLAIMS = (
             "Where the floor slips and the wall rolls, leaning on the floor dies out above ω₀₃ = √(g/jR) and grows "
             "below, at the rates of the eigenvalues of f_SR."
         ),
-        bearings=(*bearings(Case.SR), _leaning(False), _leaning(True)),
+        bearings=(
+            *bearings(Case.SR), _leaning(False), _leaning(True),
+            Bearing(
+                protocol=PROTOCOL, quantity="decay_rate", predict=_leaning_rate, size=size, by="analytic.leaning_modes",
+                when=lambda m: m.conditions["case"] == Case.SR.name,
+            ),
+        ),
         text=Text.CORRECTED,
         reason=(
             "With A_y = 0 the state is on the border to NR: the eigenvalues show on the side where the ball leans on "

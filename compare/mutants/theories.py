@@ -56,6 +56,11 @@ def _curve(name: str, factor: float) -> Any:
     return answer(lambda curves: curves | {name: curves[name] * factor})
 
 
+def _mirrored(right: Function) -> Function:
+    """A slip direction taken to the other side."""
+    return lambda beta, *rest: right(-np.asarray(beta), *rest)
+
+
 def _fold_everywhere(right: Function) -> Function:
     """A fold at omega_02 where there is none."""
 
@@ -121,6 +126,8 @@ THEORIES: tuple[WrongTheory, ...] = (
     WrongTheory("γ 3 % large", "analytic.slip_stability", "gamma", scaled(1.03)),
     WrongTheory("γ with μ and η exchanged", "analytic.slip_stability", "slip_rates", given(swapped)),
     WrongTheory("(56) with 3 % more drag", _BOUNDS, "gamma_nr", given(other(c=1.03))),
+    WrongTheory("(56) with 3 % more wall friction", _BOUNDS, "gamma_nr", given(other(eta=1.03))),
+    WrongTheory("(56) with sin β of the wrong sign", _BOUNDS, "gamma_nr", _mirrored),
     WrongTheory("(61) with 3 % more wall friction", _BOUNDS, "nr_to_ns", given(other(eta=1.03))),
     WrongTheory("(66) with μ, as printed", _BOUNDS, "rr_to_rs", given(swapped)),
     WrongTheory("(67) with 3 % more wall friction", _BOUNDS, "rr_to_rs_stationary", given(other(eta=1.03))),
