@@ -24,7 +24,7 @@ from compare.runs.engines import MUJOCO, Engine
 from compare.runs.progress import Show
 from compare.runs.workers import Workers
 from compare.scorecard import scoreboard
-from model import InputError, Parameters, SimulationError
+from model import Parameters, StorageError
 
 Announce = Callable[[Verdict], None]
 """Called with every verdict as soon as it is there."""
@@ -81,8 +81,9 @@ def validate(
             campaign.report = _progress(progress, protocol)
             try:
                 records += programme.carry_out(protocol, lab, sets, records, kept)
-            except (SimulationError, InputError, ArithmeticError, LookupError, ValueError) as error:
-                # A protocol that breaks down takes its own claims with it, and no others.
+            except StorageError:  # a full disk, or a file that was touched, is for the user to mend
+                raise
+            except Exception as error:  # a protocol that breaks down takes its own claims with it, and no others
                 broken[protocol.name] = f"{protocol.name}: {type(error).__name__}: {error}"
         if level > Level.QUICK and claims is None:
             progress("ladder of settings, error against cost", 0, 1, 0)

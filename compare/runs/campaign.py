@@ -102,8 +102,8 @@ class Campaign:
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
 
-        Raises `SimulationError` or `StorageError` for the first task that failed: use `complete` where failures are
-        expected.
+        Raises `SimulationError` for the first task that failed, `InputError` if it could not even start: use
+        `complete` where failures are expected.
         """
         failed = {failure.task.key: failure.reason for failure in self.complete(tasks)}
         for task in tasks:
@@ -111,7 +111,7 @@ class Campaign:
                 kept = failed_path(self.path(task))
                 if kept.exists():
                     raise SimulationError(f"the run {task.key} {failed[task.key]}", storage.load(kept))
-                raise StorageError(f"the run {task.key} failed: {failed[task.key]}")
+                raise InputError(f"the run {task.key} failed: {failed[task.key]}")
         return [storage.load(self.path(task)) for task in tasks]
 
     def complete(self, tasks: Iterable[Task]) -> list[Failure]:
