@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Verdict
+from compare.claims.claim import Outcome, Verdict
 from compare.commands import options, tables
 from compare.measure.lab import Level
 from compare.report import results
@@ -69,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
             progress=show,
             announce=announce,
         )
-    return _finish(verdicts, args, console)
+    admitted = [v for v in verdicts if v.outcome is not Outcome.NOT_RUN] if chosen else verdicts
+    return _finish(verdicts, admitted, args, console)
 
 
 def judge(args: argparse.Namespace) -> int:
@@ -81,7 +82,7 @@ def judge(args: argparse.Namespace) -> int:
     if not args.json:
         for verdict in verdicts:
             console.print(tables.line(verdict), soft_wrap=True)
-    return _finish(verdicts, args, console)
+    return _finish(verdicts, [v for v in verdicts if v.outcome is not Outcome.NOT_RUN], args, console)
 
 
 def _own_set(args: argparse.Namespace) -> dict[str, Parameters] | None:
@@ -90,7 +91,10 @@ def _own_set(args: argparse.Namespace) -> dict[str, Parameters] | None:
     return {args.set: Parameters.named(args.set)} if args.set else None
 
 
-def _finish(verdicts: Sequence[Verdict], args: argparse.Namespace, console: Console) -> int:
+def _finish(
+    verdicts: Sequence[Verdict], counting: Sequence[Verdict], args: argparse.Namespace, console: Console
+) -> int:
+    """Print what there is, and return the exit code: 0 if all that count came out as expected."""
     if args.json:
         print(json.dumps([results.describe(verdict) for verdict in verdicts], indent=1))
     else:
@@ -98,4 +102,4 @@ def _finish(verdicts: Sequence[Verdict], args: argparse.Namespace, console: Cons
             console.print(*(tables.checks(verdict) for verdict in verdicts if verdict.checks))
         console.print(tables.summary(verdicts), soft_wrap=True)
         console.print(f"report: {args.output / results.REPORT}")
-    return 0 if all(verdict.passed for verdict in verdicts) else 1
+    return 0 if all(verdict.passed for verdict in counting) else 1
