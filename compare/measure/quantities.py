@@ -10,6 +10,8 @@ however well the numbers agree. The ceilings follow from what each protocol can 
 * the unstable state between two attractors is what a ball comes to on its border: its oscillation has died out to 1e-4
   of the spin, and three times that is to be resolved; a ball that is pushed leaves the floor within a time step, which
   its height of some tenths of a millimetre shows;
+* friction opposes the slip of some point within a step: the law is off by what the slip turns in it, and the speed of a
+  landing by the fall within a step, about a thousandth of either;
 * rates and growths come from short records of the motion and carry the error of a time step, a few tenths of a percent.
 """
 
