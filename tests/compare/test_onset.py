@@ -144,9 +144,11 @@ def test_protocol_on_a_set_without_fold(lab, monkeypatch):
     assert {quantity for quantity, _ in found} == {"omega_01", "omega_02", "folds"}
     assert any("no omega_04" in each.reason for each in records.missing)
     verdicts = {v.claim.id: v for v in judge(bifurcations.CLAIMS, records)}
-    for claim in ("table-5-P3", "table-5-P2", "eta-critical"):
+    for claim in ("table-5-P3", "table-5-P2", "table-5-F", "eta-critical"):
         assert all(check.agrees for check in verdicts[claim].checks), claim
-    assert verdicts["table-5-F"].outcome is Outcome.NOT_RUN
+    # That there is no fold bears on the fold, too; its flow was not measured.
+    assert [check.measurement.quantity for check in verdicts["table-5-F"].checks] == ["folds"]
+    assert verdicts["table-5-NF2"].outcome is Outcome.NOT_RUN
 
 
 def _measured(quantity, value, protocol="thresholds", p=REFERENCE, **conditions):
