@@ -15,8 +15,8 @@ from compare.runs.engines import ENGINES, MUJOCO, Engine
 from mjsim import ContactSettings, scene, stepping
 from model import Parameters
 
-FAR = 1e6
-"""m"""
+LEAST = 1e-5
+"""The engine's least friction coefficient."""
 Stretch = Callable[[], AbstractContextManager[Any]]
 
 
@@ -58,13 +58,13 @@ def _no_impacts() -> AbstractContextManager[Any]:
     return mock.patch.object(stepping, "_FALL", np.inf)
 
 
-def _no_floor() -> AbstractContextManager[Any]:
-    """The floor is so low that no ball comes to it."""
+def _smooth_floor() -> AbstractContextManager[Any]:
+    """The floor carries the ball, but the contact with it has no friction."""
     built = scene.build
 
     def without(p: Parameters, settings: ContactSettings) -> Any:
         model, mjcf = built(p, settings)
-        model.geom("floor").pos[2] = -FAR
+        model.pair_friction[0] = LEAST
         return model, mjcf
 
     return mock.patch.object(scene, "build", without)
@@ -75,7 +75,7 @@ WRONG_ENGINES: tuple[Engine, ...] = (
     _wrong("wall friction 1 % low", lambda p: p.replace(eta=0.99 * p.eta)),
     _wrong("inertia 1 % high", lambda p: p.replace(j=1.01 * p.j)),
     _wrong("drag 1 % high", lambda p: p.replace(c=1.01 * p.c)),
-    _wrong("the floor is missing", fault=_no_floor),
+    _wrong("the friction of the floor is missing", fault=_smooth_floor),
     _wrong("no servo of the margins", servo=0.0),
     _wrong("no memory of friction", memory=False),
     _wrong("forces taken at the beginning of a step", order=1),
