@@ -1,5 +1,5 @@
 # make validate   set everything up and run the main job: theory against MuJoCo, with a verdict
-# make mutants    which claims notice a wrong theory or a wrong engine? writes docs/mutants.md (half an hour)
+# make mutants    which claims notice a wrong theory or a wrong engine? writes docs/mutants.md (a quarter of an hour)
 # make test       set everything up and run the tests
 # make test-all   the slow tests, too
 # make check      what CI runs: lint, types, import contracts, a quick validation judged by wrong theories, tests
