@@ -13,6 +13,9 @@ from scipy.optimize import brentq, linear_sum_assignment
 from model import Case, InputError, Trajectory
 from model.arrays import Array
 
+COVERAGE = 3.0
+"""Standard uncertainties in a tolerance."""
+
 
 @dataclass(frozen=True)
 class Measured:

@@ -17,9 +17,6 @@ from compare.measure.record import Measurement
 from compare.statistics import Measured
 from model import Parameters
 
-COVERAGE = 3.0
-"""Tolerance in units of the standard uncertainty."""
-
 
 class Outcome(StrEnum):
     """What the numbers say of a claim."""

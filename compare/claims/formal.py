@@ -10,8 +10,9 @@ from scipy.optimize import brentq
 
 import analytic
 from analytic import bifurcation, branch_stability, dynamics, jacobian, slipping_branch
-from compare.claims.claim import COVERAGE, Check, Claim, Text
+from compare.claims.claim import Check, Claim, Text
 from compare.measure.record import Measurement
+from compare.statistics import COVERAGE
 from model import Case, Parameters
 from model.arrays import Array
 

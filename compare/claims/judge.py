@@ -7,10 +7,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
-from compare.claims.claim import COVERAGE, Bearing, Check, Claim, Outcome, Verdict
+from compare.claims.claim import Bearing, Check, Claim, Outcome, Verdict
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Records
-from compare.statistics import Measured
+from compare.statistics import COVERAGE, Measured
 from model import InputError
 from model.errors import suggestion
 

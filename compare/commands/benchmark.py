@@ -19,5 +19,5 @@ def add(commands: options.Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Measure and show."""
     figures = benchmark.run()
-    options.show(figures.to_mapping(), lambda mapping: benchmark.table(figures), args.json)
+    options.show(figures.to_mapping(), lambda _: benchmark.table(figures), args.json)
     return 0

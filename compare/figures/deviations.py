@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from compare.claims.claim import COVERAGE, Check
+from compare.claims.claim import Check
 from compare.figures import style
 from compare.figures.drawing import Drawing, GapError, Material
 from compare.measure.quantities import quantity
 from compare.runs.engines import ENGINES
+from compare.statistics import COVERAGE
 
 _WIDEST = 1.5
 """Deviations over tolerance beyond this are drawn at the edge, as arrows."""

@@ -105,9 +105,6 @@ _ALL = (
     Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
     Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
     Quantity("lift", "height of a lifted ball", "m", 5e-2),
-    Quantity("height", "height of a hop", "m", 2e-2),
-    Quantity("impulse", "impulse", "N s", 2e-2),
-    Quantity("share", "share of samples", "1", 3e-2),
 )
 QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}
 """Every quantity by name."""

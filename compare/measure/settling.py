@@ -15,7 +15,7 @@ import numpy as np
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.quantities import quantity
 from compare.runs.tasks import Task
-from compare.statistics import Measured
+from compare.statistics import COVERAGE, Measured
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 
@@ -36,8 +36,6 @@ SOLVED = 1e-12
 """Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a time 1/c."""
 MARGIN = 2.0
 """A run is settled once its drift lets each check resolve what it should with this to spare."""
-COVERAGE = 3.0
-"""Standard uncertainties in a tolerance."""
 SWING = 1e-3
 """Largest range of a settled quantity within the window, over its scale: what swings more goes on from its mean."""
 STEADY = 0.98

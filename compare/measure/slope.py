@@ -15,8 +15,8 @@ import numpy as np
 from compare.measure.lab import Lab, Level
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records
-from compare.measure.settling import COVERAGE, Settled, Start, family, high, settle
-from compare.statistics import Measured
+from compare.measure.settling import Settled, Start, family, high, settle
+from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters
 from model.arrays import Array
 

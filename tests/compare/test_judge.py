@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 
 import compare.claims.judge
-from compare.claims.claim import COVERAGE, Bearing, Claim, Outcome, Relation, Text
+from compare.claims.claim import Bearing, Claim, Outcome, Relation, Text
 from compare.claims.judge import judge, remembered, select
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records
-from compare.statistics import Measured
+from compare.statistics import COVERAGE, Measured
 from model import InputError, Parameters
 
 P = Parameters.named("reference")
