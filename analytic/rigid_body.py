@@ -1,7 +1,6 @@
 """The ball as a rigid body under gravity, drag and whatever its contacts do, with no case in mind.
 
-Its velocities are ``u = (v_h, v_y, v_k, o_x, o_y, o_z)``: of the centre and of the spin, along the paper's axes i, j,
-k, where v_k = rho omega_c; impulses or forces are ``P = (A_x, A_y, A_z, B_x, B_y, B_z)``. All on plain floats.
+All on plain floats.
 """
 
 from __future__ import annotations
@@ -11,9 +10,35 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from model import Parameters
+from model.arrays import Real
 
 Six = tuple[float, float, float, float, float, float]
-NOTHING: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Velocities(NamedTuple):
+    """Velocities of the centre (m s-1) and spin (rad s-1) along the paper's axes i, j, k, or their rates."""
+
+    v_h: Real
+    v_y: Real
+    v_k: Real
+    """rho omega_c."""
+    o_x: Real
+    o_y: Real
+    o_z: Real
+
+
+class Forces(NamedTuple):
+    """Forces of floor (A) and wall (B) on the ball along the paper's axes, N; or impulses, N s."""
+
+    A_x: Real = 0.0
+    A_y: Real = 0.0
+    A_z: Real = 0.0
+    B_x: Real = 0.0
+    B_y: Real = 0.0
+    B_z: Real = 0.0
+
+
+NOTHING = Forces()
 
 
 class Place(NamedTuple):

@@ -3,10 +3,20 @@
 from model.cases import Case, Contact
 from model.errors import InputError, StorageError
 from model.flow import Flow
+from model.kinematics import State
 from model.parameters import Parameters
 from model.trajectory import Events, Header, SimulationError, Trajectory
 
 __all__ = [
-    "Case", "Contact", "Events", "Flow", "Header", "InputError", "Parameters", "SimulationError",
-    "StorageError", "Trajectory",
-]  # fmt: skip
+    "Case",
+    "Contact",
+    "Events",
+    "Flow",
+    "Header",
+    "InputError",
+    "Parameters",
+    "SimulationError",
+    "State",
+    "StorageError",
+    "Trajectory",
+]

@@ -1,8 +1,12 @@
-"""The array type of the project's annotations."""
+"""The array types of the project's annotations."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Real = Any
+"""A float, or an array of any shape: for formulas that take both."""

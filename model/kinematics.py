@@ -2,7 +2,7 @@
 
 The state of the paper is ``x = [y, v_y, omega_c, slip_x, slip_y, slip_z]`` (19). Motion away from the wall adds
 ``h = R - rho``, the gap at B (rho is the radius of the centre's orbit), and its rate ``v_h``, so that the full state
-has eight entries, `VARIABLES`; a state of six entries means ``h = v_h = 0``.
+has eight entries, those of `State`; a state of six entries means ``h = v_h = 0``.
 
 Vectors are given in the co-rotating frame of the paper: i points radially inwards, j upwards, k = i x j along the
 orbit. The world frame has z along the vessel's axis, up from the floor, and the centre of the ball stands at
@@ -12,15 +12,53 @@ orbit. The world frame has z along the vessel's axis, up from the floor, and the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from model.arrays import Array
+from model.arrays import Array, Real
 from model.errors import InputError
 from model.parameters import Parameters
 
-VARIABLES = ("y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")
+
+class State(NamedTuple):
+    """The state (19) of a ball, or its rate of change: floats, or arrays of one shape for many states.
+
+    A tuple of eight, which is taken wherever a state is asked for: ``State(omega_c=3.0, slip_x=-1.0)``.
+    """
+
+    y: Real = 0.0
+    """Gap at A, m."""
+    v_y: Real = 0.0
+    """Its rate, m s-1."""
+    omega_c: Real = 0.0
+    """Angular velocity of the orbit, rad s-1."""
+    slip_x: Real = 0.0
+    """Angular velocities of slipping (4), rad s-1."""
+    slip_y: Real = 0.0
+    slip_z: Real = 0.0
+    h: Real = 0.0
+    """Gap at B, m."""
+    v_h: Real = 0.0
+    """Its rate, m s-1."""
+
+    @classmethod
+    def of(cls, x: npt.ArrayLike) -> Self:
+        """The state in a sequence of 6 or 8 numbers, as floats, or the states in an array (..., 6 or 8), as columns.
+
+        Raises `InputError` as `full_state`.
+        """
+        columns = np.moveaxis(full_state(x), -1, 0)
+        return cls(*(columns.tolist() if columns.ndim == 1 else columns))
+
+    def stacked(self) -> Array:
+        """The states as one array (..., 8); inverse of `of`."""
+        return np.stack(np.broadcast_arrays(*self), axis=-1)
+
+
+VARIABLES = State._fields
 UNITS = ("m", "m s-1", "rad s-1", "rad s-1", "rad s-1", "rad s-1", "m", "m s-1")
 
 
@@ -44,7 +82,7 @@ class WorldState:
         return np.asarray(rotation.apply(self.angular_velocity, inverse=True))
 
 
-def full_state(x: Array) -> Array:
+def full_state(x: npt.ArrayLike) -> Array:
     """Return states of shape (..., 8), adding h = v_h = 0 to states of shape (..., 6).
 
     Raises `InputError` for another length or a value that is not finite.
