@@ -17,9 +17,9 @@ from analytic.slip_stability import SlipStability
 from analytic.stationary import (
     Stability,
     StationarySolution,
-    attractors,
     slowest_time_constant,
     solution,
+    stable_solutions,
     stationary_solutions,
 )
 
@@ -29,7 +29,6 @@ __all__ = [
     "Stability",
     "StationarySolution",
     "Thresholds",
-    "attractors",
     "characteristic_slope",
     "contact_forces",
     "floor_force",
@@ -41,6 +40,7 @@ __all__ = [
     "slope_jump",
     "slowest_time_constant",
     "solution",
+    "stable_solutions",
     "stationary_solutions",
     "thresholds",
     "unloading_limit",

@@ -51,7 +51,7 @@ def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
     InputError
         If there is no attractor (of that case), or if `case` is needed.
     """
-    found = stationary.attractors(p) if case is None else [stationary.solution(p, case)]
+    found = stationary.stable_solutions(p) if case is None else [stationary.solution(p, case)]
     if p.c == 0 or not found:
         raise InputError(f"no motion follows the flow at omega_0 = {p.omega_0:g} rad s-1 with c = {p.c:g} s-1")
     slips = {bool(np.isfinite(s.alpha)) for s in found}

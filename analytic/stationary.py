@@ -102,7 +102,7 @@ def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = F
     return found[0]
 
 
-def attractors(p: Parameters) -> list[StationarySolution]:
+def stable_solutions(p: Parameters) -> list[StationarySolution]:
     """The stationary solutions that a disturbed ball returns to; the one that only sinks (NS) is none."""
     return [s for s in stationary_solutions(p) if s.exists and s.stable and s.slip_stable and not s.moves]
 

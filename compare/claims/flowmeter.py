@@ -177,7 +177,7 @@ CLAIMS = (
         source="Fig. 13, left",
         statement="For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
         bearings=(
-            Bearing(protocol="hysteresis", quantity="case", predict=followed, by="analytic.attractors"),
+            Bearing(protocol="hysteresis", quantity="case", predict=followed, by="analytic.stable_solutions"),
             Bearing(
                 protocol="hysteresis",
                 quantity="omega_c",

@@ -24,7 +24,7 @@ When = Callable[[Measurement], bool]
 def lasting(p: Parameters) -> tuple[StationarySolution, ...]:
     """The stationary solutions that a ball may settle to: those that attract, and the one that sinks for ever."""
     sinking = [s for s in analytic.stationary_solutions(p) if s.moves and s.exists and s.stable]
-    return (*analytic.attractors(p), *sinking)
+    return (*analytic.stable_solutions(p), *sinking)
 
 
 def cases(p: Parameters) -> set[Case]:
@@ -146,7 +146,7 @@ def _from_floor(m: Measurement) -> bool:
 
 
 def _cases(when: When) -> Bearing:
-    return Bearing(protocol="settled", quantity="case", predict=case, when=when, by="analytic.attractors")
+    return Bearing(protocol="settled", quantity="case", predict=case, when=when, by="analytic.stable_solutions")
 
 
 def _with_fluid(when: When = lambda m: True) -> Bearing:
@@ -171,7 +171,7 @@ def _plane(figure: str, source: str, axis: str) -> Claim:
                 quantity="cases",
                 predict=reachable,
                 when=lambda m: m.conditions["figure"] == figure,
-                by="analytic.attractors",
+                by="analytic.stable_solutions",
             ),
         ),
     )

@@ -81,7 +81,7 @@ def predict(p: Parameters) -> Prediction:
     """Ask the closed-form theory for everything."""
     return Prediction(
         parameters=p, thresholds=analytic.thresholds(p), solutions=analytic.stationary_solutions(p),
-        attractors=analytic.attractors(p), operating_range=analytic.operating_range(p),
+        attractors=analytic.stable_solutions(p), operating_range=analytic.operating_range(p),
     )  # fmt: skip
 
 

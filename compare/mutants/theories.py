@@ -113,7 +113,7 @@ THEORIES: tuple[WrongTheory, ...] = (
     WrongTheory("eigenvalues of SS 3 % large", "analytic.branch_stability", "eigenvalues_at", scaled(1.03)),
     WrongTheory("eigenvalues of RR, RS, NR, NS 3 % large", "analytic.jacobian", "eigenvalues", scaled(1.03)),
     WrongTheory("leaning rate of SR 5 % large", "analytic.leaning", "leaning_modes", scaled(1.05, 0)),
-    WrongTheory("a ball on the wall is no attractor", _STATIONARY, "attractors", answer(each(Case.NR, _gone))),
+    WrongTheory("a ball on the wall is no attractor", _STATIONARY, "stable_solutions", answer(each(Case.NR, _gone))),
     # Bifurcations, (84)-(90)
     WrongTheory("ω₀₁ with 1 + μ for 1 + η", "analytic.bifurcation", "threshold_curves", _mu_for_eta),
     WrongTheory("ω₀₁ 0.5 % high", "analytic.bifurcation", "threshold_curves", _curve("omega_01", 1.005)),

@@ -15,7 +15,7 @@ from typing import Any
 
 from rich.table import Table
 
-from analytic import attractors
+from analytic import stable_solutions
 from compare.runs.campaign import Campaign
 from compare.runs.tasks import Task, store
 from compare.runs.workers import Workers, dask, processes
@@ -60,7 +60,7 @@ class Figures:
 
 def run() -> Figures:
     """Measure the loop over bare steps, alone and in a batch; then campaigns."""
-    (state,) = attractors(SLIPPING)
+    (state,) = stable_solutions(SLIPPING)
     x0 = state.x.tolist()
     two_over_one, dask_over_processes = _campaigns()
     return Figures(

@@ -123,7 +123,7 @@ def reached(campaign: Campaign, states: Sequence[State] = REACHED, steps: Sequen
 
 def random_sets(campaign: Campaign, count: int = 32) -> Rows:
     """Errors of the attracting states of random parameter sets at a step of 1 ms, by case; SR at y = 0 is NR."""
-    states = [State(p, s.case) for p in random_parameters(count) for s in _attractors(p)]
+    states = [State(p, s.case) for p in random_parameters(count) for s in _stable_solutions(p)]
     tasks = [
         _mujoco(s.p, _near(s), math.ceil(s.forgets / (1 - WINDOW)), ContactSettings.for_problem(s.p)) for s in states
     ]
@@ -139,8 +139,8 @@ def random_sets(campaign: Campaign, count: int = 32) -> Rows:
     return rows
 
 
-def _attractors(p: Parameters) -> list[StationarySolution]:
-    return [solution for solution in analytic.attractors(p) if solution.case is not Case.SR]
+def _stable_solutions(p: Parameters) -> list[StationarySolution]:
+    return [solution for solution in analytic.stable_solutions(p) if solution.case is not Case.SR]
 
 
 def random_parameters(count: int) -> list[Parameters]:
@@ -157,7 +157,7 @@ def random_parameters(count: int) -> list[Parameters]:
         direct = {name: v[name] for name in ("R", "j", "mu", "eta", "g")}
         p = SMOOTH.replace(**direct, r=v["r/R"] * v["R"], c=v["kappa"] * unit, omega_0=v["Omega_0"] * unit)
         limits = np.array(dataclasses.astuple(analytic.thresholds(p))[:4])
-        ends = [State(p, solution.case).forgets for solution in _attractors(p)]
+        ends = [State(p, solution.case).forgets for solution in _stable_solutions(p)]
         if ends and max(ends) <= LONGEST and not np.any(np.abs(limits / p.omega_0 - 1) < AWAY):
             kept.append(p)
     return kept

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from analytic import (
-    attractors,
     characteristic_slope,
     mean_slope,
     operating_range,
     reading_range,
     slope_jump,
     solution,
+    stable_solutions,
     thresholds,
     unloading_limit,
 )
@@ -26,8 +26,8 @@ ROUGH = Parameters.named("high-wall-friction")
 def test_operating_range_is_where_rolling_is_the_only_attractor(p: Parameters) -> None:
     limit = operating_range(p)
     for omega_0 in np.linspace(0.02, 0.9999, 9) * limit:
-        assert {s.case for s in attractors(p.replace(omega_0=float(omega_0)))} == {Case.RR}
-    assert {s.case for s in attractors(p.replace(omega_0=limit * 1.0001))} != {Case.RR}
+        assert {s.case for s in stable_solutions(p.replace(omega_0=float(omega_0)))} == {Case.RR}
+    assert {s.case for s in stable_solutions(p.replace(omega_0=limit * 1.0001))} != {Case.RR}
 
 
 @pytest.mark.parametrize("p", [P, ROUGH])
@@ -36,7 +36,7 @@ def test_reading_range(p: Parameters) -> None:
     limit = reading_range(p)
     for omega_0, reads in ((0.999 * min(limit, 1e3), True), (1.001 * limit, False)):
         if np.isfinite(omega_0):
-            found = attractors(p.replace(omega_0=omega_0))
+            found = stable_solutions(p.replace(omega_0=omega_0))
             assert all(np.isclose(s.x[2], omega_0, rtol=1e-12) for s in found) == reads
 
 
@@ -45,7 +45,7 @@ def test_unloading_limit() -> None:
     limit = unloading_limit(ROUGH)
     assert operating_range(ROUGH) == limit < thresholds(ROUGH).omega_03
     for factor, stays in ((0.999, False), (1.001, True)):
-        found = attractors(ROUGH.replace(omega_0=factor * limit))
+        found = stable_solutions(ROUGH.replace(omega_0=factor * limit))
         assert (Case.NR in {s.case for s in found}) == stays
 
 
@@ -67,7 +67,7 @@ def test_characteristic_slope_by_differences(trial: int) -> None:
     p = p.replace(eta=float(p.j * rng.uniform(0.1, 0.9)))
     t, h = thresholds(p), 1e-5
     for omega_0 in (0.5 * t.omega_01, *(t.omega_01 + (t.omega_02 - t.omega_01) * np.array([0.2, 0.5, 0.9]))):
-        below, above = (attractors(p.replace(omega_0=float(omega_0 * f)))[0].x[2] for f in (1 - h, 1 + h))
+        below, above = (stable_solutions(p.replace(omega_0=float(omega_0 * f)))[0].x[2] for f in (1 - h, 1 + h))
         slope = characteristic_slope(p.replace(omega_0=float(omega_0)))
         assert slope == pytest.approx((above - below) / (2 * h * omega_0), rel=1e-5, abs=1e-9)
 

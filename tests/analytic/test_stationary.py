@@ -11,10 +11,10 @@ from analytic import (
     SlipStability,
     Stability,
     StationarySolution,
-    attractors,
     contact_forces,
     slowest_time_constant,
     solution,
+    stable_solutions,
     stationary_solutions,
     thresholds,
     vector_field,
@@ -162,9 +162,9 @@ def test_solution_of_a_case() -> None:
         (0.6, 25.0, {Case.SR, Case.NR}), (0.6, 0.0, {Case.RR, Case.RS}),
     ],
 )  # fmt: skip
-def test_attractors(eta: float, omega_0: float, expected: set[Case]) -> None:
+def test_stable_solutions(eta: float, omega_0: float, expected: set[Case]) -> None:
     """The regions of Figs. 7, 10 and 11; no sinking ball among them, nor the far part of SS."""
-    found = attractors(P.replace(eta=eta, omega_0=omega_0))
+    found = stable_solutions(P.replace(eta=eta, omega_0=omega_0))
     assert {s.case for s in found} == expected
     assert len(found) == len(expected)
 

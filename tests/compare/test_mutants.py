@@ -40,11 +40,11 @@ def test_each_replaces_a_function_that_exists_and_gives_it_back(wrong: WrongTheo
 
 
 def test_a_fault_shows_wherever_the_function_is_known_by_name() -> None:
-    doubled = WrongTheory("", "analytic.stationary", "attractors", lambda right: lambda p: 2 * right(p))
-    right = analytic.attractors(P)
+    doubled = WrongTheory("", "analytic.stationary", "stable_solutions", lambda right: lambda p: 2 * right(p))
+    right = analytic.stable_solutions(P)
     with believed(doubled):
-        assert len(analytic.attractors(P)) == len(stationary.attractors(P)) == 2 * len(right)
-    assert len(analytic.attractors(P)) == len(right)
+        assert len(analytic.stable_solutions(P)) == len(stationary.stable_solutions(P)) == 2 * len(right)
+    assert len(analytic.stable_solutions(P)) == len(right)
 
 
 def test_a_fault_shows_in_tables_of_functions() -> None:
@@ -57,11 +57,11 @@ def test_a_fault_shows_in_tables_of_functions() -> None:
 
 
 def test_a_theory_that_raises_is_given_back_too() -> None:
-    right = stationary.attractors
+    right = stationary.stable_solutions
     with pytest.raises(ZeroDivisionError), believed(THEORIES[0]):
         raise ZeroDivisionError
-    assert stationary.attractors is right
-    assert claims.analytic.attractors is right
+    assert stationary.stable_solutions is right
+    assert claims.analytic.stable_solutions is right
 
 
 @pytest.mark.parametrize("wrong", WRONG_ENGINES, ids=lambda wrong: wrong.name)

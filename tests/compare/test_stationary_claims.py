@@ -43,7 +43,7 @@ def _row(name: str, p: Parameters, protocol: str, q: str, value: float, fine: fl
 
 def _ends(p: Parameters) -> Iterator[tuple[str, StationarySolution]]:
     """Where each start ends: on the floor as long as a state there attracts."""
-    states = {family(s.case): s for s in analytic.attractors(p)}
+    states = {family(s.case): s for s in analytic.stable_solutions(p)}
     on_floor = [states[case] for case in (Case.RR, Case.SS, Case.NR) if case in states]
     yield "rest", on_floor[0]
     yield "with the fluid", on_floor[0]
@@ -109,7 +109,7 @@ def test_coarse_measurements_tell_nothing() -> None:
 
 def _changed(monkeypatch: pytest.MonkeyPatch, change: Any) -> None:
     """Replace every public way to the stationary solutions by one with other solutions, of which there may be none."""
-    right = {name: getattr(analytic, name) for name in ("stationary_solutions", "attractors", "solution")}
+    right = {name: getattr(analytic, name) for name in ("stationary_solutions", "stable_solutions", "solution")}
 
     def several(name: str) -> Any:
         return lambda p: [new for s in right[name](p) if (new := change(s, p)) is not None]
@@ -121,7 +121,7 @@ def _changed(monkeypatch: pytest.MonkeyPatch, change: Any) -> None:
         return new
 
     monkeypatch.setattr(analytic, "stationary_solutions", several("stationary_solutions"))
-    monkeypatch.setattr(analytic, "attractors", several("attractors"))
+    monkeypatch.setattr(analytic, "stable_solutions", several("stable_solutions"))
     monkeypatch.setattr(analytic, "solution", one)
 
 
@@ -201,7 +201,7 @@ class TestLoop:
 
     def _level(self, Omega_0: float, case: Case, before: str) -> Records:
         q = self.p.replace(omega_0=Omega_0 * np.sqrt(self.p.g / self.p.R))
-        s = next(s for s in analytic.attractors(q) if s.case is case)
+        s = next(s for s in analytic.stable_solutions(q) if s.case is case)
         at = {"case": case.name, "before": before, "side": "up", "level": 1.0}
         sure = 1e-9 * q.omega_0
         return Records(
