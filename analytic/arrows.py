@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analytic import slip_stability, stationary
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.arrays import Array
-from model.kinematics import VARIABLES
 
 _ALONG = {(Case.RR, Case.RS): "slip_y", (Case.RR, Case.SR): "slip_x"}
 """The direction of slip; slip_z along the other arrows, where slip begins at the thresholds: (58), (80)."""
@@ -43,22 +42,21 @@ def stability_along(p: Parameters) -> list[Arrow]:
     (60); out of SR slip along slip_z > 0 grows below omega_02, too. Lift: v_y' of the case without the floor, which is
     0 in SR, the border to NR.
     """
-    found = []
+    leaving = []
     for s in stationary.stationary_solutions(p):
         for inner, outer in slip_stability.SLIP_ARROWS:
             if inner is s.case:
-                found += [_slip(inner, outer, s.x, side, p) for side in (1.0, -1.0)]
+                leaving += [_slip(inner, outer, s.x, side, p) for side in (1.0, -1.0)]
         for inner, outer in slip_stability.LIFT_ARROWS:
             if inner is s.case:
                 rise = slip_stability.lift_acceleration(inner, outer, s.x, p)
-                found.append(Arrow(inner, outer, s.x, np.eye(8)[VARIABLES.index("v_y")], rise, True))
-    return found
+                leaving.append(Arrow(inner, outer, s.x, np.array(State(v_y=1.0)), rise, True))
+    return leaving
 
 
 def _slip(inner: Case, outer: Case, x: Array, side: float, p: Parameters) -> Arrow:
-    n = np.zeros(8)
-    n[VARIABLES.index(_ALONG.get((inner, outer), "slip_z"))] = side
-    within = n[[VARIABLES.index(name) for name in slip_stability.normals(inner, outer)]]
+    n = State(**{_ALONG.get((inner, outer), "slip_z"): side})
+    within = [getattr(n, name) for name in slip_stability.normals(inner, outer)]
     _, A_y, B_x = slip_stability.slip_rates(inner, outer, x, within, p)
     growth = slip_stability.gamma(inner, outer, x, within, p)
-    return Arrow(inner, outer, x, n, float(growth), bool(A_y >= 0 and B_x >= 0))
+    return Arrow(inner, outer, x, np.array(n), float(growth), bool(A_y >= 0 and B_x >= 0))

@@ -13,7 +13,6 @@ from analytic import branch_stability, slipping_branch
 from analytic.stationary import StationarySolution
 from model import InputError, Parameters
 from model.arrays import Array
-from model.kinematics import VARIABLES
 
 
 @dataclass(frozen=True)
@@ -189,4 +188,4 @@ def case_map(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.
 
 def wall_spin(solution: StationarySolution, p: Parameters) -> float:
     """omega_x^0 = slip_x + omega_c R/r of (91), rad s-1: the spin on the wall, ordinate of Figs. 9-12."""
-    return float(solution.x[VARIABLES.index("slip_x")] + p.R / p.r * solution.x[VARIABLES.index("omega_c")])
+    return float(solution.state.slip_x + p.R / p.r * solution.state.omega_c)

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from analytic import dynamics, jacobian, slipping_branch
-from model import Case, InputError, Parameters
+from model import Case, InputError, Parameters, State
 from model.arrays import Array
 
 
@@ -15,9 +15,8 @@ def states(s: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
     """States (..., 8) of SS at places s of its branch (`slipping_branch`), and their flows omega_0 (37), (41)."""
     b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
     unit, w = np.sqrt(p.g / p.R), b.v_A * np.sqrt(p.g * p.R) / p.r
-    zero = np.zeros_like(w)
     turn = np.sign(p.eta - p.j) * b.sin
-    return np.stack([zero, zero, b.Omega_c * unit, w * turn, zero, w * b.cos, zero, zero], axis=-1), b.Omega_0 * unit
+    return State(omega_c=b.Omega_c * unit, slip_x=w * turn, slip_z=w * b.cos).stacked(), b.Omega_0 * unit
 
 
 def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128]:
@@ -29,14 +28,13 @@ def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128
     b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
     unit = np.sqrt(p.g / p.R)
     omega_c, fluid, q = b.Omega_c * unit, b.Omega_0 * unit, b.v_A * np.sqrt(p.g * p.R) / p.r
-    sin, cos, h = np.sign(p.eta - p.j) * b.sin, b.cos, 1j * jacobian.STEP
+    sin, cos = np.sign(p.eta - p.j) * b.sin, b.cos
     columns = []
-    for d_omega, d_q, d_alpha, d_t in np.eye(4) * h:
-        slip_A = (sin + d_alpha * cos, cos - d_alpha * sin)
-        length = q + d_q
-        w_z = length * slip_A[1]
-        x = [0.0, 0.0, omega_c + d_omega, length * slip_A[0], d_t * w_z, w_z, 0.0, 0.0]
-        force = dynamics.forces(Case.SS, x, p, fluid, slip_A, (d_t, 1.0))
+    for d_omega, d_q, d_alpha, d_t in np.eye(4) * 1j * jacobian.STEP:
+        sine, cosine = sin + d_alpha * cos, cos - d_alpha * sin
+        slip_x, slip_z = (q + d_q) * sine, (q + d_q) * cosine
+        x = State(omega_c=omega_c + d_omega, slip_x=slip_x, slip_y=d_t * slip_z, slip_z=slip_z)
+        force = dynamics.forces(Case.SS, x, p, fluid, (sine, cosine), (d_t, 1.0))
         _, _, orbit, f_x, f_y, f_z, _, _ = dynamics.newton_euler(Case.SS, x, force, p, fluid)
         # At the solution itself all rates vanish, so that the frame may be held fixed.
         rates = (orbit, sin * f_x + cos * f_z, (cos * f_x - sin * f_z) / q, f_y / (q * cos))

@@ -71,7 +71,8 @@ def solve(
     NotConvergedError
         After `max_sweeps`.
     """
-    u, P = rigid_body.apply(free, start, p), start
+    u: Six = rigid_body.apply(free, start, p)
+    P = start
     if A is None or B is None:  # a contact alone is solved exactly
         return sweep(u, P, A, B, p)
     scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))

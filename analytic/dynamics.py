@@ -12,23 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from analytic import rolling_forces
-from model import Case, Contact, InputError, Parameters
-from model.arrays import Array
+from analytic.rigid_body import Forces as Forces
+from model import Case, Contact, InputError, Parameters, State
+from model.arrays import Array, Real
 from model.cases import TRAITS
-from model.kinematics import UNITS, VARIABLES, full_state
+from model.kinematics import UNITS, VARIABLES
 
-Real = Any
-"""A float, or an array of any shape."""
 Direction = tuple[Real, Real]
 """Sine and cosine of a slip direction (8)."""
-Forces = tuple[Real, Real, Real, Real, Real, Real]
-"""A_x, A_y, A_z, B_x, B_y, B_z in N."""
 
 
 def vector_field(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
@@ -50,8 +46,7 @@ def vector_field(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.Array
         If x isn't a state of the case (`check_state`).
     """
     state, fluid = _checked(case, x, p, omega_0)
-    dx = np.stack(np.broadcast_arrays(*rates(case, state, p, fluid)), axis=-1)
-    return dx[..., : np.shape(x)[-1]]
+    return rates(case, state, p, fluid).stacked()[..., : np.shape(x)[-1]]
 
 
 def contact_forces(
@@ -66,12 +61,12 @@ def contact_forces(
     """
     state, fluid = _checked(case, x, p, omega_0)
     if case is Case.RR:
-        components = rolling_family(state[2], p, fluid, _rolling_B_y(state[2], p, fluid))
+        components = rolling_family(state.omega_c, p, fluid, _rolling_B_y(state.omega_c, p, fluid))
     else:
         components = forces(case, state, p, fluid)
-    shape = np.broadcast_shapes(np.shape(state[2]), np.shape(fluid))
-    A_x, A_y, A_z, B_x, B_y, B_z = (np.broadcast_to(component, shape) for component in components)
-    return np.stack([A_x, A_y, A_z], axis=-1), np.stack([B_x, B_y, B_z], axis=-1)
+    shape = np.broadcast_shapes(np.shape(state.omega_c), np.shape(fluid))
+    both = np.stack([np.broadcast_to(component, shape) for component in components], axis=-1)
+    return both[..., :3], both[..., 3:]
 
 
 def _rolling_B_y(omega_c: Array, p: Parameters, omega_0: Array) -> Array:
@@ -87,44 +82,41 @@ def _rolling_B_y(omega_c: Array, p: Parameters, omega_0: Array) -> Array:
     return B_y
 
 
-def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> Array:
-    """Return states x as (..., 8); `InputError` if one of them violates the case (Tables 3 and 4).
+def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> State:
+    """Return states x (..., 6 or 8) as columns; `InputError` if one of them violates the case (Tables 3 and 4).
 
     The constraints must hold exactly (v_h + r slip_z to round-off), a slipping contact must slip, and an open
     contact needs a gap of zero or more, less than R at the wall.
     """
-    state = full_state(np.asarray(x, dtype=float))
-    columns = dict(zip(VARIABLES, np.moveaxis(state, -1, 0), strict=True))
+    state = State.of(x)
+    columns = state._asdict()
     for name in TRAITS[case].constraints:
         if name in columns:
             _refuse(columns[name] != 0, columns[name], name, f"must be 0 in case {case.name}")
         else:
-            roll, v_h = p.r * columns["slip_z"], columns["v_h"]
-            tolerance = 4 * np.finfo(float).eps * np.abs(v_h)
-            _refuse(np.abs(v_h + roll) > tolerance, v_h + roll, "v_h + r slip_z", f"must be 0 in case {case.name}")
+            slide = state.v_h + p.r * state.slip_z
+            wrong = np.abs(slide) > 4 * np.finfo(float).eps * np.abs(state.v_h)
+            _refuse(wrong, slide, "v_h + r slip_z", f"must be 0 in case {case.name}")
     if case.A is Contact.N:
-        _refuse(columns["y"] < 0, columns["y"], "y", f"must be >= 0 in case {case.name}")
+        _refuse(state.y < 0, state.y, "y", f"must be >= 0 in case {case.name}")
     if case.B is Contact.N:
-        _refuse(columns["h"] < 0, columns["h"], "h", f"must be >= 0 in case {case.name}")
-        _refuse(columns["h"] >= p.R, columns["h"], "h", f"must be < R = {p.R:g} m")
-    slide_A, slide_B = slides(list(columns.values()), p)
-    for point, slipping, slide in (
-        ("A", case.A is Contact.S, slide_A),
-        ("B", case.B is Contact.S, slide_B),
-    ):
-        if slipping:
+        _refuse(state.h < 0, state.h, "h", f"must be >= 0 in case {case.name}")
+        _refuse(state.h >= p.R, state.h, "h", f"must be < R = {p.R:g} m")
+    for point, contact, slide in zip("AB", (case.A, case.B), slides(state, p), strict=True):
+        if contact is Contact.S:
             speed = np.hypot(*slide)
             _refuse(speed == 0, speed, f"slip speed at {point}", f"must be > 0 in case {case.name}")
     return state
 
 
-def rates(case: Case, x: Sequence[Real], p: Parameters, omega_0: Real) -> list[Real]:
+def rates(case: Case, x: Sequence[Real], p: Parameters, omega_0: Real) -> State:
     """Rates of the eight state variables by (20) under the forces of the case; x is not checked."""
-    forces_now = rolling_family(x[2], p, omega_0, 0.0) if case is Case.RR else forces(case, x, p, omega_0)
+    _, _, omega_c, *_ = x
+    forces_now = rolling_family(omega_c, p, omega_0, 0.0) if case is Case.RR else forces(case, x, p, omega_0)
     return newton_euler(case, x, forces_now, p, omega_0)
 
 
-def newton_euler(case: Case, x: Sequence[Real], f: Forces, p: Parameters, omega_0: Real) -> list[Real]:
+def newton_euler(case: Case, x: Sequence[Real], f: Sequence[Real], p: Parameters, omega_0: Real) -> State:
     """Rates of the eight state variables under forces f by (20); what the case holds at zero is exactly zero.
 
     For h = 0 this is (21). Off the wall, with rho = R - h and the spin o of the ball in the co-rotating frame:
@@ -138,25 +130,25 @@ def newton_euler(case: Case, x: Sequence[Real], f: Forces, p: Parameters, omega_
     dv_y = (A_y + B_y) / p.m - p.g - p.c * v_y
     dv_h = (A_x + B_x) / p.m - p.c * v_h - rho * omega_c**2
     droll = (push + v_h * omega_c) / p.r  # (rho omega_c)'/r, the rate of the rolling part (4)
-    rate = [
-        v_y, dv_y, (push + 2 * v_h * omega_c) / rho,
-        -A_z / jmr - omega_c * (v_y / p.r + w_z) - droll,
-        B_z / jmr + droll,
-        (A_x - B_y) / jmr + omega_c * (rho * omega_c / p.r + w_x) - dv_y / p.r,
-        v_h, dv_h,
-    ]  # fmt: skip
+    dw_x = -A_z / jmr - omega_c * (v_y / p.r + w_z) - droll
+    dw_z = (A_x - B_y) / jmr + omega_c * (rho * omega_c / p.r + w_x) - dv_y / p.r
+    if case is Case.RN:
+        dw_z = -dv_h / p.r  # v_h + r slip_z stays 0
+    rate = [v_y, dv_y, (push + 2 * v_h * omega_c) / rho, dw_x, B_z / jmr + droll, dw_z, v_h, dv_h]
     for k in _HELD[case]:
         rate[k] = 0.0
-    if case is Case.RN:
-        rate[5] = -dv_h / p.r
-    return rate
+    return State(*rate)
 
 
 def forces(
-    case: Case, x: Sequence[Real], p: Parameters, omega_0: Real,
-    slip_A: Direction | None = None, slip_B: Direction | None = None,
-) -> Forces:  # fmt: skip
-    """The six force components in every case but RR (`rolling_family`); x is eight variables, not checked.
+    case: Case,
+    x: Sequence[Real],
+    p: Parameters,
+    omega_0: Real,
+    slip_A: Direction | None = None,
+    slip_B: Direction | None = None,
+) -> Forces:
+    """The forces in every case but RR (`rolling_family`); x is eight variables, not checked.
 
     Sine and cosine of the slip directions alpha, beta (8) are taken from x; give `slip_A`, `slip_B` for the limit
     of vanishing slip in a direction (53).
@@ -173,74 +165,83 @@ def rolling_family(omega_c: Real, p: Parameters, omega_0: Real, B_y: Real) -> Fo
     """The forces of RR with the one free component B_y in N: (21) with (23)."""
     u = p.m * p.R * omega_c**2
     z = p.j * p.m * p.R * p.c * (omega_c - omega_0) / (1 + 2 * p.j)
-    return B_y - p.j * u, p.m * p.g - B_y, z, (1 + p.j) * u - B_y, B_y, z
+    return Forces(B_y - p.j * u, p.m * p.g - B_y, z, (1 + p.j) * u - B_y, B_y, z)
 
 
 def _rs(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> Forces:
     """(24): w_z stays 0 without B_y, so that A_x alone keeps the spin axis turning with the orbit."""
-    omega_c = x[2]
+    (_, _, omega_c, *_), (sine, _) = x, slip_B
     u = p.m * p.R * omega_c**2
     B_x = (1 + p.j) * u
-    B_z = -p.eta * B_x * slip_B[0]
+    B_z = -p.eta * B_x * sine
     A_z = p.j * (p.m * p.R * p.c * (omega_c - omega_0) - B_z) / (1 + p.j)
-    return -p.j * u, p.m * p.g, A_z, B_x, 0.0, B_z
+    return Forces(-p.j * u, p.m * p.g, A_z, B_x, 0.0, B_z)
 
 
 def _sr(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction) -> Forces:
     """(25), (29)."""
-    omega_c, w_x = x[2], x[3]
+    (_, _, omega_c, w_x, *_), (sine, _) = x, slip_A
     B_y = p.j * p.m * (p.R * omega_c**2 + p.r * omega_c * w_x)
     A_y = p.m * p.g - B_y
-    A_z = p.mu * A_y * slip_A[0]
+    A_z = p.mu * A_y * sine
     B_z = p.j * (p.m * p.R * p.c * (omega_c - omega_0) - A_z) / (1 + p.j)
-    return 0.0, A_y, A_z, p.m * p.R * omega_c**2, B_y, B_z
+    return Forces(0.0, A_y, A_z, p.m * p.R * omega_c**2, B_y, B_z)
 
 
 def _ss(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction, slip_B: Direction) -> Forces:
     """(26), (29)."""
-    u, G = p.m * p.R * x[2] ** 2, p.m * p.g
+    _, _, omega_c, *_ = x
+    u, G = p.m * p.R * omega_c**2, p.m * p.g
     (sA, cA), (sB, cB) = slip_A, slip_B
     determinant = 1 + p.mu * p.eta * cA * cB
     A_y = (G - p.eta * cB * u) / determinant
     B_x = (u + p.mu * cA * G) / determinant
-    return -p.mu * A_y * cA, A_y, p.mu * A_y * sA, B_x, p.eta * B_x * cB, -p.eta * B_x * sB
+    return Forces(-p.mu * A_y * cA, A_y, p.mu * A_y * sA, B_x, p.eta * B_x * cB, -p.eta * B_x * sB)
 
 
 def _nr(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
     """(27)."""
-    v_y, omega_c, w_x = x[1], x[2], x[3]
+    _, v_y, omega_c, w_x, *_ = x
     B_y = p.j * p.m * (p.g + p.c * v_y + p.R * omega_c**2 + p.r * omega_c * w_x) / (1 + p.j)
     B_z = p.j * p.m * p.R * p.c * (omega_c - omega_0) / (1 + p.j)
-    return 0.0, 0.0, 0.0, p.m * p.R * omega_c**2, B_y, B_z
+    return Forces(0.0, 0.0, 0.0, p.m * p.R * omega_c**2, B_y, B_z)
 
 
 def _ns(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> Forces:
     """(28), (29)."""
-    u = p.m * p.R * x[2] ** 2
-    return 0.0, 0.0, 0.0, u, p.eta * u * slip_B[1], -p.eta * u * slip_B[0]
+    (_, _, omega_c, *_), (sine, cosine) = x, slip_B
+    u = p.m * p.R * omega_c**2
+    return Forces(0.0, 0.0, 0.0, u, p.eta * u * cosine, -p.eta * u * sine)
 
 
 def _rn(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
     """Rolling on the floor away from the wall: drag alone drives the friction."""
-    omega_c, h, v_h = x[2], x[6], x[7]
+    _, _, omega_c, _, _, _, h, v_h = x
     share = p.j * p.m * p.c / (1 + p.j)
-    return share * v_h, p.m * p.g, share * (p.R - h) * (omega_c - omega_0), 0.0, 0.0, 0.0
+    return Forces(share * v_h, p.m * p.g, share * (p.R - h) * (omega_c - omega_0))
 
 
 def _sn(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction) -> Forces:
     """Slipping on the floor away from the wall."""
-    G = p.m * p.g
-    return -p.mu * G * slip_A[1], G, p.mu * G * slip_A[0], 0.0, 0.0, 0.0
+    G, (sine, cosine) = p.m * p.g, slip_A
+    return Forces(-p.mu * G * cosine, G, p.mu * G * sine)
 
 
 def _nn(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
     """In flight."""
-    return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return Forces()
 
 
 FORCES: dict[Case, Callable[..., Forces]] = {
-    Case.RS: _rs, Case.SR: _sr, Case.SS: _ss, Case.NR: _nr, Case.NS: _ns, Case.RN: _rn, Case.SN: _sn, Case.NN: _nn,
-}  # fmt: skip
+    Case.RS: _rs,
+    Case.SR: _sr,
+    Case.SS: _ss,
+    Case.NR: _nr,
+    Case.NS: _ns,
+    Case.RN: _rn,
+    Case.SN: _sn,
+    Case.NN: _nn,
+}
 """The forces of each case but RR, as `forces`, from x, p, omega_0 and the directions of its slips, A before B."""
 
 _HELD = {
@@ -261,14 +262,14 @@ def _direction(along_sine: Real, along_cosine: Real) -> Direction:
     return along_sine / speed, along_cosine / speed
 
 
-def _checked(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None) -> tuple[list[Array], Array]:
+def _checked(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None) -> tuple[State, Array]:
     state = check_state(case, x, p)
     fluid = np.asarray(p.omega_0 if omega_0 is None else omega_0, dtype=float)
     _refuse(~np.isfinite(fluid), fluid, "omega_0", "must be finite", "rad s-1")
-    return list(np.moveaxis(state, -1, 0)), fluid
+    return state, fluid
 
 
-def _refuse(wrong: npt.NDArray[np.bool_], values: Array, name: str, rule: str, unit: str | None = None) -> None:
+def _refuse(wrong: Real, values: Real, name: str, rule: str, unit: str | None = None) -> None:
     """Raise `InputError` with the first of the values that is wrong."""
     if np.any(wrong):
         value = np.extract(wrong, values)[0]

@@ -106,7 +106,8 @@ class _Simulator:
 
     def settle(self, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Six]:
         """Collide if the ball moves into something it touches, then find the case."""
-        x, impulse = at.x, NOTHING
+        x = at.x
+        impulse: Six = NOTHING
         if (x[0] == 0 and x[1] < 0) or (x[6] == 0 and x[7] < 0):
             impact = transitions.collide(at, self.p, fluid(at.time), self.settings.restitution, self.shortest)
             at, impulse = impact.after, impact.impulse

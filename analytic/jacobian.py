@@ -6,10 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import dynamics
-from model import Case, Contact, Parameters
-from model.arrays import Array
+from model import Case, Contact, Parameters, State
+from model.arrays import Array, Real
 from model.cases import TRAITS
-from model.kinematics import VARIABLES
 
 STEP = 1e-100
 """Complex step: its square vanishes beside any state, so that the derivative is exact to round-off."""
@@ -23,15 +22,16 @@ def jacobian(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike
     """
     state = dynamics.check_state(case, x, p)
     fluid = p.omega_0 if omega_0 is None else np.asarray(omega_0, dtype=float)
-    active = [VARIABLES.index(name) for name in TRAITS[case].active]
+    active = TRAITS[case].active
     columns = []
-    for k in active:
-        z = list(np.moveaxis(state.astype(complex), -1, 0))
-        z[k] = z[k] + 1j * STEP
+    for name in active:
+        z = State(*(np.asarray(column, dtype=complex) for column in state))
+        z = z._replace(**{name: getattr(z, name) + 1j * STEP})
         if case is Case.RN:
-            z[5] = -z[7] / p.r
+            z = z._replace(slip_z=-z.v_h / p.r)
         rates = _complex_rates(case, z, p, fluid)
-        columns.append(np.stack(np.broadcast_arrays(*(np.imag(rates[row]) / STEP for row in active)), axis=-1))
+        rows = (np.imag(getattr(rates, row)) / STEP for row in active)
+        columns.append(np.stack(np.broadcast_arrays(*rows), axis=-1))
     return np.stack(np.broadcast_arrays(*columns), axis=-1)
 
 
@@ -43,7 +43,7 @@ def eigenvalues(matrix: Array) -> npt.NDArray[np.complex128]:
     return np.take_along_axis(values, order, axis=-1)
 
 
-def _complex_rates(case: Case, x: list[dynamics.Real], p: Parameters, fluid: dynamics.Real) -> list[dynamics.Real]:
+def _complex_rates(case: Case, x: State, p: Parameters, fluid: Real) -> State:
     """`dynamics.rates` with slip directions that are analytic in x."""
     if case is Case.RR:
         return dynamics.rates(case, x, p, fluid)

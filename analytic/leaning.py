@@ -35,16 +35,16 @@ def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArra
     InputError
         If SR has no stationary solution that leans: for mu = 0, omega_0 = 0, and at omega_03, where slip_x = 0.
     """
-    found = [s for s in stationary.stationary_solutions(p) if s.case is Case.SR and p.mu > 0]
-    if not found:
+    leaning = [s.state for s in stationary.stationary_solutions(p) if s.case is Case.SR and p.mu > 0]
+    if not leaning:
         raise InputError(
             f"omega_0 = {p.omega_0:g} rad s-1, mu = {p.mu:g}: SR has no stationary solution that leans on the floor"
         )
-    values, vectors = np.linalg.eig(jacobian.jacobian(Case.SR, found[0].x, p).astype(complex))
+    (x,) = leaning
+    values, vectors = np.linalg.eig(jacobian.jacobian(Case.SR, x, p).astype(complex))
     first = int(np.argmax(np.abs(values + p.c / (1 + p.j))))
     order = [first, 1 - first]
-    _, _, omega_c, slip_x, *_ = found[0].x
     # How A_y falls with omega_c and slip_x.
-    falls = np.array([2 * p.R * omega_c + p.r * slip_x, p.r * omega_c])
+    falls = np.array([2 * p.R * x.omega_c + p.r * x.slip_x, p.r * x.omega_c])
     rows = vectors.T[order]
     return values[order], rows * np.where((rows @ falls).real > 0, -1.0, 1.0)[:, None]

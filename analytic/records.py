@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from analytic import rigid_body
 from analytic.rigid_body import NOTHING, Six
-from model import Case, Events, Header, Parameters, Trajectory
+from model import Case, Events, Header, Parameters, State, Trajectory
 from model.arrays import Array
-from model.kinematics import VARIABLES, angular_velocity, slip_speeds
+from model.kinematics import slip_speeds
 from model.trajectory import SAMPLE
 
 REPORT_EVERY = 1000
@@ -43,7 +45,7 @@ class Recorder:
         """Number of samples so far: ``times[taken]`` is the next one."""
         self._blocks: list[npt.NDArray[np.void]] = []
         self._progress = progress
-        self._energy = [math.nan, 0.0, 0.0]
+        self._first, self._residual, self._scale = math.nan, 0.0, 0.0
 
     def add(self, time: Array, theta: Array, x: Array, forces: Array, case: npt.ArrayLike, work: Array) -> None:
         """Add samples.
@@ -53,14 +55,15 @@ class Recorder:
         """
         block = np.empty(len(time), SAMPLE)
         block["time"], block["theta"], block["case"] = time, theta, case
-        for k, name in enumerate(VARIABLES):
-            block[name] = x[:, k]
+        state = State(*x.T)
+        for name, column in state._asdict().items():
+            block[name] = column
         block["force_A"], block["force_B"] = forces[:, :3], forces[:, 3:]
         block["slip_speed_A"], block["slip_speed_B"] = slip_speeds(x, self.p)
-        block["gap_A"], block["gap_B"] = x[:, 0], x[:, 6]
+        block["gap_A"], block["gap_B"] = state.y, state.h
         self._blocks.append(block)
         self.taken += len(block)
-        self._balance(energy(x, self.p), work)
+        self._balance(rigid_body.energy(state.y, rigid_body.velocities(state, self.p), self.p), work)
         if len(time):
             self.reached(float(time[-1]))
 
@@ -73,32 +76,18 @@ class Recorder:
     def _balance(self, energy: Array, work: Array) -> None:
         """Keep the largest change of E - W, and of the energies in play."""
         if len(energy):
-            first, residual, scale = self._energy
-            first = float(energy[0] - work[0]) if math.isnan(first) else first  # an impact may precede the first sample
-            residual = max(residual, float(np.max(np.abs(energy - work - first))))
-            scale = max(scale, float(np.max(np.abs(energy))), float(np.max(np.abs(work))))
-            self._energy = [first, residual, scale]
+            if math.isnan(self._first):
+                self._first = float(energy[0] - work[0])  # an impact may precede the first sample
+            self._residual = max(self._residual, float(np.max(np.abs(energy - work - self._first))))
+            self._scale = max(self._scale, float(np.max(np.abs(energy))), float(np.max(np.abs(work))))
 
     def trajectory(self, header: Header) -> Trajectory:
         """The run so far; adds ``energy_residual`` and ``energy_scale`` in J to the settings of the header.
 
         The residual is the largest |change of energy - work of drag, friction and impacts| at a sample.
         """
-        _, residual, scale = self._energy
-        settings = {**header.settings, "energy_residual": residual, "energy_scale": scale}
-        return Trajectory.from_blocks(_with_settings(header, settings), self._blocks, event_columns(self.events))
-
-
-def _with_settings(header: Header, settings: dict[str, object]) -> Header:
-    return Header(header.engine, header.parameters, header.flow, settings, header.mjcf, header.failure)
-
-
-def energy(x: Array, p: Parameters) -> Array:
-    """Kinetic and potential energy of states (..., 8), J; 0 at rest on the floor."""
-    y, v_y, omega_c, h, v_h = (x[..., k] for k in (0, 1, 2, 6, 7))
-    speed2 = v_h**2 + v_y**2 + ((p.R - h) * omega_c) ** 2
-    spin2 = np.sum(angular_velocity(x, p) ** 2, axis=-1)
-    return np.asarray(p.m * ((speed2 + p.j * p.r**2 * spin2) / 2 + p.g * y))
+        settings = {**header.settings, "energy_residual": self._residual, "energy_scale": self._scale}
+        return Trajectory.from_blocks(replace(header, settings=settings), self._blocks, event_columns(self.events))
 
 
 def event_columns(events: Sequence[Event]) -> Events:

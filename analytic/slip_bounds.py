@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import dynamics
-from model import Case, InputError, Parameters
+from model import Case, InputError, Parameters, State
 from model.arrays import Array
 
 
@@ -111,8 +111,8 @@ def normal_forces_rr_to_ss(p: Parameters, omega_0: npt.ArrayLike, side: int = 1)
     """
     omega_c = np.asarray(omega_0, dtype=float)
     direction = (0.0, float(side))
-    _, A_y, _, B_x, _, _ = dynamics.forces(Case.SS, [0.0, 0.0, omega_c, *[0.0] * 5], p, omega_c, direction, direction)
-    return np.asarray(A_y), np.asarray(B_x)
+    force = dynamics.forces(Case.SS, State(omega_c=omega_c), p, omega_c, direction, direction)
+    return np.asarray(force.A_y), np.asarray(force.B_x)
 
 
 def filippov_share(outer: Case, omega_c: float, p: Parameters) -> float:
@@ -130,6 +130,6 @@ def filippov_share(outer: Case, omega_c: float, p: Parameters) -> float:
 
 def _nr_terms(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array, Array]:
     """Coefficients of cos beta and sin beta in (56), and the friction that resists, rad s-2."""
-    _, v_y, omega_c, w_x, *_ = np.moveaxis(dynamics.check_state(Case.NR, x, p), -1, 0)
-    pull = (p.g + p.c * v_y + p.R * omega_c**2) / p.r + omega_c * w_x
+    _, v_y, omega_c, slip_x, *_ = dynamics.check_state(Case.NR, x, p)
+    pull = (p.g + p.c * v_y + p.R * omega_c**2) / p.r + omega_c * slip_x
     return pull, p.c * p.R / p.r * (p.omega_0 - omega_c), p.eta * p.R * (1 + p.j) / (p.j * p.r) * omega_c**2

@@ -23,10 +23,9 @@ import numpy.typing as npt
 from scipy.optimize import minimize, root
 
 from analytic import dynamics, rolling_forces
-from model import Case, Contact, Parameters
+from model import Case, Contact, Parameters, State
 from model.arrays import Array
 from model.cases import TRAITS
-from model.kinematics import VARIABLES
 
 SLIP_ARROWS = (
     (Case.RR, Case.RS), (Case.RR, Case.SR), (Case.RR, Case.SS), (Case.RS, Case.SS), (Case.SR, Case.SS),
@@ -105,27 +104,26 @@ def slip_rates(
     x is one state of `inner`, n directions (..., d) over `normals`, of any length. A negative normal force means that
     the contact opens instead of slipping that way.
     """
-    state = dynamics.check_state(inner, x, p)
-    n = np.asarray(n, dtype=float)
-    pushed = np.broadcast_to(state, (*n.shape[:-1], 8)).copy()
-    W = [VARIABLES.index(name) for name in normals(inner, outer)]
+    state, names, n = dynamics.check_state(inner, x, p), normals(inner, outer), np.asarray(n, dtype=float)
+    push = State(**dict(zip(names, np.moveaxis(n, -1, 0), strict=True)))
     directions = {}
-    slid, push = dynamics.slides(state.tolist(), p), np.zeros_like(pushed)
-    push[..., W] = n
-    pushes = dynamics.slides(list(np.moveaxis(push, -1, 0)), p)
     for name, before, after, old, new in zip(
-        ("slip_A", "slip_B"), (inner.A, inner.B), (outer.A, outer.B), slid, pushes, strict=True
+        ("slip_A", "slip_B"),
+        (inner.A, inner.B),
+        (outer.A, outer.B),
+        dynamics.slides(state, p),
+        dynamics.slides(push, p),
+        strict=True,
     ):
         if after is Contact.S:
             sine, cosine = old if before is Contact.S else new
             speed = np.hypot(sine, cosine)
             directions[name] = (sine / speed, cosine / speed)
-    columns = list(np.moveaxis(pushed, -1, 0))
-    force = dynamics.forces(outer, columns, p, p.omega_0, **directions)
-    rates = dynamics.newton_euler(outer, columns, force, p, p.omega_0)
-    shape = n.shape[:-1]
-    A_y, B_x = (np.broadcast_to(force[k], shape) for k in (1, 3))
-    return np.stack([np.broadcast_to(rates[k], shape) for k in W], axis=-1), A_y, B_x
+    force = dynamics.forces(outer, state, p, p.omega_0, **directions)
+    rates = dynamics.newton_euler(outer, state, force, p, p.omega_0)
+    slips = (getattr(rates, name) for name in names)
+    *along, A_y, B_x = (np.broadcast_to(value, n.shape[:-1]) for value in (*slips, force.A_y, force.B_x))
+    return np.stack(along, axis=-1), A_y, B_x
 
 
 def gamma(
@@ -144,8 +142,7 @@ def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters)
 
     This is (53) for the dotted arrows of Fig. 6, with n along v_y.
     """
-    state = list(dynamics.check_state(inner, x, p))
-    return float(dynamics.rates(outer, [float(v) for v in state], p, p.omega_0)[1])
+    return float(dynamics.rates(outer, dynamics.check_state(inner, x, p), p, p.omega_0).v_y)
 
 
 def extrema(
@@ -217,8 +214,8 @@ def stick_margin(case: Case, x: npt.ArrayLike, p: Parameters) -> float:
     """
     state = dynamics.check_state(case, x, p)
     if case is Case.RR:
-        return float(rolling_forces.margin(state[2], p))
-    A_x, A_y, A_z, B_x, B_y, B_z = dynamics.forces(case, state.tolist(), p, p.omega_0)
+        return float(rolling_forces.margin(state.omega_c, p))
+    A_x, A_y, A_z, B_x, B_y, B_z = dynamics.forces(case, state, p, p.omega_0)
     slacks = [np.inf]
     if case.A is Contact.R:
         slacks.append((p.mu * A_y - np.hypot(A_x, A_z)) / (p.m * p.g))

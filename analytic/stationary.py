@@ -15,10 +15,11 @@ import numpy.typing as npt
 
 from analytic import branch_stability, dynamics, jacobian, rolling_forces, slip_stability, slipping_branch
 from analytic.slip_stability import SlipStability
-from model import Case, InputError, Parameters
+from model import Case, InputError, Parameters, State
 from model.arrays import Array
 
-_MIRROR = np.array([1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
+_MIRROR = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
+"""Signs of the state of the other sense of rotation."""
 _ROUND_OFF = 1e-9
 """Real part over modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
 
@@ -56,6 +57,11 @@ class StationarySolution:
     """Slip direction at A, rad, in SS."""
 
     @property
+    def state(self) -> State:
+        """The state `x` by the names of its variables."""
+        return State(*self.x.tolist())
+
+    @property
     def stable(self) -> bool:
         """Whether disturbances within the case don't grow (asymptotic or neutral)."""
         return self.stability is not Stability.UNSTABLE
@@ -68,7 +74,7 @@ class StationarySolution:
     @property
     def moves(self) -> bool:
         """Whether the ball sinks along the wall all the same: stationary but for y (NS, Proposition 6)."""
-        return bool(self.x[1] != 0)
+        return bool(self.state.v_y != 0)
 
 
 def stationary_solutions(p: Parameters) -> list[StationarySolution]:
@@ -92,14 +98,14 @@ def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = F
     InputError
         If there is none, or more than one (two are unstable between the Hopf points of a very rough floor).
     """
-    found = [s for s in stationary_solutions(p) if s.case is case and s.stable == stable and (formal or s.exists)]
-    if len(found) != 1:
+    those = [s for s in stationary_solutions(p) if s.case is case and s.stable == stable and (formal or s.exists)]
+    if len(those) != 1:
         raise InputError(
-            f"case {case.name} has {len(found) or 'no'} {'stable' if stable else 'unstable'} stationary "
-            f"solution{'s' if found else ''} at omega_0 = {p.omega_0:g} rad s-1 "
+            f"case {case.name} has {len(those) or 'no'} {'stable' if stable else 'unstable'} stationary "
+            f"solution{'s' if those else ''} at omega_0 = {p.omega_0:g} rad s-1 "
             f"(mu = {p.mu:g}, eta = {p.eta:g}, j = {p.j:g}, c = {p.c:g} s-1, R = {p.R:g} m, g = {p.g:g} m s-2)"
         )
-    return found[0]
+    return those[0]
 
 
 def stable_solutions(p: Parameters) -> list[StationarySolution]:
@@ -115,27 +121,38 @@ def slowest_time_constant(of: StationarySolution) -> float:
 
 
 def _solution(
-    case: Case, p: Parameters, x: list[float], exists: bool,
-    family: tuple[str, ...] = (), alpha: float = np.nan, values: npt.NDArray[np.complex128] | None = None,
-) -> StationarySolution:  # fmt: skip
-    state = np.array([*x, 0.0, 0.0])
+    case: Case,
+    p: Parameters,
+    x: State,
+    exists: bool,
+    family: tuple[str, ...] = (),
+    alpha: float = np.nan,
+    values: npt.NDArray[np.complex128] | None = None,
+) -> StationarySolution:
     if p.c == 0:  # nothing pulls omega_c to omega_0
         family = (*family, "omega_c")
     if case is Case.RR:
-        B_y = float(rolling_forces.least_utilisation(x[2], p).B_y)
-        force = dynamics.rolling_family(x[2], p, p.omega_0, B_y if np.isfinite(B_y) else 0.0)
+        B_y = float(rolling_forces.least_utilisation(x.omega_c, p).B_y)
+        force = dynamics.rolling_family(x.omega_c, p, p.omega_0, B_y if np.isfinite(B_y) else 0.0)
     else:
-        force = dynamics.forces(case, state.tolist(), p, p.omega_0)
+        force = dynamics.forces(case, x, p, p.omega_0)
     zeros = len(family)
     if case is Case.NS:  # the reduced field (48), without y
-        values, zeros = jacobian.eigenvalues(jacobian.jacobian(case, state, p)[1:, 1:]), zeros - 1
+        values, zeros = jacobian.eigenvalues(jacobian.jacobian(case, x, p)[1:, 1:]), zeros - 1
     elif values is None:
-        values = jacobian.eigenvalues(jacobian.jacobian(case, state, p))
+        values = jacobian.eigenvalues(jacobian.jacobian(case, x, p))
     return StationarySolution(
-        case=case, x=state, force_A=np.array(force[:3]), force_B=np.array(force[3:]), eigenvalues=values,
-        exists=bool(exists), stability=_stability(values, zeros, bool(family) or case is Case.NS),
-        slip_stability=slip_stability.stability(case, p, x[2]), family=family, alpha=alpha,
-    )  # fmt: skip
+        case=case,
+        x=np.array(x),
+        force_A=np.array(force[:3]),
+        force_B=np.array(force[3:]),
+        eigenvalues=values,
+        exists=bool(exists),
+        stability=_stability(values, zeros, bool(family) or case is Case.NS),
+        slip_stability=slip_stability.stability(case, p, x.omega_c),
+        family=family,
+        alpha=alpha,
+    )
 
 
 def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) -> Stability:
@@ -150,7 +167,7 @@ def _rr(p: Parameters) -> list[StationarySolution]:
     """Proposition 1. Without drag every omega_c is stationary."""
     best = rolling_forces.least_utilisation(p.omega_0, p)
     exists = bool(best.utilisation <= 1 and (np.isfinite(best.B_y) or rolling_forces.margin(p.omega_0, p) >= 0))
-    return [_solution(Case.RR, p, [0.0, 0.0, p.omega_0, 0.0, 0.0, 0.0], exists)]
+    return [_solution(Case.RR, p, State(omega_c=p.omega_0), exists)]
 
 
 def _rs(p: Parameters) -> list[StationarySolution]:
@@ -159,7 +176,7 @@ def _rs(p: Parameters) -> list[StationarySolution]:
         return []
     omega_c = p.omega_0 if p.eta == 0 else 0.0
     exists = p.j * p.R * omega_c**2 <= p.mu * p.g
-    return [_solution(Case.RS, p, [0.0, 0.0, omega_c, 0.0, 1.0, 0.0], exists, ("slip_y",))]
+    return [_solution(Case.RS, p, State(omega_c=omega_c, slip_y=1.0), exists, ("slip_y",))]
 
 
 def _sr(p: Parameters) -> list[StationarySolution]:
@@ -170,35 +187,30 @@ def _sr(p: Parameters) -> list[StationarySolution]:
     if p.omega_0 == 0:
         return []
     if p.mu == 0:
-        x = [0.0, 0.0, p.omega_0, -p.omega_0 * p.R / p.r, 0.0, 0.0]
+        x = State(omega_c=p.omega_0, slip_x=-p.omega_0 * p.R / p.r)
         return [_solution(Case.SR, p, x, True, family=("slip_x",))]
-    w_x = _lifting_spin(p)
-    if w_x == 0:
-        return []
-    x = [0.0, 0.0, p.omega_0, w_x, 0.0, 0.0]
-    return [_solution(Case.SR, p, x, _wall_carries(p))]
+    x = State(omega_c=p.omega_0, slip_x=_lifting_spin(p))
+    return [_solution(Case.SR, p, x, _wall_carries(p))] if x.slip_x else []
 
 
 def _ss(p: Parameters) -> list[StationarySolution]:
     """Proposition 4, by root finding along the branch. On a smooth wall slip_y is free: the member given has none."""
     smooth = ("slip_y",) if p.eta == 0 else ()
     if p.mu == p.eta == 0 and p.omega_0 != 0:
-        x = [0.0, 0.0, p.omega_0, -p.omega_0 * p.R / p.r, 1.0, 0.0]
+        x = State(omega_c=p.omega_0, slip_x=-p.omega_0 * p.R / p.r, slip_y=1.0)
         return [_solution(Case.SS, p, x, True, family=smooth)]
-    found = []
+    solutions = []
     for s in slipping_branch.points_at(p.Omega_0, p.j, p.mu, p.eta, p.kappa):
-        x, alpha = branch_stability.states(s, p)[0].tolist()[:6], -float(np.arctan(np.exp(s)))
-        found.append(
-            _solution(Case.SS, p, x, True, family=smooth, alpha=alpha, values=branch_stability.eigenvalues_at(s, p))
-        )
-    return found
+        x, alpha = State.of(branch_stability.states(s, p)[0]), -float(np.arctan(np.exp(s)))
+        solutions.append(_solution(Case.SS, p, x, True, smooth, alpha, branch_stability.eigenvalues_at(s, p)))
+    return solutions
 
 
 def _nr(p: Parameters) -> list[StationarySolution]:
     """Proposition 5."""
     if p.omega_0 == 0:
         return []
-    x = [0.0, 0.0, p.omega_0, _lifting_spin(p), 0.0, 0.0]
+    x = State(omega_c=p.omega_0, slip_x=_lifting_spin(p))
     return [_solution(Case.NR, p, x, _wall_carries(p), ("y",))]
 
 
@@ -207,8 +219,8 @@ def _ns(p: Parameters) -> list[StationarySolution]:
     sink = p.g - p.eta * p.R * p.omega_0**2
     if p.c == 0 or sink <= 0:
         return []
-    v_y = -sink / p.c
-    x = [0.0, v_y, p.omega_0, (p.eta - p.j) / p.j * p.omega_0 * p.R / p.r, 0.0, -v_y / p.r]
+    v_y, slip_x = -sink / p.c, (p.eta - p.j) / p.j * p.omega_0 * p.R / p.r
+    x = State(v_y=v_y, omega_c=p.omega_0, slip_x=slip_x, slip_z=-v_y / p.r)
     return [_solution(Case.NS, p, x, True, family=("y", "slip_y") if p.eta == 0 else ("y",))]
 
 
@@ -224,7 +236,5 @@ def _wall_carries(p: Parameters) -> bool:
 
 def _mirrored(s: StationarySolution) -> StationarySolution:
     flip = np.array([1.0, 1.0, -1.0])
-    return replace(
-        s, x=_MIRROR * s.x + 0.0, force_A=flip * s.force_A + 0.0, force_B=flip * s.force_B + 0.0,
-        alpha=-s.alpha,
-    )  # fmt: skip
+    x = np.multiply(_MIRROR, s.x)
+    return replace(s, x=x + 0.0, force_A=flip * s.force_A + 0.0, force_B=flip * s.force_B + 0.0, alpha=-s.alpha)

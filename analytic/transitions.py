@@ -102,7 +102,7 @@ def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, short
         v_y = 0.0
     if B and 2 * v_h <= shortest[1] * fly_in * (1 - restitution):
         v_h = 0.0
-    y = rigid_body.state(x[0], x[6], (v_h, v_y, u[2], u[3], u[4], u[5]), p)
+    y = list(rigid_body.state(x[0], x[6], (v_h, v_y, u[2], u[3], u[4], u[5]), p))
     still = AT_REST * math.hypot(*before[:3], *(p.r * o for o in before[3:]))
     if A and P[1] > 0 and math.hypot(*rigid_body.slip_at_A(u, p)) <= still:
         y[3], y[5] = 0.0, -(v_h + v_y) / p.r
