@@ -7,9 +7,8 @@ from enum import IntFlag
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
-from analytic import branch_stability, slipping_branch
+from analytic import branch_stability, roots, slipping_branch
 from analytic.stationary import StationarySolution
 from model import InputError, Parameters
 from model.arrays import Array
@@ -83,7 +82,7 @@ def fold_birth(p: Parameters) -> float:
     low, high = p.j * float(np.finfo(float).eps), p.j * (1 - float(np.finfo(float).eps))
     if p.mu == 0 or growth(low) * growth(high) >= 0:
         return float("nan")
-    return float(brentq(growth, low, high, xtol=1e-300, rtol=8 * float(np.finfo(float).eps)))
+    return float(roots.bisected(lambda eta: growth(float(eta)), low, high))
 
 
 def hopf_points(p: Parameters) -> list[float]:

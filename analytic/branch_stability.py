@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
-from analytic import dynamics, jacobian, slipping_branch
+from analytic import dynamics, jacobian, roots, slipping_branch
 from model import Case, InputError, Parameters, State
 from model.arrays import Array
 
@@ -76,10 +75,10 @@ def hopf_places(p: Parameters) -> list[float]:
             product = product * total / (1 + np.abs(total))  # bounded, the zeros stay
         return np.asarray(product.real)
 
-    values, found = pair_sums(s), []
+    values, places = pair_sums(s), []
     for k in np.flatnonzero(np.sign(values[1:]) * np.sign(values[:-1]) < 0):
-        place = float(brentq(lambda t: float(pair_sums(t)), s[k], s[k + 1], xtol=1e-14, rtol=1e-14))
+        place = float(roots.bisected(pair_sums, s[k], s[k + 1]))
         pair = eigenvalues_at(place, p)
         if np.any((np.abs(pair.real) < 1e-6 * np.abs(pair.imag)) & (pair.imag > 0)):
-            found.append(place)
-    return found
+            places.append(place)
+    return places

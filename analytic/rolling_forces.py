@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import elementwise
 
+from analytic import roots
 from model import Parameters
 from model.arrays import Array
 
@@ -78,7 +78,7 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
         return np.asarray(load_A * hold_B - load_B * hold_A)
 
     A_binds, B_binds = lead_of_A(q_A, a, k, z) >= 0, lead_of_A(q_B, a, k, z) <= 0
-    crossing = elementwise.find_root(lead_of_A, (q_A, q_B), args=(a, k, z)).x
+    crossing = roots.bisected(lambda q: lead_of_A(q, a, k, z), q_A, q_B)
     q = np.where(A_binds, q_A, np.where(B_binds, q_B, crossing))
     use_A = np.where(A_binds, _least_alone(a, z, p.mu), _ratio(*at_A(q, a, z)))
     use_B = np.where(B_binds & ~A_binds, _least_alone(k, z, p.eta), _ratio(*at_B(q, k, z)))

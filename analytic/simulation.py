@@ -10,16 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from analytic import hybrid, time_stepping
 from analytic.records import Recorder
 from analytic.settings import Settings
-from model import Flow, Header, InputError, Parameters, SimulationError, Trajectory
+from model import Flow, Header, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.errors import suggestion
-from model.kinematics import full_state
-from model.parameters import check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
 
-_METHODS = {"event": hybrid.run, "time-stepping": time_stepping.run}
+MAX_SAMPLES = 5e7
 
 
 def simulate(
@@ -55,17 +53,21 @@ def simulate(
         If the run can't go on; it carries the samples so far.
     """
     settings = _settings(settings, changes)
+    if settings.method == "event":
+        from analytic.hybrid import run  # here, because the integrators of scipy take half a second to load
+    else:
+        from analytic.time_stepping import run
     flow = Flow.steady(p.omega_0) if flow is None else flow
     x = _start(x0, p, settings)
     times = _sample_times(t_end, sample_interval)
     theta_0 = check_number("theta_0", theta_0, "rad")
     shown = dataclasses.asdict(settings) | {
-        "x0": x.tolist(), "t_end": float(times[-1]), "sample_interval": float(times[1] - times[0]), "theta_0": theta_0,
+        "x0": list(x), "t_end": float(times[-1]), "sample_interval": float(times[1] - times[0]), "theta_0": theta_0,
     }  # fmt: skip
     recorder = Recorder(p, times, progress)
     failure, cause = "", None
     try:
-        _METHODS[settings.method](x.tolist(), theta_0, p, flow, settings, recorder)
+        run(list(x), theta_0, p, flow, settings, recorder)
     except KeyboardInterrupt:
         failure = f"interrupted at t = {recorder.time:g} s"
     except ArithmeticError as error:
@@ -84,34 +86,25 @@ def _settings(settings: Settings | None, changes: dict[str, Any]) -> Settings:
     return dataclasses.replace(settings or Settings(), **changes)
 
 
-def _start(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> Array:
-    """The full state at the start, or `InputError` if the ball can't be in it."""
-    x = full_state(np.asarray(x0, dtype=float))
-    if x.ndim != 1:
-        raise InputError(f"a simulation starts from one state, not from an array of shape {x.shape}")
-    for gap, speed, place in (("y", "v_y", "floor"), ("h", "v_h", "wall")):
-        value, rate = (float(x[k]) for k in ((0, 1) if gap == "y" else (6, 7)))
-        if value < 0:
-            raise InputError(f"{gap} = {value:g} m is out of range: the ball starts inside the {place}; must be >= 0")
-        if value == 0 and rate < 0 and not settings.initial_impact:
-            raise InputError(
-                f"{speed} = {rate:g} m s-1 is out of range: the ball touches the {place} ({gap} = 0) and moves in; "
-                "must be >= 0, or set initial_impact"
-            )
-    if x[6] >= p.R:
-        raise InputError(f"h = {x[6]:g} m is out of range: must be < R = {p.R:g} m")
+def _start(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
+    """The state at the start, or `InputError` if the ball can't be in it."""
+    x = State.one(x0)
+    check_number("y", x.y, "m", NOT_NEGATIVE, "to be above the floor it")
+    check_number("h", x.h, "m", Range(0.0, p.R, below=True), "to be between wall and axis it")
+    if not settings.initial_impact:
+        for place, gap, name, speed in (("floor", x.y, "v_y", x.v_y), ("wall", x.h, "v_h", x.v_h)):
+            if gap == 0:
+                meaning = f"touching the {place} and without initial_impact it"
+                check_number(name, speed, "m s-1", NOT_NEGATIVE, meaning)
     return x
 
 
 def _sample_times(t_end: float, interval: float | None) -> Array:
     """Multiples of the interval, and t_end."""
-    if check_number("t_end", t_end, "s") <= 0:
-        raise InputError(f"t_end = {t_end:g} s is out of range: a simulation must last > 0 s")
+    t_end = check_number("t_end", t_end, "s", POSITIVE)
     if interval is None:
         return np.linspace(0.0, t_end, 1001)
-    if check_number("sample_interval", interval, "s") <= 0:
-        raise InputError(f"sample_interval = {interval:g} s is out of range: must be > 0")
+    meaning = f"for at most {MAX_SAMPLES:g} samples it"
+    interval = check_number("sample_interval", interval, "s", Range(t_end / MAX_SAMPLES), meaning)
     count = math.ceil(t_end / interval * (1 - 4 * float(np.finfo(float).eps)))
-    if count > 50_000_000:
-        raise InputError(f"sample_interval = {interval:g} s is out of range: it makes {count} samples; at most 5e7")
     return np.append(np.arange(count) * interval, t_end)

@@ -4,33 +4,32 @@ From a state x* of a case Y the ball is pushed along n into a case Z of more fre
 gamma(x*, n) = lim f_Z(x* + eps n) . n (53) tells whether it is driven further. Three measures of one question:
 
 * ``gamma`` with the paper's Euclidean product: exact as (56), (66), (73), (82), (83) quote it, but over all directions
-  its maximum may be positive though no slip can last (docs/errata.md);
+  its maximum may be positive though no slip can last (docs/errata.md), since with two or more directions to slip the
+  slip turns while it grows;
 * ``gamma`` with the product of kinetic energy, the mass matrix reduced to the slip: the work done on the slip;
-* the forces: rolling goes on as long as admissible forces exist (`stick_margin`).
-
-With two or more directions to slip, growth along one is not yet lasting slip: the direction turns. It lasts along a
-limit direction, where f_Z is parallel to n (`limit_directions`).
+* the forces: rolling goes on as long as admissible forces exist (`rolling_forces.margin` for RR).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize, root
 
-from analytic import dynamics, rolling_forces
+from analytic import dynamics
 from model import Case, Contact, Parameters, State
 from model.arrays import Array
 from model.cases import TRAITS
 
 SLIP_ARROWS = (
-    (Case.RR, Case.RS), (Case.RR, Case.SR), (Case.RR, Case.SS), (Case.RS, Case.SS), (Case.SR, Case.SS),
+    (Case.RR, Case.RS),
+    (Case.RR, Case.SR),
+    (Case.RR, Case.SS),
+    (Case.RS, Case.SS),
+    (Case.SR, Case.SS),
     (Case.NR, Case.NS),
-)  # fmt: skip
+)
 """The arrows of Fig. 6 along which a contact begins to slip."""
 LIFT_ARROWS = ((Case.RR, Case.NR), (Case.RS, Case.NS), (Case.SR, Case.NR), (Case.SS, Case.NS))
 """The arrows of Fig. 6 along which the ball leaves the floor."""
@@ -53,16 +52,6 @@ class Metric(Enum):
 
     EUCLID = "Euclidean, in slip angular velocity, as in the paper"
     ENERGY = "kinetic energy of the slip"
-
-
-@dataclass(frozen=True)
-class Push:
-    """One direction of slip and how the slip grows along it."""
-
-    n: Array
-    """Unit vector in the product used, over `normals`."""
-    gamma: float
-    """Growth rate of the slip angular velocity, rad s-2."""
 
 
 def normals(inner: Case, outer: Case) -> tuple[str, ...]:
@@ -145,85 +134,6 @@ def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters)
     return float(dynamics.rates(outer, dynamics.check_state(inner, x, p), p, p.omega_0).v_y)
 
 
-def extrema(
-    inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters, metric: Metric = Metric.EUCLID, closed: bool = False
-) -> tuple[Push, Push]:
-    """The directions of least and of greatest gamma over all of W; an extremum on an edge to a degree or so.
-
-    With `closed` only over directions along which both contacts press (A_y, B_x >= 0): elsewhere the ball would lift
-    instead of slipping that way.
-    """
-    dimension = len(normals(inner, outer))
-    M = np.eye(dimension) if metric is Metric.EUCLID else slip_mass(inner, outer, p)
-    grid = _directions(dimension)
-    if closed:
-        grid = grid[_press(inner, outer, x, grid, p)]
-    values = gamma(inner, outer, x, grid, p, metric)
-    found = []
-    for sign, start in ((1.0, np.argmin(values)), (-1.0, np.argmax(values))):
-        best, value, scale = grid[start], values[start], np.abs(values).max()
-        if dimension > 1:
-            # Quasi-Newton from the best direction of the grid; gamma doesn't depend on the length of n.
-            def scaled(n: Array, factor: float = sign / scale) -> float:
-                return factor * float(gamma(inner, outer, x, n, p, metric))
-
-            polished = minimize(scaled, best, method="BFGS", options={"gtol": 1e-9})
-            better = scale * polished.fun < sign * value
-            if better and (not closed or _press(inner, outer, x, polished.x, p)):
-                best, value = polished.x, sign * scale * polished.fun
-        found.append(Push(best / np.sqrt(best @ M @ best), float(value)))
-    return found[0], found[1]
-
-
-def _press(inner: Case, outer: Case, x: npt.ArrayLike, n: Array, p: Parameters) -> npt.NDArray[np.bool_]:
-    _, A_y, B_x = slip_rates(inner, outer, x, n, p)
-    return (A_y >= 0) & (B_x >= 0)
-
-
-def limit_directions(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> list[Push]:
-    """Unit directions n along which the slip neither turns nor opens a contact: f_Z parallel to n, A_y, B_x >= 0.
-
-    A slip that lasts is along one with gamma > 0; vanishing slip arrives along one with gamma < 0.
-    """
-    dimension = len(normals(inner, outer))
-    found: list[Push] = []
-    for start in _directions(dimension, coarse=True):
-        n = start
-        if dimension > 1:
-
-            def turning(n: Array) -> Array:
-                rates, _, _ = slip_rates(inner, outer, x, n, p)
-                # f - (f.n) n/|n|^2 lies across n; the last term holds the length of n at 1.
-                return np.asarray(rates - (rates @ n) / (n @ n) * n + _SCALE * (n @ n - 1) * n)
-
-            solution = root(turning, start, tol=1e-13)
-            if not solution.success:
-                continue
-            n = solution.x / np.linalg.norm(solution.x)
-        rates, A_y, B_x = slip_rates(inner, outer, x, n, p)
-        if A_y < 0 or B_x < 0 or any(np.linalg.norm(n - other.n) < 1e-6 for other in found):
-            continue
-        found.append(Push(n, float(rates @ n)))
-    return sorted(found, key=lambda push: -push.gamma)
-
-
-def stick_margin(case: Case, x: npt.ArrayLike, p: Parameters) -> float:
-    """Slack of the friction cones (13) of the rolling contacts in units of m g: >= 0 where rolling can go on.
-
-    In RR the margin of the whole family of forces (`rolling_forces.margin`); inf if nothing rolls.
-    """
-    state = dynamics.check_state(case, x, p)
-    if case is Case.RR:
-        return float(rolling_forces.margin(state.omega_c, p))
-    A_x, A_y, A_z, B_x, B_y, B_z = dynamics.forces(case, state, p, p.omega_0)
-    slacks = [np.inf]
-    if case.A is Contact.R:
-        slacks.append((p.mu * A_y - np.hypot(A_x, A_z)) / (p.m * p.g))
-    if case.B is Contact.R:
-        slacks.append((p.eta * B_x - np.hypot(B_y, B_z)) / (p.m * p.g))
-    return float(min(slacks))
-
-
 def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:
     """Stability with respect to slipping of the stationary solution of a case at omega_c, p.omega_0 if None.
 
@@ -253,24 +163,3 @@ def _sign(drive: float, hold: float) -> SlipStability:
     if abs(drive - hold) <= 8 * np.finfo(float).eps * max(drive, hold):
         return SlipStability.NEUTRAL
     return SlipStability.UNSTABLE if drive > hold else SlipStability.STABLE
-
-
-_SCALE = 1e3
-
-
-def _directions(dimension: int, coarse: bool = False) -> Array:
-    """Directions all over the unit sphere of W, but for those that leave a contact rolling."""
-    if dimension == 1:
-        return np.array([[1.0], [-1.0]])
-    if dimension == 2:
-        angle = np.linspace(0, 2 * np.pi, 16 if coarse else 360, endpoint=False)
-        return np.stack([np.sin(angle), np.cos(angle)], axis=-1)
-    return np.concatenate(list(_sphere(7 if coarse else 60)))
-
-
-def _sphere(n: int) -> Iterator[Array]:
-    # Slip along slip_x or slip_y alone leaves one contact rolling: those axes don't belong to SS.
-    angle = (np.arange(n) + 0.5) / n * np.pi - np.pi / 2
-    for half in (0.0, np.pi):
-        yield direction(angle[:, None] + half, angle[None, :] + half).reshape(-1, 3)
-        yield direction(np.array([half]), np.array([half]))

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import elementwise
 
+from analytic import roots
 from model.arrays import Array
 
 END = 80.0
@@ -110,8 +110,9 @@ def fold(j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, kappa: float, released
         exists = exists | (eta > j) & (mu > 0) & (kappa > 0) & (_denominator(lowest, j, mu, eta) > 0)
     # Any valid numbers where there is no fold: the root there is thrown away.
     safe_mu, safe_eta = np.where(exists, mu, 1.0), np.where(exists, eta, j / 2)
-    found = _root_of_slope(j, safe_mu, safe_eta, np.where(exists, kappa, 0.0))
-    return np.where(exists, found, np.nan)
+    safe_kappa = np.where(exists, kappa, 0.0)
+    places = roots.bisected(lambda s: slope(s, j, safe_mu, safe_eta, safe_kappa), -END, END)
+    return np.where(exists, places, np.nan)
 
 
 def sign_changes(j: float, mu: float, eta: float, kappa: float, points: int = 20_001) -> int:
@@ -133,17 +134,12 @@ def points_at(Omega_0: float, j: float, mu: float, eta: float, kappa: float) -> 
     def excess(s: Array) -> Array:
         return branch(s, j, mu, eta, kappa).Omega_0 - Omega_0
 
-    found = []
+    places = []
     for part in parts:
         low, high = (float(excess(np.asarray(end))) for end in part)
         if low * high < 0:
-            found.append(float(elementwise.find_root(excess, part).x))
-    return found
-
-
-def _root_of_slope(j: float, mu: Array, eta: Array, kappa: Array) -> Array:
-    ends = (np.full(mu.shape, -END), np.full(mu.shape, END))
-    return np.asarray(elementwise.find_root(slope, ends, args=(j, mu, eta, kappa)).x)
+            places.append(float(roots.bisected(excess, *part)))
+    return places
 
 
 def _cos_sin(s: npt.ArrayLike) -> tuple[Array, Array]:

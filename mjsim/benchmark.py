@@ -17,7 +17,6 @@ from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run
 from mjsim.stepping import Polar
 from model import Flow, Parameters
-from model.kinematics import full_state
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ def cost(
     settings = settings or ContactSettings()
     model, _ = scene.build(p, settings)
     omega_0 = np.full((500, 1), p.omega_0)
-    settled = Polar([model], [p], settings, [full_state(np.asarray(x0, dtype=float))], 0.0, omega_0[0], batched=False)
+    settled = Polar([model], [p], settings, [x0], 0.0, omega_0[0], batched=False)
     settled.advance(omega_0)
     bare, whole = [_bare(settled, runs, steps)], []
     for _ in range(repeats):

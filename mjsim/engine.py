@@ -16,9 +16,9 @@ from mjsim.contact_settings import ContactSettings
 from mjsim.free import Free
 from mjsim.journal import Journal
 from mjsim.stepping import Polar, Stepper
-from model import Events, Flow, Header, InputError, Parameters, SimulationError, Trajectory
+from model import Events, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
-from model.kinematics import UNITS, VARIABLES, full_state
+from model.kinematics import UNITS, VARIABLES
 from model.parameters import check_number
 from model.trajectory import SAMPLE
 
@@ -71,7 +71,7 @@ class Run:
         self._journal, self._progress = journal, progress
         self._interval, self._count = limits.sampling(t_end, settings.timestep, sample_interval)
         theta_0 = check_number("theta_0", theta_0, "rad")
-        states = [full_state(np.asarray(x0, dtype=float)) for x0 in x0s]
+        states = [State.one(x0) for x0 in x0s]
         for x, p, flow in zip(states, parameters, flows, strict=True):
             limits.check_timestep(settings.timestep, p, flow, t_end)
             limits.check_start(x, p, settings)
@@ -84,7 +84,7 @@ class Run:
             "x0": None, "theta_0": theta_0,
         }  # fmt: skip
         self.headers = [
-            Header("mujoco", p, flow, shown | {"x0": x.tolist()}, built[still][1])
+            Header("mujoco", p, flow, shown | {"x0": list(x)}, built[still][1])
             for p, flow, x, still in zip(parameters, flows, states, scenes, strict=True)
         ]
         """Where each trajectory comes from; a failure appears here."""
@@ -168,7 +168,7 @@ class Run:
 
 
 def start(
-    models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings, x0s: Sequence[Array],
+    models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings, x0s: Sequence[npt.ArrayLike],
     theta_0: float, omega_0: Array, batched: bool,
 ) -> Stepper:  # fmt: skip
     """Simulations in the coordinates that the settings ask for; arguments as for `mjsim.stepping.Polar`."""

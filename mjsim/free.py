@@ -14,6 +14,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
@@ -31,7 +32,7 @@ class Free(Stepper):
 
     def __init__(
         self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
-        x0s: Sequence[Array], theta_0: float,
+        x0s: Sequence[npt.ArrayLike], theta_0: float,
     ) -> None:  # fmt: skip
         self._balls = [_Ball(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
         self.margins, self.axis = np.zeros((2, len(models))), np.full(len(models), np.inf)
@@ -63,7 +64,7 @@ class Free(Stepper):
 
 
 class _Ball:
-    def __init__(self, model: Any, p: Parameters, x: Array, settings: ContactSettings, theta_0: float) -> None:
+    def __init__(self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float) -> None:
         self.model = copy.copy(model)  # its margins move
         self.data = mujoco.MjData(self.model)
         self._p, self._settings, self.theta = p, settings, theta_0

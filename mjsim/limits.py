@@ -6,22 +6,23 @@ import math
 import warnings
 
 import numpy as np
+import numpy.typing as npt
 
 from mjsim.contact_settings import ContactSettings
-from model import Flow, InputError, Parameters
-from model.arrays import Array
+from model import Flow, InputError, Parameters, State
 from model.kinematics import slip_speeds
-from model.parameters import check_number
+from model.parameters import Range, check_number
 
 
-def check_start(x: Array, p: Parameters, settings: ContactSettings) -> None:
-    """Refuse a full state on or beyond the axis, where polar coordinates end.
+def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> None:
+    """Refuse a state on or beyond the axis, where polar coordinates end.
 
     Warn if contact can't be continuous at its slip speeds, taking the load of gravity for both contacts.
     """
-    if settings.coordinates == "polar" and x[6] >= p.R:
-        raise InputError(f"h = {x[6]:g} m is out of range: must be < R = {p.R:g} m")
-    for contact, friction, speed, gap in zip("AB", (p.mu, p.eta), slip_speeds(x, p), (x[0], x[6]), strict=True):
+    x = State.one(x0)
+    if settings.coordinates == "polar":
+        check_number("h", x.h, "m", Range(high=p.R, below=True), "to be off the axis it")
+    for contact, friction, speed, gap in zip("AB", (p.mu, p.eta), slip_speeds(x, p), (x.y, x.h), strict=True):
         fastest = settings.fastest_slip(p.g, friction)
         if abs(gap) < settings.touching(p.g) and speed > fastest:
             warnings.warn(
@@ -54,13 +55,9 @@ def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float) -> 
 
 def sampling(t_end: float, timestep: float, sample_interval: float | None) -> tuple[int, int]:
     """Steps between samples and number of samples, both ends included."""
-    if check_number("t_end", t_end, "s") < timestep:
-        raise InputError(f"t_end = {t_end:g} s is out of range: must be at least one time step, {timestep:g} s")
+    t_end = check_number("t_end", t_end, "s", Range(timestep), "to hold a time step it")
     if sample_interval is None:
         sample_interval = max(t_end / 1000, timestep)
-    if check_number("sample_interval", sample_interval, "s") < timestep * (1 - 1e-9):
-        raise InputError(
-            f"sample_interval = {sample_interval:g} s is out of range: must be at least one time step, {timestep:g} s"
-        )
+    check_number("sample_interval", sample_interval, "s", Range(timestep * (1 - 1e-9)), "to hold a time step it")
     steps = max(1, round(sample_interval / timestep))
     return steps, math.floor(t_end / (steps * timestep) + 1e-9) + 1

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
-from model import Parameters
+from model import Parameters, State
 from model.arrays import Array
-from model.kinematics import frame, slip_speeds
+from model.kinematics import frame, rotated, slip_speeds
 from model.trajectory import SAMPLE
 
 NQ, NV, NSENSOR = 7, 6, 28
@@ -18,13 +17,13 @@ SENSORS = NQ + NV
 _COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11), slice(12, 14)
 
 
-def joint_state(x: Array, theta: float, p: Parameters) -> tuple[Array, Array]:
-    """qpos (..., 7) and qvel (..., 6) of full states x (..., 8), with the orientation at rest.
+def joint_state(x: npt.ArrayLike, theta: float, p: Parameters) -> tuple[Array, Array]:
+    """qpos (..., 7) and qvel (..., 6) of states x (..., 6 or 8), with the orientation at rest.
 
     The axes of the joints are the paper's, so that the velocities are v_A, v_B and the slip of (4) rearranged:
     ``qvel = (omega_c, v_h, v_y, o_x, o_y - omega_c, o_z)`` with the angular velocity o of the ball.
     """
-    y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = np.moveaxis(x, -1, 0)
+    y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = State.of(x)
     roll = (p.R - h) / p.r * omega_c
     zero, one = np.zeros_like(y), np.ones_like(y)
     qpos = np.stack([zero + theta, h, y, one, zero, zero, zero], axis=-1)
@@ -32,15 +31,13 @@ def joint_state(x: Array, theta: float, p: Parameters) -> tuple[Array, Array]:
     return qpos, qvel
 
 
-def state(qpos: Array, qvel: Array, p: Parameters) -> Array:
-    """Full states (..., 8) of joint coordinates; the inverse of `joint_state`, for any orientation."""
-    shape = qpos.shape[:-1]
-    spin = Rotation.from_quat(qpos[..., 3:7].reshape(-1, 4), scalar_first=True).apply(qvel[..., 3:6].reshape(-1, 3))
-    o_x, o_y, o_z = np.moveaxis(np.asarray(spin).reshape(*shape, 3), -1, 0)
-    h, y = qpos[..., 1], qpos[..., 2]
-    omega_c, v_h, v_y = (qvel[..., k] for k in range(3))
+def state(qpos: Array, qvel: Array, p: Parameters) -> State:
+    """The states of joint coordinates, as columns; the inverse of `joint_state`, for any orientation."""
+    _, h, y, *_ = np.moveaxis(qpos, -1, 0)
+    omega_c, v_h, v_y, *_ = np.moveaxis(qvel, -1, 0)
+    o_x, o_y, o_z = np.moveaxis(rotated(qpos[..., 3:], qvel[..., 3:]), -1, 0)
     roll = (p.R - h) / p.r * omega_c
-    return np.stack([y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h], axis=-1)
+    return State(y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h)
 
 
 def samples(time: Array, raw: Array, p: Parameters, lead: float) -> npt.NDArray[np.void]:
@@ -54,16 +51,15 @@ def samples(time: Array, raw: Array, p: Parameters, lead: float) -> npt.NDArray[
     block = np.zeros(len(time), SAMPLE)
     x = state(qpos, qvel, p)
     block["time"], block["theta"] = time, qpos[:, 0]
-    for k, name in enumerate(("y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")):
-        block[name] = x[:, k]
-    speeds = slip_speeds(x, p)
-    for k, (contact, distance) in enumerate((("A", x[:, 0]), ("B", x[:, 6]))):
-        sensor = sensors[:, 14 * k : 14 * (k + 1)]
+    for name, column in x._asdict().items():
+        block[name] = column
+    contacts = zip("AB", np.split(sensors, 2, axis=1), (x.y, x.h), slip_speeds(x.stacked(), p), strict=True)
+    for contact, sensor, distance, speed in contacts:
         touches = sensor[:, _COUNT] > 0
         block[f"force_{contact}"] = np.einsum("nab,nb->na", axes, _world_force(sensor))
         # Apart, the engine has no contact to report on: the coordinates say how far, and how fast.
         block[f"gap_{contact}"] = np.where(touches, sensor[:, _DIST], distance)
-        block[f"slip_speed_{contact}"] = np.where(touches, np.hypot(*sensor[:, _SLIP].T), speeds[k])
+        block[f"slip_speed_{contact}"] = np.where(touches, np.hypot(*sensor[:, _SLIP].T), speed)
     return block
 
 

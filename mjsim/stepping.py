@@ -71,7 +71,7 @@ class Polar(Stepper):
 
     def __init__(
         self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
-        x0s: Sequence[Array], theta_0: float, omega_0: Array, batched: bool = True,
+        x0s: Sequence[npt.ArrayLike], theta_0: float, omega_0: Array, batched: bool = True,
     ) -> None:  # fmt: skip
         self._settings, self._compiled = settings, backend.compiled()
         self._form = backend.ARRAYS if batched or self._compiled else backend.FLOATS

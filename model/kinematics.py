@@ -16,7 +16,6 @@ from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from model.arrays import Array, Real
 from model.errors import InputError
@@ -53,6 +52,13 @@ class State(NamedTuple):
         columns = np.moveaxis(full_state(x), -1, 0)
         return cls(*(columns.tolist() if columns.ndim == 1 else columns))
 
+    @classmethod
+    def one(cls, x: npt.ArrayLike) -> Self:
+        """As `of`, for a single state; `InputError` for more."""
+        if np.ndim(x) > 1:
+            raise InputError(f"one state is needed, not an array of shape {np.shape(x)}")
+        return cls.of(x)
+
     def stacked(self) -> Array:
         """The states as one array (..., 8); inverse of `of`."""
         return np.stack(np.broadcast_arrays(*self), axis=-1)
@@ -78,8 +84,14 @@ class WorldState:
     @property
     def angular_velocity_body(self) -> Array:
         """Angular velocity in the ball's own axes, as MuJoCo's free and ball joints hold it, rad s-1."""
-        rotation = Rotation.from_quat(self.quaternion, scalar_first=True)
-        return np.asarray(rotation.apply(self.angular_velocity, inverse=True))
+        return rotated(self.quaternion * [1.0, -1.0, -1.0, -1.0], self.angular_velocity)
+
+
+def rotated(quaternion: Array, vector: Array) -> Array:
+    """Vectors (..., 3) rotated by unit quaternions (..., 4), the scalar first."""
+    scalar, axis = quaternion[..., :1], quaternion[..., 1:]
+    turn = 2 * np.cross(axis, vector)
+    return np.asarray(vector + scalar * turn + np.cross(axis, turn))
 
 
 def full_state(x: npt.ArrayLike) -> Array:
@@ -108,44 +120,45 @@ def frame(theta: Array | float) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def rolling_part(x: Array, p: Parameters) -> Array:
+def rolling_part(x: npt.ArrayLike, p: Parameters) -> Array:
     """Rolling part of the angular velocity (4), shape (..., 3), with rho for R away from the wall."""
-    _, v_y, omega_c, _, _, _, h, _ = np.moveaxis(full_state(x), -1, 0)
-    roll = (p.R - h) / p.r * omega_c
-    return np.stack([roll, -roll, v_y / p.r], axis=-1)
+    state = State.of(x)
+    roll = (p.R - state.h) / p.r * state.omega_c
+    return np.stack([roll, -roll, state.v_y / p.r], axis=-1)
 
 
-def angular_velocity(x: Array, p: Parameters) -> Array:
+def angular_velocity(x: npt.ArrayLike, p: Parameters) -> Array:
     """Angular velocity of the ball (4) in the co-rotating frame, shape (..., 3)."""
-    return rolling_part(x, p) + full_state(x)[..., 3:6]
+    state = State.of(x)
+    return np.asarray(rolling_part(x, p) + np.stack([state.slip_x, state.slip_y, state.slip_z], axis=-1))
 
 
-def slip_velocities(x: Array, p: Parameters) -> tuple[Array, Array]:
+def slip_velocities(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
     """Velocities v_A, v_B of the lowest and the outermost point of the ball, each (..., 3), m s-1.
 
     (6) with its first row completed by v_y and v_h: v_A = (v_h + v_y + r w_z, v_y, -r w_x),
     v_B = (v_h, -r w_z, r w_y).
     """
-    _, v_y, _, w_x, w_y, w_z, _, v_h = np.moveaxis(full_state(x), -1, 0)
+    _, v_y, _, w_x, w_y, w_z, _, v_h = State.of(x)
     v_A = np.stack([v_h + v_y + p.r * w_z, v_y, -p.r * w_x], axis=-1)
     v_B = np.stack([v_h, -p.r * w_z, p.r * w_y], axis=-1)
     return v_A, v_B
 
 
-def slip_speeds(x: Array, p: Parameters) -> tuple[Array, Array]:
+def slip_speeds(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
     """Tangential slip speeds at A and B (7), each (...), m s-1."""
-    v_A, v_B = slip_velocities(x, p)
-    return np.hypot(v_A[..., 0], v_A[..., 2]), np.hypot(v_B[..., 1], v_B[..., 2])
+    (A_x, _, A_z), (_, B_y, B_z) = (np.moveaxis(v, -1, 0) for v in slip_velocities(x, p))
+    return np.hypot(A_x, A_z), np.hypot(B_y, B_z)
 
 
-def slip_directions(x: Array, p: Parameters) -> tuple[Array, Array]:
+def slip_directions(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
     """Slip directions alpha, beta (8), each (...), rad: alpha = atan2(w_x, w_z), beta = atan2(w_y, w_z)."""
-    v_A, v_B = slip_velocities(x, p)
-    return np.arctan2(-v_A[..., 2], v_A[..., 0]), np.arctan2(v_B[..., 2], -v_B[..., 1])
+    (A_x, _, A_z), (_, B_y, B_z) = (np.moveaxis(v, -1, 0) for v in slip_velocities(x, p))
+    return np.arctan2(-A_z, A_x), np.arctan2(B_z, -B_y)
 
 
 def to_world(
-    x: Array,
+    x: npt.ArrayLike,
     theta: Array | float,
     p: Parameters,
     quaternion: Array | tuple[float, ...] = (1.0, 0.0, 0.0, 0.0),
@@ -154,18 +167,16 @@ def to_world(
 
     The orientation of a homogeneous ball is free: `quaternion` is handed through.
     """
-    state = full_state(x)
-    theta = np.asarray(theta, dtype=float)
-    y, v_y, omega_c, h, v_h = (state[..., k] for k in (0, 1, 2, 6, 7))
-    rho = p.R - h
+    state, theta = State.of(x), np.asarray(theta, dtype=float)
+    rho = p.R - state.h
     axes = frame(theta)
-    position = np.stack([rho * np.cos(theta), rho * np.sin(theta), p.r + y], axis=-1)
-    velocity = np.stack([v_h, v_y, rho * omega_c], axis=-1)
+    position = np.stack(np.broadcast_arrays(rho * np.cos(theta), rho * np.sin(theta), p.r + state.y), axis=-1)
+    velocity = np.stack([state.v_h, state.v_y, rho * state.omega_c], axis=-1)
     return WorldState(
         position=position,
         quaternion=np.broadcast_to(np.asarray(quaternion, dtype=float), (*position.shape[:-1], 4)),
         velocity=_to_world_axes(axes, velocity),
-        angular_velocity=_to_world_axes(axes, angular_velocity(state, p)),
+        angular_velocity=_to_world_axes(axes, angular_velocity(x, p)),
     )
 
 
@@ -183,8 +194,8 @@ def from_world(world: WorldState, p: Parameters) -> tuple[Array, Array]:
         omega_c = np.where(rho > 0, v_k / rho, np.nan)
     # v_k is rho omega_c: the rolling part needs no division by rho.
     slip = omega - np.stack([v_k / p.r, -v_k / p.r, v_y / p.r], axis=-1)
-    x = np.stack([pz - p.r, v_y, omega_c, slip[..., 0], slip[..., 1], slip[..., 2], p.R - rho, v_h], axis=-1)
-    return x, theta
+    w_x, w_y, w_z = np.moveaxis(slip, -1, 0)
+    return State(pz - p.r, v_y, omega_c, w_x, w_y, w_z, p.R - rho, v_h).stacked(), theta
 
 
 def _to_world_axes(axes: Array, vector: Array) -> Array:

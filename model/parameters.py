@@ -21,20 +21,22 @@ _SETS = resources.files("model") / "parameter_sets"
 
 @dataclass(frozen=True)
 class Range:
-    """The numbers from `low` to `high`; without `low` itself if `open`, only whole ones if `whole`."""
+    """The numbers from `low` to `high`: without `low` if `open`, without `high` if `below`, only whole if `whole`."""
 
     low: float = -math.inf
     high: float = math.inf
     open: bool = False
+    below: bool = False
     whole: bool = False
 
     def __contains__(self, number: float) -> bool:
-        inside = self.low < number <= self.high if self.open else self.low <= number <= self.high
-        return inside and (not self.whole or number == round(number))
+        above = self.low < number if self.open else self.low <= number
+        under = number < self.high if self.below else number <= self.high
+        return above and under and (not self.whole or number == round(number))
 
     def __str__(self) -> str:
         """As a person reads it: ``> 0 and <= 2/3``."""
-        ends = ((">" if self.open else ">=", self.low), ("<=", self.high))
+        ends = ((">" if self.open else ">=", self.low), ("<" if self.below else "<=", self.high))
         limits = " and ".join(f"{sign} {_shown(end)}" for sign, end in ends if math.isfinite(end))
         return f"{'a whole number' * self.whole} {limits}".strip() or "any"
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from analytic import scenarios, stationary_solutions, thresholds
-from model import Case, InputError, Parameters
+from analytic import scenarios
+from model import Case, Parameters
 
 ROUGH = Parameters.named("high-wall-friction")
 LIMIT = math.sqrt(ROUGH.g / (ROUGH.eta * ROUGH.R))
@@ -41,28 +41,3 @@ def test_unloading_ends_in_two_point_rolling_after_impacts():
     start = abs(run.omega_c[run.time > run.events.time[-1]][0] - last)
     left = math.exp(-(80.0 - run.events.time[-1]) / (1 + 2 * ROUGH.j))
     assert run.omega_c[-1] == pytest.approx(last, abs=1.1 * start * left)
-
-
-def test_hysteresis():
-    """Between omega_02 and omega_04 the way up is SS, the way down the wall; each at its stationary omega_c."""
-    p = Parameters.named("reference")
-    limits = thresholds(p)
-    middle = (limits.omega_02 + limits.omega_04) / 2
-    levels = np.array([middle, 1.1 * limits.omega_04, middle, 0.9 * limits.omega_02])
-    # From RR far below, so that the first level is reached on the lower branch.
-    run = scenarios.hysteresis(p, np.concatenate([[0.8 * limits.omega_01, 25.0], levels]), hold=60.0)
-    ends = np.searchsorted(run.time, 60.0 * np.arange(1, 7), side="right") - 2
-    found = [Case(code) for code in run.case[ends]]
-    assert found[2] is Case.SS
-    assert found[3] in (Case.NR, Case.SR)
-    assert found[4] in (Case.NR, Case.SR)
-    assert found[5] is Case.SS
-    for index, omega_0 in ((2, middle), (5, levels[-1])):
-        slow = [s.x[2] for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.case is Case.SS and s.stable]
-        assert run.omega_c[ends[index]] == pytest.approx(min(slow), rel=1e-4)
-    assert run.omega_c[ends[4]] == pytest.approx(middle, rel=1e-6)
-
-
-def test_no_hysteresis_without_a_fold():
-    with pytest.raises(InputError, match=r"eta = 0\.6 has no fold"):
-        scenarios.hysteresis(ROUGH)

@@ -216,13 +216,13 @@ def test_a_ball_locked_in_the_corner_does_not_rebound(method):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"x0": [-1e-3, 0, 0, 0, 0, 0]}, "y = -0.001 m .* inside the floor"),
-        ({"x0": [0, 0, 0, 0, 0, 0, -1e-3, 0]}, "h = -0.001 m .* inside the wall"),
-        ({"x0": [0, 0, 0, 0, 0, 0, 0.05, 0]}, "h = 0.05 m .* < R = 0.05 m"),
+        ({"x0": [-1e-3, 0, 0, 0, 0, 0]}, "y = -0.001 m .* above the floor it must be >= 0"),
+        ({"x0": [0, 0, 0, 0, 0, 0, -1e-3, 0]}, "h = -0.001 m .* between wall and axis it must be >= 0 and < 0.05"),
+        ({"x0": [0, 0, 0, 0, 0, 0, 0.05, 0]}, "h = 0.05 m .* < 0.05"),
         ({"x0": [0, 0, 0, 0, 0, 0, 0, -0.2]}, "v_h = -0.2 m s-1 .* wall"),
         ({"x0": [0, 0, math.nan, 0, 0, 0]}, "omega_c = nan"),
         ({"x0": [0, 0, 0]}, "6 entries"),
-        ({"x0": np.zeros((2, 6))}, r"one state, not .* \(2, "),
+        ({"x0": np.zeros((2, 6))}, r"one state is needed, not .* \(2, "),
         ({"t_end": 0.0}, "t_end = 0 s"),
         ({"t_end": -1.0}, "t_end = -1 s"),
         ({"t_end": math.inf}, "t_end = inf"),
