@@ -8,7 +8,7 @@ from enum import IntFlag
 import numpy as np
 import numpy.typing as npt
 
-from analytic import branch_stability, roots, slipping_branch
+from analytic import slipping_branch
 from analytic.stationary import StationarySolution
 from model import InputError, Parameters
 from model.arrays import Array
@@ -68,30 +68,6 @@ def number_of_folds(p: Parameters) -> int:
     """
     check_branch(p)
     return slipping_branch.sign_changes(p.j, p.mu, p.eta, p.kappa)
-
-
-def fold_birth(p: Parameters) -> float:
-    """The eta in (0, j) at which the fold is born in SR, nan if it has none or one for every eta; p.eta plays no part.
-
-    From the eigenvalues of f_SS where the branch meets SR, of which one vanishes there: (87) without its formula.
-    """
-
-    def growth(eta: float) -> float:
-        return float(branch_stability.end_eigenvalues(p.replace(eta=eta))[1][0].real)
-
-    low, high = p.j * float(np.finfo(float).eps), p.j * (1 - float(np.finfo(float).eps))
-    if p.mu == 0 or growth(low) * growth(high) >= 0:
-        return float("nan")
-    return float(roots.bisected(lambda eta: growth(float(eta)), low, high))
-
-
-def hopf_points(p: Parameters) -> list[float]:
-    """Flows omega_0 in rad s-1 of the Hopf points on the branch of SS; [] but for floors rougher than mu = 1.7 or so.
-
-    They aren't in the paper: between two of them the part of the branch before the fold isn't stable.
-    """
-    check_branch(p)
-    return sorted(float(branch_stability.states(s, p)[1]) for s in branch_stability.hopf_places(p))
 
 
 def check_branch(p: Parameters) -> None:

@@ -41,21 +41,6 @@ def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128
     return jacobian.eigenvalues(np.stack(columns, axis=-1))
 
 
-def end_eigenvalues(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
-    """The eigenvalues that stay finite at the ends of the branch in closed form, rad s-1; needs mu > 0, 0 < eta < j.
-
-    In RR (omega_01) two: lambda^2 + c lambda/(1+2j) + 2 (g/R) mu (1+eta)/((1+mu eta)(1+2j)) = 0. In SR (omega_02)
-    three: (2 mu eta omega_02 - c)/(1+j), which is positive exactly if there is a fold (87), and +-i omega_02.
-    The others, two and one, tend to minus infinity like 1/v_A and 1/v_B.
-    """
-    if not (p.mu > 0 and 0 < p.eta < p.j):
-        raise InputError(f"eta = {p.eta:g} is out of range: the branch has two ends for mu > 0 and 0 < eta < j only")
-    stiffness = 2 * p.g / p.R * p.mu * (1 + p.eta) / ((1 + p.mu * p.eta) * (1 + 2 * p.j))
-    omega_02 = np.sqrt(p.g / (p.eta * p.R))
-    at_sr = [(2 * p.mu * p.eta * omega_02 - p.c) / (1 + p.j), 1j * omega_02, -1j * omega_02]
-    return np.roots([1.0, p.c / (1 + 2 * p.j), stiffness]).astype(complex), np.array(at_sr)
-
-
 def hopf_places(p: Parameters) -> list[float]:
     """Places s of the branch at which a complex pair crosses the imaginary axis (Hopf).
 

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import dynamics
-from model import Case, InputError, Parameters, State
+from model import Case, InputError, Parameters
 from model.arrays import Array
 
 
@@ -48,13 +48,6 @@ def gamma_nr(beta: npt.ArrayLike, x: npt.ArrayLike, p: Parameters) -> Array:
     """
     pull, lag, friction = _nr_terms(x, p)
     return np.asarray(pull * np.cos(beta) + lag * np.sin(beta) - friction)
-
-
-def extreme_directions_nr(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
-    """(58): the slip directions beta_1, beta_2 in rad, shape (...), with the greatest and the least gamma out of NR."""
-    pull, lag, _ = _nr_terms(x, p)
-    greatest = np.arctan2(lag, pull)
-    return greatest, greatest + np.pi
 
 
 def nr_to_ns(p: Parameters, side: int = 1) -> SlipBound:
@@ -96,23 +89,12 @@ def rr_to_sr_stationary(p: Parameters) -> SlipBound:
 def rr_to_ss(p: Parameters, side: int = 1) -> SlipBound:
     """Slip at both points where omega_c = omega_0, along (0, 0), (82), side 1, or along (pi, pi), (83), side -1.
 
-    (83) has a real bound for eta > 1 only, below which slip would grow; see `normal_forces_rr_to_ss`.
+    (83) has a real bound for eta > 1 only, below which slip would grow; but there the wall would have to
+    pull, against (12), as section 4.3 ends. (82) has one where the floor presses for eta < j only.
     """
     unit = 1 / (p.j * p.r * (1 + p.mu * p.eta))
     drive = side * (p.mu * p.eta * (1 + p.j) + p.j) - p.eta
     return SlipBound(2, -unit * p.mu * p.g * (1 + side * p.eta), unit * p.R * drive)
-
-
-def normal_forces_rr_to_ss(p: Parameters, omega_0: npt.ArrayLike, side: int = 1) -> tuple[Array, Array]:
-    """A_y, B_x in N, shape of omega_0 (rad s-1), while slip sets in along (0, 0), side 1, or (pi, pi), side -1.
-
-    Where gamma of (82) vanishes A_y has the sign of j - eta; where that of (83) does B_x < 0: the first bound holds
-    for eta < j only and the second contradicts (12), as section 4.3 ends.
-    """
-    omega_c = np.asarray(omega_0, dtype=float)
-    direction = (0.0, float(side))
-    force = dynamics.forces(Case.SS, State(omega_c=omega_c), p, omega_c, direction, direction)
-    return np.asarray(force.A_y), np.asarray(force.B_x)
 
 
 def filippov_share(outer: Case, omega_c: float, p: Parameters) -> float:

@@ -176,13 +176,6 @@ class ContactSettings:
         """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory."""
         return self.regularisation_speed(load) * (0.0 if self.memory else 1.0)
 
-    def free_joint_creep(self, R: float, omega_c: float) -> float:
-        """Slip speed (m s-1) at B, up the wall, of a rolling ball on a free joint: R omega_c^2/b_f.
-
-        The contact frame turns, and MuJoCo drives J v' where it should drive J v' + J' v.
-        """
-        return R * omega_c**2 / self.b_f
-
     @property
     def servo_gain(self) -> float:
         """Share of a gap that the servo takes off a margin in one step."""

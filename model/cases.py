@@ -72,8 +72,3 @@ TRAITS: dict[Case, CaseTraits] = {
     Case.SN: CaseTraits(("y", "v_y"), ("omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")),
     Case.NN: CaseTraits((), ("y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")),
 }
-
-
-def codimension(inner: Case, outer: Case) -> int:
-    """Codimension (51) of the space of `inner` within that of `outer`: how many directions of slip or lift leave it."""
-    return TRAITS[outer].dimension - TRAITS[inner].dimension

@@ -13,8 +13,6 @@ from analytic.bifurcation import (
     case_map,
     double_points,
     double_points_of_equal_friction,
-    fold_birth,
-    hopf_points,
     number_of_folds,
     threshold_curves,
     wall_spin,
@@ -175,35 +173,10 @@ def test_one_fold_beyond_eta_cr_and_none_before(trial: int) -> None:
         assert t.omega_04 > t.omega_02 > t.omega_01
 
 
-@pytest.mark.parametrize("mu", [0.05, 0.2, 1.0])
-@pytest.mark.parametrize("c", [1e-3, 0.3, 1.0, 4.0])
-def test_fold_birth_is_eta_cr(mu: float, c: float) -> None:
-    """(87) from the eigenvalue of f_SS that vanishes where the branch meets SR; nan where eta_cr >= j."""
-    p = P.replace(mu=mu, c=c)
-    eta_cr = thresholds(p).eta_cr
-    if eta_cr < p.j:
-        assert fold_birth(p) == pytest.approx(eta_cr, rel=1e-12)
-    else:
-        assert np.isnan(fold_birth(p))
-    assert np.isnan(fold_birth(p.replace(mu=0.0)))
-
-
 def test_the_branch_is_asked_for_where_there_is_one() -> None:
-    for ask in (number_of_folds, hopf_points):
-        for change in ({"eta": 0.6}, {"eta": 0.0}, {"mu": 0.0}, {"c": 0.0}):
-            with pytest.raises(InputError, match="SS has a branch from RR to SR for"):
-                ask(P.replace(**change))
-
-
-def test_hopf_points() -> None:
-    """Between the two the part of the branch before the fold is unstable."""
-    assert hopf_points(P) == []
-    p = P.replace(mu=3.0, eta=0.35)
-    first, last = hopf_points(p)
-    assert thresholds(p).omega_01 < first < last < thresholds(p).omega_04
-    for omega_0, stable in ((0.999 * first, True), (0.5 * (first + last), False), (1.001 * last, True)):
-        found = [s for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.case is Case.SS]
-        assert any(s.stable for s in found) == stable
+    for change in ({"eta": 0.6}, {"eta": 0.0}, {"mu": 0.0}, {"c": 0.0}):
+        with pytest.raises(InputError, match="SS has a branch from RR to SR for"):
+            number_of_folds(P.replace(**change))
 
 
 @pytest.mark.parametrize("equal", [False, True])

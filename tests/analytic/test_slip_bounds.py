@@ -9,8 +9,9 @@ import pytest
 import sympy as sp
 
 from analytic import contact_forces, dynamics, slip_bounds, slip_stability, thresholds, vector_field
+from analytic.rigid_body import Forces
 from analytic.slip_bounds import SlipBound
-from model import Case, InputError, Parameters
+from model import Case, InputError, Parameters, State
 
 P = Parameters.named("reference")
 j, mu, eta, c, g, R, r, w, omega_0 = sp.symbols("j mu eta c g R r w omega_0", positive=True)
@@ -118,6 +119,12 @@ def test_zero_of_a_bound() -> None:
     assert SlipBound(1, 3.0, 0.0).zero == np.inf
 
 
+def forces_at_onset(p: Parameters, omega_0: np.ndarray, side: int) -> Forces:
+    """While slip sets in along (0, 0), side 1, or (pi, pi), side -1, in an orbit with the fluid."""
+    along = (0.0, float(side))
+    return dynamics.forces(Case.SS, State(omega_c=omega_0), p, omega_0, along, along)
+
+
 def test_bound_83_contradicts_the_normal_forces() -> None:
     """For eta > 1 slip along (pi, pi) would grow below a real bound, but not before the wall would pull, (12)."""
     real = 0
@@ -126,8 +133,7 @@ def test_bound_83_contradicts_the_normal_forces() -> None:
         assert (square > 0) == (p.eta > 1)
         if square > 0:
             real += 1
-            _, B_x = slip_bounds.normal_forces_rr_to_ss(p, np.linspace(0.0, 1.0, 11) * np.sqrt(square), -1)
-            assert np.all(B_x < 0)
+            assert np.all(forces_at_onset(p, np.linspace(0.0, 1.0, 11) * np.sqrt(square), -1).B_x < 0)
     assert real > 50
 
 
@@ -137,9 +143,9 @@ def test_bound_82_needs_eta_less_than_j() -> None:
     for p in random_sets(300, top=1.5):
         square = slip_bounds.rr_to_ss(p).zero
         if square > 0:
-            A_y, B_x = slip_bounds.normal_forces_rr_to_ss(p, np.sqrt(square))
-            assert (A_y > 0) == (p.eta < p.j)
-            assert B_x > 0
+            force = forces_at_onset(p, np.sqrt(square), 1)
+            assert (force.A_y > 0) == (p.eta < p.j)
+            assert force.B_x > 0
             pressing += p.eta < p.j
             if p.eta < p.j:
                 assert np.sqrt(square) == pytest.approx(thresholds(p).omega_01, rel=1e-14)
@@ -185,7 +191,10 @@ def test_58_and_59() -> None:
     """(57) vanishes at both, they are the extrema, and (59) is the friction cone, in all of X_NR."""
     p, beta, stable = P.replace(omega_0=20.0, eta=0.5), np.linspace(0, 2 * np.pi, 721), []
     for x in states_of_nr(p, 100):
-        first, second = slip_bounds.extreme_directions_nr(x, p)
+        _, v_y, omega_c, slip_x, *_ = x
+        pull = p.g / p.r + p.c * v_y / p.r + omega_c * slip_x + p.R / p.r * omega_c**2
+        first = np.arctan2(p.c * p.R / p.r * (p.omega_0 - omega_c), pull)  # (58)
+        second = first + np.pi
         values = slip_bounds.gamma_nr(beta, x, p)
         greatest, least = slip_bounds.gamma_nr(first, x, p), slip_bounds.gamma_nr(second, x, p)
         # A grid of half a degree misses an extremum by (1/2) (0.25 degrees)^2 = 1e-5 of the swing at most.

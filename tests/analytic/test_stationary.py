@@ -254,9 +254,16 @@ def test_eigenvalues_of_the_branch_in_both_coordinates() -> None:
 
 @pytest.mark.parametrize(("mu", "eta", "c"), [(0.2, 0.2, 1.0), (0.2, 0.02, 1.0), (0.7, 0.35, 0.01), (1.5, 0.1, 5.0)])
 def test_ends_of_the_branch(mu: float, eta: float, c: float) -> None:
-    """The finite eigenvalues tend to the closed forms linearly in the distance exp(-|s|) from the end."""
+    """The finite eigenvalues tend to closed forms linearly in the distance exp(-|s|) from the end.
+
+    In RR (omega_01) lambda^2 + c lambda/(1+2j) + 2 (g/R) mu (1+eta)/((1+mu eta)(1+2j)) = 0; in SR (omega_02)
+    (2 mu eta omega_02 - c)/(1+j), which is positive exactly if there is a fold (87), and +-i omega_02.
+    """
     p = P.replace(mu=mu, eta=eta, c=c)
-    at_rr, at_sr = stability.end_eigenvalues(p)
+    stiffness = 2 * p.g / p.R * mu * (1 + eta) / ((1 + mu * eta) * (1 + 2 * p.j))
+    omega_02 = np.sqrt(p.g / (eta * p.R))
+    at_rr = np.roots([1.0, c / (1 + 2 * p.j), stiffness])
+    at_sr = np.array([(2 * mu * eta * omega_02 - c) / (1 + p.j), 1j * omega_02, -1j * omega_02])
     for expected, sign in ((at_rr, -1), (at_sr, 1)):
         for distance in (18.0, 25.0):
             values = stability.eigenvalues_at(sign * distance, p)

@@ -3,7 +3,7 @@
 import pytest
 
 from model import Case, Contact
-from model.cases import TRAITS, codimension
+from model.cases import TRAITS
 
 # Table 4 (with y and v_y as free variables where A is open), and the dimensions of Fig. 2.
 TABLE_4 = {
@@ -24,14 +24,6 @@ def test_active_variables(case: Case) -> None:
 @pytest.mark.parametrize("case", list(Case))
 def test_constraints_and_active_variables_fill_the_state_space(case: Case) -> None:
     assert len(TRAITS[case].constraints) + TRAITS[case].dimension == 8
-
-
-def test_codimensions_of_sections_3_and_4() -> None:
-    assert codimension(Case.NR, Case.NS) == 2
-    assert codimension(Case.RR, Case.RS) == 1
-    assert codimension(Case.RR, Case.SR) == 1
-    assert codimension(Case.RR, Case.SS) == 3
-    assert codimension(Case.SR, Case.SS) == 2
 
 
 def test_a_case_is_its_two_contacts() -> None:
