@@ -26,6 +26,8 @@ from compare.runs.workers import Workers
 from compare.scorecard import scoreboard
 from model import Parameters, StorageError
 
+HELD = 2**19
+"""Samples of new runs that are held in memory, some 100 MB: most are looked at soon after, and once."""
 Announce = Callable[[Verdict], None]
 """Called with every verdict as soon as it is there."""
 
@@ -66,7 +68,7 @@ def validate(
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
     todo, verdicts, records = list(chosen), dict[str, Verdict](), Records()
     broken: dict[str, str] = {}
-    with Campaign(output / results.RUNS, workers, limit=limit) as campaign:
+    with Campaign(output / results.RUNS, workers, limit=limit, memory=HELD) as campaign:
         lab = Lab(campaign, engine, level)
         ahead = [p for p in programme.needed(PROTOCOLS, names) if p.level <= level]
         while True:

@@ -1,8 +1,9 @@
 """The HDF5 form of a trajectory: one run a file, flat, whole or not there at all; and the same in memory for xarray.
 
 `TrajectoryWriter` appends blocks of samples while a simulation runs, to a temporary name that becomes the final one
-only when the file is whole. `load` and `parts` trust nothing they read: links that lead out of the file are refused,
-and so is a file that is damaged, foreign, or written by a newer version.
+only when the file is whole. `save` writes a short trajectory at once, into the bytes of an empty file of its length:
+campaigns write thousands of those. `load` and `parts` trust nothing they read: links that lead out of the file are
+refused, and so is a file that is damaged, foreign, or written by a newer version.
 """
 
 from __future__ import annotations
@@ -34,17 +35,26 @@ SCHEMA = "dualball-trajectory"
 SCHEMA_VERSION = 1
 
 _CHUNK = 1024
+_AT_ONCE = 4096
+"""Most samples that are stored without chunks and compression: those pay from there on."""
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
 
 
 def save(trajectory: Trajectory, path: str | Path) -> None:
     """Write a whole trajectory; raises `StorageError` if that can't be done, leaving nothing behind."""
-    samples = np.empty(len(trajectory.time), SAMPLE)
-    for name in columns(Trajectory):
-        samples[name] = getattr(trajectory, name)
-    with TrajectoryWriter(path, trajectory.header) as writer:
-        writer.append(samples)
+    count = len(trajectory.time)
+    content, places = _empty(count if count <= _AT_ONCE else None)
+    image = bytearray(content)
+    for name, place in places.items():
+        values = np.ascontiguousarray(getattr(trajectory, name)).tobytes()
+        image[place : place + len(values)] = values
+    with TrajectoryWriter(path, trajectory.header, bytes(image)) as writer:
+        if not places:
+            samples = np.empty(count, SAMPLE)
+            for name in columns(Trajectory):
+                samples[name] = getattr(trajectory, name)
+            writer.append(samples)
         writer.finish(trajectory.events, trajectory.header.failure)
 
 
@@ -53,11 +63,11 @@ class TrajectoryWriter:
 
     Leaving the context without `finish` removes the temporary file, so that `path` exists only when it is whole.
     Every method raises `StorageError`, in one line, when the file can't be written (no such directory, no
-    permission, disk full).
+    permission, disk full). `template` is an empty file of another layout than that of many samples.
     """
 
-    def __init__(self, path: str | Path, header: Header) -> None:
-        self._whole = WholeFile(path, _empty())
+    def __init__(self, path: str | Path, header: Header, template: bytes = b"") -> None:
+        self._whole = WholeFile(path, template or _empty(None)[0])
         self._file = self._whole.file
         try:
             for name, text in _header_attributes(header).items():
@@ -87,18 +97,20 @@ class TrajectoryWriter:
 
     def finish(self, events: Events, failure: str = "", path: str | Path | None = None) -> None:
         """Write the events and why the run stopped early, if it did; then give the file its name, or `path`."""
-        for name in columns(Events):
-            values = getattr(events, name)
+        for name in columns(Events) if len(events) else ():
             column = self._file[_event_name(name)]
-            column.resize(len(values), axis=0)
-            column[...] = values
+            column.resize(len(events), axis=0)
+            column[...] = getattr(events, name)
         self._file.attrs["failure"] = failure
         self._whole.finish(path)
 
 
-@functools.cache
-def _empty() -> bytes:
-    """A trajectory file without samples and header: the same for all, and most of the work of making one."""
+@functools.lru_cache(32)
+def _empty(count: int | None) -> tuple[bytes, Mapping[str, int]]:
+    """A trajectory file without header, for any number of samples, or `count` that are all zero.
+
+    The same for all, and most of the work of making one. Also where the numbers of each such column begin.
+    """
     content = io.BytesIO()
     with h5py.File(content, "w", track_order=True) as file:
         file.attrs["schema"] = SCHEMA
@@ -106,26 +118,28 @@ def _empty() -> bytes:
         axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
         axis.attrs.update(_AXIS)
         axis.make_scale("axis")
-        for table, scale_name, rename in ((Trajectory, "time", str), (Events, "event_time", _event_name)):
-            for name, meta in columns(table).items():
-                column = _create_column(file, rename(name), meta)
-                if rename(name) == scale_name:
-                    column.make_scale(scale_name)
-                else:
-                    column.dims[0].attach_scale(file[scale_name])
-                if meta["shape"]:
-                    column.dims[1].attach_scale(axis)
-    return content.getvalue()
+        for name, meta in columns(Trajectory).items():
+            _create_column(file, name, meta, "time", count)
+        for name, meta in columns(Events).items():
+            _create_column(file, _event_name(name), meta, "event_time")
+        places = {} if not count else {name: file[name].id.get_offset() for name in columns(Trajectory)}
+    return content.getvalue(), places
 
 
-def _create_column(file: h5py.File, name: str, meta: Mapping[str, Any]) -> h5py.Dataset:
-    shape = meta["shape"]
-    column = file.create_dataset(
-        name, (0, *shape), _CASE_ENUM if meta.get("dtype") is np.int8 else np.float64,
-        maxshape=(None, *shape), chunks=(_CHUNK, *shape), compression="gzip", shuffle=True,
-    )  # fmt: skip
+def _create_column(file: h5py.File, name: str, meta: Mapping[str, Any], scale: str, count: int | None = None) -> None:
+    shape, dtype = meta["shape"], _CASE_ENUM if meta.get("dtype") is np.int8 else np.float64
+    if count:
+        column = file.create_dataset(name, data=np.zeros((count, *shape), dtype), dtype=dtype)
+    else:
+        layout = {"maxshape": (None, *shape), "chunks": (_CHUNK, *shape), "compression": "gzip", "shuffle": True}
+        column = file.create_dataset(name, (0, *shape), dtype, **layout)
     column.attrs.update(_attributes(meta))
-    return column
+    if name == scale:
+        column.make_scale(scale)
+    else:
+        column.dims[0].attach_scale(file[scale])
+    if shape:
+        column.dims[1].attach_scale(file["axis"])
 
 
 def to_xarray(trajectory: Trajectory) -> xarray.Dataset:

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() as scratch, interrupts() as interrupted:
         path = args.output or Path(scratch) / "run.h5"
         try:
-            (failure,) = store([task], [path], stop=interrupted)
+            failure = store([task], [path], stop=interrupted)[0].failure
         except KeyboardInterrupt:  # the second Ctrl-C
             print("dualball: interrupted; no samples are kept", file=sys.stderr)
             return 130

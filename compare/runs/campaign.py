@@ -18,7 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from compare.runs.tasks import OutOfTimeError, Task, failed_path, store
+from compare.runs.tasks import Outcome, OutOfTimeError, Task, failed_path, store
 from compare.runs.workers import Workers, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
 from model.files import remove_leftovers, write_text
@@ -58,6 +58,7 @@ class Campaign:
     workers : number of processes, or `Workers` of another kind; 0 runs everything in this process
     batch : most runs in one MuJoCo batch
     limit : longest time a run may take, s; a run that takes longer is reported as failed
+    memory : most samples of new runs that are kept in memory, so that `run` needn't read them from their files
     report : called with a `Progress` after every batch
     """
 
@@ -65,6 +66,7 @@ class Campaign:
     workers: int | Workers = field(default_factory=lambda: os.cpu_count() or 1)
     batch: int = BATCH
     limit: float = math.inf
+    memory: int = 0
     report: Callable[[Progress], None] = lambda progress: None
 
     def __post_init__(self) -> None:
@@ -84,6 +86,7 @@ class Campaign:
             raise StorageError(f"cannot write to {self.directory}: Permission denied")
         self._executor: Executor | None = None
         self._failed: dict[str, Failure] = {}
+        self._held: dict[str, Trajectory] = {}
         remove_leftovers(self.directory)
 
     def __enter__(self) -> Self:
@@ -112,7 +115,7 @@ class Campaign:
                 if kept.exists():
                     raise SimulationError(f"the run {task.key} {failed[task.key]}", storage.load(kept))
                 raise InputError(f"the run {task.key} failed: {failed[task.key]}")
-        return [storage.load(self.path(task)) for task in tasks]
+        return [self._held.get(task.key) or storage.load(self.path(task)) for task in tasks]
 
     def complete(self, tasks: Iterable[Task]) -> list[Failure]:
         """Carry out every task that has no file yet; return those that failed, now or earlier.
@@ -120,9 +123,10 @@ class Campaign:
         The directory's `FAILURES` lists all that have failed in this campaign, for programs.
         """
         unique = list({task.key: task for task in tasks}.values())
-        there = {entry.name for entry in os.scandir(self.directory)}
+        new = [task for task in unique if task.key not in self._held]
+        there = {entry.name for entry in os.scandir(self.directory)} if new else set()
         todo, failures = [], []
-        for task in unique:
+        for task in new:
             kept = failed_path(self.path(task))
             if kept.name in there:
                 failures.append(Failure(task, storage.load(kept).header.failure))
@@ -143,9 +147,9 @@ class Campaign:
         """Yield, for each batch that ends, how many of its runs are whole and those that failed."""
         if self._workers is None:
             for batch in fresh:
-                yield _tally(batch, run_batch(batch, self.directory, self.limit))
+                yield self._tally(batch, run_batch(batch, self.directory, self.limit, self.memory > 0))
             return
-        pending: dict[Future[list[str]], tuple[Task, ...]] = {}
+        pending: dict[Future[list[Outcome]], tuple[Task, ...]] = {}
         # A worker that dies takes other batches down with it. Those are tried again one by one, alone, so that it
         # shows which is to blame; a batch to blame is taken apart.
         suspects: deque[tuple[Task, ...]] = deque()
@@ -165,7 +169,7 @@ class Campaign:
                 batch = pending.pop(future)
                 error = future.exception()
                 if error is None:
-                    yield _tally(batch, future.result())
+                    yield self._tally(batch, future.result())
                 elif not isinstance(error, self._workers.lost):
                     raise error
                 else:
@@ -177,16 +181,28 @@ class Campaign:
                     else:
                         suspects.append(batch)
 
-    def _submit(self, batch: tuple[Task, ...]) -> Future[list[str]]:
+    def _submit(self, batch: tuple[Task, ...]) -> Future[list[Outcome]]:
         assert self._workers is not None
         for _ in range(2):
             if self._executor is None:
                 self._executor = self._workers.start()
             try:
-                return self._executor.submit(run_batch, batch, self.directory, self.limit)
+                return self._executor.submit(run_batch, batch, self.directory, self.limit, self.memory > 0)
             except self._workers.lost:
                 self._stop(at_once=True)
         raise StorageError("workers die as soon as they are started")
+
+    def _tally(self, batch: Sequence[Task], outcomes: Sequence[Outcome]) -> tuple[int, list[Failure]]:
+        """How many runs of a batch are whole, and the others; whole ones are held, as long as there is memory."""
+        failures = []
+        for task, outcome in zip(batch, outcomes, strict=True):
+            if outcome.failure:
+                failures.append(Failure(task, outcome.failure))
+            elif outcome.run:
+                self._held[task.key] = outcome.run
+        while sum(len(run.time) for run in self._held.values()) > self.memory:
+            del self._held[next(iter(self._held))]
+        return len(batch) - len(failures), failures
 
     def _stop(self, at_once: bool) -> None:
         if self._executor is not None and self._workers is not None:
@@ -199,17 +215,18 @@ def listed(failures: Iterable[Failure]) -> list[dict[str, Any]]:
     return [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures]
 
 
-def run_batch(tasks: Sequence[Task], directory: Path, limit: float) -> list[str]:
-    """Carry out tasks and store each; return, per task, why it failed (empty if it is whole).
+def run_batch(tasks: Sequence[Task], directory: Path, limit: float, hand_over: bool = False) -> list[Outcome]:
+    """Carry out tasks and store each; `hand_over` the runs themselves, too.
 
     Where a batch can't be carried out as a whole, its tasks are tried one by one.
     """
     try:
-        return store(tasks, [directory / f"{task.key}.h5" for task in tasks], limit)
+        outcomes = store(tasks, [directory / f"{task.key}.h5" for task in tasks], limit)
     except (InputError, OutOfTimeError, MemoryError) as error:  # StorageError, a full disk, is an InputError
         if len(tasks) > 1:
-            return [reason for task in tasks for reason in run_batch([task], directory, limit)]
-        return [str(error) or "out of memory"]
+            return [outcome for task in tasks for outcome in run_batch([task], directory, limit, hand_over)]
+        return [Outcome(str(error) or "out of memory")]
+    return outcomes if hand_over else [Outcome(outcome.failure) for outcome in outcomes]
 
 
 def _batches(tasks: Iterable[Task], size: int, workers: Workers | None) -> Iterator[tuple[Task, ...]]:
@@ -221,8 +238,3 @@ def _batches(tasks: Iterable[Task], size: int, workers: Workers | None) -> Itera
         share = min(size, math.ceil(len(group) / (workers.count if workers else 1)))
         for start in range(0, len(group), share):
             yield tuple(group[start : start + share])
-
-
-def _tally(batch: Sequence[Task], reasons: Sequence[str]) -> tuple[int, list[Failure]]:
-    failed = [Failure(task, reason) for task, reason in zip(batch, reasons, strict=True) if reason]
-    return len(batch) - len(failed), failed

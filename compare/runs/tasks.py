@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ import mjsim
 from compare.runs import engines
 from compare.runs.engines import Engine, Settings
 from mjsim import ContactSettings
+from mjsim.engine import Blocks
 from mjsim.journal import Journal
 from model import Flow, InputError, Parameters, Trajectory, storage
 from model.kinematics import full_state
@@ -29,6 +30,8 @@ from model.trajectory import current_versions
 
 LONG = 1e6
 """Steps from which on a run that hands out its samples keeps a journal and has a worker of its own, without batch."""
+HELD = 2**18
+"""Most samples of a batch that are held in memory, some 60 MB; more are written as they come."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,26 +125,46 @@ class Deadline:
             raise OutOfTimeError(f"it took longer than {self.limit:g} s")
 
 
-def carry_out(tasks: Sequence[Task]) -> list[Trajectory]:
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a task."""
+
+    failure: str
+    """Why it is not whole; empty if it is."""
+    run: Trajectory | None = field(default=None, repr=False)
+    """The run itself, unless it was too long to be held in memory."""
+
+
+def carry_out(
+    tasks: Sequence[Task], deadline: Deadline | None = None, stop: Callable[[], bool] = lambda: False
+) -> list[Trajectory]:
     """Run tasks of one `Task.batch_key`; a run that breaks down comes back with its failure in the header."""
+    deadline = deadline or Deadline()
     if not tasks[0].simulator.stream:
-        return [_simulated(task, Deadline()) for task in tasks]
-    run = _streaming(tasks)
-    blocks = list(run)
+        return [_simulated(task, deadline, stop) for task in tasks]
+    run, blocks, stopped = _streaming(tasks), [], ""
+    for block in run:
+        deadline.check()
+        blocks.append(block)
+        if stop():
+            stopped = _stopped(block)
+            break
+    headers = [replace(header, failure=header.failure or stopped) for header in run.headers]
     return [
         Trajectory.from_blocks(header, parts, events)
-        for header, parts, events in zip(run.headers, zip(*blocks, strict=True), run.events, strict=True)
+        for header, parts, events in zip(headers, zip(*blocks, strict=True), run.events, strict=True)
     ]
 
 
 def store(
     tasks: Sequence[Task], paths: Sequence[Path], limit: float = math.inf, stop: Callable[[], bool] = lambda: False
-) -> list[str]:
-    """Run tasks of one `Task.batch_key` into files; return, per task, why it failed (empty if it is whole).
+) -> list[Outcome]:
+    """Run tasks of one `Task.batch_key` into files.
 
-    A run that breaks down is kept under `failed_path`, until one into the same file is whole. MuJoCo's samples go to
-    their files as they come, and a run of more than `LONG` steps keeps a journal, from which it goes on after having
-    been killed. Once `stop` says so, runs end as if they had broken down, but MuJoCo's keep their journals.
+    A run that breaks down is kept under `failed_path`, until one into the same file is whole. If there are more than
+    `HELD` samples, those of MuJoCo go to their files as they come, and a run of more than `LONG` steps keeps a journal,
+    from which it goes on after having been killed. Once `stop` says so, runs end as if they had broken down, but
+    MuJoCo's keep their journals.
 
     Raises
     ------
@@ -150,19 +173,23 @@ def store(
     OutOfTimeError
         If the batch takes longer than `limit` s for each of its runs.
     """
-    deadline = Deadline(limit * len(tasks))
-    if tasks[0].simulator.stream:
-        reasons = _stream(tasks, paths, deadline, stop)
+    deadline, first = Deadline(limit * len(tasks)), tasks[0]
+    many = first.t_end * len(tasks) > HELD * (first.sample_interval or first.t_end / 1000)
+    if first.simulator.stream and (many or first.long):
+        outcomes = [Outcome(reason) for reason in _stream(tasks, paths, deadline, stop)]
     else:
-        reasons = []
-        for task, path in zip(tasks, paths, strict=True):
-            trajectory = _simulated(task, deadline, stop)
-            storage.save(trajectory, path if trajectory.complete else failed_path(path))
-            reasons.append(trajectory.header.failure)
-    for path, reason in zip(paths, reasons, strict=True):
-        if not reason:
+        runs = carry_out(tasks, deadline, stop)
+        for run, path in zip(runs, paths, strict=True):
+            storage.save(run, path if run.complete else failed_path(path))
+        outcomes = [Outcome(run.header.failure, run) for run in runs]
+    for path, outcome in zip(paths, outcomes, strict=True):
+        if not outcome.failure:
             failed_path(path).unlink(missing_ok=True)
-    return reasons
+    return outcomes
+
+
+def _stopped(block: Blocks) -> str:
+    return f"was stopped at t = {max(part['time'].max(initial=0.0) for part in block):g} s"
 
 
 def failed_path(path: Path) -> Path:
@@ -175,9 +202,7 @@ def journal_path(task: Task, path: Path) -> Path | None:
     return path.with_name(f"{task.key}.journal") if task.long else None
 
 
-def _stream(
-    tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline, stop: Callable[[], bool]
-) -> list[str]:  # fmt: skip
+def _stream(tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline, stop: Callable[[], bool]) -> list[str]:
     kept = journal_path(tasks[0], paths[0]) if len(tasks) == 1 else None
     journal = Journal(kept) if kept else None
     try:
@@ -197,7 +222,7 @@ def _stream(
             for writer, block in zip(writers, blocks, strict=True):
                 writer.append(block)
             if stop():
-                stopped = f"was stopped at t = {max(block['time'].max(initial=0.0) for block in blocks):g} s"
+                stopped = _stopped(blocks)
                 break
         reasons = [header.failure or stopped for header in run.headers]
         for writer, reason, events, path in zip(writers, reasons, run.events, paths, strict=True):
@@ -222,7 +247,7 @@ def _streaming(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.R
     )
 
 
-def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool] = lambda: False) -> Trajectory:
+def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool]) -> Trajectory:
     def check(done: float) -> None:
         deadline.check()
         if stop():

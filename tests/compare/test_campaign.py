@@ -157,11 +157,11 @@ def test_a_run_that_takes_too_long_is_reported(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("*.h5"))) == 1
 
 
-def deadly(tasks, directory, limit):
+def deadly(tasks, directory, limit, hand_over):
     """Stands in for `run_batch`: the run at omega_0 = 7 takes its worker down with it."""
     if any(task.parameters.omega_0 == 7.0 for task in tasks):
         os.kill(os.getpid(), signal.SIGKILL)
-    return run_batch(tasks, directory, limit)
+    return run_batch(tasks, directory, limit, hand_over)
 
 
 def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
