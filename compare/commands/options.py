@@ -51,11 +51,9 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
     source.add_argument("--set", metavar="NAME", default="reference", help=f"one of {', '.join(Parameters.names())}")
     source.add_argument("--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table")
     for field in dataclasses.fields(Parameters):
-        meta = field.metadata
-        group.add_argument(
-            f"--{field.name.replace('_', '-')}", dest=f"parameter_{field.name}", metavar=meta["unit"],
-            type=number, help=f"{meta['meaning']} ({meta['allowed']})",
-        )  # fmt: skip
+        option, meaning = f"--{field.name.replace('_', '-')}", "{meaning} ({allowed})".format_map(field.metadata)
+        dest, unit = f"parameter_{field.name}", field.metadata["unit"]
+        group.add_argument(option, dest=dest, metavar=unit, type=number, help=meaning)
 
 
 def parameters(args: argparse.Namespace) -> Parameters:
@@ -133,10 +131,8 @@ def workers(args: argparse.Namespace) -> int | Workers:
 
 def add_start(parser: argparse.ArgumentParser) -> None:
     """Option for the initial state."""
-    parser.add_argument(
-        "--start", nargs="*", default=[], metavar="NAME=VALUE",
-        help=f"initial state, zero (at rest against the wall) where not named; names: {', '.join(VARIABLES)}",
-    )  # fmt: skip
+    meaning = f"initial state, zero (at rest against the wall) where not named; names: {', '.join(VARIABLES)}"
+    parser.add_argument("--start", nargs="*", default=[], metavar="NAME=VALUE", help=meaning)
 
 
 def start(args: argparse.Namespace) -> np.ndarray:

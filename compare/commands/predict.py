@@ -79,10 +79,8 @@ class Prediction:
 
 def predict(p: Parameters) -> Prediction:
     """Ask the closed-form theory for everything."""
-    return Prediction(
-        parameters=p, thresholds=analytic.thresholds(p), solutions=analytic.stationary_solutions(p),
-        attractors=analytic.stable_solutions(p), operating_range=analytic.operating_range(p),
-    )  # fmt: skip
+    solutions, attractors = analytic.stationary_solutions(p), analytic.stable_solutions(p)
+    return Prediction(p, analytic.thresholds(p), solutions, attractors, analytic.operating_range(p))
 
 
 def tables(prediction: Prediction) -> list[Table | str]:

@@ -73,8 +73,7 @@ def draw(of: Diagram) -> Figure:
         axes, of.p
     )
     style.points(axes, of.states)
-    axes.set_xlabel(style.OMEGA_0)
-    axes.set_ylabel(style.OMEGA_X)
+    axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
     style.guides(axes, values)
     if of.states:
         style.legend(axes, loc="upper left")
@@ -156,8 +155,7 @@ def _figure_12(axes: Axes, p: Parameters) -> dict[str, float]:
 
 
 def _frame(axes: Axes, bottom: float, top: float) -> None:
-    axes.set_xlim(bottom, top)
-    axes.set_ylim(0, 1.12 * axes.get_ylim()[1])
+    axes.set(xlim=(bottom, top), ylim=(0, 1.12 * axes.get_ylim()[1]))
 
 
 def _hopf(p: Parameters) -> Array:

@@ -53,9 +53,7 @@ def _sketch(axes: Axes, case: Case) -> None:
     geometric = len({"y", "h"} & set(active))
     numbers = f"{geometric} + {len(active) - geometric} = {len(active)}"
     axes.text(*centre, f"{case.name}\n{numbers}", ha="center", va="center", fontsize=10, linespacing=1.4)
-    axes.set_xlim(0, 2.4)
-    axes.set_ylim(-0.2, 2.2)
-    axes.set_aspect("equal")
+    axes.set(xlim=(0, 2.4), ylim=(-0.2, 2.2), aspect="equal")
     axes.axis("off")
 
 
@@ -124,9 +122,7 @@ def draw_figure_6(_: object = None) -> Figure:
     for line, text in (("-", "slip begins at A"), ("--", "slip begins at B"), (":", "leaves the floor at A")):
         axes.plot([], [], color="black", ls=line, lw=1.4, label=text)
     axes.legend(loc="lower right", fontsize=9, frameon=False)
-    axes.set_xlim(-2.5, 3.7)
-    axes.set_ylim(-0.45, 3.95)
-    axes.set_aspect("equal")
+    axes.set(xlim=(-2.5, 3.7), ylim=(-0.45, 3.95), aspect="equal")
     axes.axis("off")
     return figure
 

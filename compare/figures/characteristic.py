@@ -74,14 +74,10 @@ def draw(curves: tuple[Curve, ...]) -> Figure:
             if own:
                 below.plot(*zip(*off, strict=True), ls="none", marker=look.mark, color=look.colour, mfc="white", ms=5)
         style.points(above, curve.states)
-        above.set_ylim(0, 1.05 * max([fastest, *(m.value for m in curve.states)]))
-        above.set_ylabel(style.OMEGA_C)
+        above.set(ylim=(0, 1.05 * max([fastest, *(m.value for m in curve.states)])), ylabel=style.OMEGA_C)
         style.legend(above, loc="upper left", frameon=False)
         style.dimensionless_x(above, p)
-        below.set_xlabel(style.OMEGA_0)
-        below.set_ylabel("$|\\Delta\\omega_c| / \\omega_c$")
-        below.set_yscale("log")
-        below.set_ylim(_LEAST / 10, 10)
+        below.set(xlabel=style.OMEGA_0, ylabel="$|\\Delta\\omega_c| / \\omega_c$", yscale="log", ylim=(_LEAST / 10, 10))
         for axes in (above, below):
             axes.grid(alpha=0.25)
     return figure

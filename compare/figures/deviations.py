@@ -85,9 +85,9 @@ def draw(strips: Strips) -> Figure:
         at = np.full(beyond.sum(), side * _WIDEST)
         axes.plot(at, lanes[beyond], marker=arrow, ms=7, color="#B3261E", ls="none", rasterized=many)
     axes.set_yticks(range(len(names)), [quantity(name).symbol for name in names])
-    axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_xlim(-1.08 * _WIDEST, 1.08 * _WIDEST)
-    axes.set_xlabel("(measured − predicted)/tolerance")
+    axes.set(
+        ylim=(len(names) - 0.5, -0.5), xlim=(-1.08 * _WIDEST, 1.08 * _WIDEST), xlabel="(measured − predicted)/tolerance"
+    )
     if len(engines) > 1:
         handles, labels = axes.get_legend_handles_labels()
         once = dict(zip(labels, handles, strict=True))

@@ -68,10 +68,7 @@ def draw(curve: Curve) -> Figure:
         plain_curve(axes, p, top(p), apart)
         for steps, case in enumerate(("RR", "SR", "NR")):
             style.points(axes, [m for m in curve.states if m.conditions["case"] == case], steps * apart)
-    axes.set_xlim(0, top(p))
-    axes.set_ylim(0, 1.15 * top(p))
-    axes.set_ylabel(style.OMEGA_C)
-    axes.set_xlabel(style.OMEGA_0)
+    axes.set(xlim=(0, top(p)), ylim=(0, 1.15 * top(p)), ylabel=style.OMEGA_C, xlabel=style.OMEGA_0)
     style.legend(axes, loc="upper left")
     style.dimensionless_x(axes, p)
     style.dimensionless_y(axes, p, "$\\Omega_c = \\omega_c\\sqrt{R/g}$")

@@ -95,10 +95,12 @@ def draw(plane: Plane) -> Figure:
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
         axes.text(section, 0.985 * fastest, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3")
     _points(axes, plane)
-    axes.set_xlabel("friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$")
-    axes.set_ylabel(style.OMEGA_0)
-    axes.set_xlim(0, _WIDEST)
-    axes.set_ylim(0, fastest)
+    axes.set(
+        xlabel="friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$",
+        ylabel=style.OMEGA_0,
+        xlim=(0, _WIDEST),
+        ylim=(0, fastest),
+    )
     figure.legend(loc="outside lower center", fontsize=8, ncols=6, frameon=False, handlelength=2.6)
     style.dimensionless_y(axes, p, style.UP_TO_UNITS)
     return figure

@@ -73,8 +73,7 @@ def draw_ladder(of: Comparison) -> Figure:
         axes.plot(x, y, f"{_MARKS[k]}-", color=_COLOURS[k], mfc="white", lw=0.6, label=quantity)
     axes.set_yticks(range(len(methods)), methods, fontsize=8.5)
     axes.invert_yaxis()
-    axes.set_xscale("log")
-    axes.set_xlabel("$|\\Delta\\omega_c|/\\omega_c$")
+    axes.set(xscale="log", xlabel="$|\\Delta\\omega_c|/\\omega_c$")
     axes.grid(alpha=0.3)
     figure.legend(loc="outside upper center", ncols=5, fontsize=8, frameon=False)
     return figure
@@ -92,8 +91,7 @@ def draw_frontier(of: Comparison) -> Figure:
             own = [s for s in (*of.scores, *of.elsewhere) if (s.method, s.quantity) == (method, quantity)]
             own.sort(key=lambda score: score.cost)
             axes.plot([s.cost for s in own], [max(s.error, _LEAST) for s in own], label=method, ms=5, lw=1, **look)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        axes.set(xscale="log", yscale="log")
         axes.set_title(quantity, fontsize=10)
         axes.grid(alpha=0.3)
     for axes in panels[len(quantities) :]:

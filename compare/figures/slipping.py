@@ -66,8 +66,7 @@ def draw(push: Push) -> Figure:
         time.axvline(1e3 * end, **style.GUIDE)
         for place, case in ((0.3, Case.NS), (1.3, Case.NR)):
             time.text(1e3 * place * end, 0.93, case.name, ha="center", transform=time.get_xaxis_transform())
-    time.set_xlabel("$t$ (ms)")
-    time.set_ylabel("slip at the wall (rad/s)")
+    time.set(xlabel="$t$ (ms)", ylabel="slip at the wall (rad/s)")
     time.legend(frameon=False)
     w_y, w_z = run.slip_y[shown], run.slip_z[shown]
     plane.plot(w_z, w_y, color="black", lw=1.4)
@@ -81,8 +80,7 @@ def draw(push: Push) -> Figure:
     )
     plane.plot(w_z[0], w_y[0], "kx", ms=7, mew=1.8)
     style.mark(plane, 0.0, 0.0, "NR", (6, -6))
-    plane.set_xlabel("$\\tilde\\omega_z$ (rad/s)")
-    plane.set_ylabel("$\\tilde\\omega_y$ (rad/s)")
+    plane.set(xlabel="$\\tilde\\omega_z$ (rad/s)", ylabel="$\\tilde\\omega_y$ (rad/s)")
     plane.margins(0.12)
     for axes in (time, plane):
         axes.axhline(0, **style.GUIDE)

@@ -11,7 +11,8 @@ from unittest import mock
 import numpy as np
 
 import mjsim
-from compare.runs.engines import ENGINES, MUJOCO, Engine
+from compare.runs.engines import ENGINES, MUJOCO, Engine, mujoco
+from compare.runs.tasks import Task
 from mjsim import ContactSettings, scene, stepping
 from model import Parameters
 
@@ -36,18 +37,16 @@ def _wrong(
     fault: Stretch = nullcontext,
     **changes: Any,
 ) -> Engine:
-    def stream(
-        parameters: Sequence[Parameters], x0s: Any, t_end: float, flows: Any, settings: Any,
-        sample_interval: float | None, batched: bool, journal: Any,
-    ) -> mjsim.Run:  # fmt: skip
-        assert isinstance(settings, ContactSettings)
+    def stream(tasks: Sequence[Task], journal: Any) -> mjsim.Run:
+        wrong = [
+            replace(task, parameters=ball(task.parameters), settings=replace(task.chosen_settings, **changes))
+            for task in tasks
+        ]
         with fault():
-            run = _Disguised(
-                [ball(p) for p in parameters], x0s, t_end, flows, replace(settings, **changes),
-                sample_interval=sample_interval, batched=batched, journal=journal,
-            )  # fmt: skip
+            run = mujoco(wrong, journal, _Disguised)
+        assert isinstance(run, _Disguised)
         run.fault = fault
-        run.headers = [replace(h, parameters=p) for h, p in zip(run.headers, parameters, strict=True)]
+        run.headers = [replace(h, parameters=t.parameters) for h, t in zip(run.headers, tasks, strict=True)]
         return run
 
     return replace(MUJOCO, name=name, stream=stream)

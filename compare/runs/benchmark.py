@@ -63,10 +63,8 @@ def run() -> Figures:
     (state,) = stable_solutions(SLIPPING)
     x0 = state.x.tolist()
     two_over_one, dask_over_processes = _campaigns()
-    return Figures(
-        single=benchmark.cost(SLIPPING, x0), batch=benchmark.cost(SLIPPING, x0, BATCH), two_over_one=two_over_one,
-        bookkeeping=_bookkeeping(), resuming=_resuming(), dask_over_processes=dask_over_processes,
-    )  # fmt: skip
+    single, batch = benchmark.cost(SLIPPING, x0), benchmark.cost(SLIPPING, x0, BATCH)
+    return Figures(single, batch, two_over_one, _bookkeeping(), _resuming(), dask_over_processes)
 
 
 def table(figures: Figures) -> Table:
@@ -104,9 +102,8 @@ def _dask(stack: ExitStack) -> list[Workers]:
         from distributed import LocalCluster
     except ImportError:
         return []
-    cluster: Any = LocalCluster(  # type: ignore[no-untyped-call]
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
-    )  # fmt: skip
+    quiet: dict[str, Any] = {"host": "127.0.0.1", "dashboard_address": None, "silence_logs": 50}
+    cluster: Any = LocalCluster(n_workers=2, threads_per_worker=1, **quiet)  # type: ignore[no-untyped-call]
     stack.enter_context(cluster)
     kind = dask(cluster.scheduler_address)
     stack.callback(kind.stop, kind.start(), False)

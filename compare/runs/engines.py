@@ -8,36 +8,24 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-
-import numpy.typing as npt
+from typing import TYPE_CHECKING
 
 import analytic
 import mjsim
 from mjsim import ContactSettings
 from mjsim.journal import Journal
-from model import Flow, InputError, Parameters, SimulationError, Trajectory
+from model import InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
+
+if TYPE_CHECKING:  # a task names its engine
+    from compare.runs.tasks import Task
 
 Settings = ContactSettings | analytic.Settings
 """Numerical settings of any engine."""
-Simulate = Callable[
-    [Parameters, npt.ArrayLike, float, Flow, Settings, float | None, Callable[[float], None]], Trajectory
-]
-"""parameters, start, duration in s, flow, settings, sample interval in s, progress: one whole run."""
-Stream = Callable[
-    [
-        Sequence[Parameters],
-        Sequence[npt.ArrayLike],
-        float,
-        Sequence[Flow],
-        Settings,
-        float | None,
-        bool,
-        Journal | None,
-    ],
-    mjsim.Run,
-]
-"""The same for many runs that hand out their samples as they come; also whether they share a batch, and a journal."""
+Simulate = Callable[["Task", Callable[[float], None]], Trajectory]
+"""One whole run; the function is called with the fraction done, from time to time."""
+Stream = Callable[[Sequence["Task"], Journal | None], mjsim.Run]
+"""Runs of one `Task.batch_key` that hand out their samples as they come."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,31 +86,30 @@ def newcomer(step: float) -> ContactSettings:
     )
 
 
-def _mujoco(
-    parameters: Sequence[Parameters], x0s: Sequence[npt.ArrayLike], t_end: float, flows: Sequence[Flow],
-    settings: Settings, sample_interval: float | None, batched: bool, journal: Journal | None,
-) -> mjsim.Run:  # fmt: skip
+def mujoco(tasks: Sequence[Task], journal: Journal | None, kind: type[mjsim.Run] = mjsim.Run) -> mjsim.Run:
+    """The runs of tasks with MuJoCo, in a batch unless they are long."""
+    first = tasks[0]
+    parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
+    settings, interval = first.chosen_settings, first.sample_interval
     assert isinstance(settings, ContactSettings)
-    return mjsim.Run(
-        parameters, x0s, t_end, flows, settings, sample_interval=sample_interval, batched=batched, journal=journal
+    return kind(
+        parameters, x0s, first.t_end, flows, settings, sample_interval=interval, batched=not first.long, journal=journal
     )
 
 
-def _unwarned(*given: object) -> mjsim.Run:
+def _unwarned(tasks: Sequence[Task], journal: Journal | None) -> mjsim.Run:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that contacts hover with these settings is what is shown
-        return _mujoco(*given)  # type: ignore[arg-type]
+        return mujoco(tasks, journal)
 
 
 def _theory(method: str) -> Simulate:
-    def simulate(
-        p: Parameters, x0: npt.ArrayLike, t_end: float, flow: Flow, settings: Settings,
-        sample_interval: float | None, progress: Callable[[float], None],
-    ) -> Trajectory:  # fmt: skip
-        assert isinstance(settings, analytic.Settings)
-        chosen = replace(settings, method=method)
+    def simulate(task: Task, progress: Callable[[float], None]) -> Trajectory:
+        assert isinstance(task.chosen_settings, analytic.Settings)
+        settings, interval = replace(task.chosen_settings, method=method), task.sample_interval
+        given = task.parameters, task.x0, task.t_end, task.fluid, settings
         try:
-            return analytic.simulate(p, x0, t_end, flow, chosen, sample_interval=sample_interval, progress=progress)
+            return analytic.simulate(*given, sample_interval=interval, progress=progress)
         except SimulationError as error:
             return error.trajectory
 
@@ -140,7 +127,7 @@ MUJOCO = Engine(
     options=("timestep",),
     configure=lambda given: ContactSettings.at(given.get("timestep", ContactSettings.timestep)),
     at=_mujoco_study,
-    stream=_mujoco,
+    stream=mujoco,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
     mark="o",

@@ -31,11 +31,9 @@ def shown(quiet: bool = False) -> Iterator[Show]:
 
 @contextmanager
 def _live() -> Iterator[Show]:
-    columns = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}"),
-        TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn(),
-    )  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    counts = BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}")
+    times = TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn()
+    with Progress(TextColumn("{task.description}"), *counts, *times, console=Console(stderr=True)) as bar:
         line = bar.add_task("", total=None, failed="")
 
         def show(what: str, done: int, total: int, failed: int) -> None:

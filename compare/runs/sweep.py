@@ -85,7 +85,5 @@ def held(template: Task, points: Iterator[Parameters]) -> list[Task]:
 
 def staircase(template: Task, omegas: Sequence[float], hold: float) -> Task:
     """One run that holds each omega_0 for `hold` seconds."""
-    return dataclasses.replace(
-        template, flow=Flow.staircase(omegas, hold), t_end=hold * len(omegas),
-        parameters=template.parameters.replace(omega_0=omegas[0]),
-    )  # fmt: skip
+    p, flow = template.parameters.replace(omega_0=omegas[0]), Flow.staircase(omegas, hold)
+    return dataclasses.replace(template, parameters=p, flow=flow, t_end=hold * len(omegas))

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import mjsim
 from compare.runs import engines
 from compare.runs.engines import Engine, Settings
 from mjsim import ContactSettings
@@ -140,9 +139,9 @@ def carry_out(
 ) -> list[Trajectory]:
     """Run tasks of one `Task.batch_key`; a run that breaks down comes back with its failure in the header."""
     deadline = deadline or Deadline()
-    if not tasks[0].simulator.stream:
+    if not (stream := tasks[0].simulator.stream):
         return [_simulated(task, deadline, stop) for task in tasks]
-    run, blocks, stopped = _streaming(tasks), [], ""
+    run, blocks, stopped = stream(tasks, None), [], ""
     for block in run:
         deadline.check()
         blocks.append(block)
@@ -205,8 +204,9 @@ def journal_path(task: Task, path: Path) -> Path | None:
 def _stream(tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline, stop: Callable[[], bool]) -> list[str]:
     kept = journal_path(tasks[0], paths[0]) if len(tasks) == 1 else None
     journal = Journal(kept) if kept else None
+    assert tasks[0].simulator.stream
     try:
-        run = _streaming(tasks, journal)
+        run = tasks[0].simulator.stream(tasks, journal)
     except InputError:  # there is nothing to go on with
         if journal:
             journal.discard()
@@ -232,21 +232,6 @@ def _stream(tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline, st
     return reasons
 
 
-def _streaming(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
-    first = tasks[0]
-    assert first.simulator.stream
-    return first.simulator.stream(
-        [task.parameters for task in tasks],
-        [task.x0 for task in tasks],
-        first.t_end,
-        [task.fluid for task in tasks],
-        first.chosen_settings,
-        first.sample_interval,
-        not first.long,
-        journal,
-    )
-
-
 def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool]) -> Trajectory:
     def check(done: float) -> None:
         deadline.check()
@@ -254,9 +239,7 @@ def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool]) -> Traj
             raise KeyboardInterrupt
 
     assert task.simulator.simulate
-    return task.simulator.simulate(
-        task.parameters, task.x0, task.t_end, task.fluid, task.chosen_settings, task.sample_interval, check
-    )
+    return task.simulator.simulate(task, check)
 
 
 @functools.cache
