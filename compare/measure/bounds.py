@@ -16,7 +16,7 @@ import numpy as np
 from compare.measure.field import DOUBT, LIMIT
 from compare.measure.growth import LARGE, SMALL, SMOOTH, STRAIGHT, Push
 from compare.measure.lab import Lab, time_unit
-from compare.measure.record import Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import Start, high, settle
 from compare.measure.watched import ends_of_rolling
 from compare.runs.tasks import Task
@@ -180,17 +180,7 @@ def _result(
     for quantity, value in zip((f"gamma_zero{square}", f"gamma_slope{square}"), (zero, slope), strict=True):
         if quantity.startswith("gamma_zero") and abs(value.value) > BEYOND * np.abs(q).max():
             continue
-        yield Measurement(
-            protocol=NAME,
-            quantity=quantity,
-            value=value.value,
-            uncertainty=value.uncertainty,
-            engine=lab.engine.name,
-            set=line.set,
-            parameters=p,
-            conditions=conditions,
-            runs=tuple(lab.file(task) for task in tasks),
-        )
+        yield measurement(lab, NAME, line.set, p, quantity, value, tasks, **conditions)
 
 
 def _lines(name: str, p: Parameters) -> Iterator[Line]:

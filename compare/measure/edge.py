@@ -18,7 +18,7 @@ from compare.measure.brackets import Bracket, Care, Search, narrow
 from compare.measure.extrapolation import vanishing
 from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.questions import lasting, rest, wall
-from compare.measure.record import Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import TAPER, Settled, Start, family, settle
 from compare.runs.tasks import Task
 from compare.statistics import Measured, tail
@@ -69,6 +69,11 @@ class Edge:
         """The state in the middle of the last bracket, (8,)."""
         assert self.found is not None
         return np.asarray(self.centre + self.found.place.value * self.line)
+
+    @property
+    def tasks(self) -> tuple[Task, ...]:
+        """The runs that the crossing follows from."""
+        return self.found.tasks if self.found else ()
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -194,35 +199,21 @@ def _onward(edge: Edge) -> Edge:
 
 def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement]:
     """The state on the edge, as sure as the last bracket and as little as it has moved since the line before."""
-    for name, (value, sure) in _values(edge).items():
-        yield Measurement(
-            protocol=PROTOCOL,
-            quantity=f"edge_{name}",
-            value=value,
-            uncertainty=sure,
-            engine=lab.engine.name,
-            set=edge.set,
-            parameters=edge.p,
-            conditions={"case": "SS"},
-            runs=_files(lab, edge),
-        )
+    for name, value in _values(edge).items():
+        yield measurement(lab, PROTOCOL, edge.set, edge.p, f"edge_{name}", value, edge.tasks, case="SS")
 
 
-def _files(lab: Lab, edge: Edge) -> tuple[str, ...]:
-    return tuple(lab.file(task) for task in edge.found.tasks) if edge.found else ()
-
-
-def _values(edge: Edge) -> dict[str, tuple[float, float]]:
+def _values(edge: Edge) -> dict[str, Measured]:
     """omega_c, the slips and the spin on the wall, each with its uncertainty; those of the slips are alike."""
     x, roll, sure = edge.crossing, edge.p.R / edge.p.r, _sure(edge)
     slips = float(max(sure[3:6].max(), roll * sure[2]))
     spin = float(x[3] + roll * x[2])
     return {
-        "omega_c": (float(x[2]), slips / roll),
-        "slip_x": (float(x[3]), slips),
-        "slip_y": (float(x[4]), slips),
-        "slip_z": (float(x[5]), slips),
-        "wall_spin": (spin, slips),
+        "omega_c": Measured(float(x[2]), slips / roll),
+        "slip_x": Measured(float(x[3]), slips),
+        "slip_y": Measured(float(x[4]), slips),
+        "slip_z": Measured(float(x[5]), slips),
+        "wall_spin": Measured(spin, slips),
     }
 
 
@@ -242,14 +233,6 @@ def _closing(lab: Lab, p: Parameters, name: str, edges: Sequence[Edge]) -> Itera
     apart = [Measured(float(edge.crossing[2] - edge.lifted[2]), noise) for edge in edges]
     place = vanishing(omegas, apart)
     if math.isfinite(place.uncertainty):
-        yield Measurement(
-            protocol=PROTOCOL,
-            quantity="omega_02",
-            value=place.value,
-            uncertainty=place.uncertainty,
-            engine=lab.engine.name,
-            set=name,
-            parameters=p.replace(omega_0=place.value),
-            conditions={"side": "from above", "by": "unstable slipping meets the lifted ball"},
-            runs=tuple(file for edge in edges for file in _files(lab, edge)),
-        )
+        tasks, by = [task for edge in edges for task in edge.tasks], "unstable slipping meets the lifted ball"
+        q = p.replace(omega_0=place.value)
+        yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", by=by)

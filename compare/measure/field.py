@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.runs.tasks import Task
+from compare.statistics import Measured
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -85,18 +86,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 continue
             values = list(_values(*seen, p))
             kept[name, seen[0].case] += bool(values)
-            for quantity, value, uncertainty in values:
-                yield Measurement(
-                    protocol=NAME,
-                    quantity=quantity,
-                    value=value,
-                    uncertainty=uncertainty,
-                    engine=lab.engine.name,
-                    set=name,
-                    parameters=p,
-                    conditions=_conditions(seen[0]),
-                    runs=tuple(lab.file(task) for task in pair),
-                )
+            for quantity, value in values:
+                at = state_of(seen[0].x)
+                yield measurement(lab, NAME, name, p, quantity, value, pair, case=seen[0].case.name, **at)
     for name in sets:
         for case in Case:
             if not kept[name, case]:
@@ -193,7 +185,7 @@ def _turns(case: Case, x: Array, p: Parameters) -> bool:
     return any(np.linalg.norm(v[-1] - v[0]) > TURN * np.linalg.norm(v, axis=1).min() for v in slips)
 
 
-def _values(best: Sighting, fine: Sighting, lower: Sighting, p: Parameters) -> Iterator[tuple[str, float, float]]:
+def _values(best: Sighting, fine: Sighting, lower: Sighting, p: Parameters) -> Iterator[tuple[str, Measured]]:
     """Quantities with uncertainties: what the extrapolation, and another degree of the polynomials, change.
 
     The largest change over the scales of the rates, or of the forces, stands for all of them: that of one may vanish
@@ -213,9 +205,9 @@ def _values(best: Sighting, fine: Sighting, lower: Sighting, p: Parameters) -> I
     if max(rate_change, force_change) > COARSE:
         return
     for k in moving:
-        yield f"rate_{VARIABLES[k]}", float(best.rates[k]), rate_change * float(scales[k])
+        yield f"rate_{VARIABLES[k]}", Measured(float(best.rates[k]), rate_change * float(scales[k]))
     for name, force in pressing.items():
-        yield f"moving_force_{name}", force, force_change * weight
+        yield f"moving_force_{name}", Measured(force, force_change * weight)
 
 
 def _forces(seen: Sighting) -> dict[str, float]:
@@ -232,7 +224,3 @@ def _rate_scales(p: Parameters) -> Array:
     spin = p.g / p.r
     speed = math.sqrt(p.g * p.R)
     return np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
-
-
-def _conditions(sighting: Sighting) -> dict[str, Condition]:
-    return {"case": sighting.case.name} | dict(zip(VARIABLES, sighting.x.tolist(), strict=True))

@@ -16,12 +16,11 @@ import numpy as np
 
 from compare.measure.field import DOUBT, LIMIT, polynomial, random_state
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.runs.tasks import Task
 from compare.statistics import Measured
 from model import Case, Parameters, Trajectory
 from model.arrays import Array
-from model.kinematics import VARIABLES
 
 NAME = "growth"
 SEED = 61
@@ -90,9 +89,9 @@ class Push:
     @property
     def conditions(self) -> dict[str, Condition]:
         """What the growth belongs to."""
-        named: dict[str, Condition] = {"inner": self.inner.name, "outer": self.outer.name, "by": self.by}
-        named |= dict(zip(VARIABLES, self.x.tolist(), strict=True))
-        return named | dict(zip(("n_x", "n_y", "n_z"), self.n.tolist(), strict=True))
+        n_x, n_y, n_z = self.n.tolist()
+        along: dict[str, Condition] = {"inner": self.inner.name, "outer": self.outer.name, "by": self.by}
+        return along | state_of(self.x) | {"n_x": n_x, "n_y": n_y, "n_z": n_z}
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -122,17 +121,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _measurement(lab: Lab, push: Push, tasks: Sequence[Task], quantity: str, value: Measured) -> Measurement:
-    return Measurement(
-        protocol=NAME,
-        quantity=quantity,
-        value=value.value,
-        uncertainty=value.uncertainty,
-        engine=lab.engine.name,
-        set=push.set,
-        parameters=push.p,
-        conditions=push.conditions,
-        runs=tuple(lab.file(task) for task in tasks),
-    )
+    return measurement(lab, NAME, push.set, push.p, quantity, value, tasks, **push.conditions)
 
 
 def _share(one: Push, its: Measured, other: Push, value: Measured) -> Measured:

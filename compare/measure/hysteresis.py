@@ -12,7 +12,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from compare.measure.lab import Lab, Level, coarse_step
-from compare.measure.record import Measurement, Missing, Records
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement
 from compare.measure.settled import state
 from compare.measure.settling import STEPS_A_SAMPLE, Settled, Start, duration, family, judged
 from compare.runs.tasks import Task
@@ -108,25 +108,16 @@ def _levels(
         if ended.failure:
             yield Missing(PROTOCOL, name, f"level {k + 1} ({side}, omega_0 = {flow:.4g} rad/s): {ended.failure}")
         else:
-            yield from _records(lab, ended, {"side": side, "level": float(k + 1), "before": before}, certainty)
+            yield from _records(lab, ended, certainty, side=side, level=float(k + 1), before=before)
         before = case
 
 
-def _records(lab: Lab, ended: Settled, at: Mapping[str, float | str], certainty: float) -> Iterator[Measurement]:
-    p, omega_c = ended.start.p, ended.values["omega_c"]
-    sure = math.hypot(omega_c.uncertainty, certainty * p.omega_0)
-    for quantity, value in (("case", Measured(float(ended.case), 0.0)), ("omega_c", Measured(omega_c.value, sure))):
-        yield Measurement(
-            protocol=PROTOCOL,
-            quantity=quantity,
-            value=value.value,
-            uncertainty=value.uncertainty,
-            engine=lab.engine.name,
-            set=ended.start.set,
-            parameters=p,
-            conditions={"case": ended.case.name, **at},
-            runs=(lab.file(ended.task),),
-        )
+def _records(lab: Lab, ended: Settled, certainty: float, **at: Condition) -> Iterator[Measurement]:
+    start, omega_c = ended.start, ended.values["omega_c"]
+    sure = Measured(omega_c.value, math.hypot(omega_c.uncertainty, certainty * start.p.omega_0))
+    for quantity, value in (("case", ended.case), ("omega_c", sure)):
+        case = ended.case.name
+        yield measurement(lab, PROTOCOL, start.set, start.p, quantity, value, [ended.task], case=case, **at)
 
 
 def _part(run: Trajectory, samples: slice) -> Trajectory:

@@ -12,8 +12,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from compare.measure.lab import Lab, coarse_step, time_unit
-from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.runs.tasks import Task
+from compare.statistics import Measured
 from model import Case, Contact, Parameters
 from model.arrays import Array
 from model.kinematics import VARIABLES
@@ -53,26 +54,17 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield Missing(NAME, name, f"{how}: the contact did not close for good within {LASTS:g} sqrt(R/g)")
             continue
         step = coarse_step(p) / REFINED
-        conditions: dict[str, Condition] = {"start": how, "time": float(coarse.time[at])}
-        conditions |= dict(zip(VARIABLES, x.tolist(), strict=True))
         units = dict(zip(VARIABLES, _units(p), strict=True))
         changes = [
             abs(getattr(fine, quantity)[2 * at] - getattr(coarse, quantity)[at]) / units[quantity] for quantity in NAMES
         ]
         # The contact closes at a step, up to one late: for so long weight and friction act otherwise than they should.
         late = step / time_unit(p) / 2
+        time, start = float(coarse.time[at]), state_of(x)
         for quantity in NAMES:
-            yield Measurement(
-                protocol=NAME,
-                quantity=f"after_{quantity}",
-                value=float(getattr(fine, quantity)[2 * at]),
-                uncertainty=math.hypot(max(changes), late) * units[quantity],
-                engine=lab.engine.name,
-                set=name,
-                parameters=p,
-                conditions=conditions,
-                runs=tuple(lab.file(task) for task in pair),
-            )
+            after = float(getattr(fine, quantity)[2 * at])
+            value = Measured(after, math.hypot(max(changes), late) * units[quantity])
+            yield measurement(lab, NAME, name, p, f"after_{quantity}", value, pair, start=how, time=time, **start)
 
 
 def _start(p: Parameters, how: str) -> tuple[Parameters, Array]:

@@ -14,8 +14,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.runs.tasks import Task
+from compare.statistics import Measured
 from model import Flow, Parameters, Trajectory
 from model.arrays import Array
 from model.kinematics import slip_velocities
@@ -49,17 +50,14 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     lab.complete([task for group in (*tasks.values(), *falls.values()) for task in group])
     for name, p in sets.items():
         coarse, fine = (deviations(lab.run(tasks[name, k])) for k in REFINE[lab.level])
-        files = tuple(lab.file(task) for task in tasks[name, REFINE[lab.level][1]])
         for key, value in fine.items():
             quantity, law, contact = key
             if math.isnan(value) or math.isnan(coarse[key]):
                 yield Missing(PROTOCOL, name, f"fewer than {FEWEST} samples show at {contact}: {law}")
                 continue
-            yield Measurement(
-                protocol=PROTOCOL, quantity=quantity, value=value, engine=lab.engine.name, set=name, parameters=p,
-                uncertainty=math.hypot(value - coarse[key], ROUNDING),
-                conditions={"law": law, "contact": contact}, runs=files,
-            )  # fmt: skip
+            sure = Measured(value, math.hypot(value - coarse[key], ROUNDING))
+            runs = tasks[name, REFINE[lab.level][1]]
+            yield measurement(lab, PROTOCOL, name, p, quantity, sure, runs, law=law, contact=contact)
     for name in FLUIDS:
         yield _sinking(lab, name, [falls[name, k] for k in REFINE[lab.level]])
 
@@ -163,12 +161,8 @@ def _sinking(lab: Lab, name: str, tasks: Sequence[Sequence[Task]]) -> Measuremen
     # What is left of a fall that has only just begun is a difference of speeds, each of them rounded in every step.
     run = lab.run(tasks[1])[0]
     rounding = ROUNDING * scale / (_ball(name).c * float(run.time[-1]))
-    conditions: dict[str, Condition] = {"case": "NN", "by": name, **FLUIDS[name]}
-    return Measurement(
-        protocol=PROTOCOL, quantity="v_y", value=fine, uncertainty=math.hypot(fine - coarse, rounding),
-        engine=lab.engine.name, set=name, parameters=_ball(name), conditions=conditions,
-        runs=tuple(lab.file(task) for task in tasks[1]),
-    )  # fmt: skip
+    value = Measured(fine, math.hypot(fine - coarse, rounding))
+    return measurement(lab, PROTOCOL, name, _ball(name), "v_y", value, tasks[1], case="NN", by=name, **FLUIDS[name])
 
 
 def terminal_speed(slow: Trajectory, fast: Trajectory) -> float:

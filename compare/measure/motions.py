@@ -14,10 +14,9 @@ import numpy.typing as npt
 
 from compare.measure.field import constrained
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from model import Case, Parameters, Trajectory
 from model.arrays import Array
-from model.kinematics import VARIABLES
 
 NAME = "motions"
 STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
@@ -72,18 +71,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             case = Case(int(run.case[last]))
             seen.add((name, case))
             x = constrained(Case(int(run.case[first])), run.x[first], p)
-            conditions: dict[str, Condition] = dict(zip(VARIABLES, x.tolist(), strict=True))
-            yield Measurement(
-                protocol=NAME,
-                quantity="case",
-                value=float(case),
-                uncertainty=0.0,
-                engine=lab.engine.name,
-                set=name,
-                parameters=p,
-                conditions=conditions | {"case": case.name, "time": float(run.time[last] - run.time[first])},
-                runs=(lab.file(task),),
-            )
+            time = float(run.time[last] - run.time[first])
+            yield measurement(lab, NAME, name, p, "case", case, [task], case=case.name, time=time, **state_of(x))
     for name in sets:
         unseen = [case.name for case in Case if (name, case) not in seen]
         if unseen:

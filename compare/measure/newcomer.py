@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from compare.measure.lab import Lab, time_unit
-from compare.measure.record import Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settled import flows, state
 from compare.measure.settling import Start, judged
 from compare.runs import engines
@@ -36,18 +36,6 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             continue
         (run,) = plain.run([task])
         ended = judged(start, task, run)
-        for quantity, value, uncertainty in (
-            ("omega_c", ended.values["omega_c"].value, ended.values["omega_c"].uncertainty),
-            ("case", float(ended.case), 0.0),
-        ):
-            yield Measurement(
-                protocol=PROTOCOL,
-                quantity=quantity,
-                value=value,
-                uncertainty=uncertainty,
-                engine=plain.engine.name,
-                set=SET,
-                parameters=start.p,
-                conditions={"case": ended.case.name, "start": start.name},
-                runs=(plain.file(task),),
-            )
+        for quantity, value in (("omega_c", ended.values["omega_c"]), ("case", ended.case)):
+            at = {"case": ended.case.name, "start": start.name}
+            yield measurement(plain, PROTOCOL, SET, start.p, quantity, value, [task], **at)

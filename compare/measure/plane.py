@@ -14,7 +14,7 @@ from scipy.spatial import Delaunay
 from scipy.stats import qmc
 
 from compare.measure.lab import Lab, Level, time_unit
-from compare.measure.record import Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settled import state
 from compare.measure.settling import Settled, Start, family, high, settle
 from model import Parameters
@@ -61,7 +61,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 out[figure] += 1
                 continue
             seen[figure].append((u, mask(states)))
-            yield _record(lab, figure, states)
+            p, tasks = row[0].p, [each.task for each in states]
+            yield measurement(lab, PROTOCOL, SET, p, "cases", mask(states), tasks, figure=figure)
         for figure in FIGURES:
             tried[figure] |= {tuple(u.tolist()) for u in points[figure]}
             fresh = (u for u in added(seen[figure]) if tuple(u.tolist()) not in tried[figure])
@@ -111,17 +112,3 @@ def _starts(p: Parameters, figure: str) -> Iterator[Start]:
     yield Start(figure, p, "half as fast", state(omega_c=p.omega_0 / 2))
     yield Start(figure, p, "with the fluid", state(omega_c=p.omega_0))
     yield Start(figure, p, "on the wall", state(y=high(p), omega_c=p.omega_0))
-
-
-def _record(lab: Lab, figure: str, states: Sequence[Settled]) -> Measurement:
-    return Measurement(
-        protocol=PROTOCOL,
-        quantity="cases",
-        value=float(mask(states)),
-        uncertainty=0.0,
-        engine=lab.engine.name,
-        set=SET,
-        parameters=states[0].start.p,
-        conditions={"figure": figure},
-        runs=tuple(lab.file(each.task) for each in states),
-    )

@@ -20,12 +20,12 @@ import numpy as np
 import numpy.typing as npt
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.measure.settled import SPIN
 from compare.measure.settling import SOLVED, family, high
 from compare.runs.engines import STUDY_SLIP
 from compare.runs.tasks import Task
-from compare.statistics import exponents, matched, propagator
+from compare.statistics import Measured, exponents, matched, propagator
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -249,11 +249,8 @@ def _measurements(
     """One of each pair of conjugates, in the order of their decay, slowest first; and how many there are in all."""
 
     def record(quantity: str, value: float, sure: float, **conditions: Condition) -> Measurement:
-        return Measurement(
-            protocol=PROTOCOL, quantity=quantity, value=value, uncertainty=sure, engine=lab.engine.name,
-            set=state.set, parameters=state.p, runs=tuple(lab.file(task) for task in tasks),
-            conditions={"case": state.case.name, **dict(zip(VARIABLES, state.x.tolist(), strict=True)), **conditions},
-        )  # fmt: skip
+        at = {"case": state.case.name, **state_of(state.x), **conditions}
+        return measurement(lab, PROTOCOL, state.set, state.p, quantity, Measured(value, sure), tasks, **at)
 
     yield record("modes", float(len(found)), 0.0)
     order = [k for k in np.argsort(-found.real) if found[k].imag >= 0]

@@ -18,9 +18,14 @@ from typing import Any
 import h5py
 import numpy as np
 
+from compare.measure.lab import Lab
 from compare.measure.quantities import quantity
+from compare.runs.tasks import Task
+from compare.statistics import Measured
 from model import Parameters, StorageError
+from model.arrays import Array
 from model.files import WholeFile, dataset, reading
+from model.kinematics import VARIABLES
 from model.trajectory import current_commit, current_versions
 
 SCHEMA = "dualball-measurements"
@@ -58,6 +63,36 @@ class Measurement:
     def unit(self) -> str:
         """Unit of value and uncertainty."""
         return quantity(self.quantity).unit
+
+
+def measurement(
+    lab: Lab,
+    protocol: str,
+    set: str,
+    p: Parameters,
+    quantity: str,
+    value: Measured | float,
+    tasks: Iterable[Task] = (),
+    **conditions: Condition,
+) -> Measurement:
+    """A measurement by the lab's engine; a plain number is exact."""
+    sure = value if isinstance(value, Measured) else Measured(float(value), 0.0)
+    return Measurement(
+        protocol=protocol,
+        quantity=quantity,
+        value=sure.value,
+        uncertainty=sure.uncertainty,
+        engine=lab.engine.name,
+        set=set,
+        parameters=p,
+        conditions=conditions,
+        runs=tuple(lab.file(task) for task in tasks),
+    )
+
+
+def state_of(x: Array) -> dict[str, float]:
+    """A state (8,), or without the last two (6,), as conditions."""
+    return dict(zip(VARIABLES, x.tolist(), strict=False))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from itertools import groupby
 import numpy as np
 
 from compare.measure.lab import Lab, Level, time_unit
-from compare.measure.record import Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import GROUPS, Settled, Start, family, high, scale, settle
 from compare.statistics import Measured
 from model import Parameters
@@ -59,7 +59,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     yield from unsettled(PROTOCOL, ended)
     good = [state for state in ended if not state.failure]
     for state in good:
-        yield _record(lab, state, "case", Measured(float(state.case), 0.0))
+        yield _record(lab, state, "case", state.case)
     alike = [list(same) for _, same in groupby(sorted(good, key=_key), key=_key)]
     refined = settle(lab, [_again(same[0]) for same in alike], refine=2, span=REFINED, sharp=SHARP[lab.level])
     yield from unsettled(PROTOCOL, refined)
@@ -127,15 +127,6 @@ def _again(each: Settled) -> Start:
     return Start(each.start.set, each.start.p, each.start.name, x0)
 
 
-def _record(lab: Lab, each: Settled, quantity: str, value: Measured) -> Measurement:
-    return Measurement(
-        protocol=PROTOCOL,
-        quantity=quantity,
-        value=value.value,
-        uncertainty=value.uncertainty,
-        engine=lab.engine.name,
-        set=each.start.set,
-        parameters=each.start.p,
-        conditions={"case": each.case.name, "start": each.start.name},
-        runs=(lab.file(each.task),),
-    )
+def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> Measurement:
+    start, at = each.start, {"case": each.case.name, "start": each.start.name}
+    return measurement(lab, PROTOCOL, start.set, start.p, quantity, value, [each.task], **at)

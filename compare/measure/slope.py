@@ -14,7 +14,7 @@ import numpy as np
 
 from compare.measure.lab import Lab, Level
 from compare.measure.quantities import quantity
-from compare.measure.record import Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import Settled, Start, family, high, settle
 from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters
@@ -77,17 +77,8 @@ def _measured(lab: Lab, curves: Sequence[Curve], sharp: float) -> Iterator[Measu
         if failure:
             yield Missing(PROTOCOL, curve.set, f"{curve.by} at omega_0 = {curve.p.omega_0:.4g} rad/s: {failure}")
             continue
-        yield Measurement(
-            protocol=PROTOCOL,
-            quantity="slope",
-            value=float(value.value),
-            uncertainty=float(value.uncertainty),
-            engine=lab.engine.name,
-            set=curve.set,
-            parameters=curve.p,
-            conditions={"case": states[-1].case.name, "by": curve.by},
-            runs=tuple(lab.file(each.task) for each in states),
-        )
+        tasks, at = [each.task for each in states], {"case": states[-1].case.name, "by": curve.by}
+        yield measurement(lab, PROTOCOL, curve.set, curve.p, "slope", value, tasks, **at)
 
 
 def _local(name: str, records: Records, most: int) -> Iterator[Curve]:

@@ -20,8 +20,9 @@ from compare.measure.brackets import Bracket
 from compare.measure.extrapolation import POINTS, turning, vanishing
 from compare.measure.lab import Lab, time_unit
 from compare.measure.questions import slip
-from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement
 from compare.measure.settling import Settled
+from compare.runs.tasks import Task
 from compare.statistics import Measured
 from model import Parameters
 from model.arrays import Array
@@ -117,10 +118,10 @@ class Rows:
             by = "floor force of settled slipping"
             yield self._missing("slipping at both points passes to the wall without a jump: there is no omega_04")
             yield from self._extrapolated("omega_02", "turning", "force_Ay", "from below", by)
-            yield self._record("folds", Measured(0.0, 0.0), self._files("turning"))
+            yield self._record("folds", 0.0, self._tasks("turning"))
         else:
             by = "maximum of omega_0 along the branch"
-            yield self._record("omega_04", top, self._files("turning"), side="from below", by=by)
+            yield self._record("omega_04", top, self._tasks("turning"), side="from below", by=by)
             last = states[0].start.p.omega_0
             if fold is None or None in fold.runs:
                 yield self._missing("the end of slipping at both points could be extrapolated, but not be bracketed")
@@ -128,7 +129,7 @@ class Rows:
                 yield self._bisected("omega_04", fold, "from below", "last settled slipping")
                 last = fold.low
             if riding is not None and last > riding.high:
-                yield self._record("folds", Measured(1.0, 0.0), self._files("turning"))
+                yield self._record("folds", 1.0, self._tasks("turning"))
 
     @property
     def _range(self) -> str:
@@ -142,32 +143,25 @@ class Rows:
         speed = max(slip(high.slip_speed_A, high), slip(high.slip_speed_B, high))
         unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
-        return self._record(quantity, place, tuple(self.lab.file(t) for t in of.tasks), side=side, by=by)
+        return self._record(quantity, place, of.tasks, side=side, by=by)
 
     def _extrapolated(
         self, quantity: str, kind: str, vanishes: str, side: str, by: str
     ) -> Iterator[Measurement | Missing]:
         place = extrapolated(self.states.get(kind, []), vanishes, vanishing)
         if place is not None:
-            yield self._record(quantity, place, self._files(kind), side=side, by=f"{by} → 0")
+            yield self._record(quantity, place, self._tasks(kind), side=side, by=f"{by} → 0")
         elif kind in self.states:
             yield self._missing(f"too few states settled for {quantity} by {by}")
 
-    def _files(self, kind: str) -> tuple[str, ...]:
-        return tuple(self.lab.file(state.task) for state in self.states[kind])
+    def _tasks(self, kind: str) -> list[Task]:
+        return [state.task for state in self.states[kind]]
 
-    def _record(self, quantity: str, value: Measured, runs: tuple[str, ...], **conditions: Condition) -> Measurement:
-        return Measurement(
-            protocol=PROTOCOL,
-            quantity=quantity,
-            value=value.value,
-            uncertainty=value.uncertainty,
-            engine=self.lab.engine.name,
-            set=self.set,
-            parameters=self.p.replace(omega_0=value.value) if quantity.startswith("omega") else self.p,
-            conditions=conditions,
-            runs=runs,
-        )
+    def _record(
+        self, quantity: str, value: Measured | float, tasks: Sequence[Task], **conditions: Condition
+    ) -> Measurement:
+        p = self.p.replace(omega_0=value.value) if isinstance(value, Measured) else self.p
+        return measurement(self.lab, PROTOCOL, self.set, p, quantity, value, tasks, **conditions)
 
     def _missing(self, reason: str) -> Missing:
         return Missing(PROTOCOL, self.set, reason)

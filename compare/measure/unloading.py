@@ -17,13 +17,12 @@ import numpy as np
 from compare.measure import onset
 from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.questions import lasting
-from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.measure.settling import Settled, Start, family, high, settle
 from compare.runs.tasks import Task
-from compare.statistics import settled_case
+from compare.statistics import Measured, settled_case
 from model import Case, Parameters, Trajectory
 from model.arrays import Array
-from model.kinematics import VARIABLES
 
 PROTOCOL = "unloading"
 LANDING, UNLOADED, UPWARDS, BY_SPIN = "unloading until it lands", "unloading", "push upwards", "push by spin"
@@ -129,28 +128,19 @@ def _rows(lab: Lab, trials: Sequence[Trial]) -> Iterator[Measurement | Missing]:
     for (_, quantity, event), rows in measured.items():
         usual = float(np.median([change for *_, change in rows]))
         for trial, value, own, change in rows:
-            yield _record(lab, trial, quantity, value, math.hypot(max(change, usual) * value, own), event=event)
+            sure = Measured(value, math.hypot(max(change, usual) * value, own))
+            yield _record(lab, trial, quantity, sure, event=event)
 
 
 def _ended(lab: Lab, trial: Trial, coarse: Case, fine: Case) -> Measurement | Missing:
     if coarse is fine:
-        return _record(lab, trial, "case", float(fine), 0.0)
+        return _record(lab, trial, "case", fine)
     return Missing(PROTOCOL, trial.set, f"{trial.name}: with half the time step the ball ends up otherwise")
 
 
-def _record(lab: Lab, trial: Trial, quantity: str, value: float, sure: float, **conditions: Condition) -> Measurement:
-    start = {name: float(value) for name, value in zip(VARIABLES, trial.x0, strict=False)}
-    return Measurement(
-        protocol=PROTOCOL,
-        quantity=quantity,
-        value=value,
-        uncertainty=sure,
-        engine=lab.engine.name,
-        set=trial.set,
-        parameters=trial.p,
-        conditions={"start": trial.name, **start, "duration": trial.tasks[0].t_end, **conditions},
-        runs=tuple(lab.file(task) for task in trial.tasks),
-    )
+def _record(lab: Lab, trial: Trial, quantity: str, value: Measured | float, **conditions: Condition) -> Measurement:
+    begun: dict[str, Condition] = {"start": trial.name, **state_of(trial.x0), "duration": trial.tasks[0].t_end}
+    return measurement(lab, PROTOCOL, trial.set, trial.p, quantity, value, trial.tasks, **(begun | conditions))
 
 
 Numbers = dict[tuple[str, str], tuple[float, float]]

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Condition, Measurement, Missing, Records
+from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.measure.settling import Start, high, settle
 from compare.runs.tasks import Task
 from compare.statistics import settled_case
 from model import Case, Parameters
 from model.arrays import Array
-from model.kinematics import VARIABLES
 
 NAME = "watched"
 DIRECTIONS = {Level.QUICK: 4, Level.DEFAULT: 8, Level.FULL: 32}
@@ -64,20 +63,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     tasks = [slight.task(lab) for slight in slights]
     lab.complete(tasks)
     for slight, task, run in zip(slights, tasks, lab.run(tasks), strict=True):
-        conditions: dict[str, Condition] = {"inner": slight.case.name, "side": slight.side}
-        conditions |= dict(zip(VARIABLES, slight.x.tolist(), strict=True))
-        conditions |= dict(zip(("n_x", "n_y", "n_z"), slight.n.tolist(), strict=True))
-        yield Measurement(
-            protocol=NAME,
-            quantity="case",
-            value=float(settled_case(run)),
-            uncertainty=0.0,
-            engine=lab.engine.name,
-            set=slight.set,
-            parameters=slight.p,
-            conditions=conditions,
-            runs=(lab.file(task),),
-        )
+        at = state_of(slight.x) | dict(zip(("n_x", "n_y", "n_z"), slight.n.tolist(), strict=True))
+        value, inner = settled_case(run), slight.case.name
+        yield measurement(lab, NAME, slight.set, slight.p, "case", value, [task], inner=inner, side=slight.side, **at)
 
 
 def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tuple[list[Slight], list[Missing]]:
