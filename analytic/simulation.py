@@ -21,10 +21,17 @@ MAX_SAMPLES = 5e7
 
 
 def simulate(
-    p: Parameters, x0: npt.ArrayLike, t_end: float, flow: Flow | None = None, settings: Settings | None = None, *,
-    sample_interval: float | None = None, theta_0: float = 0.0, progress: Callable[[float], None] | None = None,
+    p: Parameters,
+    x0: npt.ArrayLike,
+    t_end: float,
+    flow: Flow | None = None,
+    settings: Settings | None = None,
+    *,
+    sample_interval: float | None = None,
+    theta_0: float = 0.0,
+    progress: Callable[[float], None] | None = None,
     **changes: Any,
-) -> Trajectory:  # fmt: skip
+) -> Trajectory:
     """Simulate the ball across all nine cases.
 
     Parameters
@@ -61,9 +68,8 @@ def simulate(
     x = _start(x0, p, settings)
     times = _sample_times(t_end, sample_interval)
     theta_0 = check_number("theta_0", theta_0, "rad")
-    shown = dataclasses.asdict(settings) | {
-        "x0": list(x), "t_end": float(times[-1]), "sample_interval": float(times[1] - times[0]), "theta_0": theta_0,
-    }  # fmt: skip
+    start, (first, second, *_) = {"x0": list(x), "theta_0": theta_0}, times.tolist()
+    shown = dataclasses.asdict(settings) | start | {"t_end": float(times[-1]), "sample_interval": second - first}
     recorder = Recorder(p, times, progress)
     failure, cause = "", None
     try:

@@ -51,12 +51,8 @@ def branch(s: npt.ArrayLike, j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, ka
     den = np.where(den > 0, den, np.nan)
     Omega_c = np.sqrt(mu * (1 + eta * cos**2) / den)
     slip = mu * np.abs(j - eta) * sin / den
-    return BranchPoint(
-        *np.broadcast_arrays(
-            cos, sin, Omega_c, Omega_c + cos * slip / kappa, slip / (j * Omega_c),
-            (j - eta) * cos / den, mu * (1 + j * cos**2) / den,
-        )
-    )  # fmt: skip
+    Omega_0, A_y, B_x = Omega_c + cos * slip / kappa, (j - eta) * cos / den, mu * (1 + j * cos**2) / den
+    return BranchPoint(*np.broadcast_arrays(cos, sin, Omega_c, Omega_0, slip / (j * Omega_c), A_y, B_x))
 
 
 def slope(s: npt.ArrayLike, j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, kappa: npt.ArrayLike) -> Array:

@@ -30,10 +30,7 @@ class Cost:
     """Median of the ratios of timings next to each other: a machine that slows down does so for both."""
 
 
-def cost(
-    p: Parameters, x0: Sequence[float], runs: int = 1, steps: int = 2500, repeats: int = 5,
-    settings: ContactSettings | None = None,
-) -> Cost:  # fmt: skip
+def cost(p: Parameters, x0: Sequence[float], runs: int = 1, steps: int = 2500, repeats: int = 5) -> Cost:
     """Medians over `repeats` of bare and whole timings, of processor time, with a sample every 100 steps.
 
     They are taken in turn, each whole one between two bare ones.
@@ -42,17 +39,16 @@ def cost(
     with its forces, margins and surface velocities left as they are, and the ball held at its azimuth, where the wall
     stands, by a single assignment a step.
     """
-    settings = settings or ContactSettings()
+    settings = ContactSettings()
     model, _ = scene.build(p, settings)
     omega_0 = np.full((500, 1), p.omega_0)
     settled = Polar([model], [p], settings, [x0], 0.0, omega_0[0], batched=False)
     settled.advance(omega_0)
     bare, whole = [_bare(settled, runs, steps)], []
     for _ in range(repeats):
-        loop = Run(
-            [p] * runs, [x0] * runs, steps * settings.timestep, [Flow.steady(p.omega_0)] * runs, settings,
-            sample_interval=100 * settings.timestep, batched=runs > 1,
-        )  # fmt: skip
+        duration, interval, flow = steps * settings.timestep, 100 * settings.timestep, Flow.steady(p.omega_0)
+        starts = [p] * runs, [x0] * runs, duration, [flow] * runs
+        loop = Run(*starts, settings, sample_interval=interval, batched=runs > 1)
         start = time.process_time()
         for _ in loop:
             pass

@@ -93,12 +93,9 @@ class Classifier:
         """Changes of case so far, timed at the first sample of the new case."""
         if not self._changes:
             return Events()
-        time, before, after = zip(*self._changes, strict=True)
-        none = np.zeros((len(time), 3))
-        return Events(
-            time=np.array(time), from_case=np.array(before, np.int8), to_case=np.array(after, np.int8),
-            impulse_A=none, impulse_B=none,
-        )  # fmt: skip
+        time, before, after = (np.array(column) for column in zip(*self._changes, strict=True))
+        none, codes = np.zeros((len(time), 3)), {"from_case": before.astype(np.int8), "to_case": after.astype(np.int8)}
+        return Events(time=time, **codes, impulse_A=none, impulse_B=none)
 
 
 def _lasting(letters: npt.NDArray[np.intp], state: int, last: bool) -> npt.NDArray[np.intp]:

@@ -32,8 +32,12 @@ from model.arrays import Array
 from model.errors import suggestion
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
 
-CONES = ("elliptic", "pyramidal")
-INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
+CHOICES = {
+    "cone": ("elliptic", "pyramidal"),
+    "integrator": ("Euler", "implicit", "implicitfast", "discrete"),
+    "coordinates": ("polar", "free"),
+    "wall": ("tangent", "prism"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,11 +94,8 @@ class ContactSettings:
         check_number("iterations", self.iterations, "1", Range(1, whole=True))
         check_number("noslip_iterations", self.noslip_iterations, "1", Range(0, whole=True))
         check_number("facets", self.facets, "1", Range(3, 2000, whole=True))
-        for name, value, known in (
-            ("cone", self.cone, CONES), ("integrator", self.integrator, INTEGRATORS),
-            ("coordinates", self.coordinates, ("polar", "free")), ("wall", self.wall, ("tangent", "prism")),
-        ):  # fmt: skip
-            if value not in known:
+        for name, known in CHOICES.items():
+            if (value := getattr(self, name)) not in known:
                 raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(str(value), known)}")
         if self.order not in (1, 2):
             raise InputError(f"order = {self.order!r} must be 1 or 2")

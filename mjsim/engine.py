@@ -58,10 +58,19 @@ class Run:
     """
 
     def __init__(
-        self, parameters: Sequence[Parameters], x0s: Sequence[npt.ArrayLike], t_end: float,
-        flows: Sequence[Flow], settings: ContactSettings, *, sample_interval: float | None = None, theta_0: float = 0.0,
-        batched: bool = True, journal: Journal | None = None, progress: Callable[[float], None] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        parameters: Sequence[Parameters],
+        x0s: Sequence[npt.ArrayLike],
+        t_end: float,
+        flows: Sequence[Flow],
+        settings: ContactSettings,
+        *,
+        sample_interval: float | None = None,
+        theta_0: float = 0.0,
+        batched: bool = True,
+        journal: Journal | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
         if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
             raise InputError(
                 f"every run needs parameters, a start and a flow, but there are {len(parameters)} parameter sets, "
@@ -79,10 +88,8 @@ class Run:
         built = {p: scene.build(p, settings) for p in dict.fromkeys(scenes)}
         models = [built[p][0] for p in scenes]
         self._stepper = start(models, parameters, settings, states, theta_0, next(self._omega_0(0, 1)), batched)
-        shown = settings.to_mapping() | {
-            "t_end": float(t_end), "sample_interval": self._interval * settings.timestep,
-            "x0": None, "theta_0": theta_0,
-        }  # fmt: skip
+        shown = settings.to_mapping() | {"t_end": float(t_end), "sample_interval": self._interval * settings.timestep}
+        shown |= {"x0": None, "theta_0": theta_0}
         self.headers = [
             Header("mujoco", p, flow, shown | {"x0": list(x)}, built[still][1])
             for p, flow, x, still in zip(parameters, flows, states, scenes, strict=True)
@@ -161,16 +168,20 @@ class Run:
         axis = self._stepper.axis[i]
         if axis <= time:
             return f"reached the vessel's axis at t = {axis:g} s, where polar coordinates end"
-        where = "" if len(block) == 0 else " after " + ", ".join(
-            f"{name} = {block[name][-1]:.6g} {unit}" for name, unit in zip(VARIABLES, UNITS, strict=True)
-        )  # fmt: skip
-        return f"diverged by t = {time:g} s{where}"
+        names = zip(VARIABLES, UNITS, strict=True)
+        last = [f"{name} = {block[name][-1]:.6g} {unit}" for name, unit in names] if len(block) else []
+        return f"diverged by t = {time:g} s{' after ' * bool(last)}{', '.join(last)}"
 
 
 def start(
-    models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings, x0s: Sequence[npt.ArrayLike],
-    theta_0: float, omega_0: Array, batched: bool,
-) -> Stepper:  # fmt: skip
+    models: Sequence[Any],
+    parameters: Sequence[Parameters],
+    settings: ContactSettings,
+    x0s: Sequence[npt.ArrayLike],
+    theta_0: float,
+    omega_0: Array,
+    batched: bool,
+) -> Stepper:
     """Simulations in the coordinates that the settings ask for; arguments as for `mjsim.stepping.Polar`."""
     if settings.coordinates == "free":
         return Free(models, parameters, settings, x0s, theta_0)
@@ -178,10 +189,16 @@ def start(
 
 
 def simulate(
-    p: Parameters, x0: npt.ArrayLike, t_end: float, flow: Flow | None = None,
-    settings: ContactSettings | None = None, *, sample_interval: float | None = None, theta_0: float = 0.0,
+    p: Parameters,
+    x0: npt.ArrayLike,
+    t_end: float,
+    flow: Flow | None = None,
+    settings: ContactSettings | None = None,
+    *,
+    sample_interval: float | None = None,
+    theta_0: float = 0.0,
     progress: Callable[[float], None] | None = None,
-) -> Trajectory:  # fmt: skip
+) -> Trajectory:
     """Simulate one run with MuJoCo.
 
     Parameters
@@ -199,10 +216,9 @@ def simulate(
     SimulationError
         If the run diverges or reaches the vessel's axis; it carries the samples so far.
     """
-    run = Run(
-        [p], [x0], t_end, [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p),
-        sample_interval=sample_interval, theta_0=theta_0, batched=False, progress=progress,
-    )  # fmt: skip
+    flows, settings = [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p)
+    asked = [p], [x0], t_end, flows, settings
+    run = Run(*asked, sample_interval=sample_interval, theta_0=theta_0, batched=False, progress=progress)
     (trajectory,) = _joined(run, list(run))
     if not trajectory.complete:
         raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)
@@ -210,10 +226,16 @@ def simulate(
 
 
 def simulate_many(
-    parameters: Sequence[Parameters], x0s: Sequence[npt.ArrayLike], t_end: float,
-    flow: Flow | Sequence[Flow] | None = None, settings: ContactSettings | None = None, *,
-    sample_interval: float | None = None, theta_0: float = 0.0, progress: Callable[[float], None] | None = None,
-) -> list[Trajectory]:  # fmt: skip
+    parameters: Sequence[Parameters],
+    x0s: Sequence[npt.ArrayLike],
+    t_end: float,
+    flow: Flow | Sequence[Flow] | None = None,
+    settings: ContactSettings | None = None,
+    *,
+    sample_interval: float | None = None,
+    theta_0: float = 0.0,
+    progress: Callable[[float], None] | None = None,
+) -> list[Trajectory]:
     """Simulate many runs at once as one MuJoCo batch, in this process; arguments as in `simulate`.
 
     `flow` is one for all, one for each, or None for each one's own omega_0. A run that breaks down has a header

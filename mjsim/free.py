@@ -31,9 +31,13 @@ class Free(Stepper):
     """Simulations of free balls, one after the other; arguments as for `mjsim.stepping.Polar`."""
 
     def __init__(
-        self, models: Sequence[Any], parameters: Sequence[Parameters], settings: ContactSettings,
-        x0s: Sequence[npt.ArrayLike], theta_0: float,
-    ) -> None:  # fmt: skip
+        self,
+        models: Sequence[Any],
+        parameters: Sequence[Parameters],
+        settings: ContactSettings,
+        x0s: Sequence[npt.ArrayLike],
+        theta_0: float,
+    ) -> None:
         self._balls = [_Ball(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
         self.margins, self.axis = np.zeros((2, len(models))), np.full(len(models), np.inf)
 

@@ -15,9 +15,12 @@ from model import InputError, Parameters
 SCENE = Path(__file__).with_name("scene.xml")
 
 _ELEMENTS = {
-    "body": ("ball", "tangent"), "geom": ("ball", "floor", "wall", "vessel"), "pair": ("A", "B"), "sensor": ("A", "B"),
+    "body": ("ball", "tangent"),
+    "geom": ("ball", "floor", "wall", "vessel"),
+    "pair": ("A", "B"),
+    "sensor": ("A", "B"),
     "joint": ("azimuth", "inward", "upward", "spin"),
-}  # fmt: skip
+}
 _MAXFORCE = 2
 """Code of reduce="maxforce" in a contact sensor."""
 _INTEGRATORS = {
@@ -112,10 +115,9 @@ def _replace_wall(spec: Any, named: dict[str, dict[str, Any]], p: Parameters, se
     for facet in range(settings.facets):
         azimuth = 2 * math.pi * facet / settings.facets
         outwards = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-        geom = spec.worldbody.add_geom(
-            name=f"facet{facet}", type=mujoco.mjtGeom.mjGEOM_PLANE, size=wall.size, rgba=wall.rgba,
-            pos=(p.R + p.r) * outwards + [0.0, 0.0, 2 * p.r], contype=0, conaffinity=0,
-        )  # fmt: skip
+        place, plane = (p.R + p.r) * outwards + [0.0, 0.0, 2 * p.r], mujoco.mjtGeom.mjGEOM_PLANE
+        geom = spec.worldbody.add_geom(name=f"facet{facet}", type=plane, pos=place, size=wall.size, rgba=wall.rgba)
+        geom.contype, geom.conaffinity = 0, 0
         geom.alt.type, geom.alt.zaxis = mujoco.mjtOrientation.mjORIENTATION_ZAXIS, -outwards
         _set_pair(spec.add_pair(name=f"B{facet}", geomname1=geom.name, geomname2="ball"), p.eta, settings)
     # Where two facets meet, the one that carries more is reported.

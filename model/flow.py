@@ -92,10 +92,8 @@ class Flow:
 
     def to_mapping(self) -> dict[str, Any]:
         """A JSON-able description, exact."""
-        return {
-            "kind": self.kind, "start": self.start.tolist(),
-            "value": self.value.tolist(), "slope": self.slope.tolist(),
-        }  # fmt: skip
+        pieces = {name: getattr(self, name).tolist() for name in ("start", "value", "slope")}
+        return {"kind": self.kind} | pieces
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:

@@ -124,32 +124,24 @@ class Parameters:
 
     @classmethod
     def from_fluid(
-        cls, *, nu_f: float, rho_f: float, rho_b: float, r: float, R: float, mu: float, eta: float,
-        j: float = 0.4, gravity: float = 9.81, omega_0: float = 0.0,
-    ) -> Self:  # fmt: skip
+        cls, *, nu_f: float, rho_f: float, rho_b: float, r: float, gravity: float = 9.81, j: float = 0.4, **rest: float
+    ) -> Self:
         """Parameters of a uniform ball in a fluid: mass, Stokes drag by (10), gravity less buoyancy.
 
         Parameters
         ----------
         nu_f : kinematic viscosity of the fluid, m2 s-1, > 0
         rho_f, rho_b : densities of fluid and ball, kg m-3; the ball must be the denser
-        r, R, mu, eta, j, omega_0 : as in `Parameters`
         gravity : gravitational acceleration in vacuum, m s-2
+        r, j, rest : R, mu, eta and omega_0 (0 if not given), as in `Parameters`
         """
-        for name, value, unit in (
-            ("nu_f", nu_f, "m2 s-1"), ("rho_f", rho_f, "kg m-3"), ("rho_b", rho_b, "kg m-3"),
-            ("r", r, "m"), ("gravity", gravity, "m s-2"),
-        ):  # fmt: skip
-            check_number(name, value, unit, POSITIVE)
-        if rho_b <= rho_f:
-            raise InputError(
-                f"rho_b = {rho_b:g} kg m-3 is out of range: a ball not denser than the fluid "
-                f"(rho_f = {rho_f:g} kg m-3) floats; must be > rho_f"
-            )
-        return cls(
-            m=4 / 3 * math.pi * r**3 * rho_b, r=r, R=R, j=j, mu=mu, eta=eta,
-            g=gravity * (1 - rho_f / rho_b), c=9 * nu_f / (2 * r**2) * rho_f / rho_b, omega_0=omega_0,
-        )  # fmt: skip
+        check_number("nu_f", nu_f, "m2 s-1", POSITIVE)
+        check_number("rho_f", rho_f, "kg m-3", POSITIVE)
+        check_number("rho_b", rho_b, "kg m-3", Range(rho_f, open=True), "a ball that is no denser than the fluid floats; it")
+        check_number("r", r, "m", POSITIVE)
+        check_number("gravity", gravity, "m s-2", POSITIVE)
+        m, c = 4 / 3 * math.pi * r**3 * rho_b, 9 * nu_f / (2 * r**2) * rho_f / rho_b
+        return cls(m=m, r=r, j=j, g=gravity * (1 - rho_f / rho_b), c=c, **{"omega_0": 0.0} | rest)
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:

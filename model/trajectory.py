@@ -19,6 +19,7 @@ import numpy.typing as npt
 from model.arrays import Array
 from model.cases import Case
 from model.flow import Flow
+from model.kinematics import VARIABLES, State
 from model.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -28,8 +29,12 @@ AXES = ("x", "y", "z")
 """The paper's axes: x radially inwards, y upwards, z along the orbit."""
 
 
-def _column(units: str, long_name: str, equation: str = "", shape: tuple[int, ...] = ()) -> Any:
-    return field(repr=False, metadata={"units": units, "long_name": long_name, "equation": equation, "shape": shape})
+def _column(
+    units: str, long_name: str, equation: str = "", shape: tuple[int, ...] = (), dtype: Any = np.float64, **more: Any
+) -> Any:
+    """Declare a column of a table."""
+    about = {"units": units, "long_name": long_name, "equation": equation, "shape": shape, "dtype": dtype}
+    return field(repr=False, metadata=about, **more)
 
 
 @functools.cache
@@ -47,15 +52,12 @@ def current_versions() -> Mapping[str, str]:
 @functools.cache
 def current_commit() -> str:
     """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""
+    describe = ["git", "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"]
     here = Path(__file__).resolve().parent
     try:
-        answer = subprocess.run(
-            ["git", "-C", str(here), "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"],
-            capture_output=True, text=True, timeout=10, check=True,
-        )  # fmt: skip
+        return subprocess.check_output(describe, cwd=here, stderr=subprocess.DEVNULL, text=True, timeout=10).strip()
     except (OSError, subprocess.SubprocessError):
         return ""
-    return answer.stdout.strip()
 
 
 @dataclass(frozen=True)
@@ -104,23 +106,13 @@ class Trajectory:
     slip_speed_B: Array = _column("m s-1", "slip speed at the wall", "(7)")
     gap_A: Array = _column("m", "distance between ball and floor, negative where they overlap")
     gap_B: Array = _column("m", "distance between ball and wall, negative where they overlap")
-    case: npt.NDArray[np.int8] = field(
-        repr=False,
-        metadata={
-            "units": "1",
-            "long_name": "kinematic case",
-            "equation": "Fig. 2",
-            "shape": (),
-            "dtype": np.int8,
-        },
-    )
+    case: npt.NDArray[np.int8] = _column("1", "kinematic case", "Fig. 2", dtype=np.int8)
     events: Events = field(repr=False)
 
     @property
     def x(self) -> Array:
-        """The states in the order of `model.kinematics.VARIABLES`, shape (n, 8)."""
-        columns = (self.y, self.v_y, self.omega_c, self.slip_x, self.slip_y, self.slip_z, self.h, self.v_h)
-        return np.stack(columns, axis=-1)
+        """The states, shape (n, 8), columns in the order of `State`."""
+        return State(*(getattr(self, name) for name in VARIABLES)).stacked()
 
     @property
     def cases(self) -> list[Case]:
@@ -131,9 +123,8 @@ class Trajectory:
         """Longest stretches of samples in one case, with the times of their first and last sample, s."""
         starts = np.flatnonzero(np.diff(self.case, prepend=-1))
         ends = np.append(starts[1:], len(self.case)) - 1
-        return [
-            (Case(self.case[a]), float(self.time[a]), float(self.time[b])) for a, b in zip(starts, ends, strict=False)
-        ]
+        stretches = zip(self.case[starts], self.time[starts].tolist(), self.time[ends].tolist(), strict=False)
+        return [(Case(code), first, last) for code, first, last in stretches]
 
     @property
     def complete(self) -> bool:
@@ -159,10 +150,7 @@ class Trajectory:
 
 
 def _event_column(units: str, long_name: str, shape: tuple[int, ...] = (), dtype: Any = np.float64) -> Any:
-    return field(
-        default_factory=lambda: np.empty((0, *shape), dtype),
-        metadata={"units": units, "long_name": long_name, "equation": "", "shape": shape, "dtype": dtype},
-    )
+    return _column(units, long_name, "", shape, dtype, default_factory=lambda: np.empty((0, *shape), dtype))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -184,7 +172,7 @@ def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]
     return {f.name: f.metadata for f in dataclasses.fields(of) if "units" in f.metadata}
 
 
-SAMPLE = np.dtype([(name, meta.get("dtype", np.float64), meta["shape"]) for name, meta in columns(Trajectory).items()])
+SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in columns(Trajectory).items()])
 """One sample as a structured dtype; simulators yield blocks of these."""
 
 

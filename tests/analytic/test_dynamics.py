@@ -18,7 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analytic import contact_forces, dynamics, vector_field
-from model import Case, Contact, InputError, Parameters
+from analytic.rigid_body import Forces
+from model import Case, Contact, InputError, Parameters, State
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, slip_velocities
 
@@ -101,74 +102,68 @@ def test_velocities_of_the_contact_points() -> None:
 # --- numerically -----------------------------------------------------------------------------------------------
 
 
-def linear_solution(case: Case, x: np.ndarray, p: Parameters) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Solve (21) with Table 3, written out for motion off the wall too: forces (n, 6), rates (n, 8), scale of rates.
+UNKNOWNS = (*Forces._fields, "v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
+"""Of the linear system: the forces, and the rates of these variables."""
 
-    Unknowns: A_x A_y A_z B_x B_y B_z, dv_y, domega_c, dslip_x, dslip_y, dslip_z, dv_h.
-    """
+
+def linear_solution(case: Case, x: np.ndarray, p: Parameters) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Solve (21) with Table 3, written out for motion off the wall too: forces (n, 6), rates (n, 8), scale of rates."""
     n = len(x)
     _, v_y, oc, wx, _, wz, h, vh = x.T
     rho, jmr, one = p.R - h, p.j * p.m * p.r, np.ones(n)
-    oz = v_y / p.r + wz
-    M, b = np.zeros((n, 12, 12)), np.zeros((n, 12))
-    size = np.zeros((n, 6))
+    oz, droll = v_y / p.r + wz, rho / p.r  # (rho omega_c)'/r = rho omega_c'/r - v_h omega_c/r
+    M, b, size, k = np.zeros((n, 12, 12)), np.zeros((n, 12)), np.zeros((n, 6)), 0
 
-    def row(k: int, terms: dict[int, np.ndarray | float], *rhs: np.ndarray | float) -> None:
-        for column, value in terms.items():
-            M[:, k, column] = value
+    def row(*rhs: np.ndarray | float, **terms: np.ndarray | float) -> None:
+        nonlocal k
+        for name, value in terms.items():
+            M[:, k, UNKNOWNS.index(name)] = value
         b[:, k] = sum(rhs)
         if k < 6:
             size[:, k] = sum(np.abs(part) * one for part in rhs)
-
-    row(0, {0: 1, 3: 1, 11: -p.m}, p.m * rho * oc**2, p.m * p.c * vh)
-    row(1, {1: 1, 4: 1, 6: -p.m}, p.m * p.g, p.m * p.c * v_y)
-    row(2, {2: 1, 5: 1, 7: -p.m * rho}, -2 * p.m * vh * oc, p.m * p.c * rho * oc, -p.m * p.c * rho * p.omega_0)
-    droll = {7: rho / p.r}  # (rho omega_c)'/r = rho omega_c'/r - v_h omega_c/r
-    row(3, {2: 1, 7: jmr * droll[7], 8: jmr}, jmr * vh * oc / p.r, -jmr * oc * oz)
-    row(4, {5: 1, 7: jmr * droll[7], 9: -jmr}, jmr * vh * oc / p.r)
-    row(5, {0: 1, 4: -1, 6: -jmr / p.r, 10: -jmr}, -jmr * oc * rho * oc / p.r, -jmr * oc * wx)
-    v_A, v_B = slip_velocities(x, p)
-    k = 6
-    for contact, first, normal, others, rest, slide in (
-        (case.A, 0, 1, (0, 2), 6, v_A), (case.B, 3, 3, (4, 5), 11, v_B),
-    ):  # fmt: skip
-        if contact is Contact.N:
-            for column in range(first, first + 3):
-                row(k, {column: 1}, 0.0)
-                k += 1
-            continue
-        row(k, {rest: 1}, 0.0)
         k += 1
+
+    row(p.m * rho * oc**2, p.m * p.c * vh, A_x=1, B_x=1, v_h=-p.m)
+    row(p.m * p.g, p.m * p.c * v_y, A_y=1, B_y=1, v_y=-p.m)
+    drag = p.m * p.c * rho * oc, -p.m * p.c * rho * p.omega_0
+    row(-2 * p.m * vh * oc, *drag, A_z=1, B_z=1, omega_c=-p.m * rho)
+    row(jmr * vh * oc / p.r, -jmr * oc * oz, A_z=1, omega_c=jmr * droll, slip_x=jmr)
+    row(jmr * vh * oc / p.r, B_z=1, omega_c=jmr * droll, slip_y=-jmr)
+    row(-jmr * oc * rho * oc / p.r, -jmr * oc * wx, A_x=1, B_y=-1, v_y=-jmr / p.r, slip_z=-jmr)
+    for contact, point, rise, normal, friction, slide in zip(
+        (case.A, case.B), "AB", ("v_y", "v_h"), ("A_y", "B_x"), (p.mu, p.eta), slip_velocities(x, p), strict=True
+    ):
+        components = [f"{point}_{axis}" for axis in "xyz"]
+        if contact is Contact.N:
+            for component in components:
+                row(0.0, **{component: 1})
+            continue
+        row(0.0, **{rise: 1})
         if contact is Contact.S:
-            friction = p.mu if first == 0 else p.eta
             direction = slide / np.linalg.norm(slide, axis=1, keepdims=True)
-            for column in others:
-                row(k, {column: 1, normal: friction * direction[:, column - first]}, 0.0)
-                k += 1
-        elif first == 0:  # rates of v_A: (dv_h + dv_y + r dw_z, -r dw_x)
-            row(k, {11: 1 / p.r, 6: 1 / p.r, 10: 1}, 0.0)
-            row(k + 1, {8: 1}, 0.0)
-            k += 2
+            for component, along in zip(components, direction.T, strict=True):
+                if component != normal:
+                    row(0.0, **{component: 1, normal: friction * along})
+        elif point == "A":  # rates of v_A: (dv_h + dv_y + r dw_z, -r dw_x)
+            row(0.0, v_h=1 / p.r, v_y=1 / p.r, slip_z=1)
+            row(0.0, slip_x=1)
         else:
-            if case is Case.RR:
-                row(k, {4: 1}, 0.0)  # w_z' = 0 is there already: fix the free force instead
-            else:
-                row(k, {10: 1}, 0.0)
-            row(k + 1, {9: 1}, 0.0)
-            k += 2
+            # In RR w_z' = 0 is there already: the free force is fixed instead.
+            row(0.0, **{"B_y" if case is Case.RR else "slip_z": 1})
+            row(0.0, slip_y=1)
     assert k == 12
     # Equilibrate: one unit of force, one unit of angular acceleration.
     scale = np.array([p.m * p.g] * 6 + [p.g, p.g / p.r, p.g / p.r, p.g / p.r, p.g / p.r, p.g])
     M, weight = M * scale, np.abs(M * scale).max(axis=2)
     solved = np.linalg.solve(M / weight[..., None], (b / weight)[..., None])[..., 0] * scale
-    dx = np.stack([v_y, *(solved[:, c] for c in (6, 7, 8, 9, 10)), vh, solved[:, 11]], axis=1)
-    newton, euler = size[:, :3].max(axis=1) + np.abs(solved[:, :6]).max(axis=1), size.max(axis=1)
+    force, (dv_y, *rates, dv_h) = solved[:, :6], solved[:, 6:].T
+    dx = State(v_y, dv_y, *rates, vh, dv_h).stacked()
+    newton, euler = size[:, :3].max(axis=1) + np.abs(force).max(axis=1), size.max(axis=1)
     load = np.maximum(newton, euler)
     accelerations = load / (p.m * min(p.j, 1.0))
-    rates = np.stack([
-        np.abs(v_y), accelerations, accelerations / rho, *[accelerations / p.r] * 3, np.abs(vh), accelerations,
-    ], axis=1)  # fmt: skip
-    return solved[:, :6], dx, np.concatenate([rates, np.repeat(load[:, None], 6, axis=1)], axis=1)
+    slips = [accelerations / p.r] * 3
+    largest = State(np.abs(v_y), accelerations, accelerations / rho, *slips, np.abs(vh), accelerations).stacked()
+    return force, dx, np.concatenate([largest, np.repeat(load[:, None], 6, axis=1)], axis=1)
 
 
 @pytest.mark.parametrize("case", list(Case))

@@ -61,9 +61,7 @@ def test_ranges_at_the_edges() -> None:
 def test_characteristic_slope_by_differences(trial: int) -> None:
     """Central differences of omega_c between neighbouring flows, on SS (error of order step^2) and elsewhere."""
     rng = np.random.default_rng(trial)
-    p = P.replace(
-        mu=float(rng.uniform(0.05, 1)), j=float(rng.uniform(0.2, 0.6)), c=float(10 ** rng.uniform(-1, 1)),
-    )  # fmt: skip
+    p = P.replace(mu=rng.uniform(0.05, 1), j=rng.uniform(0.2, 0.6), c=10 ** rng.uniform(-1, 1))
     p = p.replace(eta=float(p.j * rng.uniform(0.1, 0.9)))
     t, h = thresholds(p), 1e-5
     for omega_0 in (0.5 * t.omega_01, *(t.omega_01 + (t.omega_02 - t.omega_01) * np.array([0.2, 0.5, 0.9]))):

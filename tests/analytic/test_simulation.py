@@ -27,10 +27,8 @@ RUNS = int(os.environ.get("DUALBALL_RANDOM_RUNS", "10000"))
 def random_run(seed):
     """Parameters and a state, reference ranges: any friction up to 1.2, any drag, slips, on or off floor and wall."""
     rng = np.random.default_rng(seed)
-    p = P.replace(
-        mu=rng.uniform(0.02, 1.2), eta=rng.uniform(0.02, 1.2), c=10 ** rng.uniform(-2, 1), j=rng.uniform(0.1, 2 / 3),
-        omega_0=rng.uniform(-40, 40),
-    )  # fmt: skip
+    mu, eta, c, j = rng.uniform(0.02, 1.2), rng.uniform(0.02, 1.2), 10 ** rng.uniform(-2, 1), rng.uniform(0.1, 2 / 3)
+    p = P.replace(mu=mu, eta=eta, c=c, j=j, omega_0=rng.uniform(-40, 40))
     orbit = math.sqrt(p.g / p.R)
     x = np.zeros(8)
     x[2] = rng.normal() * orbit
@@ -56,9 +54,8 @@ def assert_lawful(run, tolerance):
     assert np.all(np.hypot(B_y, B_z) <= p.eta * B_x + tolerance * weight)
     assert np.all(run.gap_A >= -tolerance * p.R)
     assert np.all(run.gap_B >= -tolerance * p.R)
-    for contact, gap, slip, force in (
-        ("A", run.gap_A, run.slip_speed_A, run.force_A), ("B", run.gap_B, run.slip_speed_B, run.force_B)
-    ):  # fmt: skip
+    at_A, at_B = ("A", run.gap_A, run.slip_speed_A, run.force_A), ("B", run.gap_B, run.slip_speed_B, run.force_B)
+    for contact, gap, slip, force in (at_A, at_B):
         state = np.array([getattr(case, contact) for case in run.cases])
         assert np.all(np.abs(gap[state != Contact.N]) == 0)
         assert np.all(force[state == Contact.N] == 0)
@@ -105,9 +102,14 @@ def test_ten_thousand_random_runs(capsys):
 
 
 @given(
-    mu=st.floats(0, 1), eta=st.floats(0, 1), omega_0=st.floats(-40, 40), c=st.floats(0, 5), omega_c=st.floats(-20, 20),
-    slips=st.tuples(*[st.floats(-60, 60)] * 3), e=st.sampled_from([0.0, 0.5]),
-)  # fmt: skip
+    mu=st.floats(0, 1),
+    eta=st.floats(0, 1),
+    omega_0=st.floats(-40, 40),
+    c=st.floats(0, 5),
+    omega_c=st.floats(-20, 20),
+    slips=st.tuples(*[st.floats(-60, 60)] * 3),
+    e=st.sampled_from([0.0, 0.5]),
+)
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_laws_hold_for_any_parameters(mu, eta, omega_0, c, omega_c, slips, e):
     """From states at both contacts, the edges mu = 0, eta = 0, c = 0 and zero slips among them."""

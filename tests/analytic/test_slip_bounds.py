@@ -26,20 +26,18 @@ class Symbols:
 
 def random_sets(count: int, top: float = 1.0) -> list[Parameters]:
     rng = np.random.default_rng(count)
-    found = []
+    sets = []
     for _ in range(count):
         R = 10 ** rng.uniform(-2, 0)
-        values = {
-            "mu": rng.uniform(0.02, top), "eta": rng.uniform(0.02, top), "j": rng.uniform(0.1, 2 / 3), "R": R,
-            "r": R * rng.uniform(0.05, 0.9), "c": 10 ** rng.uniform(-2, 1), "g": rng.uniform(1, 15),
-            "m": 10 ** rng.uniform(-3, 1), "omega_0": rng.uniform(-3, 3) * np.sqrt(9.81 / R),
-        }  # fmt: skip
-        found.append(Parameters(**{name: float(value) for name, value in values.items()}))
-    return found
+        mu, eta, j, r = rng.uniform([0.02, 0.02, 0.1, 0.05 * R], [top, top, 2 / 3, 0.9 * R]).tolist()
+        c, m, g = 10 ** rng.uniform(-2, 1), 10 ** rng.uniform(-3, 1), rng.uniform(1, 15)
+        omega_0 = rng.uniform(-3, 3) * np.sqrt(9.81 / R)
+        sets.append(Parameters(m=m, r=r, R=R, j=j, mu=mu, eta=eta, g=g, c=c, omega_0=omega_0))
+    return sets
 
 
-def rolling(omega_c: float) -> list[float]:
-    return [0.0, 0.0, omega_c, 0.0, 0.0, 0.0]
+def rolling(omega_c: float) -> State:
+    return State(omega_c=omega_c)
 
 
 # --- as printed ------------------------------------------------------------------------------------------------

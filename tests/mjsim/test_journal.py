@@ -18,10 +18,8 @@ P = Parameters.named("reference").replace(omega_0=25.0)
 def run(directory: Path | None, batched: bool = True) -> Run:
     """Spin-up from rest through rolling into slipping: about four blocks of samples."""
     journal = Journal(directory, interval=0.0) if directory else None
-    return Run(
-        [P], [np.zeros(8)], 4.5, [Flow.steady(25.0)], ContactSettings(), sample_interval=5e-3, batched=batched,
-        journal=journal,
-    )  # fmt: skip
+    spin_up = [P], [np.zeros(8)], 4.5, [Flow.steady(25.0)], ContactSettings()
+    return Run(*spin_up, sample_interval=5e-3, batched=batched, journal=journal)
 
 
 def joined(part: Run) -> np.ndarray:
