@@ -16,8 +16,7 @@ import h5py
 import numpy as np
 
 from model.arrays import Array
-from model.errors import StorageError
-from model.files import WholeFile, remove_leftovers
+from model.files import WholeFile, make_directory, reading, remove_leftovers
 
 _T = TypeVar("_T")
 
@@ -35,10 +34,7 @@ class Journal:
 
     def __init__(self, directory: Path, interval: float = 30.0) -> None:
         self._directory, self._interval = directory, interval
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StorageError(f"cannot write {directory}: {error.strerror}") from error
+        make_directory(directory)
         remove_leftovers(directory)
         self._count = len(list(directory.glob("*.h5")))
         self._waiting: list[Array] = []
@@ -56,12 +52,8 @@ class Journal:
         return blocks, state
 
     def _read(self, k: int, take: Callable[[h5py.File], _T]) -> _T:
-        path = self._path(k)
-        try:
-            with h5py.File(path, "r") as file:
-                return take(file)
-        except (OSError, KeyError) as error:
-            raise StorageError(f"cannot read {path}: {error}; remove {self._directory} to start anew") from error
+        with reading(self._path(k), f"remove {self._directory} to start anew") as file:
+            return take(file)
 
     def note(self, samples: Array, state: dict[str, Array]) -> None:
         """Keep a block of raw samples and the state after it; written once the interval has passed."""

@@ -113,25 +113,30 @@ class _Disk(io.FileIO):
 
 
 @contextmanager
-def reading(path: str | Path) -> Iterator[h5py.File]:
+def reading(path: str | Path, remedy: str = "") -> Iterator[h5py.File]:
     """An HDF5 file that `WholeFile` wrote, open for reading.
 
-    Raises `StorageError`, in one line that names the file, if it is missing, damaged, cut, changed, or foreign; an
-    `InputError` or error of HDF5 within the context becomes one, too.
+    Raises `StorageError`, in one line that names the file and what to do, the `remedy`, if it is missing, damaged, cut,
+    changed, or foreign; an `InputError` or error of HDF5 within the context becomes one, too.
     """
-    if not Path(path).is_file():
-        raise StorageError(f"cannot read {path}: there is no such file")
     try:
+        if not Path(path).is_file():
+            raise StorageError("there is no such file")
         with Path(path).open("rb") as content:
             _check_seal(content)
         with h5py.File(path, "r") as file:
             yield file
-    except InputError as error:
-        raise StorageError(f"cannot read {path}: {error}") from error
-    except OSError as error:
-        raise StorageError(f"cannot read {path}: {error.strerror or _first_line(error)}") from error
-    except (RuntimeError, LookupError, ValueError, TypeError, AttributeError, OverflowError, MemoryError) as error:
-        raise StorageError(f"cannot read {path}: it does not hold what it should ({_first_line(error)})") from error
+    except (
+        OSError,
+        RuntimeError,
+        LookupError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        ArithmeticError,
+        MemoryError,
+    ) as e:
+        raise StorageError(f"cannot read {path}: {_reason(e)}{remedy and f'; {remedy}'}") from e
 
 
 def dataset(file: h5py.File, name: str) -> h5py.Dataset:
@@ -170,8 +175,22 @@ def _checksum(content: BinaryIO, size: int) -> bytes:
     return digest.hexdigest().encode()
 
 
-def _first_line(error: BaseException) -> str:
-    return (str(error).strip() or type(error).__name__).splitlines()[0]
+def _reason(error: Exception) -> str:
+    """Why a file can't be read."""
+    first_line = (str(error).strip() or type(error).__name__).splitlines()[0]
+    if isinstance(error, InputError):
+        return first_line
+    if isinstance(error, OSError):
+        return error.strerror or first_line
+    return f"it does not hold what it should ({first_line})"
+
+
+def make_directory(path: Path) -> None:
+    """Make a directory where there is none; raises `StorageError`."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}") from error
 
 
 def check_writable(path: str | Path) -> None:

@@ -137,7 +137,7 @@ class Parameters:
         """
         check_number("nu_f", nu_f, "m2 s-1", POSITIVE)
         check_number("rho_f", rho_f, "kg m-3", POSITIVE)
-        check_number("rho_b", rho_b, "kg m-3", Range(rho_f, open=True), "a ball that is no denser than the fluid floats; it")
+        check_number("rho_b", rho_b, "kg m-3", Range(rho_f, open=True), "a ball not denser than the fluid floats; it")
         check_number("r", r, "m", POSITIVE)
         check_number("gravity", gravity, "m s-2", POSITIVE)
         m, c = 4 / 3 * math.pi * r**3 * rho_b, 9 * nu_f / (2 * r**2) * rho_f / rho_b

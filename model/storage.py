@@ -1,4 +1,4 @@
-"""The HDF5 form of a trajectory: one run a file, flat, whole or not there at all; and the same in memory for xarray.
+"""The HDF5 form of a trajectory: one run a file, flat, whole or not there at all.
 
 `TrajectoryWriter` appends blocks of samples while a simulation runs, to a temporary name that becomes the final one
 only when the file is whole. `save` writes a short trajectory at once, into the bytes of an empty file of its length:
@@ -15,24 +15,30 @@ import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import h5py
 import numpy as np
 import numpy.typing as npt
 
 from model.cases import Case
-from model.errors import InputError, StorageError
+from model.errors import StorageError
 from model.files import WholeFile, dataset, reading
 from model.flow import Flow
 from model.parameters import Parameters
-from model.trajectory import AXES, SAMPLE, Events, Header, Trajectory, columns
-
-if TYPE_CHECKING:
-    import xarray
-
-SCHEMA = "dualball-trajectory"
-SCHEMA_VERSION = 1
+from model.trajectory import (
+    AXES,
+    AXIS_ATTRIBUTES,
+    SAMPLE,
+    SCHEMA,
+    SCHEMA_VERSION,
+    Events,
+    Header,
+    Trajectory,
+    attributes,
+    columns,
+    event_name,
+)
 
 _CHUNK = 1024
 _AT_ONCE = 4096
@@ -70,7 +76,7 @@ class TrajectoryWriter:
         self._whole = WholeFile(path, template or _empty(None)[0])
         self._file = self._whole.file
         try:
-            for name, text in _header_attributes(header).items():
+            for name, text in header.attributes().items():
                 self._file.attrs[name] = text
             self._file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
             self._whole.flush()
@@ -98,7 +104,7 @@ class TrajectoryWriter:
     def finish(self, events: Events, failure: str = "", path: str | Path | None = None) -> None:
         """Write the events and why the run stopped early, if it did; then give the file its name, or `path`."""
         for name in columns(Events) if len(events) else ():
-            column = self._file[_event_name(name)]
+            column = self._file[event_name(name)]
             column.resize(len(events), axis=0)
             column[...] = getattr(events, name)
         self._file.attrs["failure"] = failure
@@ -116,46 +122,30 @@ def _empty(count: int | None) -> tuple[bytes, Mapping[str, int]]:
         file.attrs["schema"] = SCHEMA
         file.attrs["schema_version"] = SCHEMA_VERSION
         axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
-        axis.attrs.update(_AXIS)
+        axis.attrs.update(AXIS_ATTRIBUTES)
         axis.make_scale("axis")
         for name, meta in columns(Trajectory).items():
             _create_column(file, name, meta, "time", count)
         for name, meta in columns(Events).items():
-            _create_column(file, _event_name(name), meta, "event_time")
+            _create_column(file, event_name(name), meta, "event_time")
         places = {} if not count else {name: file[name].id.get_offset() for name in columns(Trajectory)}
     return content.getvalue(), places
 
 
 def _create_column(file: h5py.File, name: str, meta: Mapping[str, Any], scale: str, count: int | None = None) -> None:
-    shape, dtype = meta["shape"], _CASE_ENUM if meta.get("dtype") is np.int8 else np.float64
+    shape, dtype = meta["shape"], _CASE_ENUM if meta["dtype"] is np.int8 else np.float64
     if count:
         column = file.create_dataset(name, data=np.zeros((count, *shape), dtype), dtype=dtype)
     else:
         layout = {"maxshape": (None, *shape), "chunks": (_CHUNK, *shape), "compression": "gzip", "shuffle": True}
         column = file.create_dataset(name, (0, *shape), dtype, **layout)
-    column.attrs.update(_attributes(meta))
+    column.attrs.update(attributes(meta))
     if name == scale:
         column.make_scale(scale)
     else:
         column.dims[0].attach_scale(file[scale])
     if shape:
         column.dims[1].attach_scale(file["axis"])
-
-
-def to_xarray(trajectory: Trajectory) -> xarray.Dataset:
-    """What xarray reads from the stored file of a trajectory; raises `InputError` if xarray isn't installed."""
-    try:
-        import xarray  # here, because it is optional and takes a second to load
-    except ImportError as error:
-        raise InputError("to_xarray() needs xarray: pip install 'dualball[xarray]'") from error
-    variables: dict[str, Any] = {"axis": ("axis", list(AXES), _AXIS), "mjcf": ((), trajectory.header.mjcf)}
-    for name, meta in columns(Trajectory).items():
-        variables[name] = (("time", "axis")[: 1 + len(meta["shape"])], getattr(trajectory, name), _attributes(meta))
-    for name, meta in columns(Events).items():
-        dimensions = ("event_time", "axis")[: 1 + len(meta["shape"])]
-        variables[_event_name(name)] = (dimensions, getattr(trajectory.events, name), _attributes(meta))
-    schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
-    return xarray.Dataset(variables, attrs=schema | _header_attributes(trajectory.header))
 
 
 def load(path: str | Path) -> Trajectory:
@@ -180,7 +170,7 @@ def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
 def _read(file: h5py.File, part: slice) -> Trajectory:
     header = _read_header(file)
     samples = {name: _read_column(file, name, meta, part) for name, meta in columns(Trajectory).items()}
-    events = {name: _read_column(file, _event_name(name), meta) for name, meta in columns(Events).items()}
+    events = {name: _read_column(file, event_name(name), meta) for name, meta in columns(Events).items()}
     for table in (samples, events):
         lengths = {name: len(values) for name, values in table.items()}
         if len(set(lengths.values())) > 1:
@@ -189,19 +179,6 @@ def _read(file: h5py.File, part: slice) -> Trajectory:
     if not np.isin(codes, list(Case)).all():
         raise StorageError("it holds a case that does not exist")
     return Trajectory(header=header, events=Events(**events), **samples)
-
-
-def _header_attributes(header: Header) -> dict[str, str]:
-    return {
-        "engine": header.engine,
-        "parameters": json.dumps(dataclasses.asdict(header.parameters)),
-        "flow": json.dumps(header.flow.to_mapping()),
-        "settings": json.dumps(dict(header.settings)),
-        "versions": json.dumps(dict(header.versions)),
-        "commit": header.commit,
-        "created": header.created,
-        "failure": header.failure,
-    }
 
 
 def _read_header(file: h5py.File) -> Header:
@@ -215,22 +192,11 @@ def _read_header(file: h5py.File) -> Header:
             f"it was written by a newer dualball: its schema version is {version}, this program reads up to "
             f"{SCHEMA_VERSION}"
         )
-    text = {name: _text(file, name) for name in _ATTRIBUTES}
-    parsed = {name: _json(text[name], name) for name in ("parameters", "flow", "settings", "versions")}
-    return Header(
-        engine=text["engine"],
-        parameters=Parameters.from_mapping(parsed["parameters"]),
-        flow=Flow.from_mapping(parsed["flow"]),
-        settings=parsed["settings"],
-        mjcf=dataset(file, "mjcf").asstr()[()],
-        failure=text["failure"],
-        versions=parsed["versions"],
-        commit=text["commit"],
-        created=text["created"],
-    )
-
-
-_ATTRIBUTES = ("engine", "parameters", "flow", "settings", "versions", "commit", "created", "failure")
+    values: dict[str, Any] = {f.name: _text(file, f.name) for f in dataclasses.fields(Header) if f.name != "mjcf"}
+    values |= {name: _json(values[name], name) for name in ("parameters", "flow", "settings", "versions")}
+    values["parameters"] = Parameters.from_mapping(values["parameters"])
+    values["flow"] = Flow.from_mapping(values["flow"])
+    return Header(**values, mjcf=dataset(file, "mjcf").asstr()[()])
 
 
 def _text(file: h5py.File, name: str) -> str:
@@ -254,23 +220,6 @@ def _read_column(file: h5py.File, name: str, meta: Mapping[str, Any], part: slic
     column = dataset(file, name)
     if column.shape is None or column.shape[1:] != meta["shape"] or len(column.shape) != 1 + len(meta["shape"]):
         raise StorageError(f"{name!r} has shape {column.shape}")
-    dtype = meta.get("dtype", np.float64)
-    if column.dtype.kind != np.dtype(dtype).kind:
+    if column.dtype.kind != np.dtype(meta["dtype"]).kind:
         raise StorageError(f"{name!r} has type {column.dtype}")
-    return np.asarray(column[part], dtype=dtype)
-
-
-def _attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
-    """The attributes of a stored column."""
-    attributes = {key: meta[key] for key in ("units", "long_name", "equation") if meta[key]}
-    if meta.get("dtype") is np.int8:  # the CF convention's names of the codes, for readers that drop the HDF5 enum
-        attributes["flag_values"] = np.array([case.value for case in Case], np.int8)
-        attributes["flag_meanings"] = " ".join(case.name for case in Case)
-    return attributes
-
-
-_AXIS = {"units": "1", "long_name": "axes of the co-rotating frame: x inwards, y up, z along"}
-
-
-def _event_name(column: str) -> str:
-    return "event_" + column.removesuffix("_case")
+    return np.asarray(column[part], dtype=meta["dtype"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import json
 import platform
 import subprocess
 from collections.abc import Iterable, Mapping
@@ -18,6 +19,7 @@ import numpy.typing as npt
 
 from model.arrays import Array
 from model.cases import Case
+from model.errors import InputError
 from model.flow import Flow
 from model.kinematics import VARIABLES, State
 from model.parameters import Parameters
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 """The paper's axes: x radially inwards, y upwards, z along the orbit."""
+AXIS_ATTRIBUTES = {"units": "1", "long_name": "axes of the co-rotating frame: x inwards, y up, z along"}
+SCHEMA, SCHEMA_VERSION = "dualball-trajectory", 1
+"""What a file or an xarray data set of a trajectory says of itself."""
 
 
 def _column(
@@ -80,6 +85,13 @@ class Header:
     """The commit of the program, if it ran from a checkout."""
     created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     """UTC time."""
+
+    def attributes(self) -> dict[str, str]:
+        """All but the MJCF as text, mappings as JSON."""
+        texts = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "mjcf"}
+        mappings = {name: dict(texts[name]) for name in ("settings", "versions")}
+        mappings |= {"parameters": dataclasses.asdict(self.parameters), "flow": self.flow.to_mapping()}
+        return texts | {name: json.dumps(mapping) for name, mapping in mappings.items()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -136,9 +148,18 @@ class Trajectory:
 
         Raises `InputError` if xarray, an optional dependency, isn't installed.
         """
-        from model import storage  # here, because it builds on this module
-
-        return storage.to_xarray(self)
+        try:
+            import xarray  # here, because it is optional and takes a second to load
+        except ImportError as error:
+            raise InputError("to_xarray() needs xarray: pip install 'dualball[xarray]'") from error
+        variables: dict[str, Any] = {"axis": ("axis", list(AXES), AXIS_ATTRIBUTES), "mjcf": ((), self.header.mjcf)}
+        for name, meta in columns(Trajectory).items():
+            variables[name] = (("time", "axis")[: 1 + len(meta["shape"])], getattr(self, name), attributes(meta))
+        for name, meta in columns(Events).items():
+            dimensions = ("event_time", "axis")[: 1 + len(meta["shape"])]
+            variables[event_name(name)] = (dimensions, getattr(self.events, name), attributes(meta))
+        schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
+        return xarray.Dataset(variables, attrs=schema | self.header.attributes())
 
     @classmethod
     def from_blocks(cls, header: Header, blocks: Iterable[npt.NDArray[np.void]], events: Events) -> Self:
@@ -170,6 +191,20 @@ class Events:
 def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]:
     """Name and metadata (units, long_name, equation, shape, dtype) of every array column, in order."""
     return {f.name: f.metadata for f in dataclasses.fields(of) if "units" in f.metadata}
+
+
+def attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
+    """The attributes of a column in a file and in xarray."""
+    attributes = {key: meta[key] for key in ("units", "long_name", "equation") if meta[key]}
+    if meta["dtype"] is np.int8:  # the CF convention's names of the codes, for readers that drop the HDF5 enum
+        attributes["flag_values"] = np.array([case.value for case in Case], np.int8)
+        attributes["flag_meanings"] = " ".join(case.name for case in Case)
+    return attributes
+
+
+def event_name(column: str) -> str:
+    """The name of a column of `Events` in a file and in xarray."""
+    return "event_" + column.removesuffix("_case")
 
 
 SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in columns(Trajectory).items()])
