@@ -25,6 +25,8 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SEAL = b"\ndualball sha256 "
 _TRAILER = len(_SEAL) + 64
 _BLOCK = 1 << 20
+_DAMAGE = OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError, MemoryError
+"""What reading a file that does not hold what it should may end in."""
 
 
 class WholeFile:
@@ -126,17 +128,8 @@ def reading(path: str | Path, remedy: str = "") -> Iterator[h5py.File]:
             _check_seal(content)
         with h5py.File(path, "r") as file:
             yield file
-    except (
-        OSError,
-        RuntimeError,
-        LookupError,
-        ValueError,
-        TypeError,
-        AttributeError,
-        ArithmeticError,
-        MemoryError,
-    ) as e:
-        raise StorageError(f"cannot read {path}: {_reason(e)}{remedy and f'; {remedy}'}") from e
+    except _DAMAGE as error:
+        raise StorageError(f"cannot read {path}: {_reason(error)}{remedy and f'; {remedy}'}") from error
 
 
 def dataset(file: h5py.File, name: str) -> h5py.Dataset:
@@ -186,11 +179,13 @@ def _reason(error: Exception) -> str:
 
 
 def make_directory(path: Path) -> None:
-    """Make a directory where there is none; raises `StorageError`."""
+    """Make a directory where there is none; raises `StorageError` if that, or writing in it, is not allowed."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StorageError(f"cannot write {path}: {error.strerror}") from error
+        raise StorageError(f"cannot write to {path}: {error.strerror}") from error
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise StorageError(f"cannot write to {path}: Permission denied")
 
 
 def check_writable(path: str | Path) -> None:

@@ -21,7 +21,7 @@ from typing import Any, Self
 from compare.runs.tasks import Outcome, OutOfTimeError, Task, failed_path, store
 from compare.runs.workers import Workers, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
-from model.files import remove_leftovers, write_text
+from model.files import make_directory, remove_leftovers, write_text
 from model.parameters import POSITIVE, Range, check_number
 
 BATCH = 64
@@ -78,12 +78,7 @@ class Campaign:
         if self.limit != math.inf:
             check_number("limit", self.limit, "s", POSITIVE)
         self.directory = Path(self.directory).resolve()
-        try:
-            self.directory.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StorageError(f"cannot write to {self.directory}: {error.strerror}") from error
-        if not os.access(self.directory, os.W_OK | os.X_OK):
-            raise StorageError(f"cannot write to {self.directory}: Permission denied")
+        make_directory(self.directory)
         self._executor: Executor | None = None
         self._failed: dict[str, Failure] = {}
         self._held: dict[str, Trajectory] = {}
