@@ -1,14 +1,15 @@
-"""Numbers with uncertainties from sampled runs: window means, settling, extrapolation to a vanishing step."""
+"""Numbers with uncertainties from sampled runs: window means, lines, exponents; and numbers as JSON holds them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq, linear_sum_assignment
+from scipy.optimize import linear_sum_assignment
 
 from model import Case, InputError, Trajectory
 from model.arrays import Array
@@ -26,13 +27,13 @@ class Measured:
     independent: float = math.nan
 
 
-@dataclass(frozen=True)
-class Extrapolated:
-    """The limit of a vanishing time step; `order` is what the three steps show, nan if they show none."""
-
-    value: float
-    uncertainty: float
-    order: float
+def plain(value: Any) -> Any:
+    """Nested data as JSON holds it: lists for tuples, None for a number that is not finite."""
+    if isinstance(value, Mapping):
+        return {name: plain(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def window_mean(time: npt.ArrayLike, values: npt.ArrayLike) -> Measured:
@@ -75,45 +76,6 @@ def _approach(v: Array) -> float:
     slower = abs(third - second) / abs(second - first) if second != first else 0.0
     # Thirds that come together by less than a twentieth say only that nothing has settled.
     return abs(third - first) / 2 + abs(third - second) * slower / (1 - min(slower, 0.95))
-
-
-def settled_from(time: npt.ArrayLike, values: npt.ArrayLike, tolerance: float) -> float:
-    """Earliest time (s) from which samples stay within `tolerance` of the mean of their last tenth; nan if never.
-
-    A run counts as settled only if it did so in its first 9 tenths.
-    """
-    t, v = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
-    tail = max(1, len(v) // 10)
-    away = np.flatnonzero(np.abs(v - v[-tail:].mean()) > tolerance)
-    if len(away) == 0:
-        return float(t[0])
-    return float(t[away[-1] + 1]) if away[-1] + 1 < len(v) - tail else math.nan
-
-
-def richardson(
-    steps: Sequence[float], values: Sequence[float], uncertainties: Sequence[float] = (0.0, 0.0, 0.0)
-) -> Extrapolated:
-    """Extrapolate three values at decreasing time steps to step 0, by ``value + const step^order``.
-
-    The uncertainty is what the observed order changes against the nearest whole one, and the noise. Where differences
-    don't shrink like a power of the step between 0.2 and 8 there is no order to go by: the value at the smallest step
-    stands, and the largest difference is its uncertainty. Raises `InputError` unless there are three falling steps.
-    """
-    if not len(steps) == len(values) == len(uncertainties) == 3 or not steps[0] > steps[1] > steps[2] > 0:
-        raise InputError(f"Richardson extrapolation needs three falling time steps > 0, not {list(steps)}")
-    (h1, h2, h3), (v1, v2, v3) = steps, values
-    noise = math.hypot(*uncertainties)
-    spread = max(abs(v1 - v2), abs(v2 - v3))
-
-    def excess(order: float) -> float:
-        return float((v1 - v2) * (h2**order - h3**order) - (v2 - v3) * (h1**order - h2**order))
-
-    low, high = 0.2, 8.0
-    if abs(v2 - v3) <= 3 * noise or excess(low) * excess(high) >= 0:
-        return Extrapolated(v3, math.hypot(spread, noise), math.nan)
-    order = float(brentq(excess, low, high))
-    correction, whole = ((v3 - v2) / ((h2 / h3) ** q - 1) for q in (order, max(1, round(order))))
-    return Extrapolated(v3 + correction, abs(correction - whole) + (1 + abs(correction / (v3 - v2))) * noise, order)
 
 
 def tail(run: Trajectory, share: float = 0.1) -> slice:

@@ -23,7 +23,7 @@ from compare.runs.campaign import Campaign, Progress
 from compare.runs.engines import MUJOCO, Engine
 from compare.runs.progress import Show
 from compare.runs.workers import Workers
-from compare.scorecard import scoreboard
+from compare.scorecard import scores
 from model import Parameters, StorageError
 
 HELD = 2**19
@@ -89,7 +89,7 @@ def validate(
                 broken[protocol.name] = f"{protocol.name}: {type(error).__name__}: {error}"
         if level > Level.QUICK and claims is None:
             progress("ladder of settings, error against cost", 0, 1, 0)
-            scoreboard.write(campaign, output)
+            scores.write(campaign, output)
     files = [path for protocol in PROTOCOLS if (path := kept / f"{protocol.name}.h5").exists()]
     _write(output, level, files, report, verdicts)
     return [verdicts[claim.id] for claim in chosen]
@@ -109,7 +109,7 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None) -> 
 
 def material(directory: Path, verdicts: Sequence[Verdict], records: Records) -> Material:
     """What figures of a results directory are made of."""
-    return Material(tuple(verdicts), records, directory, **scoreboard.read(directory))
+    return Material(tuple(verdicts), records, directory, **scores.read(directory))
 
 
 def stored_material(directory: Path) -> Material:

@@ -16,6 +16,7 @@ from rich.table import Table
 import analytic
 from analytic import StationarySolution, Thresholds
 from compare.commands import options
+from compare.statistics import plain
 from model import Case, Parameters
 from model.kinematics import UNITS, VARIABLES
 
@@ -67,14 +68,17 @@ class Prediction:
 
     def to_mapping(self) -> dict[str, Any]:
         """JSON-able data; what doesn't exist is null."""
-        return {
-            "parameters": dataclasses.asdict(self.parameters),
-            "groups": {"kappa": self.parameters.kappa, "Omega_0": self.parameters.Omega_0},
-            "thresholds": {k: _finite(v) for k, v in dataclasses.asdict(self.thresholds).items()},
-            "operating_range": _finite(self.operating_range),
-            "reading": self.reading,
-            "solutions": [_solution(solution) for solution in self.solutions],
-        }
+        about: dict[str, Any] = plain(
+            {
+                "parameters": dataclasses.asdict(self.parameters),
+                "groups": {"kappa": self.parameters.kappa, "Omega_0": self.parameters.Omega_0},
+                "thresholds": dataclasses.asdict(self.thresholds),
+                "operating_range": self.operating_range,
+                "reading": self.reading,
+                "solutions": [_solution(solution) for solution in self.solutions],
+            }
+        )
+        return about
 
 
 def predict(p: Parameters) -> Prediction:
@@ -161,7 +165,3 @@ def _solution(s: StationarySolution) -> dict[str, Any]:
         "slip_stable": bool(s.slip_stable),
         "family": list(s.family),
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

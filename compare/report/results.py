@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,6 +16,7 @@ from compare.claims.claim import Check, Verdict
 from compare.measure import record
 from compare.measure.lab import Level
 from compare.measure.record import Records
+from compare.statistics import plain
 from model.errors import StorageError
 from model.files import write_text
 from model.trajectory import current_commit, current_versions
@@ -51,39 +51,22 @@ def describe(verdict: Verdict) -> dict[str, Any]:
     """A verdict as JSON-able data; a number that is not finite is null."""
     claim = verdict.claim
     texts = {name: getattr(claim, name) for name in ("section", "source", "statement", "text", "reason")}
-    return {
-        "id": claim.id,
-        "verdict": verdict.outcome,
-        "expected": claim.expected,
-        "passed": verdict.passed,
-        **texts,
-        "resolving_power": {name: _finite(value) for name, value in verdict.resolving_power.items()},
-        "worst": _finite(verdict.worst),
-        "missing": list(verdict.missing),
-        "error": verdict.error,
-        "checks": [_check(check) for check in verdict.checks],
-    }
+    about = {"id": claim.id, "verdict": verdict.outcome, "expected": claim.expected, "passed": verdict.passed, **texts}
+    power = {"resolving_power": dict(verdict.resolving_power), "worst": verdict.worst}
+    less = {"missing": list(verdict.missing), "error": verdict.error}
+    return {**plain(about | power | less), "checks": [_check(check) for check in verdict.checks]}
 
 
 def _check(check: Check) -> dict[str, Any]:
     m = check.measurement
-    numbers = ("predicted", "deviation", "tolerance", "scale", "resolves")
-    return {
-        **{name: getattr(m, name) for name in ("protocol", "quantity", "unit", "engine", "set")},
-        "parameters": dataclasses.asdict(m.parameters),
-        "conditions": dict(m.conditions),
-        "measured": _finite(m.value),
-        "uncertainty": _finite(m.uncertainty),
-        "relation": check.relation,
-        **{name: _finite(getattr(check, name)) for name in numbers},
-        "agrees": check.agrees,
-        "conclusive": check.conclusive,
-        "runs": list(m.runs),
-    }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    of_measurement = ("protocol", "quantity", "unit", "engine", "set", "conditions", "uncertainty", "runs")
+    numbers = ("relation", "predicted", "deviation", "tolerance", "scale", "resolves", "agrees", "conclusive")
+    described: dict[str, Any] = plain(
+        {name: getattr(m, name) for name in of_measurement}
+        | {"parameters": dataclasses.asdict(m.parameters), "measured": m.value}
+        | {name: getattr(check, name) for name in numbers}
+    )
+    return described
 
 
 def open_directory(directory: Path) -> None:

@@ -5,15 +5,12 @@ Each function runs what it needs in a campaign and returns the rows of one table
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import qmc
 
-import analytic
-from analytic import StationarySolution, rolling_forces
+from analytic import rolling_forces
 from compare.runs.campaign import Campaign
 from compare.runs.engines import EVENT, MUJOCO
 from compare.runs.tasks import Task
@@ -39,23 +36,6 @@ REACHED = tuple(
 )
 OFF = 1.02
 """Start near a state, in units of its variables."""
-RANGES = {
-    "R": (0.01, 0.5),
-    "r/R": (0.05, 0.6),
-    "j": (0.1, 0.66),
-    "mu": (0.05, 0.9),
-    "eta": (0.05, 0.6),
-    "g": (1.0, 15.0),
-    "kappa": (0.03, 0.3),
-    "Omega_0": (0.3, 3.0),
-}
-"""Of random parameter sets."""
-LOGARITHMIC = ("R", "kappa", "Omega_0")
-"""Those spread evenly in their logarithms."""
-SEED = 5
-AWAY, LONGEST = 0.03, 200.0
-"""Least relative distance of omega_0 from a threshold, and longest run (s) of a random set: near a threshold nothing
-settles."""
 FINE = (4e-3, 2e-3, 1e-3, 4e-4, 2e-4, 1e-4)
 """Time steps of the transient, s; from the last three it is extrapolated."""
 MOTIONS = {
@@ -119,48 +99,6 @@ def reached(campaign: Campaign, states: Sequence[State] = REACHED, steps: Sequen
                 ]
             )
     return rows
-
-
-def random_sets(campaign: Campaign, count: int = 32) -> Rows:
-    """Errors of the attracting states of random parameter sets at a step of 1 ms, by case; SR at y = 0 is NR."""
-    states = [State(p, s.case) for p in random_parameters(count) for s in _stable_solutions(p)]
-    tasks = [
-        _mujoco(s.p, _near(s), math.ceil(s.forgets / (1 - WINDOW)), ContactSettings.for_problem(s.p)) for s in states
-    ]
-    errors: dict[Case, list[tuple[float, float, float]]] = {}
-    for state, held in zip(states, _held(campaign, states, tasks), strict=True):
-        errors.setdefault(state.case, []).append((abs(held.omega_c), _relative_slip(held, state), held.open))
-    rows = [["case", "states", "ω_c, median", "ω_c, largest", "slip, median", "slip, largest", "open, largest"]]
-    for case in sorted(errors):
-        table = np.array(errors[case])
-        (omega_c, slip, _), (omega_c_most, slip_most, gaps) = np.median(table, axis=0), table.max(axis=0)
-        cells = [number(value) for value in (omega_c, omega_c_most, slip, slip_most)]
-        rows.append([case.name, str(len(table)), *cells, f"{gaps:.1%}"])
-    return rows
-
-
-def _stable_solutions(p: Parameters) -> list[StationarySolution]:
-    return [solution for solution in analytic.stable_solutions(p) if solution.case is not Case.SR]
-
-
-def random_parameters(count: int) -> list[Parameters]:
-    """Parameter sets in `RANGES`, off the thresholds, with states that settle in time."""
-    kept: list[Parameters] = []
-    design = qmc.Halton(len(RANGES), seed=SEED)
-    while len(kept) < count:
-        (shares,) = design.random(1)
-        v = {
-            name: low * (high / low) ** share if name in LOGARITHMIC else low + share * (high - low)
-            for share, (name, (low, high)) in zip(shares.tolist(), RANGES.items(), strict=True)
-        }
-        unit = math.sqrt(v["g"] / v["R"])
-        direct = {name: v[name] for name in ("R", "j", "mu", "eta", "g")}
-        p = SMOOTH.replace(**direct, r=v["r/R"] * v["R"], c=v["kappa"] * unit, omega_0=v["Omega_0"] * unit)
-        limits = np.array(dataclasses.astuple(analytic.thresholds(p))[:4])
-        ends = [State(p, solution.case).forgets for solution in _stable_solutions(p)]
-        if ends and max(ends) <= LONGEST and not np.any(np.abs(limits / p.omega_0 - 1) < AWAY):
-            kept.append(p)
-    return kept
 
 
 def transient(campaign: Campaign, steps: Sequence[float] = FINE) -> Rows:

@@ -70,7 +70,6 @@ def _frontier(campaign: Campaign) -> Rows:
 TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "formulas": lambda campaign: confirmation.table(),
     "reached": accuracy.reached,
-    "random": accuracy.random_sets,
     "transient": accuracy.transient,
     "events": accuracy.event_times,
     "split": accuracy.force_split,

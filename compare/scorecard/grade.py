@@ -22,8 +22,8 @@ from compare.scorecard import trials
 from compare.scorecard.advice import advice
 from compare.scorecard.contenders import NEWCOMER, OURS, PLAIN, Contender, costs
 from compare.scorecard.native import Native
-from compare.scorecard.plain import without_nan
 from compare.scorecard.trials import AT_REST, KICKED, ROLLING, ROUGH, SLIPPING, SMOOTH, STATES, Held, State
+from compare.statistics import plain
 from mjsim import ContactSettings
 from model import Case, Contact, Parameters, Trajectory
 
@@ -75,10 +75,8 @@ class Column:
     def to_mapping(self) -> dict[str, Any]:
         """JSON-able data; None for what is missing."""
         values = dataclasses.asdict(self)
-        plain: dict[str, Any] = without_nan(
-            values | {"reproduced": self.reproduced, "cost_of_a_second": self.cost_of_a_second}
-        )
-        return plain
+        more = {"reproduced": self.reproduced, "cost_of_a_second": self.cost_of_a_second}
+        return {name: plain(value) for name, value in (values | more).items()}
 
 
 def grade(

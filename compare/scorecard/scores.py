@@ -15,6 +15,7 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -25,14 +26,17 @@ from compare.runs.engines import MOREAU, NEWCOMER, Settings
 from compare.runs.tasks import Task, carry_out, failed_path
 from compare.scorecard import settings as ways
 from compare.scorecard import trials
-from compare.scorecard.plain import without_nan
 from compare.scorecard.trials import AT_REST, KICKED, PASSES, SLIPPING, STATES
+from compare.statistics import plain
 from mjsim import ContactSettings, Run
-from model import Flow, Trajectory, storage
+from model import Flow, StorageError, Trajectory, storage
 from model.files import write_text
 
+FILE = "scores.json"
 STEP = 1e-3
 """Time step of the ladder and the variants, s."""
+STEPS = (4e-3, 2e-3, 1e-3)
+"""Time steps of error against cost that figures show, s."""
 WINDOW = 0.1
 """Last part of a settled run, which is averaged."""
 REPEATS = 3
@@ -59,9 +63,9 @@ class Score:
     """Processor time over simulated time; nan where it isn't measured."""
 
     def to_mapping(self) -> dict[str, Any]:
-        """JSON-able data; None for nan."""
-        plain: dict[str, Any] = without_nan(dataclasses.asdict(self))
-        return plain
+        """JSON-able data; None for what is not finite."""
+        values: dict[str, Any] = plain(dataclasses.asdict(self))
+        return values
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
@@ -183,3 +187,24 @@ ELSEWHERE = [
 ]
 """Other engines in co-rotating coordinates, from 2 % off the states: measured once, on another machine, not part of
 this program."""
+
+
+def write(campaign: Campaign, directory: Path) -> None:
+    """Measure ladder and error against cost for figures, and keep them beside the results, unless they are there."""
+    if not (directory / FILE).exists():
+        measured = {"ladder": ladder(campaign), "frontier": frontier(campaign, STEPS)}
+        content = {name: [score.to_mapping() for score in row] for name, row in measured.items()}
+        write_text(directory / FILE, json.dumps(content, indent=1))
+
+
+def read(directory: Path) -> dict[str, tuple[Score, ...]]:
+    """The scores by name, none where none were measured; raises `StorageError` for a file that isn't whole."""
+    path = directory / FILE
+    if not path.exists():
+        return {}
+    try:
+        rows = json.loads(path.read_text("utf-8"))
+        kept = {name: tuple(Score.from_mapping(values) for values in rows[name]) for name in ("ladder", "frontier")}
+    except (ValueError, KeyError, TypeError) as error:
+        raise StorageError(f"{path} is damaged: remove it, and it is measured again") from error
+    return {**kept, "elsewhere": tuple(ELSEWHERE)}

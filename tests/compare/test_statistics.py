@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compare.statistics import correlation_length, richardson, settled_from, window_mean
+from compare.statistics import correlation_length, window_mean
 from model import InputError
 
 T = np.linspace(0, 10, 1001)
@@ -34,34 +34,8 @@ def test_uncertainty_covers_the_rest_of_an_exponential_approach(rate) -> None:
     assert abs(mean.value - 2.0) <= 2 * mean.uncertainty
 
 
-def test_settled_from() -> None:
-    values = np.exp(-T)
-    # |exp(-t) - exp(-10)| < 1e-2 from t = ln(100) on, up to the mean of the tail.
-    assert settled_from(T, values, 1e-2) == pytest.approx(np.log(100), abs=0.05)
-    assert np.isnan(settled_from(T, T, 0.1))
-
-
-@pytest.mark.parametrize("order", [1.0, 2.0])
-def test_richardson_finds_order_and_limit(order) -> None:
-    steps = [4e-3, 2e-3, 1e-3]
-    values = [1.0 + 5 * h**order + 7 * h ** (order + 1) for h in steps]
-    limit = richardson(steps, values)
-    assert limit.order == pytest.approx(order, abs=0.05)
-    assert abs(limit.value - 1.0) <= limit.uncertainty
-    assert abs(limit.value - 1.0) < abs(values[2] - 1.0) / 10
-
-
-def test_richardson_does_not_extrapolate_noise() -> None:
-    limit = richardson([4e-3, 2e-3, 1e-3], [1.0, 1.2, 0.9], [0.2, 0.2, 0.2])
-    assert np.isnan(limit.order)
-    assert limit.value == 0.9
-    assert limit.uncertainty >= 0.3
-
-
 def test_bad_input() -> None:
     with pytest.raises(InputError, match="at least 6 samples"):
         window_mean([0, 1], [1, 2])
     with pytest.raises(InputError, match="finite"):
         window_mean(np.arange(6), [1, 2, 3, 4, 5, np.nan])
-    with pytest.raises(InputError, match="three falling time steps"):
-        richardson([1e-3, 2e-3, 4e-3], [1, 2, 3])
