@@ -19,7 +19,7 @@ import numpy as np
 from mjsim import ContactSettings, scene
 from model import InputError, Parameters, StorageError
 from model.errors import suggestion
-from model.parameters import check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, check_number
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 CONES = ("pyramidal", "elliptic")
@@ -73,12 +73,10 @@ class Native:
     """What the file that it was read from lacks, and what stands for it."""
 
     def __post_init__(self) -> None:
-        for name, unit in (("timestep", "s"), ("impratio", "1")):
-            if check_number(name, getattr(self, name), unit) <= 0:
-                raise InputError(f"{name} = {getattr(self, name):g} {unit} is out of range: must be > 0")
+        check_number("timestep", self.timestep, "s", POSITIVE)
+        check_number("impratio", self.impratio, "1", POSITIVE)
         for name in ("iterations", "noslip_iterations", "tolerance"):
-            if getattr(self, name) < 0:
-                raise InputError(f"{name} = {getattr(self, name):g} is out of range: must be >= 0")
+            check_number(name, getattr(self, name), "1", NOT_NEGATIVE)
         for name, known in (("integrator", INTEGRATORS), ("cone", CONES), ("solver", SOLVERS)):
             value = getattr(self, name)
             if value not in known:

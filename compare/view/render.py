@@ -21,6 +21,11 @@ from compare.view.stage import Stage
 from model import InputError, StorageError, Trajectory
 from model.arrays import Array
 from model.files import check_writable
+from model.parameters import POSITIVE, Range, check_number
+
+WIDTHS = Range(160, 1920)
+"""Of pictures, pixels."""
+_IN_RUN = "to be within the run it"
 
 
 def picture(run: Trajectory, at: float | None = None, width: int = 960) -> Image.Image:
@@ -45,14 +50,11 @@ def film(
 
     Raises as `picture`, and `StorageError` if the file can't be written.
     """
-    for name, value in (("seconds", seconds), ("speed", speed), ("rate", rate)):
-        if not value > 0:
-            raise InputError(f"{name} = {value:g} is out of range: must be > 0")
-    end = min(start + seconds * speed, float(run.time[-1]) if len(run.time) else 0.0)
-    times = np.arange(start, end + 1e-12, speed / rate)
-    if len(times) == 0:
-        raise InputError(f"from = {start:g} s is out of range: the run ends at {end:g} s")
-    images = _frames(run, times, width, f"× {speed:g}")
+    for name, value, unit in (("seconds", seconds, "s"), ("speed", speed, "1"), ("rate", rate, "s-1")):
+        check_number(name, value, unit, POSITIVE)
+    check_number("from", start, "s", _within(run), _IN_RUN)
+    end = min(start + seconds * speed, float(run.time[-1]))
+    images = _frames(run, np.arange(start, end + 1e-12, speed / rate), width, f"× {speed:g}")
     first = next(images)
     palette = _palette(first)
     frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in itertools.chain([first], images)]
@@ -100,16 +102,15 @@ def _save(image: Image.Image, output: Path, **options: Any) -> None:
         raise StorageError(f"cannot write {output}: {error.strerror or error}") from error
 
 
-def _frames(run: Trajectory, times: Array, width: int, note: str = "") -> Iterator[Image.Image]:
+def _within(run: Trajectory) -> Range:
     if len(run.time) == 0:
         raise InputError("the run has no samples to show")
-    for time in times:
-        if not run.time[0] <= time <= run.time[-1]:
-            raise InputError(
-                f"time = {time:g} s is out of range: the run has samples from {run.time[0]:g} to {run.time[-1]:g} s"
-            )
-    if not 160 <= width <= 1920:
-        raise InputError(f"width = {width} pixels is out of range: must be >= 160 and <= 1920")
+    return Range(float(run.time[0]), float(run.time[-1]))
+
+
+def _frames(run: Trajectory, times: Array, width: int, note: str = "") -> Iterator[Image.Image]:
+    check_number("time", times[0], "s", _within(run), _IN_RUN)
+    check_number("width", width, "pixels", WIDTHS)
     stage = Stage(run, width)
     try:
         for time in times:

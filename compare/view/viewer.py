@@ -15,6 +15,7 @@ from mjsim import ContactSettings, limits, scene
 from mjsim.stepping import Polar
 from model import Flow, InputError, Parameters
 from model.kinematics import full_state
+from model.parameters import POSITIVE, check_number
 
 FRAME = 1 / 60
 """Time between two pictures, s."""
@@ -33,8 +34,7 @@ def view(
 
     Raises `InputError` if there is no display, or for a speed out of range.
     """
-    if not speed > 0:
-        raise InputError(f"speed = {speed:g} is out of range: must be > 0")
+    check_number("speed", speed, "1", POSITIVE)
     if platform.system() == "Linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise InputError(
             "there is no display for a window; 'dualball simulate' and 'dualball render' make a film instead"

@@ -90,10 +90,10 @@ def test_the_ball_turns_with_its_angular_velocity(reference: Parameters) -> None
     [
         ("film.mp4", {}, r"cannot write film\.mp4: a picture is a \.png, a film a \.gif"),
         ("nowhere/p.png", {}, "there is no directory nowhere"),
-        ("p.png", {"at": 9.0}, r"time = 9 s is out of range: the run has samples from 0 to 0\.8 s"),
+        ("p.png", {"at": 9.0}, r"time = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$"),
         ("p.png", {"width": 9999}, "width = 9999 pixels is out of range"),
         ("p.gif", {"start": 2.0}, "from = 2 s is out of range"),
-        ("p.gif", {"speed": 0.0}, "speed = 0 is out of range"),
+        ("p.gif", {"speed": 0.0}, "speed = 0 1 is out of range"),
     ],
 )
 def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name: str, options: dict, message: str) -> None:
