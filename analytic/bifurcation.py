@@ -70,6 +70,15 @@ def number_of_folds(p: Parameters) -> int:
     return slipping_branch.sign_changes(p.j, p.mu, p.eta, p.kappa)
 
 
+def critical_drag(p: Parameters) -> float:
+    """The drag c in s-1 at which p.eta is eta_cr, (87): for less of it SS has a fold. eta_cr rises like c^2.
+
+    `InputError` unless 0 < eta < j, mu > 0 and p.c > 0; else p.c plays no part.
+    """
+    check_branch(p)
+    return p.c * float(np.sqrt(p.eta / slipping_branch.eta_critical(p.mu, p.kappa)))
+
+
 def check_branch(p: Parameters) -> None:
     """`InputError` unless SS has a branch from RR to SR: 0 < eta < j, mu > 0 and c > 0."""
     if not (0 < p.eta < p.j and p.mu > 0 and p.c > 0):

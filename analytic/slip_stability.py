@@ -17,7 +17,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from analytic import dynamics
+from analytic import dynamics, roots
 from model import Case, Contact, Parameters, State
 from model.arrays import Array
 from model.cases import TRAITS
@@ -132,6 +132,22 @@ def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters)
     This is (53) for the dotted arrows of Fig. 6, with n along v_y.
     """
     return float(dynamics.rates(outer, dynamics.check_state(inner, x, p), p, p.omega_0).v_y)
+
+
+def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
+    """omega_c in rad s-1 at which the ball begins to lift, at states else like x that go round with the fluid.
+
+    Looked for between a tenth and ten times that of x; nan where it lifts at both or at none.
+    """
+    state = dynamics.check_state(inner, x, p)
+
+    def rise(omega_c: float) -> float:
+        return lift_acceleration(inner, outer, state._replace(omega_c=omega_c), p.replace(omega_0=omega_c))
+
+    low, high = 0.1 * float(state.omega_c), 10 * float(state.omega_c)
+    if rise(low) * rise(high) > 0:
+        return float("nan")
+    return float(roots.bisected(np.vectorize(rise), low, high))
 
 
 def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:

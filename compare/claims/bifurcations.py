@@ -88,6 +88,13 @@ def _number_of_folds(m: Measurement) -> float:
         raise LookupError(str(error)) from error
 
 
+def _critical_drag(m: Measurement) -> float:
+    try:
+        return bifurcation.critical_drag(m.parameters)
+    except InputError as error:
+        raise LookupError(str(error)) from error
+
+
 def _claim(bifurcation: str, statement: str, *bearings: Bearing) -> Claim:
     return Claim(
         id=f"table-5-{bifurcation}",
@@ -143,6 +150,12 @@ CLAIMS = (
         ),
         bearings=(
             Bearing(protocol=THRESHOLDS, quantity="folds", predict=_folds, by="analytic.thresholds: eta_cr"),
+            Bearing(
+                protocol="birth",
+                quantity="critical_drag",
+                predict=_critical_drag,
+                by="analytic.bifurcation.critical_drag",
+            ),
             _at("omega_02", of=SLIPPING),
         ),
     ),

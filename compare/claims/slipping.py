@@ -33,6 +33,12 @@ def _along(inner: Case, outer: Case, by: str = "") -> Callable[[Measurement], bo
     return along
 
 
+def _out_of(inner: Case, outer: Case) -> Callable[[Measurement], bool]:
+    """Along an arrow, random or dragged; not in the direction that bears on the extrema alone."""
+    ways = [_along(inner, outer, by) for by in ("", "dragged")]
+    return lambda m: any(along(m) for along in ways)
+
+
 def _arrow(inner: Case, outer: Case) -> Claim:
     return Claim(
         id=f"slip-{inner.name}-{outer.name}",
@@ -44,11 +50,46 @@ def _arrow(inner: Case, outer: Case) -> Claim:
                 protocol="growth",
                 quantity="gamma",
                 predict=_gamma,
-                when=_along(inner, outer),
+                when=_out_of(inner, outer),
                 scale=slip_unit,
                 by="slip_stability.gamma",
             ),
             *((_GAMMA_NR,) if inner is Case.NR else ()),
+        ),
+    )
+
+
+def _lift(m: Measurement, lift: Callable[..., float]) -> float:
+    inner, outer = Case[str(m.conditions["inner"])], Case[str(m.conditions["outer"])]
+    return lift(inner, outer, np.array(state(m)), m.parameters)
+
+
+def _lifting(inner: Case, outer: Case) -> Claim:
+    def along(m: Measurement) -> bool:
+        return m.conditions["inner"] == inner.name
+
+    never = inner is Case.RS
+    return Claim(
+        id=f"lift-{inner.name}-{outer.name}",
+        section="Slipping",
+        source="Fig. 6, dotted",
+        statement=f"Out of {inner.name} the ball {'never ' * never}lifts off the floor{'' if never else ' once'}"
+        f"{', whatever its orbit' if never else f' the wall alone, in {outer.name}, would drive it up'}.",
+        bearings=(
+            Bearing(
+                protocol="lift",
+                quantity="lifts",
+                predict=lambda m: float(_lift(m, slip_stability.lift_acceleration) > 0),
+                when=along,
+                by="slip_stability.lift_acceleration",
+            ),
+            Bearing(
+                protocol="lift",
+                quantity="lift_onset",
+                predict=lambda m: _lift(m, slip_stability.lift_onset),
+                when=along,
+                by="slip_stability.lift_onset",
+            ),
         ),
     )
 
@@ -62,7 +103,7 @@ _GAMMA_NR = Bearing(
     protocol="growth",
     quantity="gamma",
     predict=_gamma_nr,
-    when=_along(Case.NR, Case.NS),
+    when=_out_of(Case.NR, Case.NS),
     scale=slip_unit,
     by="slip_bounds.gamma_nr",
 )
@@ -148,6 +189,7 @@ def _watched(inner: Case, outer: Case) -> Bearing:
 
 CLAIMS = (
     *(_arrow(inner, outer) for inner, outer in slip_stability.SLIP_ARROWS),
+    *(_lifting(inner, outer) for inner, outer in slip_stability.LIFT_ARROWS),
     _claim(
         "eq-61",
         "(60), (61)",

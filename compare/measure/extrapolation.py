@@ -26,6 +26,17 @@ def vanishing(where: Array, order: Sequence[Measured]) -> Measured:
     return _converged(zero, order)
 
 
+def initial_slope(where: Array, order: Sequence[Measured]) -> Measured:
+    """How the place goes with a quantity where that is zero: the derivative there."""
+    size = max(abs(m.value) for m in order)
+
+    def slope(values: Array, count: int) -> float:
+        fit = np.polynomial.Polynomial.fit(values[:count] / size, where[:count], count - 1)
+        return float(fit.deriv()(0.0)) / size
+
+    return _converged(slope, order)
+
+
 def turning(where: Array, order: Sequence[Measured]) -> Measured:
     """The place at its maximum as a function of a quantity; nan if the polynomials have none."""
 

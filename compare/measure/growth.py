@@ -53,6 +53,8 @@ STRAIGHT = 1e-4
 COARSE = 6e-3
 """Largest uncertainty that counts, in units of (1+j)/j g/r: where a contact is hardly loaded, slip turns too fast."""
 SMOOTH = "without friction at both contacts there is nothing that rolls"
+SINKING = 0.5
+"""Speed at which a ball sinks on which the fluid also pulls along the wall as hard as its weight, over g/c."""
 SIDEWAYS = (0.3, 1.0, 0.3)
 """A direction of slip that is almost that of the wall's contact alone."""
 
@@ -70,7 +72,7 @@ class Push:
     n: Array
     """Unit vector (3,) over slip_x, slip_y, slip_z."""
     by: str = ""
-    """``sideways`` for the direction `SIDEWAYS`; empty for one at random."""
+    """``sideways`` for the direction `SIDEWAYS`, ``dragged`` where the fluid pulls hard; empty for one at random."""
 
     def task(self, lab: Lab, size: float, times: int = 1) -> Task:
         """The run with one size of slip, in units of `_slip_unit`, and `times` as many steps."""
@@ -173,6 +175,11 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[Push]:
     n = np.array(SIDEWAYS) / np.linalg.norm(SIDEWAYS)
     x = np.array([0.0, 0.0, slow, 0.0, 0.0, 0.0, 0.0, 0.0])
     yield Push(name, p.replace(omega_0=slow), Case.RR, Case.SS, x, n, "sideways")
+    for side in (1, -1):
+        x = random_state(Case.NR, p, rng)
+        x[1] = -SINKING * p.g / p.c
+        dragged = p.replace(omega_0=x[2] + p.g / (p.c * p.R))
+        yield Push(name, dragged, Case.NR, Case.NS, x, np.array([0.0, 0.8 * side, 0.6]), "dragged")
     for (inner, outer), count in PUSHES.items():
         for _ in range(count * more):
             x = random_state(inner, p, rng)

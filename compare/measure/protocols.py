@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from compare.measure import (
+    birth,
     bounds,
     edge,
     field,
@@ -10,6 +11,7 @@ from compare.measure import (
     hysteresis,
     impacts,
     laws,
+    lift,
     motions,
     newcomer,
     plane,
@@ -31,9 +33,11 @@ PROTOCOLS: tuple[Protocol, ...] = (
     Protocol("laws", laws.measure),
     Protocol("thresholds", thresholds.measure),
     Protocol("edge", edge.measure, ("thresholds",)),
+    Protocol("birth", birth.measure, ("thresholds",)),
     Protocol("unloading", unloading.measure, ("thresholds",)),
     Protocol("field", field.measure),
     Protocol("growth", growth.measure),
+    Protocol("lift", lift.measure),
     Protocol("bounds", bounds.measure, ("thresholds",)),
     Protocol("watched", watched.measure, ("thresholds",)),
     Protocol("motions", motions.measure),

@@ -96,6 +96,9 @@ _ALL = (
             ("wall_spin", "ω_x⁰", 1e-3),
         )
     ),
+    Quantity("lifts", "leaves the floor", "1", 0.0),
+    Quantity("lift_onset", "ω_c at A_y = 0", "rad s-1", 2e-2),
+    Quantity("critical_drag", "c at η = η_cr", "s-1", 4e-3),
     Quantity("folds", "number of folds", "1", 0.0),
     Quantity("slope", "dω_c/dω₀", "1", 1e-4),
     Quantity("law", "deviation from the law", "1", 1e-6),
