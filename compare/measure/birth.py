@@ -85,7 +85,6 @@ def _lag(slopes: Slopes, name: str) -> Measured | None:
     points = [(1 / c, slope) for (one, c), (slope, _) in slopes.items() if one == name]
     if len(points) < len(STRONG):
         return None
-    zero, _ = straight_line(
-        [lag for lag, _ in points], *zip(*((s.value, s.uncertainty) for _, s in points), strict=True)
-    )
+    lags, values = [lag for lag, _ in points], [slope.value for _, slope in points]
+    zero, _ = straight_line(lags, values, [slope.uncertainty for _, slope in points])
     return zero

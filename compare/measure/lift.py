@@ -15,11 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.measure.extrapolation import vanishing
-from compare.measure.field import polynomial
+from compare.measure.field import DOUBT, LIMIT, polynomial
 from compare.measure.lab import Lab, coarse_step, time_unit
-from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.measure.quantities import quantity
+from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.runs.tasks import Task
-from compare.statistics import Measured
+from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters, Trajectory
 from model.arrays import Array
 
@@ -31,12 +32,12 @@ ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
     (Case.SS, Case.NS): (0.3, 0.1, 0.8),
 }
 """Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r omega_c."""
-ORBITS = (0.5, 0.8, 1.2, 1.6, 2.0, 2.4, 2.8, 3.2, 3.6)
+ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 """omega_c sqrt(R/g) at which the ball is looked at first."""
 NEAR = (0.05, 0.08, 0.12, 0.17)
 """How much slower the others are than the orbit to which the first point, relative."""
-REFINED = 64
-"""Steps in one of `coarse_step`."""
+REFINED = 32
+"""Steps in one of `coarse_step`; of the shorter ones twice as many. With still shorter ones contacts answer no faster."""
 STEPS, SKIPPED, FEWEST = 16, 4, 5
 """Steps of a run, those at its start in which contact forces build up, and the least number that must be left."""
 
@@ -57,53 +58,48 @@ class Line:
         slips = np.array(ARROWS[self.inner, self.outer]) * unit
         return p.replace(omega_0=omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
 
-    def task(self, lab: Lab, omega_c: float) -> Task:
-        """The run from there."""
+    def task(self, lab: Lab, omega_c: float, times: int = 1) -> Task:
+        """The run from there, with the step `times` as short."""
         p, x = self.at(omega_c)
-        step = coarse_step(p) / REFINED
+        step = coarse_step(p) / REFINED / times
         return lab.task(p, x, STEPS * step, step, samples=STEPS)
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
     lines = [Line(name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
-    first = _forces(lab, [(line, Omega / time_unit(line.p)) for line in lines for Omega in ORBITS])
-    about = {line: _about(line, first) for line in lines}
-    near = [(line, where * (1 - part)) for line, where in about.items() if where for part in NEAR]
-    others = _forces(lab, near)
-    for line in lines:
-        along: dict[str, Condition] = {"inner": line.inner.name, "outer": line.outer.name}
-        own = [(omega_c, *found) for (one, omega_c), found in others.items() if one is line]
-        fastest = ORBITS[-1] / time_unit(line.p)
-        gone = next((k for k in ORBITS if first[line, k / time_unit(line.p)][1] is None), None)
-        if gone is None:
-            p, x = line.at(fastest)
-            yield measurement(lab, NAME, line.set, p, "lifts", 0.0, [line.task(lab, fastest)], **along, **state_of(x))
-            continue
-        seen = first[line, gone / time_unit(line.p)][0]
-        forces = [force for *_, force in own if force]
-        if seen is not line.outer or len(forces) < len(NEAR):
-            yield Missing(NAME, line.set, f"out of {line.inner.name} the ball lifts to {seen.name}, not smoothly")
-            continue
-        square = vanishing(np.array([omega_c**2 for omega_c, _, _ in own]), forces)
-        root = math.sqrt(square.value)
-        value = Measured(root, square.uncertainty / (2 * root))
-        p, x = line.at(value.value)
-        tasks = [line.task(lab, omega_c) for omega_c, *_ in own]
-        yield measurement(lab, NAME, line.set, p, "lift_onset", value, tasks, **along, **state_of(x))
+    first = [[line.task(lab, Omega / time_unit(line.p)) for Omega in ORBITS] for line in lines]
+    lab.complete([task for row in first for task in row])
+    seen = [lab.run(row) for row in first]
+    about = [_about(runs) for runs in seen]
+    near = [
+        [line.task(lab, where * (1 - part), times) for part in NEAR for times in (1, 2)] if where else []
+        for line, where in zip(lines, about, strict=True)
+    ]
+    lab.complete([task for row in near for task in row])
+    for line, orbits, begun, tasks in zip(lines, first, seen, near, strict=True):
+        lifted = next((run for run in begun if _force(run) is None), None)
+        if lifted is None:
+            yield _record(lab, line, "lifts", ORBITS[-1] / time_unit(line.p), 0.0, orbits[-1:])
+        elif Case(int(lifted.case[-1])) is not line.outer:
+            to = Case(int(lifted.case[-1])).name
+            yield Missing(NAME, line.set, f"out of {line.inner.name} the ball leaves the floor for {to}")
+        elif (value := _onset(lab.run(tasks))) is None:
+            yield Missing(NAME, line.set, f"where the ball leaves {line.inner.name} the floor's contact comes and goes")
+        else:
+            yield _record(lab, line, "lift_onset", value.value, value, tasks)
 
 
-def _forces(lab: Lab, states: Sequence[tuple[Line, float]]) -> dict[tuple[Line, float], tuple[Case, Measured | None]]:
-    """By line and omega_c: the case at the end, and the force of the floor at the beginning over the weight.
-
-    None for the force where the floor doesn't press for long enough.
-    """
-    tasks = [line.task(lab, omega_c) for line, omega_c in states]
-    runs = lab.run(tasks)
-    return {state: (Case(int(run.case[-1])), _force(run)) for state, run in zip(states, runs, strict=True)}
+def _record(
+    lab: Lab, line: Line, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]
+) -> Measurement:
+    p, x = line.at(omega_c)
+    inner, outer = line.inner.name, line.outer.name
+    return measurement(lab, NAME, line.set, p, quantity, value, tasks, inner=inner, outer=outer, **state_of(x))
 
 
 def _force(run: Trajectory) -> Measured | None:
+    """Force of the floor at the beginning over the weight; None where it doesn't press for long enough."""
     p, force = run.header.parameters, run.force_A[SKIPPED:, 1:2]
     pressed = int(np.argmax(np.append(force <= 0, True)))
     if pressed < FEWEST:
@@ -115,11 +111,27 @@ def _force(run: Trajectory) -> Measured | None:
     return Measured(value, abs(value - lower))
 
 
-def _about(line: Line, forces: Mapping[tuple[Line, float], tuple[Case, Measured | None]]) -> float | None:
+def _about(runs: Sequence[Trajectory]) -> float | None:
     """Where the forces of the last two orbits before the ball leaves point to, over omega_c^2; None if nowhere."""
-    orbits = [k / time_unit(line.p) for k in ORBITS]
-    pressed = [(omega_c**2, force.value) for omega_c in orbits if (force := forces[line, omega_c][1])]
-    if len(pressed) < 2 or len(pressed) == len(orbits):
+    pressed = [(run.omega_c[0] ** 2, force.value) for run in runs if (force := _force(run))]
+    if len(pressed) < 2 or len(pressed) == len(runs):
         return None
     (a, high), (b, low) = pressed[-2:]
     return math.sqrt(b + low * (b - a) / (high - low)) if high > low else None
+
+
+def _onset(runs: Sequence[Trajectory]) -> Measured | None:
+    """omega_c where the force vanishes, from runs with both steps at each orbit; None where it doesn't do so smoothly."""
+    squares, forces = [], []
+    for run, coarse, fine in zip(runs[::2], map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
+        if coarse is None or fine is None:
+            return None
+        change = fine.value - coarse.value
+        squares.append(run.omega_c[0] ** 2)
+        forces.append(Measured(fine.value + change * LIMIT, math.hypot(fine.uncertainty, change * DOUBT)))
+    if not forces:
+        return None
+    square = vanishing(np.array(squares), forces)
+    if not 0 < COVERAGE * square.uncertainty < 2 * quantity("lift_onset").resolves * square.value:
+        return None
+    return Measured(math.sqrt(square.value), square.uncertainty / (2 * math.sqrt(square.value)))
