@@ -174,6 +174,23 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
     return next((kind for kind in worst_first if kind in found), SlipStability.STABLE)
 
 
+def neutral_flow(case: Case, p: Parameters) -> float:
+    """The flow in rad s-1 at which a stationary motion is neutral (Definition 3), between stable and unstable.
+
+    Looked for within a tenth of p.omega_0, by bisection down to round-off; nan if it is the same on both sides.
+    """
+    low, high = 0.9 * p.omega_0, 1.1 * p.omega_0
+    below, above = (stability(case, p.replace(omega_0=flow)) for flow in (low, high))
+    if below is above:
+        return float("nan")
+    while (middle := (low + high) / 2) not in (low, high):
+        here = stability(case, p.replace(omega_0=middle))
+        if here is SlipStability.NEUTRAL:
+            return middle
+        low, high = (middle, high) if here is below else (low, middle)
+    return low
+
+
 def _sign(drive: float, hold: float) -> SlipStability:
     """What the sign of drive - hold says; both are >= 0 and carry the few round-offs of their products."""
     if abs(drive - hold) <= 8 * np.finfo(float).eps * max(drive, hold):

@@ -173,16 +173,28 @@ def _greatest_as_printed(m: Measurement) -> float:
     return float(slip_stability.gamma(*_RR_SS, np.array(state(m)), n, m.parameters).max())
 
 
-def _watched(inner: Case, outer: Case) -> Bearing:
+def _neutral(quantity: str, case: Case, by: str) -> Bearing:
+    def predict(m: Measurement) -> float:
+        return slip_stability.neutral_flow(case, m.parameters)
+
+    return Bearing(
+        protocol="thresholds", quantity=quantity, predict=predict, when=lambda m: m.conditions["by"] == by,
+        by="slip_stability.neutral_flow",
+    )  # fmt: skip
+
+
+def _watched(inner: Case, end: str, beyond: Case) -> Bearing:
+    """What becomes of slight slips on either side of the flow at which rolling ends; `beyond` it they come to that."""
+
     def predict(m: Measurement) -> float:
         stable = slip_stability.stability(inner, m.parameters) is slip_stability.SlipStability.STABLE
-        return float(inner if stable else outer)
+        return float(inner if stable else beyond)
 
     return Bearing(
         protocol="watched",
         quantity="case",
         predict=predict,
-        when=lambda m: m.conditions["inner"] == inner.name,
+        when=lambda m: m.conditions["end"] == end,
         by="slip_stability.stability",
     )
 
@@ -218,14 +230,20 @@ CLAIMS = (
     _claim(
         "eq-74",
         "(74)",
-        "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃.",
-        _bound(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
+        "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, it is lifted (η > j).",
+        (
+            *_bound(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
+            _watched(Case.RR, "omega_03", Case.NR),
+        ),
     ),
     _claim(
         "eq-82",
         "(82)",
         "Slip at both points at once, with directions (0, 0), grows above ω₀₁ and dies out below.",
-        (*_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1), _watched(*_RR_SS)),
+        (
+            *_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
+            _watched(Case.RR, "omega_01", Case.SS),
+        ),
     ),
     _claim(
         "eq-83",
@@ -237,7 +255,7 @@ CLAIMS = (
         "fig-4-5",
         "Figs. 4 and 5",
         "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below it remains slipping for good.",
-        (_watched(*_NR_NS),),
+        (_watched(Case.NR, "omega_02", Case.NS),),
     ),
     _claim(
         "eq-69",
@@ -251,6 +269,25 @@ CLAIMS = (
                 scale=lambda p: 1.0,
                 by="slip_bounds.filippov_share",
             ),
+        ),
+    ),
+    _claim(
+        "definition-3",
+        "Definitions 1-3, (67)",
+        "Rolling is stable with respect to slipping up to a flow at which it is neutral, and unstable beyond (on the "
+        "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
+        (
+            Bearing(
+                protocol="growth",
+                quantity="gamma",
+                predict=_gamma,
+                when=_along(*_RR_RS, "rest"),
+                scale=slip_unit,
+                by="slip_stability.gamma",
+            ),
+            _neutral("omega_01", Case.RR, "onset of slip"),
+            _neutral("omega_02", Case.NR, "onset of sliding on the wall"),
+            _neutral("omega_03", Case.RR, "loss of the floor"),
         ),
     ),
     Claim(

@@ -196,11 +196,13 @@ def _lines(name: str, p: Parameters) -> Iterator[Line]:
     slow = 0.5 / unit * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
     yield Line(name, Case.RR, Case.RS, (0, 1, 0), "held", (slow, 3 * slow), held(slow))
     rubbing = math.sqrt(p.mu) / unit
-    yield Line(name, Case.RR, Case.RS, (0, -1, 0), "stationary", (0.5 * rubbing, 0.9 * rubbing), along)
+    for side in (1, -1):
+        yield Line(name, Case.RR, Case.RS, (0, side, 0), "stationary", (0.5 * rubbing, 0.9 * rubbing), along)
     spinning = math.sqrt(1 / p.j) / unit
     fast = 0.7 * spinning
     yield Line(name, Case.RR, Case.SR, (-1, 0, 0), "held", (fast, 1.5 * fast), held(fast))
-    yield Line(name, Case.RR, Case.SR, (1, 0, 0), "stationary", (0.5 * spinning, 0.8 * spinning), along)
+    for side in (1, -1):
+        yield Line(name, Case.RR, Case.SR, (side, 0, 0), "stationary", (0.5 * spinning, 0.8 * spinning), along)
     hanging = min(1.0, 1 / math.sqrt(p.eta)) / unit
     yield Line(name, Case.RR, Case.SS, (0, 0, 1), "stationary", (0.4 * hanging, 0.8 * hanging), along)
     yield Line(name, Case.RR, Case.SS, (0, 0, -1), "stationary", (1.5 * rubbing, 2.2 * rubbing), along)

@@ -37,7 +37,8 @@ ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 NEAR = (0.05, 0.08, 0.12, 0.17)
 """How much slower the others are than the orbit to which the first point, relative."""
 REFINED = 32
-"""Steps in one of `coarse_step`; of the shorter ones twice as many. With still shorter ones contacts answer no faster."""
+"""Steps in one of `coarse_step`; of the shorter ones twice as many. With still shorter ones contacts answer
+no faster."""
 STEPS, SKIPPED, FEWEST = 16, 4, 5
 """Steps of a run, those at its start in which contact forces build up, and the least number that must be left."""
 
@@ -121,7 +122,7 @@ def _about(runs: Sequence[Trajectory]) -> float | None:
 
 
 def _onset(runs: Sequence[Trajectory]) -> Measured | None:
-    """omega_c where the force vanishes, from runs with both steps at each orbit; None where it doesn't do so smoothly."""
+    """omega_c where the force vanishes, from runs with both steps at each orbit; None if it does not so smoothly."""
     squares, forces = [], []
     for run, coarse, fine in zip(runs[::2], map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
         if coarse is None or fine is None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
-from compare.measure.settling import Start, high, settle
+from compare.measure.settling import Start, family, high, settle
 from compare.runs.tasks import Task
 from compare.statistics import settled_case
 from model import Case, Parameters
@@ -22,8 +22,8 @@ from model.arrays import Array
 
 NAME = "watched"
 DIRECTIONS = {Level.QUICK: 4, Level.DEFAULT: 8, Level.FULL: 32}
-ENDS = {"omega_01": Case.RR, "omega_02": Case.NR}
-"""The measured flows at which rolling at both points, or at the wall alone, ends."""
+ENDS = {"omega_01": Case.RR, "omega_03": Case.RR, "omega_02": Case.NR}
+"""The measured flows at which rolling at both points, by slip or by lift, or at the wall alone, ends."""
 SIDES = (0.97, 1.03)
 """Flows, over that."""
 SLIGHT = 0.02
@@ -46,6 +46,8 @@ class Slight:
     x: Array
     n: Array
     side: str
+    end: str
+    """The flow beside which it is."""
 
     def task(self, lab: Lab) -> Task:
         """The run that shows what becomes of it."""
@@ -64,8 +66,10 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     lab.complete(tasks)
     for slight, task, run in zip(slights, tasks, lab.run(tasks), strict=True):
         at = state_of(slight.x) | dict(zip(("n_x", "n_y", "n_z"), slight.n.tolist(), strict=True))
-        value, inner = settled_case(run), slight.case.name
-        yield measurement(lab, NAME, slight.set, slight.p, "case", value, [task], inner=inner, side=slight.side, **at)
+        value, inner = family(settled_case(run)), slight.case.name
+        yield measurement(
+            lab, NAME, slight.set, slight.p, "case", value, [task], inner=inner, side=slight.side, end=slight.end, **at
+        )
 
 
 def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tuple[list[Slight], list[Missing]]:
@@ -82,7 +86,7 @@ def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tupl
                 x = np.array([0.0, 0.0, q.omega_0, 0, 0, 0, 0, 0])
                 if case is Case.NR:  # the spin about the radial axis is the same, whatever the orbit
                     x[0], x[3] = HIGH * p.R, hanging[name] - p.R / p.r * q.omega_0
-                found += [Slight(name, q, case, x, n, side) for n in directions(case, DIRECTIONS[lab.level])]
+                found += [Slight(name, q, case, x, n, side, quantity) for n in directions(case, DIRECTIONS[lab.level])]
     return found, missing
 
 
