@@ -230,7 +230,7 @@ CLAIMS = (
     _claim(
         "eq-74",
         "(74)",
-        "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, it is lifted (η > j).",
+        "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, it lifts (η > j).",
         (
             *_bound(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
             _watched(Case.RR, "omega_03", Case.NR),

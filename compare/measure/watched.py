@@ -67,9 +67,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for slight, task, run in zip(slights, tasks, lab.run(tasks), strict=True):
         at = state_of(slight.x) | dict(zip(("n_x", "n_y", "n_z"), slight.n.tolist(), strict=True))
         value, inner = family(settled_case(run)), slight.case.name
-        yield measurement(
-            lab, NAME, slight.set, slight.p, "case", value, [task], inner=inner, side=slight.side, end=slight.end, **at
-        )
+        by = {"inner": inner, "side": slight.side, "end": slight.end}
+        yield measurement(lab, NAME, slight.set, slight.p, "case", value, [task], **by, **at)
 
 
 def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tuple[list[Slight], list[Missing]]:
@@ -79,7 +78,7 @@ def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tupl
         ends = ends_of_rolling(records, quantity)
         for name, p in sets.items():
             if name not in ends or (case is Case.NR and name not in hanging):
-                missing.append(Missing(NAME, name, f"no flow was measured at which {case.name} ends in slip"))
+                missing.append(Missing(NAME, name, f"{quantity}, at which {case.name} would end, was not measured"))
                 continue
             for factor, side in zip(SIDES, ("below", "above"), strict=True):
                 q = p.replace(omega_0=ends[name] * factor)
