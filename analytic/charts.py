@@ -73,7 +73,7 @@ def _signed(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
         turn, none = np.full_like(t, sign * math.pi / 2), np.full_like(t, math.nan)
         return Path(t, z[0], x, turn if A_slips else none, none if A_slips else turn, z[3])
 
-    start = [at.theta, at.x[2], sign * at.x[index], at.work]
+    start = [at.theta, at.x.omega_c, sign * at.x[index], at.work]
     ends = ("A sticks", "B slips", "A lifts") if A_slips else ("B sticks", "A slips")
     return Chart(case, start, [1.0, 1 / T, w, E], rates, ends, guards, path)
 

@@ -99,7 +99,7 @@ def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float
 def flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """NN: (Z, dZ/dt, work); height and fall are known (`flight`), and the whole spin rests."""
     start, unit, energy = _start(at, p), *_units(p)
-    y, v_y = at.x[0], at.x[1]
+    y, v_y = at.x.y, at.x.v_y
 
     def rates(t: float, z: list[float]) -> list[float]:
         lag, rise = _lag(t, z, omega_0), v_y - (p.c * v_y + p.g) * flight.decay(t - at.time, p.c)

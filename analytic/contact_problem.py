@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analytic import rigid_body
-from analytic.rigid_body import NOTHING, Six
+from analytic.rigid_body import NOTHING, Forces, Six, Velocities
 from model import Parameters
 from model.arrays import Array
 
@@ -34,8 +34,10 @@ PLAIN_SWEEPS = 10
 """Sweeps before the continuation takes over: most problems are solved by then."""
 ATTEMPT = 100
 """Sweeps after which the continuation starts afresh, from where it is."""
-RISE = 1.3
-"""Rise of the change in a sweep that every other attempt overlooks."""
+WARY, BOLD = 1.0, 1.3
+"""How far the change may rise from one sweep to the next before it counts as a setback, the two in turns from attempt
+to attempt. Wary where the sweeps swing; bold where impulses that hardly move the ball have to pile up in the corner
+until one of them finds the limit of friction."""
 MAX_SWEEPS = 2000
 
 
@@ -55,7 +57,7 @@ class NotConvergedError(ArithmeticError):
 def solve(
     free: Six, A: Closed | None, B: Closed | None, p: Parameters,
     start: Six = NOTHING, tolerance: float = 4e-15, max_sweeps: int = MAX_SWEEPS,
-) -> tuple[Six, Six]:  # fmt: skip
+) -> tuple[Velocities, Forces]:  # fmt: skip
     """Velocities and impulses that obey Coulomb's law at both contacts.
 
     Parameters
@@ -71,15 +73,14 @@ def solve(
     NotConvergedError
         After `max_sweeps`.
     """
-    u: Six = rigid_body.apply(free, start, p)
-    P = start
+    u, P = rigid_body.apply(free, start, p), start
     if A is None or B is None:  # a contact alone is solved exactly
         return sweep(u, P, A, B, p)
     scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
     pace, change, enough = Continuation(A, B, p), math.inf, math.inf
     for _ in range(max_sweeps):
         u, new = sweep(u, P, A, B, p)
-        change = max(abs(new[3] - P[3]), abs(new[4] - P[4]), abs(new[5] - P[5])) / p.m
+        change = max(abs(after - before) for after, before in zip(new[3:], P[3:], strict=True)) / p.m
         enough = tolerance * max(scale, max(map(abs, new)) / p.m)
         if change <= enough:
             return rigid_body.apply(free, new, p), new
@@ -90,7 +91,7 @@ def solve(
     )
 
 
-def sweep(u: Six, P: Six, A: Closed | None, B: Closed | None, p: Parameters) -> tuple[Six, Six]:
+def sweep(u: Six, P: Six, A: Closed | None, B: Closed | None, p: Parameters) -> tuple[Velocities, Forces]:
     """Solve A for the present impulse at B, then B for that at A; u already contains P, None is an open contact."""
     v_h, v_y, v_k, o_x, o_y, o_z = u
     A_x, A_y, A_z, B_x, B_y, B_z = P
@@ -107,19 +108,21 @@ def sweep(u: Six, P: Six, A: Closed | None, B: Closed | None, p: Parameters) -> 
         o_y, o_z = o_y + (t - B_z) / jmr, o_z - (s - B_y) / jmr
         B_x, B_y, B_z = n, s, t
         u = v_h, v_y, v_k, o_x, o_y, o_z
-    return u, (A_x, A_y, A_z, B_x, B_y, B_z)
+    return Velocities(*u), Forces(A_x, A_y, A_z, B_x, B_y, B_z)
 
 
 def _unlimited_A(u: Six, P: Six, A: Closed, p: Parameters) -> tuple[float, float, float]:
     """Impulses (normal, along x, along z) that would bring A to its target and to rest, were they not limited."""
     m_t = p.m * p.j / (1 + p.j)  # mass that a tangential impulse feels at the contact point
-    return P[1] - p.m * (u[1] - A.target), P[0] - m_t * (u[0] + p.r * u[5]), P[2] - m_t * (u[2] - p.r * u[3])
+    (_, v_y, *_), (A_x, A_y, A_z, *_), (slip_x, slip_z) = u, P, rigid_body.slip_at_A(u, p)
+    return A_y - p.m * (v_y - A.target), A_x - m_t * slip_x, A_z - m_t * slip_z
 
 
 def _unlimited_B(u: Six, P: Six, B: Closed, p: Parameters) -> tuple[float, float, float]:
     """The same at B: (normal, along y, along z)."""
     m_t = p.m * p.j / (1 + p.j)
-    return P[3] - p.m * (u[0] - B.target), P[4] - m_t * (u[1] - p.r * u[5]), P[5] - m_t * (u[2] + p.r * u[4])
+    (v_h, *_), (*_, B_x, B_y, B_z), (slip_y, slip_z) = u, P, rigid_body.slip_at_B(u, p)
+    return B_x - p.m * (v_h - B.target), B_y - m_t * slip_y, B_z - m_t * slip_z
 
 
 def _project(
@@ -169,10 +172,8 @@ class Continuation:
 
     A sweep takes the impulse b at B to f(b). The solution b = f(b) is a place of rest of db/dt = f(b) - b, whose
     linearly implicit Euler steps, (1/span + 1 - f') db = f(b) - b, are damped sweeps for small spans and those
-    of the generalised Newton method for large ones. A success lengthens the span; a setback shortens it, and makes
-    its growth more careful from then on. A change that rises is a setback where the sweeps swing, but none where
-    impulses that hardly move the ball have to pile up in the corner until one of them finds the limit of friction;
-    attempts that take it for one and attempts that don't take turns.
+    of the generalised Newton method for large ones. A success lengthens the span; a setback, a change that rises by
+    more than the attempt allows (`WARY`, `BOLD`), shortens it and makes its growth more careful from then on.
     """
 
     A: Closed
@@ -183,25 +184,24 @@ class Continuation:
     _last: float = field(init=False, default=math.inf)
     _sweeps: int = field(init=False, default=0)
 
-    def next(self, u: Six, before: Six, after: Six, change: float) -> Six:
+    def next(self, u: Six, before: Six, after: Six, change: float) -> Forces:
         """Impulses to start the next sweep from; the last took `before` to `after`, with velocities u."""
         self._sweeps += 1
         if self._sweeps <= PLAIN_SWEEPS:
-            return after
+            return Forces(*after)
         attempt, sweeps = divmod(self._sweeps, ATTEMPT)
         if sweeps == 0:
             self._span, self._growth = 1.0, 8.0
-        if change <= self._last * (RISE if attempt % 2 else 1.0):
+        if change <= self._last * (BOLD if attempt % 2 else WARY):
             self._span = min(self._span * self._growth, 1e10)
         else:
             # The rate of a sweep is of the order of mu eta at most: shorter spans damp no better.
             least = 1 / (10 + self.p.mu * self.p.eta)
             self._span, self._growth = max(self._span / 20, least), max(self._growth**0.7, 1.1)
         self._last = change
-        x, y, z = (f - b for f, b in zip(after[3:], before[3:], strict=True))
         matrix = (1 + 1 / self._span) * np.eye(3) - self._rate(u, after)
-        x, y, z = np.linalg.solve(matrix, (x, y, z)).tolist()
-        return (*after[:3], before[3] + x, before[4] + y, before[5] + z)
+        at_B = np.array(before[3:])
+        return Forces(*after[:3], *(at_B + np.linalg.solve(matrix, after[3:] - at_B)).tolist())
 
     def _rate(self, u: Six, P: Six) -> Array:
         """f': how the impulse (n, s, t) at B after a sweep changes with that before it."""

@@ -7,8 +7,7 @@ negative first, and `transitions` says how to go on.
 from __future__ import annotations
 
 import math
-from collections import deque
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,16 +17,14 @@ from analytic import charts, dynamics, rolling_forces, transitions, two_point_ro
 from analytic.integrator import StalledError, Stretch
 from analytic.motion import Fluid, Moment, Path
 from analytic.records import REPORT_EVERY, Event, Recorder
-from analytic.rigid_body import NOTHING, Six
+from analytic.rigid_body import NOTHING, Forces
 from analytic.settings import Settings
-from model import Case, Contact, Flow, Parameters
+from analytic.transitions import Shortest
+from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
 
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
-ANY = "the case changes"
-CHATTER = {"RR ends": (10, 1e-4), ANY: (1000, 0.05)}
-"""How often within what time, in natural units, is too often. A ball that hops (restitution) may change more often."""
 
 
 def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
@@ -41,7 +38,7 @@ def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Se
     t_end = float(recorder.times[-1])
     knots = [0.0, *(t for t in flow.start.tolist() if 0 < t < t_end), t_end]
     simulator = _Simulator(p, settings, recorder)
-    at, case = Moment(0.0, theta_0, x0), None
+    at, case = Moment(0.0, theta_0, State(*x0)), None
     for start, end in pairwise(knots):
         fluid = _piece(flow, start, end)
         if case is None or flow(start) != flow(np.nextafter(start, -1.0)):
@@ -65,19 +62,21 @@ class _Simulator:
     p: Parameters
     settings: Settings
     recorder: Recorder
-    absolute: float = field(init=False)
-    shortest: tuple[float, float] = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.absolute = self.settings.rtol / 1e3 if self.settings.atol is None else self.settings.atol
-        # A hop that lasts T rises by g T^2/8, which must be well above the tolerance of lengths where it is integrated.
+    @property
+    def absolute(self) -> float:
+        """Absolute tolerance in natural units."""
+        return self.settings.rtol / 1e3 if self.settings.atol is None else self.settings.atol
+
+    @property
+    def shortest(self) -> Shortest:
+        """A hop that lasts T rises by g T^2/8, well above the tolerance of lengths where it is integrated."""
         unit = math.sqrt(self.p.R / self.p.g)
-        self.shortest = self.settings.rtol * unit, math.sqrt(8 * self.absolute) * unit
+        return Shortest(self.settings.rtol * unit, math.sqrt(8 * self.absolute) * unit)
 
     def advance(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[Case, Moment]:
         """Go on through all events before `until`."""
         at_once = 0
-        recent = {what: deque([-math.inf] * count, count) for what, (count, _) in CHATTER.items()}
         while at.time < until:
             start = at.time
             guard, at = self._roll(at, until, fluid) if case is Case.RR else self._follow(case, at, until, fluid)
@@ -85,76 +84,57 @@ class _Simulator:
                 before = case
                 case, at, impulse = self._react(guard, case, at, fluid)
                 self.recorder.events.append(Event(at.time, before, case, impulse))
-                self._check_pace(recent, guard, at.time)
             at_once = at_once + 1 if at.time - start <= 1e-14 * until else 0
             if at_once > MAX_EVENTS_AT_ONCE:
                 raise StalledError(f"no way on from case {case.name} at state {at.x}")
         return case, at
 
-    def _check_pace(self, recent: dict[str, deque[float]], guard: str, now: float) -> None:
-        """Raise `StalledError` if slip or lift sets in and dies out again and again, so that a run would not end."""
-        for what, times in recent.items():
-            if what == guard or (what == ANY and self.settings.restitution == 0):
-                times.append(now)
-        for what, (count, within) in CHATTER.items():
-            lasted = now - recent[what][0]
-            if lasted < within * math.sqrt(self.p.R / self.p.g):
-                raise StalledError(
-                    f"{what} {count} times in {lasted:.3g} s (leave_rolling = {self.settings.leave_rolling!r}): "
-                    "slip or lift sets in and dies out at once, again and again"
-                )
-
-    def settle(self, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Six]:
+    def settle(self, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
         """Collide if the ball moves into something it touches, then find the case."""
-        x = at.x
-        impulse: Six = NOTHING
-        if (x[0] == 0 and x[1] < 0) or (x[6] == 0 and x[7] < 0):
-            impact = transitions.collide(at, self.p, fluid(at.time), self.settings.restitution, self.shortest)
+        x, omega_0, impulse = at.x, fluid(at.time), NOTHING
+        if (x.y == 0 and x.v_y < 0) or (x.h == 0 and x.v_h < 0):
+            impact = transitions.collide(at, self.p, omega_0, self.settings.restitution, self.shortest)
             at, impulse = impact.after, impact.impulse
-        case, at = transitions.choose(at, self.p, fluid(at.time), self.settings.leave_rolling)
-        return case, at, impulse
+        return *transitions.choose(at, self.p, omega_0, self.settings.leave_rolling), impulse
 
-    def _react(self, guard: str, case: Case, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Six]:
+    def _react(self, guard: str, case: Case, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
         """What follows when a guard has fired."""
-        x = list(at.x)
-        at = replace(at, x=x)
+        x = at.x
         match guard:
             case "A slips":
-                A_x, _, A_z = self._forces_at(case, at, fluid)[:3]
-                return Case.of(Contact.S, case.B), replace(at, alpha=math.atan2(A_z, -A_x)), NOTHING
+                f = self._forces_at(case, at, fluid)
+                return Case.of(Contact.S, case.B), replace(at, alpha=math.atan2(f.A_z, -f.A_x)), NOTHING
             case "B slips":
-                _, B_y, B_z = self._forces_at(case, at, fluid)[3:]
-                return Case.of(case.A, Contact.S), replace(at, beta=math.atan2(-B_z, B_y)), NOTHING
+                f = self._forces_at(case, at, fluid)
+                return Case.of(case.A, Contact.S), replace(at, beta=math.atan2(-f.B_z, f.B_y)), NOTHING
             case "A lifts":
                 return Case.of(Contact.N, case.B), replace(at, alpha=math.nan), NOTHING
             case "B opens":
                 return Case.of(case.A, Contact.N), replace(at, beta=math.nan), NOTHING
             case "RR ends":
-                return *two_point_rolling.leave(at, self.p, fluid(at.time)), NOTHING
+                return *transitions.leave(at, self.p, fluid(at.time)), NOTHING
             case "A sticks":
-                x[3], x[5] = 0.0, -(x[7] + x[1]) / self.p.r
-                if case.B is Contact.S and abs(x[4]) <= self._still:
-                    x[4] = 0.0
+                x = x._replace(slip_x=0.0, slip_z=-(x.v_h + x.v_y) / self.p.r)
+                if case.B is Contact.S and abs(x.slip_y) <= self._still:
+                    x = x._replace(slip_y=0.0)
             case "B sticks":
-                x[4] = x[5] = 0.0
-                if case.A is Contact.S and abs(x[3]) <= self._still:
-                    x[3] = 0.0
+                x = x._replace(slip_y=0.0, slip_z=0.0)
+                if case.A is Contact.S and abs(x.slip_x) <= self._still:
+                    x = x._replace(slip_x=0.0)
             case "A lands":
-                x[0] = 0.0
+                x = x._replace(y=0.0)
             case "B lands":
-                x[6] = 0.0
-        return self.settle(at, fluid)
+                x = x._replace(h=0.0)
+        return self.settle(replace(at, x=x), fluid)
 
     @property
     def _still(self) -> float:
         """Slip in rad s-1 that counts as zero where the other contact has just stuck."""
         return 10 * self.settings.rtol * math.sqrt(self.p.g * self.p.R) / self.p.r
 
-    def _forces_at(self, case: Case, at: Moment, fluid: Fluid) -> Six:
+    def _forces_at(self, case: Case, at: Moment, fluid: Fluid) -> Forces:
         path = Path(*(np.array([v]) for v in (at.time, at.theta, at.x, at.alpha, at.beta, at.work)))
-        forces = path_forces(case, path, self.p, np.array([fluid(at.time)]))[0]
-        A_x, A_y, A_z, B_x, B_y, B_z = forces.tolist()
-        return A_x, A_y, A_z, B_x, B_y, B_z
+        return Forces(*path_forces(case, path, self.p, np.array([fluid(at.time)]))[0].tolist())
 
     def _roll(self, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
         """RR up to its end or `until`."""
@@ -190,10 +170,10 @@ class _Simulator:
     def _hop(self, case: Case, at: Moment, fluid: Fluid) -> float:
         """About how long the ball will be off floor or wall if it is just rebounding from it, s; else inf."""
         x = at.x
-        if not ((x[0] == 0 < x[1] and case is not Case.NN) or x[6] == 0 < x[7]):
+        if not ((x.y == 0 < x.v_y and case is not Case.NN) or x.h == 0 < x.v_h):
             return math.inf
         dx = dynamics.newton_euler(case, x, self._forces_at(case, at, fluid), self.p, fluid(at.time))
-        hops = [2 * v / -a for gap, v, a in ((x[0], x[1], dx[1]), (x[6], x[7], dx[7])) if gap == 0 < v and a < 0]
+        hops = [2 * v / -a for gap, v, a in ((x.y, x.v_y, dx.v_y), (x.h, x.v_h, dx.v_h)) if gap == 0 < v and a < 0]
         return min(hops, default=math.inf)
 
     def _samples(self, start: float, stop: float) -> Array:
@@ -214,11 +194,11 @@ class _Simulator:
 
 def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:
     """Contact forces along a path, shape (n, 6), N; in RR those of least friction utilisation."""
-    x = list(path.x.T)
+    x = State.of(path.x)
     if case is Case.RR:
-        B_y = rolling_forces.least_utilisation(x[2], p, omega_0).B_y
-        jammed = rolling_forces.admissible_interval(x[2], p, omega_0)[1]
-        f = dynamics.rolling_family(x[2], p, omega_0, np.where(np.isfinite(B_y), B_y, jammed))
+        B_y = rolling_forces.least_utilisation(x.omega_c, p, omega_0).B_y
+        jammed = rolling_forces.admissible_interval(x.omega_c, p, omega_0)[1]
+        f = dynamics.rolling_family(x.omega_c, p, omega_0, np.where(np.isfinite(B_y), B_y, jammed))
     else:
         slip_A = (np.sin(path.alpha), np.cos(path.alpha)) if case.A is Contact.S else None
         slip_B = (np.sin(path.beta), np.cos(path.beta)) if case.B is Contact.S else None
@@ -227,4 +207,5 @@ def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:
 
 
 def _moment(path: Path, k: int) -> Moment:
-    return Moment(*(getattr(path, f.name)[k].tolist() for f in fields(Path)))
+    at = Moment(*(getattr(path, f.name)[k].tolist() for f in fields(Path)))
+    return replace(at, x=State(*at.x))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.arrays import Array
 
 Fluid = Callable[[float], float]
@@ -23,8 +23,7 @@ class Moment:
 
     time: float
     theta: float
-    x: list[float]
-    """The eight state variables."""
+    x: State
     alpha: float = math.nan
     """Direction of slip at A (8), rad, where it slips: the state doesn't tell at the very onset."""
     beta: float = math.nan

@@ -55,6 +55,27 @@ def margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None 
     return np.asarray(np.minimum(np.minimum(*slacks), overlap))
 
 
+def slip_margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+    """How far RR is from the onset of a slip that lasts, in units of m g: >= 0 where slip dies out.
+
+    Two slacks: of the wall's friction that must drive the spin (66), and of the floor's cone once the wall carries
+    `last_share` of the weight. Continuous; never beyond the zero of `margin`. docs/theory.md derives it.
+    """
+    u, z = _loads(omega_c, p, omega_0)
+    share = last_share(omega_c, p, omega_0)
+    return np.asarray(np.minimum(p.eta * (1 + p.j) * u - z, p.mu * (1 - share) - np.hypot(p.j * u - share, z)))
+
+
+def last_share(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+    """B_y in units of m g at which RR gives way: all that the wall's cone has, but not more than turns the spin, j u.
+
+    0 where the cone has nothing left, beyond (66).
+    """
+    u, z = _loads(omega_c, p, omega_0)
+    k = (1 + p.j) * u
+    return np.asarray(np.clip(k - _normal_forces(k, z, p.eta)[0], 0.0, p.j * u))
+
+
 def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> LeastUtilisation:
     """The member of the family with the least larger utilisation, see `LeastUtilisation`.
 

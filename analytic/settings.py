@@ -11,7 +11,7 @@ from model.errors import suggestion
 from model.parameters import POSITIVE, Range, check_number
 
 METHODS = ("event", "time-stepping")
-LEAVING = ("infeasible", "slip-stability")
+LEAVING = ("slip-stability", "infeasible")
 _EPS = float(np.finfo(float).eps)
 
 
@@ -38,11 +38,10 @@ class Settings:
     """Newton's coefficient of restitution e of both contacts, 0 <= e <= 1. A ball that hops in the corner is slow
     (event): a series of hops on the floor takes about ln(rtol)/ln(e) impacts, of which each takes about a millisecond,
     and each hit of the wall, itself one of a series, starts another. At e = 0.9 there may be 1e4."""
-    leave_rolling: str = "infeasible"
-    """When RR ends, whose forces are not determined (event). ``infeasible``: when no forces within both Coulomb
-    cones can hold it. ``slip-stability``: already when a slight slip, of A alone, of B alone, or of both along (0, 0)
-    as in (82), would grow. In a stationary orbit both agree; off it the second may come earlier: between the bounds
-    (73) or (66) and the cones sticking and slipping are both consistent."""
+    leave_rolling: str = "slip-stability"
+    """When RR ends, whose forces are not determined (event). ``slip-stability``: as soon as a slight slip would last,
+    Definitions 1-3 (docs/theory.md, section 7). ``infeasible``: when no forces within both Coulomb cones hold it. On
+    the stationary orbit both are the same for mu <= 1; on rougher floors, and off it, the second is later."""
     initial_impact: bool = False
     """Let a ball that starts with a speed into a closed contact collide at once, instead of refusing it."""
 

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from analytic import charts, contact_forces, flight, motion, two_point_rolling, vector_field
 from analytic.rigid_body import energy, velocities
-from model import Case, Contact, Parameters
+from model import Case, Contact, Parameters, State
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, slip_directions, slip_velocities
 
@@ -32,7 +32,11 @@ def moment(case: Case, seed: int) -> motion.Moment:
         x[5] = -x[7] / P.r
     alpha, beta = slip_directions(np.array(x), P)
     return motion.Moment(
-        0.3, 1.1, x, float(alpha) if case.A is Contact.S else math.nan, float(beta) if case.B is Contact.S else math.nan
+        0.3,
+        1.1,
+        State(*x),
+        float(alpha) if case.A is Contact.S else math.nan,
+        float(beta) if case.B is Contact.S else math.nan,
     )
 
 
@@ -68,11 +72,11 @@ def test_rates_are_those_of_the_vector_field(case):
 def test_vanishing_slip_has_a_direction(case):
     """At the onset the state has no slip; the chart starts with the direction given, and its slip grows from zero."""
     at = moment(case, 3)
-    x = list(at.x)
+    x = at.x
     if case.A is Contact.S:
-        x[3], x[5] = 0.0, -(x[7] + x[1]) / P.r
+        x = x._replace(slip_x=0.0, slip_z=-(x.v_h + x.v_y) / P.r)
     if case.B is Contact.S:
-        x[4] = x[5] = 0.0
+        x = x._replace(slip_y=0.0, slip_z=0.0)
     at = motion.Moment(at.time, at.theta, x, at.alpha, at.beta)
     chart = charts.chart(case, at, P, ramp, FLOOR)
     assert chart.least_slip(chart.start) == pytest.approx(0.0, abs=1e-15)
@@ -105,7 +109,7 @@ def test_fall_ends_on_the_floor(c, y, v_y):
 def test_two_point_rolling_solves_its_equation(c):
     """Along a ramp: omega_c' = -c (omega_c - omega_0)/(1+2j), azimuth and work by their definitions."""
     p = P.replace(c=c)
-    at, until = motion.Moment(0.3, 1.1, [0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0]), 4.0
+    at, until = motion.Moment(0.3, 1.1, State(omega_c=5.0)), 4.0
     t = np.linspace(0.3, until, 50)[1:]
     path = two_point_rolling.path(t, at, until, p, ramp)
     k = c / (1 + 2 * p.j)

@@ -12,9 +12,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from analytic import rolling_forces, simulate, stationary_solutions, two_point_rolling, vector_field
+from analytic import rolling_forces, simulate, stationary_solutions, vector_field
 from analytic.dynamics import newton_euler
-from model import Case, Flow, Parameters, SimulationError
+from model import Case, Flow, Parameters
 
 P = Parameters.named("reference")
 RTOL = 1e-9
@@ -123,24 +123,6 @@ def test_rolling_ends_where_no_forces_are_left():
     soon = simulate(p, [0, 0, 9.0, 0, 0, 0], end + 2e-3, sample_interval=1e-3).slip_z[-1]
     sooner = simulate(p, [0, 0, 9.0, 0, 0, 0], end + 1e-3, sample_interval=1e-3).slip_z[-1]
     assert soon / sooner == pytest.approx(4.0, rel=0.05)
-
-
-def test_rolling_left_at_the_slip_stability_bound():
-    """Off the stationary orbit a slip can grow before the forces run out: one option leaves RR, the other stays."""
-    p, omega_c = P.replace(mu=0.6, eta=0.6, c=5.0), 3.0
-    fluids = np.linspace(3.0, 15.0, 100)
-    both = [
-        fluid for fluid in fluids
-        if two_point_rolling.holds(omega_c, p, fluid, "infeasible")
-        and not two_point_rolling.holds(omega_c, p, fluid, "slip-stability")
-    ]  # fmt: skip
-    assert both
-    q = p.replace(omega_0=both[len(both) // 2])
-    stays = simulate(q, [0, 0, omega_c, 0, 0, 0], 1e-3)
-    leaves = simulate(q, [0, 0, omega_c, 0, 0, 0], 1e-3, leave_rolling="slip-stability")
-    assert stays.cases[0] is Case.RR
-    assert leaves.cases[0] is Case.RS  # (66): the wall gives way first
-    assert leaves.slip_speed_B[-1] > 0
 
 
 # Against plain integration and stationary solutions -----------------------------------------------------------------
@@ -256,18 +238,3 @@ def test_near_the_axis_is_an_ordinary_place():
     start = rho * np.exp(0.4j)
     velocity = np.exp(0.4j) * (-radial + 1j * along)
     np.testing.assert_allclose(place, start + velocity * run.time, atol=1e-11)
-
-
-@pytest.mark.parametrize(
-    ("change", "omega_c", "message"),
-    [
-        ({"mu": 1.4, "eta": 0.066, "j": 0.45, "c": 0.3, "omega_0": 16.7, "r": 0.049}, 9.9, "RR ends 10 times"),
-        ({"mu": 2.4, "eta": 0.057, "j": 0.63, "c": 0.59, "omega_0": 26.9, "r": 0.033}, 26.7, "case changes 1000 times"),
-    ],
-)
-def test_chatter_is_given_up(change, omega_c, message):
-    """Where mu > 1, rolling and slipping are both consistent off the stationary point: the run says so and ends."""
-    p, x0 = P.replace(R=0.1, **change), [0, 0, omega_c, 0, 0, 0]
-    with pytest.raises(SimulationError, match=rf"{message} in .* s \(leave_rolling = 'slip-stability'\)"):
-        simulate(p, x0, 10.0, leave_rolling="slip-stability")
-    assert simulate(p, x0, 10.0).header.failure == ""

@@ -1,0 +1,255 @@
+"""Where rolling is left: the rule against a contact with steep friction, the paper, and other simulators.
+
+The steep contact has friction against the direction of v/sqrt(v^2 + eps^2) in the place of v/|v|: the equations of SS
+(26) hold throughout, nothing ever sticks and no case is chosen. The simulation has to be its limit for eps -> 0.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from analytic import dynamics, rolling_forces, simulate, solution, thresholds, transitions, two_point_rolling
+from analytic.contact_problem import Closed, solve
+from analytic.motion import Moment
+from analytic.rigid_body import Place, slip_at_A, slip_at_B, smooth_rates, velocities
+from model import Case, Contact, Parameters, SimulationError, State
+
+P = Parameters.named("reference")
+UNIT = math.sqrt(P.g / P.R)
+RUNS = int(os.environ.get("DUALBALL_LONG_RUNS", "1500"))
+"""Number of runs of 60/c in the slow test."""
+JAMMING = {  # (mu, eta, j, r/R, kappa, Omega_0): where Moreau's time stepping and MuJoCo settle, omega_c in rad s-1
+    (1.7222, 0.0388, 0.482, 0.292, 0.1099, 2.635): 25.46520,
+    (1.2277, 0.1721, 0.611, 0.154, 0.1198, 2.099): 19.08114,
+}
+"""Sets in which forces can hold RR beyond omega_01, by jamming."""
+
+
+def parameters(mu, eta, j, r, kappa, Omega_0):
+    return P.replace(mu=mu, eta=eta, j=j, r=r * P.R, c=kappa * UNIT, omega_0=Omega_0 * UNIT)
+
+
+def steep(p, eps):
+    """Rates of (omega_c, slip_x, slip_y, slip_z) with steep friction, and its forces."""
+
+    def direction(across, along):
+        size = math.sqrt(across**2 + along**2 + eps**2)
+        return across / size, along / size
+
+    def forces(z):
+        _, slip_x, slip_y, slip_z = z
+        state = State(0.0, 0.0, *z)
+        return dynamics.forces(Case.SS, state, p, p.omega_0, direction(slip_x, slip_z), direction(slip_y, slip_z))
+
+    def rates(_, z):
+        _, _, *rate, _, _ = dynamics.newton_euler(Case.SS, State(0.0, 0.0, *z), forces(z), p, p.omega_0)
+        return rate
+
+    return rates, forces
+
+
+def random_rolling(rng):
+    """Parameters and omega_c of a ball in RR: mu to 3, eta to 2, as much lag or lead as friction might just hold."""
+    mu, eta, j = 10 ** rng.uniform(-1.5, math.log10(3)), 10 ** rng.uniform(-1.5, math.log10(2)), rng.uniform(0.1, 0.66)
+    load = 10 ** rng.uniform(-1, 1)
+    omega_c = math.sqrt(load) * UNIT
+    lag = rng.choice([0.0, rng.uniform(-1.5, 1.5)]) * (1 + 2 * j) / j * min(mu, eta * (1 + j) * load)
+    return P.replace(mu=mu, eta=eta, j=j, c=UNIT, omega_0=omega_c + lag * UNIT), omega_c
+
+
+def test_a_steep_contact_creeps_exactly_where_the_margin_is_positive():
+    """At a fixed omega_c the slip of a steep contact that starts from none comes to rest (creep), or runs away."""
+    rng, eps, seen = np.random.default_rng(5), 1e-4, set()
+    for _ in range(60):
+        p, omega_c = random_rolling(rng)
+        margin = float(rolling_forces.slip_margin(omega_c, p))
+        if abs(margin) < 0.02:  # creep there is as slow and as wide as you like
+            continue
+        rates, forces = steep(p, eps)
+
+        def leaves(_, slip, forces=forces, omega_c=omega_c):
+            return min(100 * eps - np.abs(slip).max(), forces((omega_c, *slip)).A_y)
+
+        leaves.terminal = True
+        run = solve_ivp(
+            lambda t, slip, rates=rates, omega_c=omega_c: rates(t, (omega_c, *slip))[1:],
+            (0, 1e4 * eps * p.r / p.g), np.zeros(3), method="LSODA", events=leaves, rtol=1e-6, atol=1e-9 * eps,
+        )  # fmt: skip
+        assert (run.status == 0) == (margin > 0), (p, omega_c)
+        seen.add((margin > 0, float(rolling_forces.margin(omega_c, p)) > 0))
+    assert seen >= {(True, True), (False, False)}
+
+
+@pytest.mark.parametrize("values", JAMMING)
+def test_the_limit_of_a_steep_contact(values):
+    """From SS through RS and RR into SS: errors shrink as eps does; those of rolling on while it is feasible don't.
+
+    At the onset the creep eps/sqrt(2 (1 - utilisation)) ~ eps t^(-1/2) meets the slip ~ t^2 when both are of the order
+    of eps^(4/5). So is the error from then on; that from where slip dies out is smaller, of the order of eps.
+    """
+    p = parameters(*values)
+    x0 = [0, 0, 0.9 * p.omega_0, 0, 0, 0]
+    ours, jammed = (
+        simulate(p, x0, 2.0, sample_interval=0.1, leave_rolling=policy) for policy in ("slip-stability", "infeasible")
+    )
+    assert (Case.RR, Case.SS) in zip(ours.events.from_case, ours.events.to_case, strict=True)
+    errors = []
+    for eps in (1e-2, 1e-3):
+        run = solve_ivp(steep(p, eps)[0], (0, 2), x0[2:], method="LSODA", t_eval=ours.time, rtol=1e-8, atol=1e-9)
+        errors.append([np.abs(run.y.T - other.x[:, 2:6]).max() for other in (ours, jammed)])
+    coarse, fine = np.array(errors)
+    assert fine[0] < coarse[0] / 5  # 10^(4/5) = 6.3
+    assert fine[1] > 0.9 * coarse[1]
+
+
+@pytest.mark.parametrize("values", JAMMING)
+def test_settles_where_the_other_simulators_do(values):
+    p = parameters(*values)
+    settled = solution(p, Case.SS)
+    assert settled.state.omega_c == pytest.approx(JAMMING[values], abs=5e-6)
+    run = simulate(p, np.zeros(6), 60 / p.c, sample_interval=1.0)
+    assert run.cases[-1] is Case.SS
+    np.testing.assert_allclose(run.x[-1], settled.state, atol=1e-6 * p.omega_0)
+    jammed = simulate(p, np.zeros(6), 10.0, sample_interval=0.1, leave_rolling="infeasible")
+    assert np.ptp(jammed.omega_c[-50:]) > 1  # sticks and slips for ever
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.6, 1.7, 3.0])
+@pytest.mark.parametrize("eta", [0.05, 0.3, 0.8, 1.7])
+def test_the_papers_bounds(mu, eta):
+    """omega_c = omega_0: (82) for eta < j, (74) for more, at any mu. Off it (66), and (73) where the wall holds."""
+    p = P.replace(mu=mu, eta=eta)
+    t = thresholds(p)
+    bound = t.omega_01 if eta < p.j else t.omega_03
+    for factor in (0.1, 0.5, 1 - 1e-9):
+        assert rolling_forces.slip_margin(factor * bound, p, factor * bound) >= 0
+    assert rolling_forces.slip_margin((1 + 1e-9) * bound, p, (1 + 1e-9) * bound) < 0
+    omega_c = 0.3 * bound
+    at_B = eta * (1 + p.j) * (1 + 2 * p.j) / (p.j * p.c) * omega_c**2
+    at_A = (1 + 2 * p.j) * mu / (p.j * p.R * p.c) * (p.g - p.j * p.R * omega_c**2)
+    for side in (1, -1):
+        for lag in (at_B, at_A):
+            assert rolling_forces.slip_margin(omega_c, p, omega_c + side * (1 + 1e-9) * lag) < 0
+        if mu > (1 + p.j) * eta + p.j:  # the floor is by far the rougher: the wall gives way
+            assert rolling_forces.slip_margin(omega_c, p, omega_c + side * (1 - 1e-9) * at_B) > 0
+
+
+def test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends():
+    """At the end of RR friction is full and opposes the slip that sets in, which has no acceleration yet."""
+    rng, ends = np.random.default_rng(2), set()
+    for _ in range(300):
+        p, omega_c = random_rolling(rng)
+        lag = p.omega_0 - omega_c
+
+        def margin(share, p=p, omega_c=omega_c, lag=lag):
+            return float(rolling_forces.slip_margin(omega_c, p, omega_c + share * lag))
+
+        if margin(0) <= 0 or margin(3) >= 0:
+            continue
+        fluid = omega_c + brentq(margin, 0, 3, xtol=1e-14) * lag
+        at = Moment(0.0, 0.0, State(omega_c=omega_c))
+        case, onset = two_point_rolling.onset(at, p, fluid)
+        ends.add(case)
+        slips = (onset.alpha, case.A), (onset.beta, case.B)
+        directions = [(math.sin(angle), math.cos(angle)) for angle, contact in slips if contact is Contact.S]
+        forces = dynamics.FORCES[case](at.x, p, fluid, *directions)
+        assert rolling_forces.margin(omega_c, p, fluid) > -1e-12
+        assert math.hypot(forces.A_x, forces.A_z) <= p.mu * forces.A_y * (1 + 1e-9)
+        assert math.hypot(forces.B_y, forces.B_z) <= p.eta * forces.B_x * (1 + 1e-9)
+        rate = dynamics.newton_euler(case, at.x, forces, p, fluid)
+        np.testing.assert_allclose([rate.slip_x, rate.slip_y, rate.slip_z], 0.0, atol=1e-9 * p.g / p.r)
+    assert ends == {Case.RS, Case.SR, Case.SS}
+
+
+def test_beyond_the_onset_something_moves():
+    """Wherever the margin is negative the contact problem has a solution that slips or lifts, and it is reached."""
+    rng, count = np.random.default_rng(4), 0
+    for _ in range(1000):
+        p, omega_c = random_rolling(rng)
+        if rolling_forces.slip_margin(omega_c, p) < 0:
+            case, _ = transitions.choose(Moment(0.0, 0.0, State(omega_c=omega_c)), p, p.omega_0)
+            count += 1
+            assert case is not Case.RR
+    assert count > 300
+
+
+@pytest.mark.parametrize("rolls", "AB")
+def test_a_single_rolling_contact_holds_or_gives_way(rolls):
+    """RS and SR: while friction can hold the contact no slip of it lasts, if the other's is below 2 sqrt(1+j)/j.
+
+    A slip along n that lasts has the acceleration gamma n > 0 with full friction against n: a fixed direction, found
+    from any start by following it.
+    """
+    rng = np.random.default_rng(8)
+    for _ in range(200):
+        p, omega_c = random_rolling(rng)
+        sense = rng.choice([-1.0, 1.0])
+        x = State(omega_c=omega_c, slip_x=0.0 if rolls == "A" else sense, slip_y=sense if rolls == "A" else 0.0)
+        case = Case.RS if rolls == "A" else Case.SR
+        f = dynamics.forces(case, x, p, p.omega_0)
+        if f.A_y <= 0:
+            continue
+        free = smooth_rates(velocities(x, p), Place(-p.R, 0.0, omega_c), p.omega_0, p)
+        known = Closed(0.0, (0.0, -sense)) if rolls == "B" else Closed(0.0, (0.0, sense))
+        A, B = (Closed(), known) if rolls == "A" else (known, Closed())
+        load, friction = (p.mu * f.A_y, (f.A_x, f.A_z)) if rolls == "A" else (p.eta * f.B_x, (f.B_y, f.B_z))
+        if abs(math.hypot(*friction) / load - 1) < 1e-3:
+            continue
+        for angle in np.arange(8) * math.pi / 4:  # from full friction in any direction
+            push = load * math.cos(angle), load * math.sin(angle)
+            start = (push[0], f.A_y, push[1], *f[3:]) if rolls == "A" else (*f[:3], f.B_x, *push)
+            rates, _ = solve(free, A, B, p, start, tolerance=1e-13)
+            slip = slip_at_A(rates, p) if rolls == "A" else slip_at_B(rates, p)
+            assert (math.hypot(*slip) < 1e-9 * p.g) == (math.hypot(*friction) < load)
+
+
+def random_start(seed):
+    """Parameters and a start all over the range: mu 0.03-3, eta 0.03-2, kappa 0.01-3; on the floor or up to R above."""
+    rng = np.random.default_rng([77, seed])
+
+    def log_uniform(low, high):
+        return float(10 ** rng.uniform(math.log10(low), math.log10(high)))
+
+    p = P.replace(
+        r=rng.uniform(0.05, 0.6) * P.R, mu=log_uniform(0.03, 3), eta=log_uniform(0.03, 2), j=rng.uniform(0.1, 0.66),
+        c=log_uniform(0.01, 3) * UNIT, omega_0=rng.uniform(0.3, 6) * UNIT,
+    )  # fmt: skip
+    y, v_y, h, v_h = 0.0, 0.0, 0.0, 0.0
+    omega_c = rng.uniform(-0.5, 1.5) * p.omega_0
+    slips = rng.normal(size=3) * p.omega_0 * p.R / p.r * 10 ** rng.uniform(-2, 0.3)
+    if rng.random() < 0.5:
+        y, v_y = rng.uniform(0, P.R), rng.normal() * 0.3 * UNIT * P.R
+    if rng.random() < 0.2:
+        h, v_h = rng.uniform(0, 0.9) * P.R, rng.normal() * 0.3 * UNIT * P.R
+    return p, State(y, v_y, omega_c, *slips.tolist(), h, v_h)
+
+
+def fault(seed):
+    """What is wrong with a run of 60/c; empty if nothing is. Each change of case, or hop, has to take its time."""
+    p, x0 = random_start(seed)
+    try:
+        run = simulate(p, x0, 60 / p.c, sample_interval=1 / p.c)
+    except SimulationError as error:
+        return f"seed {seed}: {error}"
+    settings = run.header.settings
+    balanced = settings["energy_residual"] <= 1e-6 * settings["energy_scale"]
+    return "" if balanced and len(run.events) < 100 + 60 / p.c * UNIT else f"seed {seed}: {settings}, {len(run.events)}"
+
+
+@pytest.mark.parametrize("seed", range(30, 40))
+def test_long_random_runs_end(seed):
+    assert not fault(seed)
+
+
+@pytest.mark.slow
+def test_many_long_random_runs_end():
+    with ProcessPoolExecutor() as pool:
+        faults = [line for line in pool.map(fault, range(RUNS), chunksize=10) if line]
+    assert not faults, "\n".join(faults)
