@@ -23,6 +23,8 @@ ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
 be stiff."""
 PATIENCE = 300
 """Steps of LSODA with a small slip after which it gives way; a slip that dies out takes fewer."""
+MAX_RESTARTS = 20
+"""How often in one stretch a solver may fail; the other one then takes over."""
 EPS = math.ulp(1.0)
 LOCAL = 0.25
 """Tolerance of a step of the integrator relative to that asked for: errors of many steps add up."""
@@ -30,6 +32,10 @@ LOCAL = 0.25
 
 class StalledError(ArithmeticError):
     """The run makes no progress."""
+
+
+class _SolverError(ArithmeticError):
+    """A solver can't go on."""
 
 
 class Step(NamedTuple):
@@ -62,16 +68,22 @@ class Stretch:
     def steps(self, first_step: float | None) -> Iterator[Step]:
         """Steps with the samples in them, the last of them ending at a guard or at `until`.
 
-        `first_step` in s for a motion that may soon end. Raises `StalledError` if the solver can't go on.
+        `first_step` in s for a motion that may soon end. A solver whose steps become shorter than its time can resolve
+        gives way to the other one, whose time starts from zero again. Raises `StalledError` after `MAX_RESTARTS`.
         """
         t, z, small = self.start, self.motion.start, self.motion.least_slip(self.motion.start) < ONSET_SLIP
-        watch = Watch(self.motion, t, self.absolute, self.relative)
+        watch, failures = Watch(self.motion, t, self.absolute, self.relative), 0
         while t < self.until:
-            for step in self._suited(small, self._solve(BDF if small else LSODA, t, z, first_step, watch)):
-                yield step
-                t, z, first_step = step.time, step.z, None
-                if step.guard:
-                    return
+            try:
+                for step in self._suited(small, self._solve(BDF if small else LSODA, t, z, first_step, watch)):
+                    yield step
+                    t, z, first_step = step.time, step.z, None
+                    if step.guard:
+                        return
+            except _SolverError as error:
+                failures += 1
+                if failures > MAX_RESTARTS:
+                    raise StalledError(str(error)) from error
             small = not small
 
     def _suited(self, small: bool, steps: Iterator[Step]) -> Iterator[Step]:
@@ -105,7 +117,7 @@ class Stretch:
             message = solver.step()
             z = solver.y.tolist()
             if solver.status == "failed" or not math.isfinite(sum(z)):
-                raise StalledError(f"{method.__name__} in case {motion.case.name}: {message}")
+                raise _SolverError(f"{method.__name__} in case {motion.case.name}: {message}")
             t = self.until if solver.t == solver.t_bound else start + float(solver.t)
             fired = watch.fired(t, z)
             if not fired and (taken == len(times) or times[taken] > t):

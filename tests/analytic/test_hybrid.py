@@ -12,9 +12,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from analytic import rolling_forces, simulate, stationary_solutions, vector_field
+from analytic import integrator, rolling_forces, simulate, stationary_solutions, vector_field
 from analytic.dynamics import newton_euler
-from model import Case, Flow, Parameters
+from model import Case, Flow, Parameters, SimulationError
 
 P = Parameters.named("reference")
 RTOL = 1e-9
@@ -238,3 +238,36 @@ def test_near_the_axis_is_an_ordinary_place():
     start = rho * np.exp(0.4j)
     velocity = np.exp(0.4j) * (-radial + 1j * along)
     np.testing.assert_allclose(place, start + velocity * run.time, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", ["BDF", "LSODA"])
+def test_a_solver_that_fails_gives_way_to_the_other(name, monkeypatch):
+    """The same motion, through RR and the onset of SS, where one solver breaks off now and then."""
+    p, x0 = P.replace(omega_0=25.0), [0, 0, 9.0, 0, 0, 0]
+    right = simulate(p, x0, 1.5, sample_interval=0.1)
+
+    class Fails(getattr(integrator, name)):
+        steps = 0
+
+        def step(self):
+            Fails.steps += 1
+            if Fails.steps in (10, 30, 31, 60):
+                self.status = "failed"
+                return "step size below spacing of numbers"
+            return super().step()
+
+    monkeypatch.setattr(integrator, name, Fails)
+    run = simulate(p, x0, 1.5, sample_interval=0.1)
+    assert Fails.steps >= 10
+    np.testing.assert_allclose(run.x, right.x, rtol=0, atol=1e-7 * 25.0)
+
+
+def test_solvers_that_both_fail_end_the_run(monkeypatch):
+    def fails(self):
+        self.status = "failed"
+        return "step size below spacing of numbers"
+
+    monkeypatch.setattr(integrator.BDF, "step", fails)
+    monkeypatch.setattr(integrator.LSODA, "step", fails)
+    with pytest.raises(SimulationError, match="in case SS: step size below spacing of numbers"):
+        simulate(P.replace(omega_0=25.0), [0, 0, 9.0, 3, 2, -3], 1.5)
