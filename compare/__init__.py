@@ -1,20 +1,24 @@
 """Theory and engine side by side: measure blind, predict, judge, show."""
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
-from compare.claims.claim import Check, Claim, Outcome, Verdict
-from compare.measure.lab import Level
-
 if TYPE_CHECKING:
+    from compare.claims.claim import Check, Claim, Outcome, Verdict
+    from compare.measure.lab import Level
     from compare.validation import validate
 
 __all__ = ["Check", "Claim", "Level", "Outcome", "Verdict", "validate"]
 
+_CLAIM = "compare.claims.claim"
+_MODULES = dict.fromkeys(("Check", "Claim", "Outcome", "Verdict"), _CLAIM) | {
+    "Level": "compare.measure.lab",
+    "validate": "compare.validation",
+}
+
 
 def __getattr__(name: str) -> Any:
-    """`validate` when it is asked for: it draws, and a worker that imports this package never does."""
-    if name == "validate":
-        from compare.validation import validate
-
-        return validate
+    """A name when it is asked for: engines and figures take a second to load, and `dualball predict` needs neither."""
+    if name in _MODULES:
+        return getattr(importlib.import_module(_MODULES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

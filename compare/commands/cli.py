@@ -7,18 +7,19 @@ Exit codes: 0 done and as expected, 1 a verdict failed or a run broke down, 2 a 
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import sys
 from collections.abc import Sequence
 
-from compare.commands import benchmark, grade, look, predict, simulate, sweep, validate
 from model import InputError, SimulationError
 from model.trajectory import current_versions
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with the given arguments, the process's own for None; return its exit code."""
-    args = _parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    args = _parser(words).parse_args(words)
     try:
         return int(args.run(args))
     except InputError as error:
@@ -35,15 +36,29 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _parser() -> argparse.ArgumentParser:
+_MODULES = {
+    "predict": ("predict",),
+    "simulate": ("simulate",),
+    "validate": ("validate", "judge"),
+    "sweep": ("sweep", "collect"),
+    "look": ("report", "figures", "inspect", "render", "view"),
+    "grade": ("grade",),
+    "benchmark": ("benchmark",),
+}
+"""The commands in each module of this package: `predict` doesn't wait for the engines and figures of the others."""
+
+
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """The parser of the command that was asked for, or of all of them."""
     parser = argparse.ArgumentParser(
         prog="dualball",
         description="A physics engine on trial: the dual-point contact ball, in closed form and in MuJoCo.",
     )
     parser.add_argument("--version", action="version", version=f"dualball {current_versions()['dualball']}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for module in (predict, simulate, validate, sweep, look, grade, benchmark):
-        module.add(commands)
+    asked = [module for module, names in _MODULES.items() if words[0:1] and words[0] in names]
+    for module in asked or _MODULES:
+        importlib.import_module(f"compare.commands.{module}").add(commands)
     return parser
 
 

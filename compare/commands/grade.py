@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import sys
 from pathlib import Path
@@ -11,6 +12,9 @@ from rich.console import Console
 
 from compare.commands import options
 from compare.runs import progress
+from compare.scorecard import native
+from compare.scorecard.native import Native
+from model import InputError
 from model.files import check_writable, write_text
 
 
@@ -19,7 +23,7 @@ def add(commands: options.Commands) -> None:
     command = options.command(
         commands, "grade", run, "a score card for MuJoCo contact settings: yours, dualball's, MuJoCo's own"
     )
-    options.add_native(command)
+    add_settings(command)
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write")
     command.add_argument("--json", action="store_true", help="print JSON")
 
@@ -30,13 +34,13 @@ def run(args: argparse.Namespace) -> int:
 
     if args.output:
         check_writable(args.output)
-    yours = options.native(args)
+    yours = settings(args)
     if yours.note:
         print(f"dualball: {yours.note}", file=sys.stderr)
     with progress.shown(quiet=args.json) as show:
         columns = grade.grade(yours, progress=lambda name, done, total: show(f"grade {name}", done, total, 0))
     if args.output:
-        described = f"{options.describe_native(args)} {yours.note}".rstrip()
+        described = f"{describe(args)} {yours.note}".rstrip()
         write_text(args.output, card.html(columns, described))
     if args.json:
         print(json.dumps([column.to_mapping() for column in columns], indent=1))
@@ -46,3 +50,50 @@ def run(args: argparse.Namespace) -> int:
     for item in columns[0].advice:
         console.print(f"• {item}", markup=False, highlight=False)
     return 0
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Options that name settings of MuJoCo's contacts: a file, changes to it, or both."""
+    parser.add_argument("file", type=Path, nargs="?", metavar="FILE.xml", help="MJCF file with a ball and its contacts")
+    group = parser.add_argument_group("settings", "as in MJCF; where not given, those of FILE.xml or MuJoCo's own")
+    group.add_argument("--timestep", type=options.number, metavar="s")
+    group.add_argument("--integrator", metavar="NAME", help=", ".join(native.INTEGRATORS))
+    group.add_argument("--cone", metavar="NAME", help=", ".join(native.CONES))
+    group.add_argument("--solver", metavar="NAME", help=", ".join(native.SOLVERS))
+    group.add_argument("--impratio", type=options.number)
+    group.add_argument("--iterations", type=int)
+    group.add_argument("--tolerance", type=options.number)
+    group.add_argument("--noslip-iterations", type=int)
+    group.add_argument("--solref", type=options.number, nargs=2, metavar=("TIMECONST", "DAMPRATIO"))
+    group.add_argument("--solreffriction", type=options.number, nargs=2, metavar=("TIMECONST", "DAMPRATIO"))
+    group.add_argument("--solimp", type=options.number, nargs="+", metavar="D", help="dmin dmax width midpoint power")
+    group.add_argument("--margin", type=options.number, metavar="m")
+
+
+def settings(args: argparse.Namespace) -> Native:
+    """The settings that the options of `add_settings` name."""
+    base = native.read(args.file) if args.file else Native()
+    given = {name: getattr(args, name) for name in _NATIVE if getattr(args, name) is not None}
+    contacts = {name: getattr(args, name) for name in _CONTACT if getattr(args, name) is not None}
+    if "solimp" in contacts:
+        values = contacts["solimp"]
+        if not 1 <= len(values) <= 5:
+            raise InputError(f"solimp has {len(values)} numbers, but at most 5: dmin dmax width midpoint power")
+        contacts["solimp"] = [*values, *base.A.solimp[len(values) :]]
+    contacts = {name: tuple(v) if isinstance(v, list) else v for name, v in contacts.items()}
+    return dataclasses.replace(base, **given).with_contacts(**contacts)
+
+
+def describe(args: argparse.Namespace) -> str:
+    """The same in words."""
+    given = [
+        f"{name} {' '.join(f'{v:g}' for v in value) if isinstance(value, list) else value}"
+        for name in (*_NATIVE, *_CONTACT)
+        if (value := getattr(args, name)) is not None
+    ]
+    source = f"Settings of {args.file}" if args.file else "MuJoCo's defaults"
+    return f"{source}, with {', '.join(given)}." if given else f"{source}."
+
+
+_NATIVE = ("timestep", "integrator", "cone", "solver", "impratio", "iterations", "tolerance", "noslip_iterations")
+_CONTACT = ("solref", "solreffriction", "solimp", "margin")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from compare.commands import options
+from compare.commands import options, running
 from compare.report import results
 from compare.runs import collection
 from compare.view import inspection
@@ -44,8 +44,8 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "view", view, "the ball in MuJoCo's viewer, driven by the study's own loop")
     options.add_parameters(command)
-    options.add_flow(command)
-    options.add_start(command)
+    running.add_flow(command)
+    running.add_start(command)
     command.add_argument("--timestep", type=options.number, metavar="s", help="time step")
     command.add_argument("--speed", type=options.number, default=1.0, help="1 is real time (default)")
 
@@ -101,5 +101,5 @@ def view(args: argparse.Namespace) -> int:
     p = options.parameters(args)
     timestep = {} if args.timestep is None else {"timestep": args.timestep}
     settings = ContactSettings.for_problem(p, **timestep)
-    viewer.view(p, options.start(args), options.flow(args), settings, args.speed)
+    viewer.view(p, running.start(args), running.flow(args), settings, args.speed)
     return 0

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from compare.commands import options
+from compare.commands import options, running
 from compare.runs.tasks import Task, failed_path, journal_path, store
 from compare.runs.workers import interrupts
 from compare.view import inspection
@@ -17,10 +17,10 @@ from model.files import check_writable
 def add(commands: options.Commands) -> None:
     """Declare the command."""
     command = options.command(commands, "simulate", run, "one run with any engine, into an HDF5 file")
-    options.add_engine(command)
+    running.add_engine(command)
     options.add_parameters(command)
-    options.add_flow(command)
-    options.add_start(command)
+    running.add_flow(command)
+    running.add_start(command)
     command.add_argument("--time", type=options.number, default=10.0, metavar="s", help="duration (default 10)")
     command.add_argument(
         "--sample-interval", type=options.number, metavar="s", help="default: a thousandth of the duration"
@@ -34,11 +34,11 @@ def run(args: argparse.Namespace) -> int:
     task = Task(
         engine=args.engine.name,
         parameters=options.parameters(args),
-        x0=options.start(args),
+        x0=running.start(args),
         t_end=args.time,
-        flow=options.flow(args),
+        flow=running.flow(args),
         sample_interval=args.sample_interval,
-        settings=options.settings(args),
+        settings=running.settings(args),
     )
     if args.output:
         check_writable(args.output)

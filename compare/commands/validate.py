@@ -11,7 +11,7 @@ from rich.console import Console
 
 from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Outcome, Verdict
-from compare.commands import options, tables
+from compare.commands import options, running, tables
 from compare.measure.lab import Level
 from compare.report import results
 from compare.runs import progress
@@ -29,7 +29,7 @@ def add(commands: options.Commands) -> None:
     own.add_argument("--parameters", type=Path, metavar="FILE", help="your own set, a TOML file, instead of many")
     command.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR")
     command.add_argument("--list", action="store_true", help="list the claims and stop")
-    options.add_workers(command)
+    running.add_workers(command)
     command.add_argument("--quiet", action="store_true", help="no progress")
     _add_shared(command)
 
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
             level=args.level,
             claims=args.claim,
             sets=chosen,
-            workers=options.workers(args),
+            workers=running.workers(args),
             limit=args.limit,
             progress=show,
             announce=announce,
