@@ -134,8 +134,8 @@ class Trajectory:
     def phases(self) -> list[tuple[Case, float, float]]:
         """Longest stretches of samples in one case, with the times of their first and last sample, s."""
         starts = np.flatnonzero(np.diff(self.case, prepend=-1))
-        ends = np.append(starts[1:], len(self.case)) - 1
-        stretches = zip(self.case[starts], self.time[starts].tolist(), self.time[ends].tolist(), strict=False)
+        ends = np.append(starts, len(self.case))[1:] - 1
+        stretches = zip(self.case[starts], self.time[starts].tolist(), self.time[ends].tolist(), strict=True)
         return [(Case(code), first, last) for code, first, last in stretches]
 
     @property
