@@ -1,13 +1,9 @@
 """Stability with respect to slipping (section 3): does a slight slip, or lift, out of a rolling case die out or grow?
 
 From a state x* of a case Y the ball is pushed along n into a case Z of more freedom (the arrows of Fig. 6, and NR->NS);
-gamma(x*, n) = lim f_Z(x* + eps n) . n (53) tells whether it is driven further. Three measures of one question:
-
-* ``gamma`` with the paper's Euclidean product: exact as (56), (66), (73), (82), (83) quote it, but over all directions
-  its maximum may be positive though no slip can last (docs/errata.md), since with two or more directions to slip the
-  slip turns while it grows;
-* ``gamma`` with the product of kinetic energy, the mass matrix reduced to the slip: the work done on the slip;
-* the forces: rolling goes on as long as admissible forces exist (`rolling_forces.margin` for RR).
+gamma(x*, n) = lim f_Z(x* + eps n) . n (53), in the paper's Euclidean product, tells whether it is driven further. Over
+all directions its maximum may be positive though no slip can last, since with two or more directions to slip the slip
+turns while it grows (docs/errata.md); then the work done on the slip or the forces decide, `stability`.
 """
 
 from __future__ import annotations
@@ -47,13 +43,6 @@ class SlipStability(Enum):
     """gamma > 0 in one."""
 
 
-class Metric(Enum):
-    """The inner product of (52)."""
-
-    EUCLID = "Euclidean, in slip angular velocity, as in the paper"
-    ENERGY = "kinetic energy of the slip"
-
-
 def normals(inner: Case, outer: Case) -> tuple[str, ...]:
     """The variables that span W (51): what may slip in `outer` and doesn't in `inner`."""
     return tuple(name for name in _SLIPS if name in TRAITS[outer].active and name not in TRAITS[inner].active)
@@ -68,21 +57,6 @@ def direction(alpha: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
     sign = np.sign(np.pi / 2 - np.asarray(alpha, dtype=float))
     n = np.stack(np.broadcast_arrays(tan_a, tan_b, 1.0), axis=-1)
     return np.asarray(sign[..., None] * n / np.linalg.norm(n, axis=-1, keepdims=True))
-
-
-def slip_mass(inner: Case, outer: Case, p: Parameters) -> Array:
-    """Mass matrix of the slip in units of m r^2, shape (d, d): the kinetic energy reduced to W.
-
-    In (v_y/r, omega_c R/r, slips) the energy is that of the centre plus that of the spin (4); what moves in `inner` is
-    eliminated (Schur complement). For RR->SS: j/(1+2j) [[1+j, j, 0], [j, 1+j, 0], [0, 0, 1+2j]].
-    """
-    spin = np.array([[0.0, 1, 1, 0, 0], [0, -1, 0, 1, 0], [1, 0, 0, 0, 1]])
-    mass = np.diag([1.0, 1, 0, 0, 0]) + p.j * spin.T @ spin
-    order = ("v_y", "omega_c", *_SLIPS)
-    W = [order.index(name) for name in normals(inner, outer)]
-    Y = [k for k, name in enumerate(order) if name in TRAITS[inner].active]
-    cross = mass[np.ix_(Y, W)]
-    return np.asarray(mass[np.ix_(W, W)] - cross.T @ np.linalg.solve(mass[np.ix_(Y, Y)], cross))
 
 
 def slip_rates(
@@ -115,15 +89,11 @@ def slip_rates(
     return np.stack(along, axis=-1), A_y, B_x
 
 
-def gamma(
-    inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters, metric: Metric = Metric.EUCLID
-) -> Array:
-    """gamma of (53) in rad s-2 for directions n (..., d), which are scaled to unit length in the metric."""
+def gamma(inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters) -> Array:
+    """gamma of (53) in rad s-2 along directions n (..., d) of any length."""
     n = np.asarray(n, dtype=float)
     rates, _, _ = slip_rates(inner, outer, x, n, p)
-    M = np.eye(n.shape[-1]) if metric is Metric.EUCLID else slip_mass(inner, outer, p)
-    length = np.sqrt(np.einsum("...a,ab,...b->...", n, M, n))
-    return np.asarray(np.einsum("...a,ab,...b->...", n, M, rates) / length)
+    return np.asarray(np.sum(n * rates, axis=-1) / np.linalg.norm(n, axis=-1))
 
 
 def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
@@ -154,8 +124,8 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
     """Stability with respect to slipping of the stationary solution of a case at omega_c, p.omega_0 if None.
 
     RR: (67), (74), and (82), which can be met only for eta < j because A_y < 0 otherwise. SR and NR: (61). RS: the
-    friction j m R omega_c^2 that its floor must supply. These are the signs of gamma in the metric of kinetic energy
-    over all directions along which the contacts stay closed; on a threshold, to round-off, it is neutral.
+    friction j m R omega_c^2 that its floor must supply. These are the signs of the work done on a slight slip, over all
+    directions along which the contacts stay closed; on a threshold, to round-off, it is neutral.
     """
     Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
     match case:
