@@ -15,7 +15,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from compare.runs import engines
@@ -23,8 +22,7 @@ from compare.runs.engines import Engine, Settings
 from mjsim import ContactSettings
 from mjsim.engine import Blocks
 from mjsim.journal import Journal
-from model import Flow, InputError, Parameters, Trajectory, storage
-from model.kinematics import full_state
+from model import Flow, InputError, Parameters, State, Trajectory, storage
 from model.trajectory import current_versions
 
 LONG = 1e6
@@ -41,7 +39,7 @@ class Task:
     """Name of a `compare.runs.engines.Engine`."""
     parameters: Parameters
     x0: npt.ArrayLike
-    """Initial state, 6 or 8 entries in the order of `model.kinematics.VARIABLES`; kept as a tuple of 8."""
+    """Initial state, 6 or 8 numbers; kept as a `State`."""
     t_end: float
     """s"""
     flow: Flow | None = None
@@ -55,10 +53,7 @@ class Task:
         simulator = self.simulator
         if self.settings is not None and not isinstance(self.settings, simulator.settings):
             raise InputError(f"settings of another engine were given to {self.engine!r}")
-        state = full_state(np.asarray(self.x0, dtype=float))
-        if state.ndim != 1:
-            raise InputError(f"x0 is one state, not {len(state)}")
-        object.__setattr__(self, "x0", tuple(state.tolist()))
+        object.__setattr__(self, "x0", State.one(self.x0))
 
     @property
     def simulator(self) -> Engine:

@@ -16,7 +16,6 @@ from mjsim import ContactSettings, recorder, scene
 from mjsim.engine import start
 from mjsim.stepping import Stepper
 from model import Events, Flow, Header, Parameters, Trajectory
-from model.kinematics import full_state
 
 _HUGE = 1e8
 """A coordinate, speed or force beyond this, in SI units, has diverged."""
@@ -35,8 +34,7 @@ class Contender:
     def start(self, p: Parameters, x0: npt.ArrayLike) -> Stepper:
         """A simulation from a state."""
         model = self.native.build(p, self.loop) if self.native else scene.build(p, self.loop)[0]
-        x = full_state(np.asarray(x0, dtype=float))
-        return start([model], [p], self.loop, [x], 0.0, np.full(1, p.omega_0), batched=False)
+        return start([model], [p], self.loop, [x0], 0.0, np.full(1, p.omega_0), batched=False)
 
     def run(self, p: Parameters, x0: npt.ArrayLike, t_end: float, interval: float, skip: float = 0.0) -> Trajectory:
         """Samples from about `skip` to `t_end`, every `interval` s, up to where the run diverges; without cases."""

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from mjsim import ContactSettings, limits, scene
 from mjsim.stepping import Polar
 from model import Flow, InputError, Parameters
-from model.kinematics import full_state
 from model.parameters import POSITIVE, check_number
 
 FRAME = 1 / 60
@@ -56,13 +55,12 @@ def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSetting
     """The simulation, with what only serves contact out of sight."""
     if settings.coordinates != "polar":
         raise InputError("the viewer shows coordinates = 'polar' only")
-    x = full_state(np.asarray(x0, dtype=float))
     limits.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))
-    limits.check_start(x, p, settings)
+    limits.check_start(x0, p, settings)
     model, _ = scene.build(p, settings)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
     omega_0 = flow([0.5 * settings.timestep])
-    return Polar([model], [p], settings, [x], 0.0, omega_0, batched=False)
+    return Polar([model], [p], settings, [x0], 0.0, omega_0, batched=False)
 
 
 def run(

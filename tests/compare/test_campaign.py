@@ -261,7 +261,7 @@ def test_bad_campaigns(tmp_path: Path) -> None:
     ("x0", "says"),
     [
         ((0.0, 1.0), r"a state has 6 entries .* or 8"),
-        (np.zeros((2, 6)), "x0 is one state, not 2"),
+        (np.zeros((2, 6)), "one state is needed"),
         ((0, 0, float("nan"), 0, 0, 0), "omega_c = nan rad s-1 must be finite"),
     ],
 )
