@@ -99,27 +99,19 @@ class DoublePoint:
     """The thresholds that meet there."""
 
 
-def double_points(p: Parameters) -> list[DoublePoint]:
-    """Where the curves of Fig. 7 (eta varied at fixed mu) meet: at eta_cr, where the fold is born, and at eta = j."""
-    unit, found = np.sqrt(p.g / p.R), []
-    eta_cr = float(slipping_branch.eta_critical(p.mu, p.kappa))
-    if 0 < eta_cr < p.j:
-        found.append(DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04")))
-    if p.mu > 0:
-        folds = ("omega_04",) if eta_cr < p.j and p.c > 0 else ()
-        found.append(DoublePoint(p.j, float(unit / np.sqrt(p.j)), ("omega_01", "omega_02", "omega_03", *folds)))
-    return found
+def double_points(p: Parameters, equal: bool = False) -> list[DoublePoint]:
+    """Where the curves of Fig. 7 meet, or with `equal` friction mu = eta those of Fig. 8.
 
-
-def double_points_of_equal_friction(p: Parameters) -> list[DoublePoint]:
-    """The same for Fig. 8, where mu = eta are varied together: eta_cr is then (kappa^2/4)^(1/3)."""
-    unit, found = np.sqrt(p.g / p.R), []
-    eta_cr = float(np.cbrt(p.kappa**2 / 4))
-    if 0 < eta_cr < p.j:
-        found.append(DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04")))
-    folds = ("omega_04",) if 0 < eta_cr < p.j else ()
-    found.append(DoublePoint(p.j, float(unit / np.sqrt(p.j)), ("omega_01", "omega_02", "omega_03", *folds)))
-    return found
+    At eta_cr, for equal friction (kappa^2/4)^(1/3), where the fold is born; and at eta = j.
+    """
+    unit = np.sqrt(p.g / p.R)
+    eta_cr = float(np.cbrt(p.kappa**2 / 4) if equal else slipping_branch.eta_critical(p.mu, p.kappa))
+    folds = 0 < eta_cr < p.j
+    points = [DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04"))] if folds else []
+    if equal or p.mu > 0:
+        meets = ("omega_01", "omega_02", "omega_03", *("omega_04",) * folds)
+        points.append(DoublePoint(p.j, float(unit / np.sqrt(p.j)), meets))
+    return points
 
 
 class Exists(IntFlag):

@@ -51,16 +51,16 @@ def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
     InputError
         If there is no attractor (of that case), or if `case` is needed.
     """
-    found = stationary.stable_solutions(p) if case is None else [stationary.solution(p, case)]
-    if p.c == 0 or not found:
+    followed = stationary.stable_solutions(p) if case is None else [stationary.solution(p, case)]
+    if p.c == 0 or not followed:
         raise InputError(f"no motion follows the flow at omega_0 = {p.omega_0:g} rad s-1 with c = {p.c:g} s-1")
-    slips = {bool(np.isfinite(s.alpha)) for s in found}
+    slips = {bool(np.isfinite(s.alpha)) for s in followed}
     if len(slips) > 1:
-        names = ", ".join(s.case.name for s in found)
+        names = ", ".join(s.case.name for s in followed)
         raise InputError(f"the characteristic has several branches at omega_0 = {p.omega_0:g} rad s-1: choose {names}")
     if slips == {False}:
         return 1.0
-    s = np.log(np.abs(np.tan(found[0].alpha)))
+    s = np.log(np.abs(np.tan(followed[0].alpha)))
     return float(slipping_branch.characteristic_slope(s, p.j, p.mu, p.eta, p.kappa))
 
 

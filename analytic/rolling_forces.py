@@ -126,7 +126,7 @@ def _interval(u: Array, z: Array, p: Parameters) -> tuple[Array, Array]:
 def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
     """Roots s of (d - s)^2 + z^2 = friction^2 s^2 that bound the admissible normal forces of one contact.
 
-    Where no s is admissible the discriminant is taken as 0, or both ends are inf: `margin` tells.
+    Where no s is admissible the discriminant is taken as 0, or both ends are inf: there `margin` is negative.
     """
     hyp2 = d**2 + z**2
     top = d + np.sqrt(np.maximum((friction - 1) * (friction + 1) * z**2 + (friction * d) ** 2, 0.0))

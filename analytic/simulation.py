@@ -37,7 +37,7 @@ def simulate(
     Parameters
     ----------
     p : parameters; its omega_0 is used if there is no `flow`
-    x0 : state at the start, 6 entries, or 8 with h and v_h (`model.kinematics.VARIABLES`); its case is found from it
+    x0 : state at the start, a `State` or 6 or 8 numbers in its order; its case follows from it
     t_end : duration, s
     settings : `Settings` if None
     sample_interval : time between samples, s; a thousandth of t_end if None. The end is always a sample.
@@ -48,7 +48,7 @@ def simulate(
     Returns
     -------
     Trajectory
-        Its header tells the largest error of the energy balance (``energy_residual`` in J, beside ``energy_scale``,
+        Its header has the largest error of the energy balance (``energy_residual`` in J, beside ``energy_scale``,
         the largest energy in play). A run that is interrupted (Ctrl-C) returns what it has; the header says so.
 
     Raises

@@ -1,7 +1,7 @@
 """Stability with respect to slipping (section 3): does a slight slip, or lift, out of a rolling case die out or grow?
 
 From a state x* of a case Y the ball is pushed along n into a case Z of more freedom (the arrows of Fig. 6, and NR->NS);
-gamma(x*, n) = lim f_Z(x* + eps n) . n (53), in the paper's Euclidean product, tells whether it is driven further. Over
+gamma(x*, n) = lim f_Z(x* + eps n) . n (53), in the paper's Euclidean product, says whether it is driven further. Over
 all directions its maximum may be positive though no slip can last, since with two or more directions to slip the slip
 turns while it grows (docs/errata.md); then the work done on the slip or the forces decide, `stability`.
 """
@@ -130,18 +130,18 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
     Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
     match case:
         case Case.RR:
-            found = {_sign(0.0, p.eta * Omega2), _sign(p.mu * p.j * Omega2, p.mu)}
+            kinds = {_sign(0.0, p.eta * Omega2), _sign(p.mu * p.j * Omega2, p.mu)}
             if p.eta < p.j:
-                found.add(_sign(Omega2 * (p.mu * p.eta * (1 + p.j) + p.j - p.eta), p.mu * (1 + p.eta)))
+                kinds.add(_sign(Omega2 * (p.mu * p.eta * (1 + p.j) + p.j - p.eta), p.mu * (1 + p.eta)))
         case Case.SR | Case.NR:
             smooth_floor = case is Case.SR and p.mu == 0  # the floor then carries the weight, the wall nothing
-            found = {_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}
+            kinds = {_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}
         case Case.RS:
-            found = {_sign(p.j * Omega2, p.mu)}
+            kinds = {_sign(p.j * Omega2, p.mu)}
         case _:
-            found = set()
+            kinds = set()
     worst_first = SlipStability.UNSTABLE, SlipStability.NEUTRAL
-    return next((kind for kind in worst_first if kind in found), SlipStability.STABLE)
+    return next((kind for kind in worst_first if kind in kinds), SlipStability.STABLE)
 
 
 def neutral_flow(case: Case, p: Parameters) -> float:

@@ -27,7 +27,7 @@ def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> 
         if abs(gap) < settings.touching(p.g) and speed > fastest:
             warnings.warn(
                 f"the ball slips at {speed:.3g} m s-1 at {contact} at the start, but with these settings contact "
-                f"is continuous only up to {fastest:.3g} m s-1; ContactSettings.for_problem finds softer ones",
+                f"is continuous only up to {fastest:.3g} m s-1; ContactSettings.for_problem gives softer ones",
                 stacklevel=4,
             )
 

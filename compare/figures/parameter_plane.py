@@ -82,7 +82,7 @@ def draw(plane: Plane) -> Figure:
     axes = figure.add_subplot()
     eta = np.linspace(0.0, _WIDEST, 801)
     mu = eta if plane.equal else np.full(eta.shape, p.mu)
-    doubles = bifurcation.double_points_of_equal_friction(p) if plane.equal else bifurcation.double_points(p)
+    doubles = bifurcation.double_points(p, plane.equal)
     highest = [point.omega_0 for point in doubles] + [c.measurement.parameters.omega_0 for c in plane.checks]
     fastest = 1.15 * max([2.2 * float(np.sqrt(p.g / p.R)), *highest])
     _regions(axes, p, mu, eta, np.linspace(0.0, fastest, 901))

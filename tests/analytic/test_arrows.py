@@ -18,8 +18,8 @@ def of(p: Parameters, inner: Case, outer: Case) -> list[Arrow]:
 
 
 def test_all_arrows_of_figure_6_are_there() -> None:
-    found = {(a.inner, a.outer) for w in FLOWS for a in stability_along(P.replace(omega_0=w))}
-    assert found == {*slip_stability.SLIP_ARROWS, *slip_stability.LIFT_ARROWS}
+    asked = {(a.inner, a.outer) for w in FLOWS for a in stability_along(P.replace(omega_0=w))}
+    assert asked == {*slip_stability.SLIP_ARROWS, *slip_stability.LIFT_ARROWS}
 
 
 @pytest.mark.parametrize("omega_0", FLOWS[1:])
@@ -33,8 +33,8 @@ def test_slip_out_of_rr_and_nr(omega_0: float) -> None:
         (Case.NR, Case.NS): [slip_bounds.nr_to_ns(p, side) for side in (1, -1)],
     }
     for (inner, outer), expected in bounds.items():
-        found = [a.growth for a in of(p, inner, outer)]
-        np.testing.assert_allclose(found, [b.gamma(omega_0) for b in expected], rtol=1e-12, atol=1e-9)
+        growths = [a.growth for a in of(p, inner, outer)]
+        np.testing.assert_allclose(growths, [b.gamma(omega_0) for b in expected], rtol=1e-12, atol=1e-9)
 
 
 def test_slip_out_of_rs() -> None:

@@ -127,9 +127,9 @@ def test_equation_66() -> None:
 
     step = 500.0 / 200_000
     for mu, eta in ((0.3, 0.45), (0.6, 0.45), (0.3, 0.2)):
-        found = limit(P.replace(mu=mu, eta=eta))
+        border = limit(P.replace(mu=mu, eta=eta))
         tolerance = 2 * step * P.j * P.c / ((1 + P.j) * (1 + 2 * P.j) * omega_c**2)
-        assert abs(found - eta) <= tolerance
+        assert abs(border - eta) <= tolerance
 
 
 def test_section_5_3() -> None:
@@ -144,10 +144,10 @@ def test_section_5_3() -> None:
 def test_proposition_3() -> None:
     """A_y = 0: the stationary solution of SR is one of NR too, for which y is neutral."""
     p = Parameters.named("reference").replace(omega_0=35.0)
-    found = {s.case: s for s in stationary_solutions(p)}
-    np.testing.assert_array_equal(found[Case.SR].x, found[Case.NR].x)
-    assert abs(found[Case.SR].force_A[1]) <= 1e-14 * p.m * p.g * (1 + p.j * p.R * p.omega_0**2 / p.g)
-    assert "y" in found[Case.NR].family
+    by_case = {s.case: s for s in stationary_solutions(p)}
+    np.testing.assert_array_equal(by_case[Case.SR].x, by_case[Case.NR].x)
+    assert abs(by_case[Case.SR].force_A[1]) <= 1e-14 * p.m * p.g * (1 + p.j * p.R * p.omega_0**2 / p.g)
+    assert "y" in by_case[Case.NR].family
 
 
 @pytest.mark.parametrize("document", ["errata.md", "theory.md"])

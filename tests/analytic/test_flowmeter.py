@@ -36,8 +36,8 @@ def test_reading_range(p: Parameters) -> None:
     limit = reading_range(p)
     for omega_0, reads in ((0.999 * min(limit, 1e3), True), (1.001 * limit, False)):
         if np.isfinite(omega_0):
-            found = stable_solutions(p.replace(omega_0=omega_0))
-            assert all(np.isclose(s.x[2], omega_0, rtol=1e-12) for s in found) == reads
+            lasting = stable_solutions(p.replace(omega_0=omega_0))
+            assert all(np.isclose(s.state.omega_c, omega_0, rtol=1e-12) for s in lasting) == reads
 
 
 def test_unloading_limit() -> None:
@@ -45,8 +45,8 @@ def test_unloading_limit() -> None:
     limit = unloading_limit(ROUGH)
     assert operating_range(ROUGH) == limit < thresholds(ROUGH).omega_03
     for factor, stays in ((0.999, False), (1.001, True)):
-        found = stable_solutions(ROUGH.replace(omega_0=factor * limit))
-        assert (Case.NR in {s.case for s in found}) == stays
+        lasting = stable_solutions(ROUGH.replace(omega_0=factor * limit))
+        assert (Case.NR in {s.case for s in lasting}) == stays
 
 
 def test_ranges_at_the_edges() -> None:

@@ -136,8 +136,8 @@ def test_sliding_at_both_points_under_more_friction_than_weight():
     x = [0, 0, 5.0, 0.3, -0.2, 12.0]
     run = simulate(p, x, 1e-3)
     assert run.cases[0] is Case.SS
-    for found, expected in zip((run.force_A[0], run.force_B[0]), contact_forces(Case.SS, x, p), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * p.m * p.g)
+    for force, expected in zip((run.force_A[0], run.force_B[0]), contact_forces(Case.SS, x, p), strict=True):
+        np.testing.assert_allclose(force, expected, rtol=1e-12, atol=1e-12 * p.m * p.g)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -100,7 +100,7 @@ def test_bounds_at_random_sets() -> None:
             ]
             for bound, outer, w, n in table:
                 flows = np.array([-1.3, 0.4, 2.1]) * abs(p.omega_0)
-                found = [
+                growth = [
                     float(
                         slip_stability.gamma(
                             Case.RR, outer, rolling(flow if w is None else w), n, p.replace(omega_0=flow)
@@ -109,7 +109,7 @@ def test_bounds_at_random_sets() -> None:
                     for flow in flows.tolist()
                 ]
                 scale = abs(bound.offset) + np.abs(bound.slope * flows**bound.power)
-                assert np.all(np.abs(bound.gamma(flows) - found) <= 1e-13 * scale)
+                assert np.all(np.abs(bound.gamma(flows) - growth) <= 1e-13 * scale)
 
 
 def test_zero_of_a_bound() -> None:
@@ -167,13 +167,13 @@ def test_56_at_any_state() -> None:
         beta = np.linspace(-np.pi, np.pi, 9)
         n = np.stack([np.sin(beta), np.cos(beta)], axis=-1)
         for x in states_of_nr(p, 10):
-            found = slip_stability.gamma(Case.NR, Case.NS, x, n, p)
+            growth = slip_stability.gamma(Case.NR, Case.NS, x, n, p)
             scale = (
                 np.abs(slip_bounds.gamma_nr(beta, x, p)).max()
                 + p.g / p.r
                 + abs(x[2]) * (abs(x[3]) + p.R / p.r * abs(x[2]))
             )
-            assert np.all(np.abs(slip_bounds.gamma_nr(beta, x, p) - found) <= 1e-12 * scale / p.j)
+            assert np.all(np.abs(slip_bounds.gamma_nr(beta, x, p) - growth) <= 1e-12 * scale / p.j)
 
 
 def test_56_takes_many_states() -> None:

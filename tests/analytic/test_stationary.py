@@ -95,9 +95,9 @@ def test_propositions_3_and_5(eta: float) -> None:
 def test_proposition_4(omega_0: float) -> None:
     """(37)-(42) at the alpha of the solution."""
     p = P.replace(omega_0=omega_0)
-    found = of_case(p, Case.SS)
-    assert len(found) == (1 if omega_0 < thresholds(p).omega_02 else 2)
-    for s in found:
+    solutions = of_case(p, Case.SS)
+    assert len(solutions) == (1 if omega_0 < thresholds(p).omega_02 else 2)
+    for s in solutions:
         assert s.exists
         alpha, _ = slip_directions(s.x, p)
         np.testing.assert_allclose(alpha, s.alpha, rtol=1e-12)
@@ -111,7 +111,7 @@ def test_proposition_4(omega_0: float) -> None:
         np.testing.assert_allclose(omega_0, omega_c - drag, rtol=1e-12)
         np.testing.assert_allclose(s.force_A[1], p.m * p.g * (p.j - p.eta) * cos / den, rtol=1e-12)
         np.testing.assert_allclose(s.force_B[0], p.mu * p.m * p.g * (1 + p.j * cos**2) / den, rtol=1e-12)
-    assert [s.stability for s in found] == [Stability.ASYMPTOTIC, Stability.UNSTABLE][: len(found)]
+    assert [s.stability for s in solutions] == [Stability.ASYMPTOTIC, Stability.UNSTABLE][: len(solutions)]
 
 
 def test_proposition_6() -> None:
@@ -169,9 +169,9 @@ def test_solution_of_a_case() -> None:
 )
 def test_stable_solutions(eta: float, omega_0: float, expected: set[Case]) -> None:
     """The regions of Figs. 7, 10 and 11; no sinking ball among them, nor the far part of SS."""
-    found = stable_solutions(P.replace(eta=eta, omega_0=omega_0))
-    assert {s.case for s in found} == expected
-    assert len(found) == len(expected)
+    attracting = stable_solutions(P.replace(eta=eta, omega_0=omega_0))
+    assert {s.case for s in attracting} == expected
+    assert len(attracting) == len(expected)
 
 
 def test_slowest_time_constant() -> None:
@@ -250,11 +250,11 @@ def test_eigenvalues_of_the_branch_in_both_coordinates() -> None:
     values = stability.eigenvalues_at(s, P)
     for x, omega_0, expected in zip(states, flow, values, strict=True):
         matrix = jacobian(Case.SS, x, P.replace(omega_0=float(omega_0)))
-        found = np.linalg.eigvals(matrix)
+        values = np.linalg.eigvals(matrix)
         # Round-off of the stiff entries is what the small eigenvalues suffer.
         tolerance = 1e3 * EPS * np.abs(matrix).max()
         for value in expected:
-            assert np.abs(found - value).min() <= tolerance
+            assert np.abs(values - value).min() <= tolerance
 
 
 @pytest.mark.parametrize(("mu", "eta", "c"), [(0.2, 0.2, 1.0), (0.2, 0.02, 1.0), (0.7, 0.35, 0.01), (1.5, 0.1, 5.0)])
@@ -319,7 +319,7 @@ def test_hopf_point_of_figure_12() -> None:
 @pytest.mark.parametrize("kappa", [1e-6, 1e-2, 1.0, 30.0])
 @pytest.mark.parametrize("mu", [0.05, 0.2, 1.0])
 def test_roots_of_the_branch_to_round_off(mu: float, kappa: float, eta: float) -> None:
-    """Every place found belongs to its flow, over the whole branch and right up to its ends."""
+    """Every place belongs to its flow, over the whole branch and right up to its ends."""
     for s in (-25.0, -12.0, -3.0, 0.0, 3.0, 12.0):
         Omega_0 = float(branch(s, 0.4, mu, eta, kappa).Omega_0)
         low, high = (float(branch(end, 0.4, mu, eta, kappa).Omega_0) for end in (-80, 80))
@@ -389,29 +389,29 @@ def test_without_drag() -> None:
 
 def test_smooth_floor() -> None:
     """mu = 0: the ball goes round with the fluid, sliding on the floor with any spin about the radius."""
-    found = kinds(P.replace(mu=0.0))
-    assert found["RR"][0] is False
-    assert found["SR"] == (True, "NEUTRAL", ("slip_x",))
-    assert "SS" not in found
+    by_case = kinds(P.replace(mu=0.0))
+    assert by_case["RR"][0] is False
+    assert by_case["SR"] == (True, "NEUTRAL", ("slip_x",))
+    assert "SS" not in by_case
 
 
 def test_smooth_wall() -> None:
     """eta = 0: the wall never carries the weight (NR, SR can't exist), and the spin about the axis is free."""
-    found = kinds(P.replace(eta=0.0))
-    assert found["RR"][0] is False
-    assert found["RS"][0] is False
-    assert found["SR"][0] is False
-    assert found["NR"][0] is False
-    assert found["SS"] == (True, "NEUTRAL", ("slip_y",))
-    assert found["NS"] == (True, "NEUTRAL", ("y", "slip_y"))
+    by_case = kinds(P.replace(eta=0.0))
+    assert by_case["RR"][0] is False
+    assert by_case["RS"][0] is False
+    assert by_case["SR"][0] is False
+    assert by_case["NR"][0] is False
+    assert by_case["SS"] == (True, "NEUTRAL", ("slip_y",))
+    assert by_case["NS"] == (True, "NEUTRAL", ("y", "slip_y"))
     slow = kinds(P.replace(eta=0.0, omega_0=9.0))
     assert slow["RR"][0] is slow["RS"][0] is True
 
 
 def test_nothing_at_all() -> None:
     """mu = eta = 0: the ball goes round with the fluid and spins as it likes about the axis."""
-    found = kinds(P.replace(mu=0.0, eta=0.0))
-    assert found["SS"] == (True, "NEUTRAL", ("slip_y",))
+    by_case = kinds(P.replace(mu=0.0, eta=0.0))
+    assert by_case["SS"] == (True, "NEUTRAL", ("slip_y",))
     for s in stationary_solutions(P.replace(mu=0.0, eta=0.0)):
         rate = vector_field(s.case, s.x, P.replace(mu=0.0, eta=0.0))
         assert np.abs(rate[1:]).max() <= 1e-11

@@ -85,7 +85,7 @@ def test_restitution():
 
 @pytest.mark.parametrize("side", [0.97, 1.03])
 def test_finds_the_end_of_two_point_rolling_by_itself(side):
-    """Below omega_01 the ball ends up in RR, above it in SS; nothing told the scheme."""
+    """Below omega_01 the ball ends up in RR, above it in SS, though the scheme knows of neither."""
     omega_0 = side * thresholds(P).omega_01
     run = simulate(
         P.replace(omega_0=omega_0), [0, 0, 0.9 * omega_0, 0, 0, 0], 8.0, method="time-stepping", step=2e-3,
