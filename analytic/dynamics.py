@@ -1,9 +1,9 @@
 """Contact forces and vector fields of the nine kinematic cases: (20)-(29), and RN, SN, NN.
 
 The forces follow from the state, case by case (`forces`); the rates follow from the forces by Newton and Euler (20),
-the same way in every case (`rates`). Both work on floats and on arrays alike and check nothing: an integrator calls
-them with eight floats. `contact_forces` and `vector_field` are the doors for everyone else: arrays of states, checked
-against the case.
+the same way in every case (`rates`). Both take floats or arrays and check nothing, since an integrator calls them in
+its innermost loop. `contact_forces` and `vector_field` are for everyone else: they take arrays of states and check
+them against the case.
 
 Away from the wall the drag (9) is extended by a radial part -m c rho', and the fluid rotates as one rigid body.
 """
@@ -38,7 +38,7 @@ def vector_field(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.Array
     Returns
     -------
     Array
-        dx/dt, shape of x. Whether the contact forces are admissible is not asked, see `contact_forces`.
+        dx/dt, shape of x. Whether the contact forces are admissible is not checked, see `contact_forces`.
 
     Raises
     ------

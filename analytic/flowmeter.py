@@ -1,4 +1,4 @@
-"""What the ball is good for as a flowmeter (section 5.3): its characteristic curve omega_c(omega_0), and its range."""
+"""The ball as a flowmeter (section 5.3): its characteristic curve omega_c(omega_0), and its range."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a simulation leaves behind: samples, events and its energy balance, kept while it runs."""
+"""Samples, events and energy balance of a simulation, collected while it runs."""
 
 from __future__ import annotations
 

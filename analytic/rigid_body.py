@@ -1,4 +1,4 @@
-"""The ball as a rigid body under gravity, drag and whatever its contacts do, with no case in mind.
+"""The ball as a rigid body under gravity, drag and contact forces, whatever its case.
 
 All on plain floats.
 """

@@ -1,4 +1,4 @@
-"""The door to simulation: settings, checks, and the choice of the method."""
+"""Where simulations start: checks of the arguments, choice of the method, header of the result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run may be asked for: refused or warned of before anything is simulated."""
+"""Checks of what a run is asked for, before anything is simulated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that are whole or not there at all, and that are read only as they were written.
+"""Files that are either complete or absent, and that are read only if nothing in them has changed.
 
 Every HDF5 file of the program ends with the SHA-256 checksum of all that comes before, which HDF5 itself ignores. It is
 compared before HDF5 looks at the file: on damaged metadata the library may hang, and give wrong numbers.
@@ -32,8 +32,8 @@ _DAMAGE = OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeEr
 class WholeFile:
     """An HDF5 file under construction; a context manager.
 
-    It has a temporary name until `finish`; leaving the context without that removes it. ``file`` is the h5py file,
-    empty or as in `template`, the bytes of an HDF5 file.
+    It has a temporary name until `finish`; leaving the context without that removes it. ``file`` is the h5py file:
+    empty, or a copy of `template`, the bytes of an HDF5 file.
     Raises `StorageError`, in one line, when it can't be written (no such directory, no permission, disk full).
     """
 

@@ -49,7 +49,7 @@ class Flow:
 
     @classmethod
     def steady(cls, omega_0: float) -> Self:
-        """omega_0 for ever."""
+        """Constant omega_0."""
         return cls._pieces("steady", [0.0], [omega_0], [0.0])
 
     @classmethod
@@ -61,7 +61,7 @@ class Flow:
 
     @classmethod
     def staircase(cls, levels: Sequence[float], hold: float) -> Self:
-        """Each level in turn held for `hold` seconds, the last one for ever."""
+        """Each level in turn held for `hold` seconds, the last one from then on."""
         check_number("hold", hold, "s", POSITIVE)
         return cls._pieces("staircase", [hold * k for k in range(len(levels))], levels, [0.0] * len(levels))
 
