@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 import statistics
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,12 +20,14 @@ from analytic import stable_solutions
 from compare.runs.campaign import Campaign
 from compare.runs.tasks import Task, store
 from compare.runs.workers import Workers, dask, processes
+from compare.statistics import plain
 from mjsim import benchmark
 from model import Parameters
 
 BATCH = 64
 REPEATS = 3
 FINISHED = 10_000
+COUNT = 20_000_000
 SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
 """Slipping at both points: both contacts closed, and friction on its cone."""
 
@@ -39,6 +42,8 @@ class Figures:
     """A batch of `BATCH`."""
     two_over_one: float
     """Throughput of a campaign with two processes over that with one."""
+    machine: float
+    """The same of bare arithmetic: what the machine, with all else that runs on it, lets two processes do at best."""
     bookkeeping: float
     """Time a campaign spends on a task beside simulating and storing it, s."""
     resuming: float
@@ -48,23 +53,16 @@ class Figures:
 
     def to_mapping(self) -> dict[str, Any]:
         """JSON-able data."""
-        return {
-            "single": {**dataclasses.asdict(self.single), "ratio": self.single.ratio},
-            "batch": {**dataclasses.asdict(self.batch), "ratio": self.batch.ratio},
-            "two_over_one": self.two_over_one,
-            "bookkeeping": self.bookkeeping,
-            "resuming": self.resuming,
-            "dask_over_processes": None if math.isnan(self.dask_over_processes) else self.dask_over_processes,
-        }
+        return {name: plain(value) for name, value in dataclasses.asdict(self).items()}
 
 
 def run() -> Figures:
     """Measure the loop over bare steps, alone and in a batch; then campaigns."""
     (state,) = stable_solutions(SLIPPING)
     x0 = state.x.tolist()
-    two_over_one, dask_over_processes = _campaigns()
+    two_over_one, machine, dask_over_processes = _campaigns()
     single, batch = benchmark.cost(SLIPPING, x0), benchmark.cost(SLIPPING, x0, BATCH)
-    return Figures(single, batch, two_over_one, _bookkeeping(), _resuming(), dask_over_processes)
+    return Figures(single, batch, two_over_one, machine, _bookkeeping(), _resuming(), dask_over_processes)
 
 
 def table(figures: Figures) -> Table:
@@ -75,6 +73,7 @@ def table(figures: Figures) -> Table:
     for name, cost in (("one simulation", figures.single), (f"batch of {figures.batch.runs}", figures.batch)):
         shown.add_row(name, f"{1e6 * cost.bare:.2f} µs", f"{1e6 * cost.whole:.2f} µs", f"{cost.ratio:.2f}")
     shown.add_row("campaign: two processes over one", "", "", f"{figures.two_over_one:.2f}")
+    shown.add_row("the same of bare arithmetic: the machine's limit", "", "", f"{figures.machine:.2f}")
     shown.add_row("campaign: two Dask workers over two processes", "", "", f"{figures.dask_over_processes:.2f}")
     shown.add_row("campaign: bookkeeping of a task", "", f"{1e3 * figures.bookkeeping:.1f} ms", "")
     shown.add_row(f"campaign: resuming {FINISHED} finished tasks", "", f"{figures.resuming:.1f} s", "")
@@ -87,14 +86,15 @@ def _tasks(count: int, t_end: float) -> list[Task]:
     return [Task(engine="mujoco", parameters=p, x0=(0.0,) * 8, t_end=t_end) for p in sets]
 
 
-def _campaigns() -> tuple[float, float]:
-    """Medians over `REPEATS` of the time with one process over that with two, and of that over two Dask workers'."""
+def _campaigns() -> tuple[float, float, float]:
+    """Ratios of medians over `REPEATS`, taken in turn: one process over two, of campaigns and of bare arithmetic; and
+    two processes over two Dask workers."""
     tasks = _tasks(2 * BATCH, 2.0)
     with ExitStack() as stack:
         kinds: list[Workers] = [processes(1), processes(2), *_dask(stack)]
-        times = [[_timed(kind, tasks) for kind in kinds] for _ in range(REPEATS)]
-    one, two, *others = (statistics.median(column) for column in zip(*times, strict=True))
-    return one / two, two / others[0] if others else math.nan
+        times = [[*map(_computing, kinds[:2]), *(_timed(kind, tasks) for kind in kinds)] for _ in range(REPEATS)]
+    alone, both, one, two, *others = (statistics.median(column) for column in zip(*times, strict=True))
+    return one / two, alone / both, two / others[0] if others else math.nan
 
 
 def _dask(stack: ExitStack) -> list[Workers]:
@@ -110,13 +110,41 @@ def _dask(stack: ExitStack) -> list[Workers]:
     return [kind]
 
 
+def _computing(kind: Workers) -> float:
+    """Time of arithmetic in two parts, on workers that have started."""
+    executor = kind.start()
+    _wake(executor, kind.count)
+    start = time.perf_counter()
+    list(executor.map(_count, [COUNT, COUNT]))
+    elapsed = time.perf_counter() - start
+    kind.stop(executor, False)
+    return elapsed
+
+
+def _wake(executor: Executor, count: int) -> None:
+    """Wait until all workers have started and imported what they need; the first could do any short task alone."""
+    while len(set(executor.map(_number, range(4 * count)))) < count:
+        pass
+
+
+def _number(_: int) -> int:
+    time.sleep(0.02)
+    return os.getpid()
+
+
+def _count(times: int) -> None:
+    for _ in range(times):
+        pass
+
+
 def _timed(kind: Workers, tasks: list[Task]) -> float:
     """Time of a campaign whose workers have started and imported what they need."""
     with tempfile.TemporaryDirectory() as warm, tempfile.TemporaryDirectory() as directory:
         executor = kind.start()
+        _wake(executor, kind.count)
         kept = dataclasses.replace(kind, start=lambda: executor, stop=lambda executor, at_once: None)
         with Campaign(Path(warm), kept, batch=1) as campaign:
-            campaign.complete(_tasks(4, 0.01))
+            campaign.complete(_tasks(8, 0.01))
         start = time.perf_counter()
         with Campaign(Path(directory), kept) as campaign:
             campaign.complete(tasks)
