@@ -115,13 +115,8 @@ def tables(prediction: Prediction) -> list[Table | str]:
     reach = (
         f"ω_c = ω₀ holds uniquely up to ω₀ = {range_:.8g} rad/s" if math.isfinite(range_) else "no limit to ω_c = ω₀"
     )
-    return [
-        head,
-        f"[dim]{groups}",
-        limits,
-        found,
-        f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {prediction.reading}; {reach}.",
-    ]
+    reading = f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {prediction.reading}; {reach}."
+    return [head, f"[dim]{groups}", limits, found, reading]
 
 
 _SYMBOLS = {"omega_01": "ω₀₁", "omega_02": "ω₀₂", "omega_03": "ω₀₃", "omega_04": "ω₀₄", "eta_cr": "η_cr"}

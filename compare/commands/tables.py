@@ -54,29 +54,17 @@ def summary(verdicts: Sequence[Verdict]) -> Text:
 
 def checks(verdict: Verdict) -> Table:
     """Every number of one claim."""
-    table = Table(
-        title=f"{verdict.claim.id}  {escape(verdict.claim.statement)}",
-        title_justify="left",
-        title_style="bold",
-        box=None,
-        padding=(0, 1, 0, 0),
-        header_style="dim",
-    )
+    title = Text(f"{verdict.claim.id}  {verdict.claim.statement}", "bold")
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0), header_style="dim")
     for column in ("set", "ω₀", "", "predicted", "measured", "deviation", "tolerance", ""):
         table.add_column(column, justify="left" if column == "set" else "right", no_wrap=True)
     for check in verdict.checks:
         m = check.measurement
         mark = Text("pass", "green") if check.agrees and check.conclusive else Text("coarse", "yellow")
-        table.add_row(
-            m.set,
-            f"{m.parameters.omega_0:.6g}",
-            quantity(m.quantity).symbol,
-            "none" if math.isnan(check.predicted) else f"{check.predicted:.9g}",
-            f"{m.value:.9g}",
-            f"{check.deviation:+.1e}",
-            f"{check.tolerance:.1e}",
-            mark if check.agrees else Text("FAIL", "bold red"),
-        )
+        predicted = "none" if math.isnan(check.predicted) else f"{check.predicted:.9g}"
+        numbers = predicted, f"{m.value:.9g}", f"{check.deviation:+.1e}", f"{check.tolerance:.1e}"
+        mark = mark if check.agrees else Text("FAIL", "bold red")
+        table.add_row(m.set, f"{m.parameters.omega_0:.6g}", quantity(m.quantity).symbol, *numbers, mark)
     return table
 
 

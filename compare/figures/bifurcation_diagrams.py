@@ -23,6 +23,10 @@ RELEASED = Parameters.named("reference").replace(eta=0.43)
 _CASES = {"fig-9": ("NS", "NR"), "fig-10": ("RR", "SS", "SR", "NR"), "fig-11": ("RR", "SR", "NR")}
 Quantity = Callable[[Array, Array], Array]
 """What is drawn, of slip_x and omega_c."""
+Line = str | tuple[object, ...]
+"""A line style."""
+Place = tuple[float, tuple[float, float]]
+"""Where the name of a curve stands: at a share of the curve, with an offset in points."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +73,8 @@ def draw(of: Diagram) -> Figure:
     """One diagram, with both scales."""
     figure = style.figure(5.8, 4.1)
     axes = figure.add_subplot()
-    values = {"fig-9": _figure_9, "fig-10": _figure_10, "fig-11": _figure_11, "fig-12": _figure_12}[of.figure](
-        axes, of.p
-    )
+    figures = {"fig-9": _figure_9, "fig-10": _figure_10, "fig-11": _figure_11, "fig-12": _figure_12}
+    values = figures[of.figure](axes, of.p)
     style.points(axes, of.states)
     axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
     style.guides(axes, values)
@@ -84,12 +87,11 @@ def draw(of: Diagram) -> Figure:
 
 def _figure_9(axes: Axes, p: Parameters) -> dict[str, float]:
     t = bifurcation.thresholds(p)
-    top = 2 * t.omega_02
-    below, above = np.linspace(0.0, t.omega_02, 100), np.linspace(t.omega_02, top, 200)
-    _curve(axes, Case.NS, below, p.eta / p.j * below * p.R / p.r, at=0.35, offset=(-4, 6))
-    _curve(axes, Case.NR, above, lifted(above, p), at=0.5, offset=(4, 6))
-    style.mark(axes, t.omega_02, float(lifted(np.array(t.omega_02), p)), "P2", (0, 8))
-    _frame(axes, 0.0, top)
+    below, above = np.linspace(0.0, t.omega_02, 100), np.linspace(t.omega_02, 2 * t.omega_02, 200)
+    _curve(axes, Case.NS, below, p.eta / p.j * below * p.R / p.r, (0.35, (-4, 6)))
+    _curve(axes, Case.NR, above, lifted(above, p), (0.5, (4, 6)))
+    style.mark(axes, t.omega_02, float(lifted(t.omega_02, p)), "P2", (0, 8))
+    _frame(axes, 0.0, 2 * t.omega_02)
     return {"omega_02": t.omega_02}
 
 
@@ -97,12 +99,11 @@ def _figure_10(axes: Axes, p: Parameters) -> dict[str, float]:
     t = bifurcation.thresholds(p)
     top = 1.25 * t.omega_04
     _rolling(axes, p, 0.0, t.omega_01)
-    slipping(axes, p, lambda slip_x, omega_c: slip_x + p.R / p.r * omega_c, "SS", (0.5, (0, -7)), (0.4, (6, 6)))
-    _lifting(axes, p, t.omega_02, top, style.STABLE, 0.85, (-5, -5))
+    slipping(axes, p, _spin(p), "SS", (0.5, (0, -7)), (0.4, (6, 6)))
+    _lifting(axes, p, t.omega_02, top, (0.85, (-5, -5)))
     style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (-6, 4))
-    style.mark(axes, t.omega_02, float(lifted(np.array(t.omega_02), p)), "NF2", (-4, -6))
-    fold = fold_state(p)
-    style.mark(axes, t.omega_04, float(fold[3] + fold[2] * p.R / p.r), "F", (7, 0))
+    style.mark(axes, t.omega_02, float(lifted(t.omega_02, p)), "NF2", (-4, -6))
+    style.mark(axes, t.omega_04, _spin_of(fold_state(p), p), "F", (7, 0))
     _frame(axes, 0.0, top)
     return {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_04")}
 
@@ -111,47 +112,43 @@ def _figure_11(axes: Axes, p: Parameters) -> dict[str, float]:
     t = bifurcation.thresholds(p)
     top = 1.6 * t.omega_03
     _rolling(axes, p, 0.0, t.omega_03)
-    _lifting(axes, p, t.omega_02, t.omega_03, style.UNSTABLE, 0.4, (6, 4), "SR, unstable")
-    _lifting(axes, p, t.omega_03, top, style.STABLE, 0.5, (4, 6))
-    axes.plot([t.omega_02], [lifted(np.array(t.omega_02), p)], **style.POINT)
+    _lifting(axes, p, t.omega_02, t.omega_03, (0.4, (6, 4)), style.UNSTABLE, "SR, unstable")
+    _lifting(axes, p, t.omega_03, top, (0.5, (4, 6)))
+    axes.plot([t.omega_02], [lifted(t.omega_02, p)], **style.POINT)
     axes.plot([t.omega_03], [t.omega_03 * p.R / p.r], **style.POINT)
     _frame(axes, 0.0, top)
     return {"omega_02": t.omega_02, "omega_03": t.omega_03}
 
 
 def _figure_12(axes: Axes, p: Parameters) -> dict[str, float]:
-    t = bifurcation.thresholds(p)
-    unit = np.sqrt(p.g / p.R)
-    released = {
-        name: float(v * unit) for name, v in bifurcation.threshold_curves(p, p.mu, p.eta, released=True).items()
-    }
-    omega_01, omega_04 = released["omega_01"], released["omega_04"]
+    t, unit = bifurcation.thresholds(p), np.sqrt(p.g / p.R)
+    curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
+    omega_01, omega_04 = (float(curves[name] * unit) for name in ("omega_01", "omega_04"))
     top, bottom = omega_04 + 0.35 * (omega_04 - t.omega_02), t.omega_02 - 0.5 * (omega_04 - t.omega_02)
     _rolling(axes, p, bottom, t.omega_03)
-    _curve(
-        axes,
-        Case.RR,
-        np.array([t.omega_03, omega_01]),
-        np.array([t.omega_03, omega_01]) * p.R / p.r,
-        style.UNSTABLE,
-        "RR, virtual",
-        0.6,
-        (-4, 4),
-    )
-    slipping(axes, p, lambda slip_x, omega_c: slip_x + p.R / p.r * omega_c, "SS", (0.5, (0, 7)), (0.35, (0, 7)))
-    _lifting(axes, p, t.omega_02, t.omega_03, style.UNSTABLE, 0.5, (-20, 60), "SR, unstable")
-    _lifting(axes, p, t.omega_03, top, style.STABLE, 0.35, (-5, -5))
+    virtual = np.array([t.omega_03, omega_01])
+    _curve(axes, Case.RR, virtual, virtual * p.R / p.r, (0.6, (-4, 4)), style.UNSTABLE, "RR, virtual")
+    slipping(axes, p, _spin(p), "SS", (0.5, (0, 7)), (0.35, (0, 7)))
+    _lifting(axes, p, t.omega_02, t.omega_03, (0.5, (-20, 60)), style.UNSTABLE, "SR, unstable")
+    _lifting(axes, p, t.omega_03, top, (0.35, (-5, -5)))
     style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
     style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (0, -8))
-    style.mark(axes, t.omega_02, float(lifted(np.array(t.omega_02), p)), "NF2", (-6, 4))
-    fold = fold_state(p, released=True)
-    style.mark(axes, omega_04, float(fold[3] + fold[2] * p.R / p.r), "F", (7, 0))
+    style.mark(axes, t.omega_02, float(lifted(t.omega_02, p)), "NF2", (-6, 4))
+    style.mark(axes, omega_04, _spin_of(fold_state(p, released=True), p), "F", (7, 0))
     for s in _hopf(p):
         x, omega_0 = branch_stability.states(s, p)
-        style.mark(axes, float(omega_0), float(x[3] + x[2] * p.R / p.r), "H", (5, -6))
+        style.mark(axes, float(omega_0), _spin_of(x, p), "H", (5, -6))
     _frame(axes, bottom, top)
     axes.set_ylim(0.75 * t.omega_03 * p.R / p.r, 1.15 * omega_01 * p.R / p.r)
     return {"omega_01": omega_01, "omega_02": t.omega_02, "omega_03": t.omega_03, "omega_04": omega_04}
+
+
+def _spin(p: Parameters) -> Quantity:
+    return lambda slip_x, omega_c: slip_x + p.R / p.r * omega_c
+
+
+def _spin_of(x: Array, p: Parameters) -> float:
+    return float(x[3] + x[2] * p.R / p.r)
 
 
 def _frame(axes: Axes, bottom: float, top: float) -> None:
@@ -162,56 +159,33 @@ def _hopf(p: Parameters) -> Array:
     return np.asarray(branch_stability.hopf_places(p), dtype=float)
 
 
-def _curve(
-    axes: Axes,
-    case: Case,
-    x: Array,
-    y: Array,
-    line: str | tuple[object, ...] = style.STABLE,
-    text: str = "",
-    at: float = 0.5,
-    offset: tuple[float, float] = (0, 6),
-) -> None:
-    """A curve with its name beside it, at a share of its samples."""
+def _curve(axes: Axes, case: Case, x: Array, y: Array, place: Place, line: Line = style.STABLE, text: str = "") -> None:
     axes.plot(x, y, color=style.COLOURS[case], ls=line, lw=2)
-    k = int(at * (len(x) - 1))
-    here = (x[0] + at * (x[1] - x[0]), y[0] + at * (y[1] - y[0])) if len(x) == 2 else (x[k], y[k])
-    style.name(axes, float(here[0]), float(here[1]), text or case.name, offset, style.COLOURS[case])
+    at, offset = place
+    along = at * (len(x) - 1)
+    here_x, here_y = (float(np.interp(along, range(len(x)), values)) for values in (x, y))
+    style.name(axes, here_x, here_y, text or case.name, offset, style.COLOURS[case])
 
 
-def lifted(omega_0: Array, p: Parameters) -> Array:
+def lifted(omega_0: Array | float, p: Parameters) -> Array:
     """omega_x^0 of SR and NR (35), (46), rad s-1."""
     return np.asarray(p.g / (p.j * omega_0 * p.r))
 
 
 def _rolling(axes: Axes, p: Parameters, begin: float, end: float) -> None:
     omega = np.array([begin, end])
-    _curve(axes, Case.RR, omega, omega * p.R / p.r, at=0.5, offset=(-5, 5))
+    _curve(axes, Case.RR, omega, omega * p.R / p.r, (0.5, (-5, 5)))
 
 
 def _lifting(
-    axes: Axes,
-    p: Parameters,
-    begin: float,
-    end: float,
-    line: str | tuple[object, ...],
-    at: float,
-    offset: tuple[float, float],
-    text: str = "",
+    axes: Axes, p: Parameters, begin: float, end: float, place: Place, line: Line = style.STABLE, text: str = ""
 ) -> None:
     omega = np.linspace(begin, end, 200)
-    _curve(axes, Case.SR, omega, lifted(omega, p), line, text, at, offset)
+    _curve(axes, Case.SR, omega, lifted(omega, p), place, line, text)
 
 
-def slipping(
-    axes: Axes,
-    p: Parameters,
-    quantity: Quantity,
-    name: str,
-    stable: tuple[float, tuple[float, float]],
-    unstable: tuple[float, tuple[float, float]],
-) -> None:
-    """The branch of SS, its line by its eigenvalues; its names each at a share of their part, with an offset."""
+def slipping(axes: Axes, p: Parameters, quantity: Quantity, name: str, stable: Place, unstable: Place) -> None:
+    """The branch of SS, its line by its eigenvalues; a name at each part."""
     s = np.linspace(-16.0, 16.0, 1601)
     states, omega_0 = branch_stability.states(s, p)
     grows = branch_stability.eigenvalues_at(s, p).real.max(axis=-1) > 0

@@ -134,14 +134,6 @@ def _arrow(axes: Axes, inner: Case, outer: Case, line: str, shift: float = 0.0) 
     sideways = shift * np.array([-along[1], along[0]])
     begin, end = tail + _REACH * along + sideways, head - _REACH * along + sideways
     axes.plot(*np.transpose([begin, end - 0.1 * along]), color="black", ls=line, lw=1.4)
-    tip = FancyArrowPatch(
-        tuple(end - 0.2 * along),
-        tuple(end),
-        arrowstyle="-|>",
-        mutation_scale=13,
-        color="black",
-        lw=0,
-        shrinkA=0,
-        shrinkB=0,
-    )
+    look: dict[str, Any] = {"color": "black", "lw": 0, "shrinkA": 0, "shrinkB": 0}
+    tip = FancyArrowPatch(tuple(end - 0.2 * along), tuple(end), arrowstyle="-|>", mutation_scale=13, **look)
     axes.add_patch(tip)

@@ -10,7 +10,7 @@ from compare.figures import style
 from compare.figures.drawing import GapError, Material
 from compare.figures.flow_curve import Curve, fold_curve, plain_curve, top
 from compare.measure.record import Measurement
-from compare.runs.engines import ENGINES
+from compare.runs.engines import ENGINES, NEWCOMER
 from model import Parameters
 
 SETS = ("reference", "high-wall-friction")
@@ -22,20 +22,12 @@ _SETTLED = frozenset({"settled", "newcomer", "hysteresis"})
 
 def select(material: Material) -> tuple[Curve, ...]:
     """The settled states of every engine with the two sets of the paper's kind, without balls that only sink (NS)."""
-    curves = tuple(
-        Curve(
-            Parameters.named(name),
-            tuple(
-                m
-                for m in material.select("omega_c", case=None)
-                if m.set == name
-                and m.protocol in _SETTLED
-                and m.parameters.omega_0 > 0
-                and m.conditions["case"] != "NS"
-            ),
-        )
-        for name in SETS
-    )
+    settled = [
+        m
+        for m in material.select("omega_c", case=None)
+        if m.protocol in _SETTLED and m.parameters.omega_0 > 0 and m.conditions["case"] != "NS"
+    ]
+    curves = tuple(Curve(Parameters.named(name), tuple(m for m in settled if m.set == name)) for name in SETS)
     if not any(curve.states for curve in curves):
         raise GapError("no settled states were measured with its parameter sets")
     return curves
@@ -45,15 +37,12 @@ def caption(curves: tuple[Curve, ...]) -> str:
     """Of the characteristic curves."""
     sets = "; ".join(f"{'left' if k == 0 else 'right'}: {style.named(curve.p)}" for k, curve in enumerate(curves))
     count = sum(len(curve.states) for curve in curves)
-    poor = (
-        ", crosses: MuJoCo's own contact parameters from rest"
-        if any(m.engine == "mujoco-defaults" for curve in curves for m in curve.states)
-        else ""
-    )
+    poor = any(m.engine == NEWCOMER.name for curve in curves for m in curve.states)
+    crosses = ", crosses: MuJoCo's own contact parameters from rest" if poor else ""
     return (
         f"Angular velocity ω_c of the ball's orbit over that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
         f"dashed where unstable; SR and NR lie on one line. Marks: {count} settled states, from rest, going round "
-        f"with the fluid, and high up on the wall{poor}. Bars of three standard uncertainties are smaller than most "
+        f"with the fluid, and high up on the wall{crosses}. Bars of three standard uncertainties are smaller than most "
         "marks. Below: relative deviation from the nearest attracting solution; what is below 1e-16 is drawn there."
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,13 +32,8 @@ class Strips:
 
 def of(claim: str) -> Drawing:
     """The figure of a claim that has none of its own."""
-    return Drawing(
-        title=f"Deviations of {claim}",
-        select=lambda material: select(material, claim),
-        draw=draw,
-        caption=caption,
-        claims=(claim,),
-    )
+    title, choose = f"Deviations of {claim}", partial(select, claim=claim)
+    return Drawing(title=title, select=choose, draw=draw, caption=caption, claims=(claim,))
 
 
 def select(material: Material, claim: str) -> Strips:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import analytic
 from analytic import bifurcation
 from compare.figures import style
-from compare.figures.bifurcation_diagrams import fold_state, slipping
+from compare.figures.bifurcation_diagrams import Line, fold_state, slipping
 from compare.figures.drawing import Material
 from compare.measure.record import Measurement
 from model import Case, Parameters
@@ -115,14 +115,7 @@ def plain_curve(axes: Axes, p: Parameters, fastest: float, apart: float = 0.0) -
 
 
 def _line(
-    axes: Axes,
-    case: Case,
-    begin: float,
-    end: float,
-    text: str,
-    at: float,
-    lift: float = 0.0,
-    line: str | tuple[object, ...] = style.STABLE,
+    axes: Axes, case: Case, begin: float, end: float, text: str, at: float, lift: float = 0.0, line: Line = style.STABLE
 ) -> None:
     """omega_c = omega_0, drawn higher by `lift`, with its name above or below."""
     axes.plot([begin, end], [begin + lift, end + lift], color=style.COLOURS[case], ls=line, lw=2)

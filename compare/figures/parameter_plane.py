@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -95,12 +97,8 @@ def draw(plane: Plane) -> Figure:
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
         axes.text(section, 0.985 * fastest, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3")
     _points(axes, plane)
-    axes.set(
-        xlabel="friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$",
-        ylabel=style.OMEGA_0,
-        xlim=(0, _WIDEST),
-        ylim=(0, fastest),
-    )
+    friction = "friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$"
+    axes.set(xlabel=friction, ylabel=style.OMEGA_0, xlim=(0, _WIDEST), ylim=(0, fastest))
     figure.legend(loc="outside lower center", fontsize=8, ncols=6, frameon=False, handlelength=2.6)
     style.dimensionless_y(axes, p, style.UP_TO_UNITS)
     return figure
@@ -110,17 +108,9 @@ def _regions(axes: Axes, p: Parameters, mu: Array, eta: Array, omega_0: Array) -
     plane = bifurcation.case_map(p, mu, eta, omega_0).T
     kinds = np.unique(plane)
     shades = ListedColormap([_TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
-    axes.imshow(
-        np.searchsorted(kinds, plane),
-        cmap=shades,
-        vmin=0,
-        vmax=len(kinds) - 1,
-        origin="lower",
-        aspect="auto",
-        interpolation="nearest",
-        extent=(eta[0], eta[-1], omega_0[0], omega_0[-1]),
-        zorder=0,
-    )
+    grid: dict[str, Any] = {"origin": "lower", "aspect": "auto", "extent": (*eta[[0, -1]], *omega_0[[0, -1]])}
+    shown = np.searchsorted(kinds, plane)
+    axes.imshow(shown, cmap=shades, vmin=0, vmax=len(kinds) - 1, interpolation="nearest", zorder=0, **grid)
     both = (plane == _BISTABLE).astype(float)
     if both.any():
         hatched = axes.contourf(eta, omega_0, both, levels=[0.5, 1.5], colors="none", hatches=["////"], zorder=0.2)
@@ -162,35 +152,19 @@ def _label_regions(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0
 
 def _far_label(axes: Axes, here: tuple[float, float], text: str) -> None:
     """A name at the top, with a line to where it belongs: the region itself is too narrow."""
-    axes.annotate(
-        text,
-        here,
-        xytext=(0.31, 0.97),
-        textcoords="axes fraction",
-        fontsize=9,
-        va="top",
-        bbox=style.HALO,
-        zorder=6,
-        arrowprops={"arrowstyle": "-", "lw": 0.7, "color": "0.4"},
-    )
+    look: dict[str, Any] = {"bbox": style.HALO, "arrowprops": {"arrowstyle": "-", "lw": 0.7, "color": "0.4"}}
+    axes.annotate(text, here, xytext=(0.31, 0.97), textcoords="axes fraction", fontsize=9, va="top", zorder=6, **look)
 
 
 def _points(axes: Axes, plane: Plane) -> None:
     for engine in dict.fromkeys(check.measurement.engine for check in plane.checks):
-        own = [check for check in plane.checks if check.measurement.engine == engine]
-        x, y = np.transpose([[c.measurement.parameters.eta, c.measurement.parameters.omega_0] for c in own])
-        look = ENGINES[engine]
-        axes.plot(
-            x, y, ls="none", marker=look.mark, color=look.colour, ms=4.5, mfc="white", label=f"{engine}, as predicted"
-        )
-    failed = [c.measurement.parameters for c in plane.checks if not c.agrees]
-    if failed:
-        axes.plot(
-            [p.eta for p in failed],
-            [p.omega_0 for p in failed],
-            "x",
-            color="#B3261E",
-            ms=10,
-            mew=2,
-            label="not as predicted",
-        )
+        x, y = _places(check for check in plane.checks if check.measurement.engine == engine)
+        look: dict[str, Any] = {"marker": ENGINES[engine].mark, "color": ENGINES[engine].colour, "mfc": "white"}
+        axes.plot(x, y, ls="none", ms=4.5, label=f"{engine}, as predicted", **look)
+    if failed := [check for check in plane.checks if not check.agrees]:
+        axes.plot(*_places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
+
+
+def _places(checks: Iterable[Check]) -> Array:
+    """Wall friction and flow of each, (2, n)."""
+    return np.transpose([(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks])

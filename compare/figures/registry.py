@@ -27,31 +27,21 @@ def _explaining(title: str, draw: Callable[[object], Figure], text: str) -> Draw
     return Drawing(title=title, select=lambda _: None, draw=draw, caption=lambda _: text, background=True)
 
 
-def _of_paper(module: Any, name: str, title: str, claim: str = "") -> Drawing:
-    """A figure whose module draws several of a kind; it stands beside the claim of its own name, or another."""
-    select = partial(module.select, figure=name)
-    return Drawing(title=title, select=select, draw=module.draw, caption=module.caption, claims=(claim or name,))
+def _of(module: Any, title: str, name: str = "", *claims: str) -> Drawing:
+    """A figure of a module, which draws several of a kind if there is a name."""
+    select = partial(module.select, figure=name) if name else module.select
+    return Drawing(title=title, select=select, draw=module.draw, caption=module.caption, claims=claims)
+
+
+def _of_paper(module: Any, name: str, title: str) -> Drawing:
+    """One that stands beside the claim of its own name."""
+    return _of(module, title, name, name)
 
 
 FIGURES: dict[str, Drawing] = {
-    "characteristic": Drawing(
-        title="Characteristic curves",
-        select=characteristic.select,
-        draw=characteristic.draw,
-        caption=characteristic.caption,
-    ),
-    "ladder": Drawing(
-        title="From a newcomer's settings to the study's",
-        select=settings.select_ladder,
-        draw=settings.draw_ladder,
-        caption=settings.caption_ladder,
-    ),
-    "frontier": Drawing(
-        title="Error and cost",
-        select=settings.select_frontier,
-        draw=settings.draw_frontier,
-        caption=settings.caption_frontier,
-    ),
+    "characteristic": _of(characteristic, "Characteristic curves"),
+    "ladder": _of(settings, "From a newcomer's settings to the study's", "ladder"),
+    "frontier": _of(settings, "Error and cost", "frontier"),
     "fig-2": _explaining(
         "Fig. 2: the nine cases",
         cases.draw_figure_2,
@@ -66,8 +56,8 @@ FIGURES: dict[str, Drawing] = {
         "RS are lines, SS is all the rest. Right: y = v_y = ω̃_z = 0 over ω_c: SR and RS are planes that meet in the "
         "line RR.",
     ),
-    "fig-4": _of_paper(slipping, "fig-4", "Fig. 4: a slip that dies out", "slip-NR-NS"),
-    "fig-5": _of_paper(slipping, "fig-5", "Fig. 5: a slip that grows", "slip-NR-NS"),
+    "fig-4": _of(slipping, "Fig. 4: a slip that dies out", "fig-4", "slip-NR-NS"),
+    "fig-5": _of(slipping, "Fig. 5: a slip that grows", "fig-5", "slip-NR-NS"),
     "fig-6": _explaining(
         "Fig. 6: transitions to more freedom",
         cases.draw_figure_6,
@@ -82,13 +72,7 @@ FIGURES: dict[str, Drawing] = {
     "fig-12": _of_paper(bifurcation_diagrams, "fig-12", "Fig. 12: on the floor, η > j, (12) released"),
     "fig-13-left": _of_paper(flow_curve, "fig-13-left", "Fig. 13, left: hysteresis, η < j"),
     "fig-13-right": _of_paper(flow_curve, "fig-13-right", "Fig. 13, right: η > j"),
-    "unloading": Drawing(
-        title="Section 5.3: the fall at unloading",
-        select=unloading.select,
-        draw=unloading.draw,
-        caption=unloading.caption,
-        claims=("fig-13-right",),
-    ),
+    "unloading": _of(unloading, "Section 5.3: the fall at unloading", "", "fig-13-right"),
 }
 """Every figure by its file name, in the order of the report."""
 

@@ -26,35 +26,27 @@ _OF_STATES = (
 class Comparison:
     """Scores, and those of engines that are not part of this program."""
 
+    figure: str
     scores: tuple[Score, ...]
     elsewhere: tuple[Score, ...] = ()
 
 
-def select_ladder(material: Material) -> Comparison:
-    """The scores of the ladder; `GapError` if it was not climbed."""
-    if not material.ladder:
-        raise GapError("the ladder of settings was not measured")
-    return Comparison(material.ladder)
+def select(material: Material, figure: str) -> Comparison:
+    """The scores of the "ladder", or those of the "frontier", which have a cost; `GapError` if there are none."""
+    scores = material.ladder if figure == "ladder" else material.frontier
+    if not scores:
+        raise GapError(f"the {'ladder of settings' if figure == 'ladder' else 'error against cost'} was not measured")
+    return Comparison(figure, scores, material.elsewhere if figure == "frontier" else ())
 
 
-def select_frontier(material: Material) -> Comparison:
-    """The scores that have a cost; `GapError` if there are none."""
-    if not material.frontier:
-        raise GapError("error against cost was not measured")
-    return Comparison(material.frontier, material.elsewhere)
-
-
-def caption_ladder(of: Comparison) -> str:
-    """Of the ladder."""
-    return (
-        f"Relative error of ω_c in {_OF_STATES} and, as root mean square, in a transient, under settings that each "
-        "have one thing more than those above them, from what a newcomer writes to those of this study (ours). What "
-        "is below 1e-16 is drawn there; a run that diverged has no mark."
-    )
-
-
-def caption_frontier(of: Comparison) -> str:
-    """Of error against cost."""
+def caption(of: Comparison) -> str:
+    """Of either figure."""
+    if of.figure == "ladder":
+        return (
+            f"Relative error of ω_c in {_OF_STATES} and, as root mean square, in a transient, under settings that each "
+            "have one thing more than those above them, from what a newcomer writes to those of this study (ours). "
+            "What is below 1e-16 is drawn there; a run that diverged has no mark."
+        )
     text = (
         f"Relative error of ω_c over the processor time that a simulated second takes, in {_OF_STATES} and in a "
         "transient. Marks of one kind: one method at several time steps, joined. What is below 1e-16 is drawn there."
@@ -62,7 +54,12 @@ def caption_frontier(of: Comparison) -> str:
     return text + (" Grey: other engines, measured once, elsewhere." if of.elsewhere else "")
 
 
-def draw_ladder(of: Comparison) -> Figure:
+def draw(of: Comparison) -> Figure:
+    """Either figure."""
+    return (_ladder if of.figure == "ladder" else _frontier)(of)
+
+
+def _ladder(of: Comparison) -> Figure:
     """Rows of settings, a mark for each state."""
     methods = list(dict.fromkeys(score.method for score in of.scores))
     figure = style.figure(9, 1.1 + 0.33 * len(methods))
@@ -79,7 +76,7 @@ def draw_ladder(of: Comparison) -> Figure:
     return figure
 
 
-def draw_frontier(of: Comparison) -> Figure:
+def _frontier(of: Comparison) -> Figure:
     """A panel for each state and one for the transient."""
     quantities = list(dict.fromkeys(score.quantity for score in of.scores))
     rows = -(-len(quantities) // COLUMNS)

@@ -33,6 +33,7 @@ POINT: dict[str, Any] = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none
 """A special point."""
 HALO: dict[str, Any] = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.85}
 """Ground of a name that stands on lines."""
+_TEXT: dict[str, Any] = {"fontsize": 9, "bbox": HALO}
 OMEGA_0, OMEGA_C, OMEGA_X = "$\\omega_0$ (rad/s)", "$\\omega_c$ (rad/s)", "$\\omega_x^0$ (rad/s)"
 UP_TO_UNITS = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$"
 THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
@@ -73,19 +74,10 @@ def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] 
 def name(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (0, 0), colour: str = "k") -> None:
     """A name beside a point or a curve, `offset` in points; one that is far off has a line to it."""
     leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1} if math.hypot(*offset) > 16 else None
-    axes.annotate(
-        text,
-        (x, y),
-        xytext=offset,
-        textcoords="offset points",
-        fontsize=9,
-        bbox=HALO,
-        zorder=6,
-        color=colour,
-        arrowprops=leader,
-        ha="center" if offset[0] == 0 else "left" if offset[0] > 0 else "right",
-        va="center" if offset[1] == 0 else "bottom" if offset[1] > 0 else "top",
-    )
+    ha = "center" if offset[0] == 0 else "left" if offset[0] > 0 else "right"
+    va = "center" if offset[1] == 0 else "bottom" if offset[1] > 0 else "top"
+    look: dict[str, Any] = {"color": colour, "arrowprops": leader, "zorder": 6, "ha": ha, "va": va}
+    axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", **_TEXT | look)
 
 
 def guides(axes: Axes, values: dict[str, float]) -> None:
@@ -98,33 +90,19 @@ def guides(axes: Axes, values: dict[str, float]) -> None:
         step = 1 - step if value - last < 0.08 * (high - low) else 0
         last = value
         axes.axvline(value, **GUIDE)
-        axes.annotate(
-            THRESHOLD_LABELS[key],
-            (value, 0.02 + 0.07 * step),
-            xycoords=("data", "axes fraction"),
-            xytext=(2, 0),
-            textcoords="offset points",
-            fontsize=9,
-            color="0.25",
-            bbox=HALO,
-            zorder=0.5,
-        )
+        place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "xytext": (2, 0), "textcoords": "offset points"}
+        axes.annotate(THRESHOLD_LABELS[key], (value, 0.02 + 0.07 * step), **place, **_TEXT, color="0.25", zorder=0.5)
 
 
 def points(axes: Axes, states: Sequence[Measurement], lift: float = 0.0, way: str = "", **look: Any) -> None:
     """Measured values over omega_0 by engine, drawn higher by `lift`; capped bars of three standard uncertainties."""
     for engine in dict.fromkeys(m.engine for m in states):
         own, given = [m for m in states if m.engine == engine], ENGINES[engine]
-        axes.errorbar(
-            [m.parameters.omega_0 for m in own],
-            [m.value + lift for m in own],
-            yerr=[3 * m.uncertainty for m in own],
-            **{"marker": given.mark, "color": given.colour, "mfc": "white", "ms": 5, "label": engine + way, **look},
-            ls="none",
-            capsize=2.5,
-            elinewidth=1,
-            zorder=4,
-        )
+        omegas, values = [m.parameters.omega_0 for m in own], [m.value + lift for m in own]
+        bars = [3 * m.uncertainty for m in own]
+        own_look: dict[str, Any] = {"marker": given.mark, "color": given.colour, "mfc": "white", "ms": 5}
+        own_look |= {"label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4} | look
+        axes.errorbar(omegas, values, yerr=bars, ls="none", **own_look)
 
 
 def legend(axes: Axes, **where: Any) -> None:

@@ -25,14 +25,10 @@ Rows = list[list[str]]
 """A table: its head, then its rows."""
 STEPS = (4e-3, 1e-3)
 """Time steps of stationary states, s."""
-REACHED = tuple(
-    State(p.replace(omega_0=omega_0), case)
-    for p, case, omegas in (
-        (SMOOTH, Case.RR, (8.0, 12.0)),
-        (SMOOTH, Case.SS, (14.5, 20.0, 25.0, 30.0)),
-        (ROUGH, Case.NR, (25.0,)),
-    )
-    for omega_0 in omegas
+REACHED = (
+    *(State(SMOOTH.replace(omega_0=omega_0), Case.RR) for omega_0 in (8.0, 12.0)),
+    *(State(SMOOTH.replace(omega_0=omega_0), Case.SS) for omega_0 in (14.5, 20.0, 25.0, 30.0)),
+    State(ROUGH.replace(omega_0=25.0), Case.NR),
 )
 OFF = 1.02
 """Start near a state, in units of its variables."""
@@ -87,17 +83,10 @@ def reached(campaign: Campaign, states: Sequence[State] = REACHED, steps: Sequen
         for h, results in by_step.items():
             pair = results[2 * k : 2 * k + 2]
             rolls = Contact.R in (state.case.A, state.case.B)
-            rows.append(
-                [
-                    state.name,
-                    f"{state.p.eta:g}",
-                    _milliseconds(h),
-                    number(max(abs(each.omega_c) for each in pair)),
-                    number(max(_relative_slip(each, state) for each in pair)),
-                    number(max(each.creep for each in pair)) if rolls else "–",
-                    f"{max(each.open for each in pair):.1%}",
-                ]
-            )
+            errors = (max(abs(each.omega_c) for each in pair), max(_relative_slip(each, state) for each in pair))
+            creep = number(max(each.creep for each in pair)) if rolls else "–"
+            cells = [*map(number, errors), creep, f"{max(each.open for each in pair):.1%}"]
+            rows.append([state.name, f"{state.p.eta:g}", _milliseconds(h), *cells])
     return rows
 
 

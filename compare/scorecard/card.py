@@ -100,14 +100,5 @@ def table(columns: Sequence[Column]) -> Table:
 
 def html(columns: Sequence[Column], settings: str) -> str:
     """The card as one self-contained page; `settings` says in words what was graded."""
-    return pages.render(
-        "compare.scorecard",
-        "grade.html",
-        caption=CAPTION,
-        columns=columns,
-        lines=lines(columns),
-        headline=headline(columns[0]),
-        settings=settings,
-        good=GOOD,
-        good_speed=GOOD_SPEED,
-    )
+    shown = {"caption": CAPTION, "columns": columns, "lines": lines(columns), "headline": headline(columns[0])}
+    return pages.render("compare.scorecard", "grade.html", **shown, settings=settings, good=GOOD, good_speed=GOOD_SPEED)

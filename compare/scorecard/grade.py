@@ -102,15 +102,8 @@ def grade(
 
 
 def _column(contender: Contender, cost: float) -> Column:
-    return Column(
-        name=contender.name,
-        timestep=contender.loop.timestep,
-        cases=_cases(contender),
-        stationary=tuple(_held(contender, state) for state in STATES),
-        omega_01=_onset(contender),
-        transient=_transient(contender),
-        cost=cost,
-    )
+    h, states = contender.loop.timestep, tuple(_held(contender, state) for state in STATES)
+    return Column(contender.name, h, _cases(contender), states, _onset(contender), _transient(contender), cost)
 
 
 def _held(contender: Contender, state: State) -> Held:

@@ -24,6 +24,13 @@ from model.parameters import NOT_NEGATIVE, POSITIVE, check_number
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 CONES = ("pyramidal", "elliptic")
 SOLVERS = ("PGS", "CG", "Newton")
+_NUMBERS = ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations")
+_CHOICES = {
+    "integrator": (INTEGRATORS, "mjtIntegrator.mjINT_"),
+    "cone": (CONES, "mjtCone.mjCONE_"),
+    "solver": (SOLVERS, "mjtSolver.mjSOL_"),
+}
+"""Options of the engine by what is known of them and what their constants are called."""
 _NOTE = "{}: there is no {} that the ball can touch; the contact with its {} stands for both"
 _DOWN = 0.7
 """Least share of down in the way from the ball to its floor."""
@@ -77,7 +84,7 @@ class Native:
         check_number("impratio", self.impratio, "1", POSITIVE)
         for name in ("iterations", "noslip_iterations", "tolerance"):
             check_number(name, getattr(self, name), "1", NOT_NEGATIVE)
-        for name, known in (("integrator", INTEGRATORS), ("cone", CONES), ("solver", SOLVERS)):
+        for name, (known, _) in _CHOICES.items():
             value = getattr(self, name)
             if value not in known:
                 raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(value, known)}")
@@ -96,12 +103,10 @@ class Native:
         """The scene compiled to an `mujoco.MjModel` with these settings; `InputError` if MuJoCo refuses them."""
         spec = scene.spec(p, loop)
         option = spec.option
-        option.timestep, option.impratio = self.timestep, self.impratio
-        option.iterations, option.tolerance = self.iterations, self.tolerance
-        option.noslip_iterations = self.noslip_iterations
-        option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{self.integrator.upper()}")
-        option.cone = getattr(mujoco.mjtCone, f"mjCONE_{self.cone.upper()}")
-        option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{self.solver.upper()}")
+        for name in _NUMBERS:
+            setattr(option, name, getattr(self, name))
+        for name, (_, prefix) in _CHOICES.items():
+            setattr(option, name, _value(prefix, getattr(self, name)))
         for pair in spec.pairs:
             touch = self.A if pair.name == "A" else self.B
             for field in dataclasses.fields(Touch):
@@ -128,16 +133,9 @@ class Native:
         friction = touch.solreffriction if any(touch.solreffriction) else touch.solref
         b_f, _ = self._rates(friction, touch.solimp[1], d)
         tc = 2 / (d * b)
-        return ContactSettings(
-            timestep=1e-12,
-            solref=(tc, 1 / (tc * math.sqrt(d * k))),
-            solreffriction=2 / (d * b_f),
-            solimp=d,
-            impratio=min(max(self.impratio, 0.1), 1e7),
-            memory=False,
-            servo=0.0,
-            order=1,
-        )
+        impratio = min(max(self.impratio, 0.1), 1e7)
+        bare = ContactSettings(timestep=1e-12, solimp=d, impratio=impratio, memory=False, servo=0.0, order=1)
+        return dataclasses.replace(bare, solref=(tc, 1 / (tc * math.sqrt(d * k))), solreffriction=2 / (d * b_f))
 
     def _rates(self, solref: tuple[float, float], highest: float, d: float) -> tuple[float, float]:
         """Damping b (s-1) and stiffness k (s-2) of a row, as the chapter on computation gives them."""
@@ -184,23 +182,19 @@ def read(path: Path) -> Native:
     walls = [touch for geom, touch in touches.items() if geom not in floor]
     note = "" if floors and walls else _NOTE.format(path, *(("floor", "wall") if walls else ("wall", "floor")))
     opt = model.opt
-    return Native(
-        timestep=opt.timestep,
-        integrator=_name(INTEGRATORS, mujoco.mjtIntegrator, "mjINT_", opt.integrator),
-        cone=_name(CONES, mujoco.mjtCone, "mjCONE_", opt.cone),
-        impratio=opt.impratio,
-        solver=_name(SOLVERS, mujoco.mjtSolver, "mjSOL_", opt.solver),
-        iterations=opt.iterations,
-        tolerance=opt.tolerance,
-        noslip_iterations=opt.noslip_iterations,
-        A=(floors or walls)[0],
-        B=(walls or floors)[0],
-        note=note,
-    )
+    same: dict[str, Any] = {name: getattr(opt, name) for name in _NUMBERS}
+    same |= {name: _name(known, kind, getattr(opt, name)) for name, (known, kind) in _CHOICES.items()}
+    return Native(**same, A=(floors or walls)[0], B=(walls or floors)[0], note=note)
 
 
-def _name(known: Sequence[str], kind: Any, prefix: str, value: int) -> str:
-    return next(name for name in known if int(getattr(kind, prefix + name.upper())) == value)
+def _name(known: Sequence[str], prefix: str, value: int) -> str:
+    return next(name for name in known if _value(prefix, name) == value)
+
+
+def _value(prefix: str, name: str) -> int:
+    """The engine's number of a choice: prefix "mjtCone.mjCONE_" and name "elliptic" are one of its constants."""
+    kind, start = prefix.split(".")
+    return int(getattr(getattr(mujoco, kind), start + name.upper()))
 
 
 def _ball(model: Any, path: Path) -> int:

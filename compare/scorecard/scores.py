@@ -29,7 +29,7 @@ from compare.scorecard import trials
 from compare.scorecard.trials import AT_REST, KICKED, PASSES, SLIPPING, STATES
 from compare.statistics import plain
 from mjsim import ContactSettings, Run
-from model import Flow, StorageError, Trajectory, storage
+from model import StorageError, Trajectory, storage
 from model.files import write_text
 
 FILE = "scores.json"
@@ -156,14 +156,8 @@ def _time_spent(task: Task) -> float:
     count = BATCH if task.settings.coordinates == "polar" else 1  # free balls are stepped one after the other
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of contacts that hover
-        run = Run(
-            [task.parameters] * count,
-            [task.x0] * count,
-            task.t_end,
-            [Flow.steady(task.parameters.omega_0)] * count,
-            task.settings,
-            sample_interval=task.sample_interval,
-        )
+        given = [task.parameters] * count, [task.x0] * count, task.t_end, [task.fluid] * count, task.settings
+        run = Run(*given, sample_interval=task.sample_interval)
     begin = time.process_time()
     for _ in run:
         pass

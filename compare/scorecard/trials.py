@@ -50,17 +50,10 @@ class State:
         return -math.log(EPS) * max(analytic.slowest_time_constant(self.solution), (1 + 2 * self.p.j) / self.p.c)
 
 
-STATES = tuple(
-    State(p.replace(omega_0=omega_0), case)
-    for p, case, omega_0 in (
-        (SMOOTH, Case.RR, 12.0),
-        (SMOOTH, Case.SS, 14.5),
-        (SMOOTH, Case.SS, 25.0),
-        (ROUGH, Case.NR, 25.0),
-    )
-)
+ROLLING = State(SMOOTH.replace(omega_0=12.0), Case.RR)
+SLIPPING = State(SMOOTH.replace(omega_0=25.0), Case.SS)
+STATES = (ROLLING, State(SMOOTH.replace(omega_0=14.5), Case.SS), SLIPPING, State(ROUGH.replace(omega_0=25.0), Case.NR))
 """Rolling, slipping little and much, and carried by the wall alone."""
-ROLLING, _, SLIPPING, _ = STATES
 
 
 @dataclass(frozen=True)
@@ -102,14 +95,8 @@ KICKED = (0.0, 0.0, 14.35, -1.0, 2.0, 7.0, 0.0, 0.0)
 """Start of the transient, in which the ball slips at both points all the time."""
 PASSES = 2.0
 """Duration of the transient, s."""
-EXACT = Task(
-    engine="event",
-    parameters=SLIPPING.p,
-    x0=KICKED,
-    t_end=PASSES,
-    settings=analytic.Settings(rtol=1e-12),
-    sample_interval=1e-3,
-)
+_SHARP = analytic.Settings(rtol=1e-12)
+EXACT = Task(engine="event", parameters=SLIPPING.p, x0=KICKED, t_end=PASSES, settings=_SHARP, sample_interval=1e-3)
 """The transient by the event-driven simulation."""
 
 

@@ -56,11 +56,5 @@ def _add_ring(spec: Any, p: Parameters, sides: int = 120) -> None:
         faces += [np.stack([a + this, a + other, b + this], -1), np.stack([a + other, b + other, b + this], -1)]
     mesh = spec.add_mesh(name="ring", uservert=corners.ravel(), userface=np.concatenate(faces).ravel())
     mesh.smoothnormal = False
-    spec.worldbody.add_geom(
-        name="ring",
-        type=mujoco.mjtGeom.mjGEOM_MESH,
-        meshname="ring",
-        rgba=(0.45, 0.65, 0.80, 0.22),
-        contype=0,
-        conaffinity=0,
-    )
+    glass = {"rgba": (0.45, 0.65, 0.80, 0.22), "contype": 0, "conaffinity": 0}
+    spec.worldbody.add_geom(name="ring", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ring", **glass)
