@@ -73,23 +73,21 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 def settings(args: argparse.Namespace) -> Native:
     """The settings that the options of `add_settings` name."""
     base = native.read(args.file) if args.file else Native()
-    given = {name: getattr(args, name) for name in _NATIVE if getattr(args, name) is not None}
-    contacts = {name: getattr(args, name) for name in _CONTACT if getattr(args, name) is not None}
+    contacts = options.given(args, _CONTACT)
     if "solimp" in contacts:
         values = contacts["solimp"]
         if not 1 <= len(values) <= 5:
             raise InputError(f"solimp has {len(values)} numbers, but at most 5: dmin dmax width midpoint power")
         contacts["solimp"] = [*values, *base.A.solimp[len(values) :]]
     contacts = {name: tuple(v) if isinstance(v, list) else v for name, v in contacts.items()}
-    return dataclasses.replace(base, **given).with_contacts(**contacts)
+    return dataclasses.replace(base, **options.given(args, _NATIVE)).with_contacts(**contacts)
 
 
 def describe(args: argparse.Namespace) -> str:
     """The same in words."""
     given = [
         f"{name} {' '.join(f'{v:g}' for v in value) if isinstance(value, list) else value}"
-        for name in (*_NATIVE, *_CONTACT)
-        if (value := getattr(args, name)) is not None
+        for name, value in options.given(args, (*_NATIVE, *_CONTACT)).items()
     ]
     source = f"Settings of {args.file}" if args.file else "MuJoCo's defaults"
     return f"{source}, with {', '.join(given)}." if given else f"{source}."

@@ -78,9 +78,9 @@ def inspect(args: argparse.Namespace) -> int:
         options.show(collection.describe(args.file), collection.table, args.json)
         return 0
     if args.plot:
-        from compare.figures import trajectory  # here, because drawing takes a second to load
+        from compare.figures import gallery, trajectory  # here, because drawing takes a second to load
 
-        trajectory.plot(storage.load(args.file), args.plot)
+        gallery.save(trajectory.draw(storage.load(args.file)), args.plot)
     options.show(inspection.describe(args.file), inspection.table, args.json)
     return 0
 

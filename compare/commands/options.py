@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rich.console import Console
@@ -47,8 +47,13 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
 def parameters(args: argparse.Namespace) -> Parameters:
     """The parameters that the options of `add_parameters` name."""
     chosen = Parameters.load(args.parameters) if args.parameters else Parameters.named(args.set)
-    given = {f.name: getattr(args, f"parameter_{f.name}") for f in dataclasses.fields(Parameters)}
-    return chosen.replace(**{name: value for name, value in given.items() if value is not None})
+    return chosen.replace(**given(args, [field.name for field in dataclasses.fields(Parameters)], "parameter_"))
+
+
+def given(args: argparse.Namespace, names: Iterable[str], prefix: str = "") -> dict[str, Any]:
+    """The options of these names that were given, with their values."""
+    values = {name: getattr(args, prefix + name) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def number(text: str) -> float:

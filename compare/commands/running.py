@@ -6,12 +6,14 @@ import argparse
 import math
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from compare.commands.options import number
+from compare.commands.options import given, number, parameters
 from compare.runs import engines
 from compare.runs.engines import Settings
+from compare.runs.tasks import Task
 from compare.runs.workers import Workers, dask
 from model import Flow, InputError, State, StorageError
 from model.errors import suggestion
@@ -42,13 +44,8 @@ def flow(args: argparse.Namespace) -> Flow | None:
 def add_engine(parser: argparse.ArgumentParser) -> None:
     """Options that choose an engine and its accuracy."""
     group = parser.add_argument_group("engine")
-    group.add_argument(
-        "--engine",
-        type=_engine,
-        default=engines.MUJOCO,
-        metavar="NAME",
-        help=f"{', '.join(engines.ENGINES)}; analytic is event",
-    )
+    known = f"{', '.join(engines.ENGINES)}; analytic is event"
+    group.add_argument("--engine", type=_engine, default=engines.MUJOCO, metavar="NAME", help=known)
     group.add_argument("--timestep", type=number, metavar="s", help="time step of mujoco and time-stepping")
     group.add_argument("--rtol", type=number, help="relative tolerance of event")
     group.add_argument("--restitution", type=number, help="coefficient of restitution of event and time-stepping")
@@ -63,18 +60,22 @@ def _engine(name: str) -> engines.Engine:
 
 def settings(args: argparse.Namespace) -> Settings:
     """Settings of the engine that the options of `add_engine` choose."""
-    given = {name: getattr(args, name) for name in ("timestep", "rtol", "restitution")}
     chosen: engines.Engine = args.engine
-    return chosen.configured({name: value for name, value in given.items() if value is not None})
+    return chosen.configured(given(args, ("timestep", "rtol", "restitution")))
+
+
+def task(args: argparse.Namespace, **more: Any) -> Task:
+    """The run that the options of `add_engine`, `add_start`, ``--time`` and the parameters describe."""
+    engine, p, x0 = args.engine.name, parameters(args), start(args)
+    return Task(engine=engine, parameters=p, x0=x0, t_end=args.time, settings=settings(args), **more)
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
     """Options that say where runs are carried out."""
     group = parser.add_argument_group("workers")
     choice = group.add_mutually_exclusive_group()
-    choice.add_argument(
-        "--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes of this machine (0: this one)"
-    )
+    here, all_of_them = "processes of this machine (0: this one)", os.cpu_count() or 1
+    choice.add_argument("--workers", type=int, default=all_of_them, metavar="N", help=here)
     choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
     group.add_argument("--limit", type=number, default=math.inf, metavar="s", help="longest real time a run may take")
 
@@ -93,13 +94,13 @@ def add_start(parser: argparse.ArgumentParser) -> None:
 
 def start(args: argparse.Namespace) -> State:
     """The initial state of `add_start`."""
-    units, given = dict(zip(VARIABLES, UNITS, strict=True)), {}
+    units, values = dict(zip(VARIABLES, UNITS, strict=True)), {}
     for item in args.start:
         name, _, value = item.partition("=")
         if name not in units:
             raise InputError(f"unknown state variable {name!r}{suggestion(name, VARIABLES)}")
-        given[name] = parse_number(name, value, units[name])
-    return State(**given)
+        values[name] = parse_number(name, value, units[name])
+    return State(**values)
 
 
 def _read_flow(path: Path) -> Flow:

@@ -31,15 +31,7 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, keep what there is, and show it."""
-    task = Task(
-        engine=args.engine.name,
-        parameters=options.parameters(args),
-        x0=running.start(args),
-        t_end=args.time,
-        flow=running.flow(args),
-        sample_interval=args.sample_interval,
-        settings=running.settings(args),
-    )
+    task = running.task(args, flow=running.flow(args), sample_interval=args.sample_interval)
     if args.output:
         check_writable(args.output)
     with tempfile.TemporaryDirectory() as scratch, interrupts() as interrupted:

@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from compare.commands import options
+from compare.commands import options, running
 from compare.runs import campaign, collection, progress, sweep
 from compare.runs.campaign import Campaign
 from compare.runs.tasks import Task
@@ -17,7 +17,7 @@ def add(commands: options.Commands) -> None:
     """Declare the commands."""
     command = options.command(commands, "sweep", run, "many runs over ranges of parameters, resumable")
     options.add_parameters(command)
-    options.add_start(command)
+    running.add_start(command)
     command.add_argument(
         "--vary",
         action="append",
@@ -36,10 +36,10 @@ def add(commands: options.Commands) -> None:
     command.add_argument(
         "--hold", type=options.number, default=20.0, metavar="s", help="time at each step (default 20)"
     )
-    options.add_engine(command)
+    running.add_engine(command)
     command.add_argument("--time", type=options.number, default=30.0, metavar="s", help="duration (default 30)")
     command.add_argument("-o", "--output", type=Path, default=Path("sweep"), metavar="DIR")
-    options.add_workers(command)
+    running.add_workers(command)
     command.add_argument("--batch", type=int, default=campaign.BATCH, metavar="N", help="runs in one MuJoCo batch")
     command.add_argument("--json", action="store_true", help="print a summary as JSON")
     command.add_argument("--quiet", action="store_true", help="no progress")
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     tasks = _tasks(args)
     with (
         progress.shown(quiet=args.quiet or args.json) as show,
-        Campaign(args.output, options.workers(args), args.batch, args.limit) as work,
+        Campaign(args.output, running.workers(args), args.batch, args.limit) as work,
     ):
         work.report = lambda now: show("sweep", now.done, now.total, now.failed)
         failures = work.complete(tasks)
@@ -72,14 +72,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _tasks(args: argparse.Namespace) -> list[Task]:
     axes = [sweep.Axis.parse(text) for text in args.vary]
-    p = options.parameters(args)
-    start, settings = options.start(args), options.settings(args)
-    template = Task(engine=args.engine.name, parameters=p, x0=start, t_end=args.time, settings=settings)
+    template = running.task(args)
     if args.direction != "held":
         return [sweep.staircase(template, sweep.levels(axes, args.direction), args.hold)]
     if args.random is not None:
-        return sweep.held(template, sweep.random(p, axes, args.random, args.seed))
-    return sweep.held(template, sweep.grid(p, axes))
+        return sweep.held(template, sweep.random(template.parameters, axes, args.random, args.seed))
+    return sweep.held(template, sweep.grid(template.parameters, axes))
 
 
 def collect(args: argparse.Namespace) -> int:

@@ -59,15 +59,9 @@ def run(args: argparse.Namespace) -> int:
             console.print(tables.line(verdict), soft_wrap=True)
 
     with progress.shown(quiet=args.quiet or args.json) as show:
+        wanted = {"level": args.level, "claims": args.claim, "sets": chosen, "limit": args.limit}
         verdicts = validation.validate(
-            args.output,
-            level=args.level,
-            claims=args.claim,
-            sets=chosen,
-            workers=running.workers(args),
-            limit=args.limit,
-            progress=show,
-            announce=announce,
+            args.output, **wanted, workers=running.workers(args), progress=show, announce=announce
         )
     admitted = [v for v in verdicts if v.outcome is not Outcome.NOT_RUN] if chosen else verdicts
     return _finish(verdicts, admitted, args, console)

@@ -36,20 +36,24 @@ def write(output: Path, material: Material, formats: tuple[str, ...] = ("svg",))
         except (GapError, StorageError) as gap:
             yield name, f"not drawn: {gap}"
             continue
-        _save(figure, output, name, formats)
+        for suffix in formats:
+            save(figure, output / f"{name}.{suffix}")
         captions.append(f"{name}\n{drawing.title}. {drawing.caption(data)}\n")
         yield name, ""
     write_text(output / CAPTIONS, "\n".join(captions))
 
 
-def _save(figure: Figure, output: Path, name: str, formats: tuple[str, ...]) -> None:
-    for suffix in formats:
-        path = output / f"{name}.{suffix}"
-        try:
-            figure.savefig(path, dpi=200, metadata=_METADATA[suffix])
-        except OSError as error:
-            raise StorageError(f"cannot write {path}: {error.strerror}") from error
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure to a file, in the format that its name says; equal figures make equal files.
+
+    Raises `StorageError` if it can't be written or the name says no format.
+    """
+    try:
+        figure.savefig(path, dpi=200, metadata=_TIMELESS.get(path.suffix, {}))
+    except OSError as error:
+        raise StorageError(f"cannot write {path}: {error.strerror}") from error
+    except ValueError as error:
+        raise StorageError(f"cannot write {path}: {str(error).splitlines()[0]}") from error
 
 
-_METADATA: Mapping[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}
-"""Without the time of writing, equal figures make equal files."""
+_TIMELESS: Mapping[str, dict[str, None]] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}

@@ -25,6 +25,8 @@ COLOURS = {
     Case.NN: "#000000",
 }
 """Okabe and Ito's colours, told apart by colour-blind readers; names beside the curves tell them apart in print."""
+FORCE, SLIP, BALL, INK = "#b3261e", "#6a3d9a", "#f5cc6b", "#1c2430"
+"""Of pictures and films: arrows of force and slip, the ball, text."""
 STABLE, UNSTABLE = "-", (0, (5, 2.5))
 """Line styles."""
 GUIDE: dict[str, Any] = {"color": "0.55", "lw": 0.8, "ls": ":", "zorder": 0}

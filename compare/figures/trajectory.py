@@ -2,43 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from compare.figures import style
-from model import StorageError, Trajectory
-
-
-def plot(trajectory: Trajectory, path: Path) -> None:
-    """Draw omega_c, slip, gaps and forces over time, with the case as a band, to a file.
-
-    Raises `StorageError` if the file can't be written or its suffix names no format.
-    """
-    figure = draw(trajectory)
-    try:
-        figure.savefig(path, dpi=150)
-    except OSError as error:
-        raise StorageError(f"cannot write {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise StorageError(f"cannot write {path}: {str(error).splitlines()[0]}") from error
+from model import Trajectory
 
 
 def draw(trajectory: Trajectory) -> Figure:
-    """The figure of `plot`."""
+    """omega_c, slip, gaps and forces over time, with the case as a band."""
     t, p = trajectory.time, trajectory.header.parameters
     figure = style.figure(9, 9)
     orbit, slip, gap, force, band = figure.subplots(5, sharex=True, height_ratios=[3, 3, 2, 3, 0.6])
     orbit.plot(t, trajectory.header.flow(t), color="0.6", ls="--", label="ω₀")
     orbit.plot(t, trajectory.omega_c, color="#0072B2", label="ω_c")
     orbit.set_ylabel("orbit (rad/s)")
-    for name, symbol, colour in (
-        ("slip_x", "ω̃ₓ", "#D55E00"),
-        ("slip_y", "ω̃ᵧ", "#009E73"),
-        ("slip_z", "ω̃_z", "#CC79A7"),
-    ):
-        slip.plot(t, getattr(trajectory, name), label=symbol, color=colour)
+    colours = {"ω̃ₓ": "#D55E00", "ω̃ᵧ": "#009E73", "ω̃_z": "#CC79A7"}
+    for values, (symbol, colour) in zip(trajectory.x[:, 3:6].T, colours.items(), strict=True):
+        slip.plot(t, values, label=symbol, color=colour)
     slip.set_ylabel("slip (rad/s)")
     gap.plot(t, 1e3 * trajectory.y, color="#0072B2", label="y (floor)")
     gap.plot(t, 1e3 * trajectory.h, color="#E69F00", ls="--", label="h (wall)")
@@ -58,7 +39,6 @@ def draw(trajectory: Trajectory) -> Figure:
     for axes in (orbit, slip, gap, force):
         axes.legend(fontsize=8, ncols=4, frameon=False)
         axes.grid(alpha=0.3)
-    figure.suptitle(
-        f"{trajectory.header.engine}: μ = {p.mu:g}, η = {p.eta:g}, j = {p.j:g}, c = {p.c:g} 1/s", fontsize=11
-    )
+    set_ = f"μ = {p.mu:g}, η = {p.eta:g}, j = {p.j:g}, c = {p.c:g} 1/s"
+    figure.suptitle(f"{trajectory.header.engine}: {set_}", fontsize=11)
     return figure

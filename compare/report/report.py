@@ -51,7 +51,7 @@ def render(material: Material, summary: Summary) -> str:
     ran = [verdict for verdict in material.verdicts if verdict.outcome is not Outcome.NOT_RUN]
     option = _OPTIONS[Level[summary.level]]
     rows = [_row(material, verdict, option) for verdict in ran]
-    sections = list(dict.fromkeys(row["section"] for row in rows))
+    sections = dict.fromkeys(row["section"] for row in rows)
     judged = {row["id"] for row in rows}
     free = {name: each for name, each in FIGURES.items() if not judged & set(each.claims)}
     drawn = [

@@ -8,7 +8,7 @@ import matplotlib
 from PIL import Image, ImageDraw, ImageFont
 
 from compare.figures import style
-from compare.view.colours import FORCE, INK, SLIP
+from compare.figures.style import FORCE, INK, SLIP
 from compare.view.motion import Moment
 from model import Flow, Parameters
 from model.kinematics import slip_speeds

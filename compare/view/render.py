@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from PIL import Image
 
 from compare.figures import style
-from compare.view.colours import BALL, FORCE, SLIP, rgb
+from compare.figures.style import BALL, FORCE, SLIP
 from compare.view.stage import Stage
 from model import InputError, StorageError, Trajectory
 from model.arrays import Array
@@ -68,7 +69,7 @@ def _palette(image: Image.Image) -> Image.Image:
     What moves is small, and a palette of the first frame alone would give it the greys of its surroundings.
     """
     seen = image.quantize(120, dither=Image.Dither.NONE).getpalette() or []
-    meant = [rgb(colour) for colour in (*style.COLOURS.values(), FORCE, SLIP, BALL)]
+    meant = [to_rgb(colour) for colour in (*style.COLOURS.values(), FORCE, SLIP, BALL)]
     shades = np.linspace(0.45, 1.0, 6)[:, None, None] * np.array(meant)
     tints = 1 - (1 - np.array(meant)) * np.array([0.25, 0.5, 0.75])[:, None, None]
     chosen = np.concatenate([shades.reshape(-1, 3), tints.reshape(-1, 3)])

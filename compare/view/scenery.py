@@ -7,8 +7,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from matplotlib.colors import to_rgb
 
-from compare.view.colours import BALL, rgb
+from compare.figures.style import BALL
 from mjsim import ContactSettings, scene
 from model import InputError, Parameters, Trajectory
 
@@ -33,7 +34,7 @@ def spec(run: Trajectory) -> Any:
             geom.group = HIDDEN
     if made.geom("ball") is None:
         raise InputError("the run's MJCF has no geom named 'ball' to show")
-    made.geom("ball").material, made.geom("ball").rgba = "", (*rgb(BALL), 0.26)  # arrows stand inside
+    made.geom("ball").material, made.geom("ball").rgba = "", (*to_rgb(BALL), 0.26)  # arrows stand inside
     floor = made.geom("floor")
     if floor is not None:
         floor.material, floor.rgba = "", (0.80, 0.82, 0.85, 1.0)

@@ -7,11 +7,12 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from matplotlib.colors import to_rgb
 from PIL import Image
 
 from compare.figures import style
+from compare.figures.style import FORCE, SLIP
 from compare.view import opengl, overlay, scenery
-from compare.view.colours import FORCE, SLIP, rgb
 from compare.view.motion import STEP, Moment, Turning, moment
 from model import Case, Trajectory
 from model.arrays import Array
@@ -104,14 +105,14 @@ class Stage:
         cases = run.case[np.searchsorted(run.time, times, side="right") - 1]
         for k in range(len(times) - 1):
             if max(age[k], age[k + 1]) < 1:
-                rgba = (*rgb(style.COLOURS[Case(cases[k])]), 0.9 * (1 - age[k]))
+                rgba = (*to_rgb(style.COLOURS[Case(cases[k])]), 0.9 * (1 - age[k]))
                 self._connect(mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[k], points[k + 1], rgba)
 
     def _add_spots(self, centre: Array) -> None:
         """Spots on the ball that let the eye see it turn."""
         turned = self._data.geom_xmat[self._ball].reshape(3, 3)
         for spot in _SPOTS @ turned.T:
-            geom = self._next(mujoco.mjtGeom.mjGEOM_SPHERE, (*rgb("#8a6d1f"), 1.0))
+            geom = self._next(mujoco.mjtGeom.mjGEOM_SPHERE, (*to_rgb("#8a6d1f"), 1.0))
             geom.size[:] = 0.11 * self._p.r
             geom.pos[:] = centre + 0.95 * self._p.r * spot
 
@@ -131,7 +132,7 @@ class Stage:
 
     def _arrow(self, width: float, begin: Array, end: Array, colour: str) -> None:
         if np.linalg.norm(end - begin) > 2 * width:
-            self._connect(mujoco.mjtGeom.mjGEOM_ARROW, width, begin, end, (*rgb(colour), 1.0))
+            self._connect(mujoco.mjtGeom.mjGEOM_ARROW, width, begin, end, (*to_rgb(colour), 1.0))
 
     def _connect(self, kind: Any, width: float, begin: Array, end: Array, rgba: tuple[float, ...]) -> None:
         mujoco.mjv_connector(self._next(kind, rgba), kind, width, begin, end)
