@@ -13,14 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.measure.field import DOUBT, LIMIT
-from compare.measure.growth import LARGE, SMALL, SMOOTH, STRAIGHT, Push
+from compare.measure.field import DOUBT, LIMIT, floor
+from compare.measure.growth import LARGE, SMALL, SMOOTH, Push
 from compare.measure.lab import Lab, time_unit
+from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import Start, high, settle
 from compare.measure.watched import ends_of_rolling
 from compare.runs.tasks import Task
-from compare.statistics import straight_line
+from compare.statistics import COVERAGE, straight_line
 from model import Case, Parameters, Trajectory
 from model.arrays import Array
 
@@ -29,8 +30,8 @@ AROUND = (0.7, 1.3)
 """Where the second two flows are, over the zero that the first two show."""
 MEDIUM = (1.0, 0.5)
 """Sizes of slip of a ball that hangs on a smooth wall, and so goes round fast, in units as those of `LARGE`."""
-COARSE = 6e-3
-"""Largest uncertainty of a slope that counts, over the slope."""
+COARSE = quantity("gamma_slope").resolves / COVERAGE
+"""Largest uncertainty of a slope that counts, over the slope: all that a check may have."""
 BEYOND = 2.1
 """Largest zero that counts, over the largest value at which slip stayed in its case: a line isn't followed farther."""
 FAR = 100.0
@@ -128,7 +129,7 @@ def _points(lab: Lab, line: Line, flows: Sequence[float], tasks: Sequence[Task])
         return None
     p = pushes[0].p
     change = rates[:, 0] - rates[:, 1]
-    noise = math.hypot(np.abs(change).max() * DOUBT, fine[:, 1].max(), STRAIGHT * p.g / p.r)
+    noise = math.hypot(np.abs(change).max() * DOUBT, fine[:, 1].max(), floor(p) * p.g / p.r)
     return _Points(tuple(flows), tuple(fine[:, 0].tolist()), tuple((change * LIMIT).tolist()), noise)
 
 
@@ -177,10 +178,10 @@ def _result(
     p, x = line.at(line.first[0])
     conditions = line.push(line.first[0]).conditions | {"by": line.by, "omega_c": float(x[2])}
     square = "_square" if line.power == 2 else ""
-    for quantity, value in zip((f"gamma_zero{square}", f"gamma_slope{square}"), (zero, slope), strict=True):
-        if quantity.startswith("gamma_zero") and abs(value.value) > BEYOND * np.abs(q).max():
+    for what, value in zip((f"gamma_zero{square}", f"gamma_slope{square}"), (zero, slope), strict=True):
+        if what.startswith("gamma_zero") and abs(value.value) > BEYOND * np.abs(q).max():
             continue
-        yield measurement(lab, NAME, line.set, p, quantity, value, tasks, **conditions)
+        yield measurement(lab, NAME, line.set, p, what, value, tasks, **conditions)
 
 
 def _lines(name: str, p: Parameters) -> Iterator[Line]:

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.runs.tasks import Task
-from compare.statistics import Measured
+from compare.statistics import COVERAGE, Measured
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -36,16 +37,16 @@ CENTRES, HALF = (16, 40, 64), 8
 """Middles of the windows and half their width, in steps of the coarser run."""
 APART = 4
 """Steps around a window in which the case doesn't change, either: in that time friction builds up or dies out."""
-FLOOR = 3e-5
-"""Least uncertainty over the scale: a contact follows its load within a few steps, of which a window has 16 and the
-unit of time 300; what that leaves is of second order in the step, and halving the step may by chance not show it."""
-
-COARSE = 1.6e-3
-"""Largest uncertainty over the scale with which a state counts: where a fast slip hardly presses, contact comes and
-goes."""
-LIMIT, DOUBT = 2 / 3, 1 / 2
+LAG = 3
+"""Steps in which a contact follows its load: forces that build up from nothing are there after as many."""
+COARSE = quantity("rate_v_y").resolves / COVERAGE
+"""Largest uncertainty over the scale with which a state counts, all that a check may have: where a fast slip hardly
+presses, contact comes and goes."""
+LIMIT, DOUBT = 2 / 3, 1 / 3
 """Limit of a vanishing step beyond the finer run, and its uncertainty, in differences of two steps, one twice the
 other: their error is between first order, for the direction of friction, and second, with limits of 1 and 1/3."""
+DEGREES = (5, 3)
+"""Of the polynomials through a window; the lower one shows what the degree changes."""
 TURN = 0.5
 """Largest change of a slip in a window over the slip itself: where it is about to vanish, friction turns too fast."""
 COMPONENTS = ("Ax", "Ay", "Az", "Bx", "By", "Bz")
@@ -62,6 +63,19 @@ class Sighting:
     """(8,), each per second."""
     forces: Array
     """(6,): A_x, A_y, A_z, B_x, B_y, B_z in N."""
+
+
+def floor(p: Parameters) -> float:
+    """Least uncertainty of a rate over its natural size, which halving the step may by chance not show.
+
+    What lags behind by a time `LAG` is off by half its square, in units of `time_unit`, once the first order is gone.
+    """
+    return (LAG * coarse_step(p) / REFINED / time_unit(p)) ** 2 / 2
+
+
+def slope_weights(samples: Array, degree: int) -> Array:
+    """Weights (n,) of values at samples (n,) in the slope at 0 of the polynomial through them, by least squares."""
+    return np.asarray(np.linalg.pinv(np.vander(samples, degree + 1, increasing=True))[1])
 
 
 def polynomial(time: Array, values: Array, degree: int, at: float) -> tuple[Array, Array]:
@@ -86,9 +100,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 continue
             values = list(_values(*seen, p))
             kept[name, seen[0].case] += bool(values)
-            for quantity, value in values:
+            for what, value in values:
                 at = state_of(seen[0].x)
-                yield measurement(lab, NAME, name, p, quantity, value, pair, case=seen[0].case.name, **at)
+                yield measurement(lab, NAME, name, p, what, value, pair, case=seen[0].case.name, **at)
     for name in sets:
         for case in Case:
             if not kept[name, case]:
@@ -154,8 +168,9 @@ def _seen(coarse: Trajectory, fine: Trajectory, centre: int) -> tuple[Sighting, 
 
     None if the case changes in or near the window, or a slip turns.
     """
-    seen = [_sight(*each) for each in ((coarse, centre, 1, 5), (fine, 2 * centre, 2, 5), (fine, 2 * centre, 2, 3))]
-    one, two, lower = seen
+    high, low = DEGREES
+    one, two = _sight(coarse, centre, 1, high), _sight(fine, 2 * centre, 2, high)
+    lower = _sight(fine, 2 * centre, 2, low)
     if not (one and two and lower and one.case is two.case):
         return None
     x, rates, force = (
@@ -196,7 +211,7 @@ def _values(best: Sighting, fine: Sighting, lower: Sighting, p: Parameters) -> I
     pressing = _forces(best)
     weight = p.m * p.g
     rate_change, force_change = (
-        max(FLOOR, *(abs(a - b) * DOUBT / LIMIT + abs(b - c) for a, b, c in zip(*rows, strict=True)))
+        max(floor(p), *(abs(a - b) * DOUBT / LIMIT + abs(b - c) for a, b, c in zip(*rows, strict=True)))
         for rows in (
             [(each.rates / scales)[moving] for each in (best, fine, lower)],
             [[force / weight for force in _forces(each).values()] or [0.0] for each in (best, fine, lower)],

@@ -14,11 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.measure.field import DOUBT, LIMIT, polynomial, random_state
+from compare.measure import field
+from compare.measure.field import DOUBT, LIMIT, polynomial, random_state, slope_weights
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.quantities import quantity
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.runs.tasks import Task
-from compare.statistics import Measured
+from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters, Trajectory
 from model.arrays import Array
 
@@ -45,13 +47,16 @@ LARGE, SMALL, BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
 """Slips at the start in units of `_slip_unit`: so large that they neither end nor turn much in a record; small where
 one contact has to hold, or the ball goes round slowly and the wall carries little; and three where the direction of a
 contact that slips already depends on the size."""
-FLOOR = 1e-3
-"""Least uncertainty in units of g/r: contacts answer within a few steps, see `compare.measure.field.FLOOR`, and a
-derivative at the end of a record is some thirty times as uncertain as one in its middle."""
-STRAIGHT = 1e-4
-"""The same where the direction of slip does not turn and the load does not depend on it."""
-COARSE = 6e-3
-"""Largest uncertainty that counts, in units of (1+j)/j g/r: where a contact is hardly loaded, slip turns too fast."""
+DEGREES = (4, 3)
+"""Of the polynomials through a record; the lower one shows what the degree changes."""
+AT_END = float(
+    np.linalg.norm(slope_weights(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]))
+    / np.linalg.norm(slope_weights(np.arange(-field.HALF, field.HALF + 1.0), field.DEGREES[0]))
+)
+"""How many times as uncertain as in the middle of a window of `compare.measure.field` a rate is before a record."""
+COARSE = quantity("gamma").resolves / COVERAGE
+"""Largest uncertainty that counts, in units of (1+j)/j g/r, all that a check may have: where a contact is hardly
+loaded, slip turns too fast."""
 SMOOTH = "without friction at both contacts there is nothing that rolls"
 SINKING = 0.5
 """Speed at which a ball sinks on which the fluid also pulls along the wall as hard as its weight, over g/c."""
@@ -89,7 +94,7 @@ class Push:
         if not np.isin(run.case[SKIPPED * times :], list(alike)).all():
             return np.full(2, np.nan)
         time, slip = run.time[SKIPPED * times :], run.x[SKIPPED * times :, 3:6] @ self.n
-        return np.array([polynomial(time, slip[:, None], degree, 0.0)[1][0] for degree in (4, 3)])
+        return np.array([polynomial(time, slip[:, None], degree, 0.0)[1][0] for degree in DEGREES])
 
     @property
     def conditions(self) -> dict[str, Condition]:
@@ -165,7 +170,8 @@ def _growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
         value = (rates[0, 0] - 6 * before + 8 * last) / 3
     change = fine[0] - last
     p = push.p
-    floor = (STRAIGHT if push.outer is Case.RS else FLOOR) * p.g / p.r
+    # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
+    floor = field.floor(p) * (1.0 if push.outer is Case.RS else AT_END) * p.g / p.r
     uncertainty = math.hypot(change * DOUBT, fine[0] - fine[1], (value - linear) / 3, floor)
     if uncertainty > COARSE * (1 + p.j) / p.j * p.g / p.r:
         return None

@@ -23,13 +23,11 @@ from compare.measure.questions import slip
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement
 from compare.measure.settling import Settled
 from compare.runs.tasks import Task
-from compare.statistics import Measured
+from compare.statistics import COVERAGE, Measured
 from model import Parameters
 from model.arrays import Array
 
 PROTOCOL = "thresholds"
-APART = 3.0
-"""Standard uncertainties by which two flows must differ to count as two."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -68,7 +66,7 @@ def _reaches_wall(lab: Lab, name: str, found: onset.Brackets, states: onset.Stat
     if unloaded is None or riding is None:
         return False
     near = onset.FOLD_WIDTH[lab.level] * riding.high
-    return abs(unloaded.value - riding.high) < near and APART * unloaded.uncertainty < near
+    return abs(unloaded.value - riding.high) < near and COVERAGE * unloaded.uncertainty < near
 
 
 @dataclass(frozen=True, eq=False)
