@@ -40,7 +40,7 @@ MORE = {Level.QUICK: 1, Level.DEFAULT: 2, Level.FULL: 6}
 SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
 """Which of slip_x, slip_y, slip_z a case allows beyond the one it leaves."""
 REFINED = 16
-"""Steps in one of `coarse_step`; one run has twice as many."""
+"""Steps in one of `coarse_step`; every other run has twice as many."""
 STEPS, SKIPPED = 18, 3
 """Steps of a record, and those at its start in which contact forces build up."""
 LARGE, SMALL, BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
@@ -149,33 +149,36 @@ def _sizes(push: Push) -> tuple[float, ...]:
 
 
 def _tasks(lab: Lab, push: Push) -> list[Task]:
-    """Every size, and the smallest with half the step."""
-    sizes = _sizes(push)
-    return [*(push.task(lab, size) for size in sizes), push.task(lab, sizes[-1], 2)]
+    """Every size, with either step."""
+    return [push.task(lab, size, times) for times in (1, 2) for size in _sizes(push)]
 
 
 def _growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
-    """gamma for a vanishing size, None if a record was not in the case or is too coarse.
+    """gamma for a vanishing size and step, None if a record was not in the case or is too coarse.
 
-    Its uncertainty is what halving the step and a degree of the polynomials change, and for three sizes a third of
-    what the third one does: the next would change less.
+    Its uncertainty is what the step and a degree of the polynomials change, and for three sizes a third of what the
+    third one does: the next would change less.
     """
-    rates = np.array([push.rate(run) for run in runs[:-1]])
-    fine = push.rate(runs[-1], 2)
-    if np.isnan(rates).any() or np.isnan(fine).any():
+    half = len(runs) // 2
+    coarse, fine = (np.array([push.rate(run, n) for run in runs[k : k + half]]) for n, k in ((1, 0), (2, half)))
+    if np.isnan(coarse).any() or np.isnan(fine).any():
         return None
-    *_, before, last = rates[:, 0]
-    value = linear = 2 * last - before
-    if len(rates) == 3:
-        value = (rates[0, 0] - 6 * before + 8 * last) / 3
-    change = fine[0] - last
+    value, lower = _vanishing(fine + (fine - coarse) * LIMIT)
+    step, _ = _vanishing(fine - coarse) * DOUBT
+    size = (value - _vanishing(fine[-2:] + (fine[-2:] - coarse[-2:]) * LIMIT)[0]) / 3
     p = push.p
     # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
     floor = field.floor(p) * (1.0 if push.outer is Case.RS else AT_END) * p.g / p.r
-    uncertainty = math.hypot(change * DOUBT, fine[0] - fine[1], (value - linear) / 3, floor)
+    uncertainty = math.hypot(step, value - lower, size, floor)
     if uncertainty > COARSE * (1 + p.j) / p.j * p.g / p.r:
         return None
-    return Measured(float(value + change * (1 + LIMIT)), uncertainty)
+    return Measured(float(value), uncertainty)
+
+
+def _vanishing(rates: Array) -> Array:
+    """The limit of rows (2 or 3, n), each of which belongs to half the size of the one before."""
+    *first, before, last = rates
+    return np.asarray((first[0] - 6 * before + 8 * last) / 3 if first else 2 * last - before)
 
 
 def _pushes(name: str, p: Parameters, more: int) -> Iterator[Push]:
