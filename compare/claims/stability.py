@@ -6,14 +6,12 @@ import analytic
 from analytic import StationarySolution
 from compare.claims.claim import Bearing, Claim, Relation, Text
 from compare.claims.judge import remembered
-from compare.measure.lab import time_unit
+from compare.measure.rates import natural_size
 from compare.measure.record import Measurement
 from model import Case, InputError, Parameters
 
 SECTION = "Stability"
 PROTOCOL = "rates"
-REST = 0.05
-"""Share of the drag coefficient c below which a measured rate counts as none."""
 
 
 @remembered
@@ -63,11 +61,9 @@ def count(m: Measurement) -> float:
 
 
 def size(m: Measurement) -> float:
-    """Natural size of a rate, s-1: its own, or that of the eigenvalue if it is none, or else that of free fall."""
-    for rate in (abs(m.value), abs(eigenvalue(m))):
-        if rate > REST * m.parameters.c:
-            return rate
-    return 1 / time_unit(m.parameters)
+    """Natural size of a measured rate, s-1."""
+    other = m.conditions["frequency" if m.quantity == "decay_rate" else "decay_rate"]
+    return natural_size(m.value, float(other), m.parameters)
 
 
 def bearings(case: Case) -> tuple[Bearing, ...]:

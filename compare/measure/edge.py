@@ -18,8 +18,8 @@ from compare.measure.brackets import Bracket, Care, Search, narrow
 from compare.measure.extrapolation import vanishing
 from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.questions import lasting, rest, wall
-from compare.measure.record import Measurement, Missing, Records, measurement
-from compare.measure.settling import TAPER, Settled, Start, family, settle
+from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
+from compare.measure.settling import TAPER, Settled, Start, family, rotation_scale, settle
 from compare.runs.tasks import Task
 from compare.statistics import Measured, tail
 from model import Case, Parameters, Trajectory
@@ -61,6 +61,8 @@ class Edge:
     found: Bracket | None = None
     moved: Array | None = None
     """How far the crossing is from that of the line before; None for the first line, and after one without crossing."""
+    before: Array | None = None
+    """The same one line earlier."""
     stretched: int = 0
     """How many lines were too short since the last crossing."""
 
@@ -154,7 +156,7 @@ def _followed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
             else:
                 crossed = replace(lines[k], found=bracket, stretched=0)
                 moved = np.abs(crossed.crossing - current[k].crossing) if current[k].found else None
-                current[k] = replace(crossed, moved=moved)
+                current[k] = replace(crossed, moved=moved, before=current[k].moved)
     return [edge for edge in current if edge.found and edge.moved is not None]
 
 
@@ -197,9 +199,14 @@ def _onward(edge: Edge) -> Edge:
     return replace(edge, centre=_grounded(mean), line=line, reach=(-reach, reach))
 
 
-def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement]:
-    """The state on the edge, as sure as the last bracket and as little as it has moved since the line before."""
+def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
+    """The state on the edge, as far as it is sure enough."""
     for name, value in _values(edge).items():
+        quantity, roll = f"edge_{name}", 1.0 if name == "omega_c" else edge.p.R / edge.p.r
+        if not sure_enough(quantity, value, rotation_scale(edge.p) * roll):
+            at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
+            yield Missing(PROTOCOL, edge.set, f"{name} on the edge {at} is uncertain by {value.uncertainty:.1g} rad/s")
+            continue
         yield measurement(lab, PROTOCOL, edge.set, edge.p, f"edge_{name}", value, edge.tasks, case="SS")
 
 
@@ -218,10 +225,15 @@ def _values(edge: Edge) -> dict[str, Measured]:
 
 
 def _sure(edge: Edge) -> Array:
-    """Standard uncertainty of the crossing, (8,)."""
+    """Standard uncertainty of the crossing, (8,): of the last bracket, and of all moves to come.
+
+    They are taken to shrink as the last two did: together they are at least the last one, and at most ten of its size.
+    """
     assert edge.found is not None
     assert edge.moved is not None
-    return np.hypot(edge.found.place.uncertainty * edge.line, edge.moved)
+    last, before = (0.0 if moved is None else float(np.linalg.norm(moved[3:6])) for moved in (edge.moved, edge.before))
+    ratio = min(last / before, 0.9) if before else 0.0
+    return np.hypot(edge.found.place.uncertainty * edge.line, edge.moved / (1 - ratio))
 
 
 def _closing(lab: Lab, p: Parameters, name: str, edges: Sequence[Edge]) -> Iterator[Measurement | Missing]:
@@ -232,7 +244,7 @@ def _closing(lab: Lab, p: Parameters, name: str, edges: Sequence[Edge]) -> Itera
     noise = max(float(_sure(edge)[2]) for edge in edges)
     apart = [Measured(float(edge.crossing[2] - edge.lifted[2]), noise) for edge in edges]
     place = vanishing(omegas, apart)
-    if math.isfinite(place.uncertainty):
+    if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
         tasks, by = [task for edge in edges for task in edge.tasks], "unstable slipping meets the lifted ball"
         q = p.replace(omega_0=place.value)
         yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", by=by)

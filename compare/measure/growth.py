@@ -18,7 +18,7 @@ from compare.measure import field
 from compare.measure.field import DOUBT, LIMIT, polynomial, random_state, slope_weights
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
 from compare.measure.quantities import quantity
-from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters, Trajectory
@@ -120,7 +120,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             continue
         yield _measurement(lab, push, tasks, "gamma", value)
         if before and before[0].x is push.x:
-            yield _measurement(lab, push, tasks, "filippov_share", _share(*before, push, value))
+            share = _share(*before, push, value)
+            if sure_enough("filippov_share", share, 1.0):
+                yield _measurement(lab, push, tasks, "filippov_share", share)
         before = push, value
     for (name, inner, outer), count in left.items():
         yield Missing(

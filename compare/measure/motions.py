@@ -45,9 +45,11 @@ LENGTH = 40
 APART = 10
 """Samples between the ends of a piece and any change of case: a slip dies out and a force builds up in three or so, the
 case is taken to have changed after as many more, and a change comes by a few steps earlier or later than it should."""
-NARROW, SLOW = 1e-4, 1e-3
-"""Least gap of an open contact over R, and least slip of a slipping one over sqrt(g R), at the ends of a piece. An
-unloaded contact may hover, and where two contacts roll one may creep, since how they share the load is not determined.
+NARROW = 1e-4
+"""Least gap of an open contact over R at the ends of a piece: an unloaded contact may hover."""
+LATE = 2.0
+"""Steps, of which two landings may come one late each. What weight does to a slip in that time is the least slip at the
+ends of a piece: where two contacts roll one may creep so fast, since how they share a load is not determined.
 """
 
 
@@ -104,7 +106,7 @@ def _plain(run: Trajectory) -> npt.NDArray[np.bool_]:
     for side, gap, speed in (("A", run.y, run.slip_speed_A), ("B", run.h, run.slip_speed_B)):
         contact = np.array([getattr(case, side).name for case in Case])[run.case]
         plain &= (contact != "N") | (gap > NARROW * p.R)
-        plain &= (contact != "S") | (speed > SLOW * math.sqrt(p.g * p.R))
+        plain &= (contact != "S") | (speed > LATE * p.g * coarse_step(p) / REFINED)
     return plain
 
 

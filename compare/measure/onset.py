@@ -14,13 +14,13 @@ import numpy as np
 
 from compare.measure.brackets import Bracket, Care, Search, narrow
 from compare.measure.lab import Lab, Level, time_unit
+from compare.measure.laws import PRESSES
 from compare.measure.questions import (
     From,
     falls,
     held,
     keeps_on,
     leaning,
-    presses,
     rest,
     rider,
     rolling,
@@ -32,7 +32,7 @@ from compare.measure.questions import (
 )
 from compare.measure.settling import Settled, Start, family, high, settle
 from compare.runs.tasks import Task
-from compare.statistics import Measured, settled_case
+from compare.statistics import Measured, settled_case, tail
 from model import Case, Parameters
 from model.arrays import Array
 
@@ -126,8 +126,12 @@ def neighbourhoods(
 
 
 def lifts(end: Bracket) -> bool:
-    """Whether rolling on both ends by losing the floor, not by slipping."""
-    return end.runs[1] is not None and not presses(end.runs[1])
+    """Whether rolling on both ends by losing the floor, not by slipping: it carries no more than a hovering contact."""
+    run = end.runs[1]
+    if run is None:
+        return False
+    p = run.header.parameters
+    return bool(run.force_A[tail(run), 1].mean() < PRESSES * p.m * p.g)
 
 
 def settled_beside(lab: Lab, sets: Mapping[str, Parameters], found: Brackets) -> dict[Key, list[Settled]]:

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.measure.settled import SPIN
 from compare.measure.settling import SOLVED, family, high
 from compare.runs.engines import STUDY_SLIP
@@ -59,6 +59,8 @@ HOVERS = 10.0
 """How many times as fast as `STUDY_SLIP` allows for its load a contact may slip: at 20 times it hovers."""
 RESOLVED = 0.25
 """Largest exponent in units of the finer time step."""
+REST = 0.05
+"""Share of the drag coefficient c below which a measured rate counts as none."""
 Exponents = npt.NDArray[np.complex128]
 
 
@@ -218,7 +220,7 @@ def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Expon
     length = min(map(len, answers))
 
     def exponents_of(large: Array, small: Array, share: float = 1.0) -> Exponents:
-        last = max(8, round(share * length))
+        last = max(4, round(share * length))
         gain = 1 / (2 ** ORDER[state.case] - 1) if large is not small else 0.0
 
         def at(lag: int) -> Array:
@@ -248,19 +250,33 @@ def _measurements(
 ) -> Iterator[Measurement | Missing]:
     """One of each pair of conjugates, in the order of their decay, slowest first; and how many there are in all."""
 
-    def record(quantity: str, value: float, sure: float, **conditions: Condition) -> Measurement:
-        at = {"case": state.case.name, **state_of(state.x), **conditions}
-        return measurement(lab, PROTOCOL, state.set, state.p, quantity, Measured(value, sure), tasks, **at)
-
-    yield record("modes", float(len(found)), 0.0)
+    at: dict[str, Condition] = {"case": state.case.name, **state_of(state.x)}
+    yield measurement(lab, PROTOCOL, state.set, state.p, "modes", len(found), tasks, **at)
     order = [k for k in np.argsort(-found.real) if found[k].imag >= 0]
     for mode, k in enumerate(order, start=1):
         if abs(found[k]) * step > RESOLVED:
             yield _missing(state, f"one of its motions, by {abs(found[k]):.3g} 1/s, is too fast for the time step")
             continue
         decay, frequency, sure = -float(found[k].real), float(found[k].imag), float(uncertainty[k])
-        yield record("decay_rate", decay, sure, mode=mode, frequency=frequency)
-        yield record("frequency", frequency, sure, mode=mode, decay_rate=decay)
+        for quantity, value, other in (("decay_rate", decay, frequency), ("frequency", frequency, decay)):
+            if sure_enough(quantity, Measured(value, sure), natural_size(value, other, state.p)):
+                part = "frequency" if quantity == "decay_rate" else "decay_rate"
+                also: dict[str, Condition] = {"mode": mode, part: other}
+                one = Measured(value, sure)
+                yield measurement(lab, PROTOCOL, state.set, state.p, quantity, one, tasks, **at, **also)
+            else:
+                yield _missing(state, f"the {quantity.replace('_', ' ')} {value:.3g} 1/s is uncertain by {sure:.1g}")
+
+
+def natural_size(rate: float, other: float, p: Parameters) -> float:
+    """Natural size in s-1 of a part of an exponent, of which `other` is the other part.
+
+    Its own, or that of the exponent if it is none, or else that of free fall.
+    """
+    for size in (abs(rate), math.hypot(rate, other)):
+        if size > REST * p.c:
+            return size
+    return 1 / time_unit(p)
 
 
 def _missing(state: State, why: str) -> Missing:

@@ -21,7 +21,7 @@ import numpy as np
 from compare.measure.lab import Lab
 from compare.measure.quantities import quantity
 from compare.runs.tasks import Task
-from compare.statistics import Measured
+from compare.statistics import COVERAGE, Measured
 from model import Parameters, StorageError
 from model.arrays import Array
 from model.files import WholeFile, dataset, reading
@@ -88,6 +88,11 @@ def measurement(
         conditions=conditions,
         runs=tuple(lab.file(task) for task in tasks),
     )
+
+
+def sure_enough(name: str, value: Measured, scale: float) -> bool:
+    """Whether a check of a measured quantity can resolve what it should, over a scale that is natural to it."""
+    return COVERAGE * value.uncertainty <= quantity(name).resolves * scale
 
 
 def state_of(x: Array) -> dict[str, float]:

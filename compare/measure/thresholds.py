@@ -20,7 +20,7 @@ from compare.measure.brackets import Bracket
 from compare.measure.extrapolation import POINTS, turning, vanishing
 from compare.measure.lab import Lab, time_unit
 from compare.measure.questions import slip
-from compare.measure.record import Condition, Measurement, Missing, Records, measurement
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement, sure_enough
 from compare.measure.settling import Settled
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
@@ -119,7 +119,10 @@ class Rows:
             yield self._record("folds", 0.0, self._tasks("turning"))
         else:
             by = "maximum of omega_0 along the branch"
-            yield self._record("omega_04", top, self._tasks("turning"), side="from below", by=by)
+            if sure_enough("omega_04", top, top.value):
+                yield self._record("omega_04", top, self._tasks("turning"), side="from below", by=by)
+            else:
+                yield self._missing(f"the {by} is uncertain by {top.uncertainty:.1g} rad/s")
             last = states[0].start.p.omega_0
             if fold is None or None in fold.runs:
                 yield self._missing("the end of slipping at both points could be extrapolated, but not be bracketed")
@@ -147,10 +150,10 @@ class Rows:
         self, quantity: str, kind: str, vanishes: str, side: str, by: str
     ) -> Iterator[Measurement | Missing]:
         place = extrapolated(self.states.get(kind, []), vanishes, vanishing)
-        if place is not None:
+        if place is not None and sure_enough(quantity, place, place.value):
             yield self._record(quantity, place, self._tasks(kind), side=side, by=f"{by} → 0")
         elif kind in self.states:
-            yield self._missing(f"too few states settled for {quantity} by {by}")
+            yield self._missing(f"too few states settled for {quantity} by {by}, or they point to it too vaguely")
 
     def _tasks(self, kind: str) -> list[Task]:
         return [state.task for state in self.states[kind]]

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compare.measure import onset
+from compare.measure.field import LAG
 from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.questions import lasting
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
@@ -104,11 +105,15 @@ def _push(lab: Lab, state: Settled, upwards: bool) -> Trial:
 
 def _trial(lab: Lab, state: Settled, name: str, p: Parameters, x0: Array) -> Trial:
     """Runs with both steps, sampled at every step where a landing is looked at."""
-    t_end, tasks = lasting(p, UNLOADING if name == LANDING else SETTLING), []
-    for refine in REFINE[lab.level]:
-        step = coarse_step(p) / (refine if name == LANDING else refine // 4)
-        tasks.append(lab.task(p, x0, t_end, step, samples=round(t_end / step) if name == LANDING else 1000))
+    t_end, landing = lasting(p, UNLOADING if name == LANDING else SETTLING), name == LANDING
+    steps = _steps(lab, name, p)
+    tasks = [lab.task(p, x0, t_end, step, samples=round(t_end / step) if landing else 1000) for step in steps]
     return Trial(state.start.set, name, p, x0, tasks)
+
+
+def _steps(lab: Lab, name: str, p: Parameters) -> list[float]:
+    """Both time steps of a trial, s."""
+    return [coarse_step(p) / (refine if name == LANDING else refine // 4) for refine in REFINE[lab.level]]
 
 
 def _rows(lab: Lab, trials: Sequence[Trial]) -> Iterator[Measurement | Missing]:
@@ -118,7 +123,8 @@ def _rows(lab: Lab, trials: Sequence[Trial]) -> Iterator[Measurement | Missing]:
         coarse, fine = lab.run(trial.tasks)
         if trial.name != LANDING:
             yield _ended(lab, trial, *(family(settled_case(run)) for run in (coarse, fine)))
-        numbers = [_numbers(trial.name, run) for run in (coarse, fine)]
+        steps = _steps(lab, trial.name, trial.p)
+        numbers = [_numbers(trial.name, run, step) for run, step in zip((coarse, fine), steps, strict=True)]
         if numbers[0].keys() != numbers[1].keys() or (trial.name == LANDING and not numbers[1]):
             yield Missing(PROTOCOL, trial.set, f"{trial.name}: the ball does not slip and land")
             continue
@@ -147,13 +153,15 @@ Numbers = dict[tuple[str, str], tuple[float, float]]
 """Value and own uncertainty by quantity and event."""
 
 
-def _numbers(name: str, run: Trajectory) -> Numbers:
+def _numbers(name: str, run: Trajectory, step: float) -> Numbers:
     """What a trial shows; of a push upwards, after which the ball falls on the floor first, how high it came first."""
     if name == LANDING:
         return _landed(run)
     if name == UPWARDS:
         return {("lift", "first top"): (first_top(run), 0.0)}
-    return {("lift", "end"): (float(run.y[-1]), 0.0)} if name == BY_SPIN else {}
+    # It may leave the floor as late as a contact follows its load, and rises so much less.
+    late = LAG * step * float(run.v_y.max())
+    return {("lift", "end"): (float(run.y[-1]), late)} if name == BY_SPIN else {}
 
 
 def _landed(run: Trajectory) -> Numbers:
