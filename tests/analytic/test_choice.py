@@ -19,10 +19,9 @@ from analytic import dynamics, rolling_forces, simulate, solution, thresholds, t
 from analytic.contact_problem import Closed, solve
 from analytic.motion import Moment
 from analytic.rigid_body import Place, slip_at_A, slip_at_B, smooth_rates, velocities
-from model import Case, Contact, Parameters, SimulationError, State
+from model import Case, Contact, SimulationError, State
+from tests.random_motions import UNIT, P, random_start
 
-P = Parameters.named("reference")
-UNIT = math.sqrt(P.g / P.R)
 RUNS = int(os.environ.get("DUALBALL_LONG_RUNS", "1500"))
 """Number of runs of 60/c in the slow test."""
 JAMMING = {  # (mu, eta, j, r/R, kappa, Omega_0): where Moreau's time stepping and MuJoCo settle, omega_c in rad s-1
@@ -208,27 +207,6 @@ def test_a_single_rolling_contact_holds_or_gives_way(rolls):
             rates, _ = solve(free, A, B, p, start, tolerance=1e-13)
             slip = slip_at_A(rates, p) if rolls == "A" else slip_at_B(rates, p)
             assert (math.hypot(*slip) < 1e-9 * p.g) == (math.hypot(*friction) < load)
-
-
-def random_start(seed):
-    """Parameters and a start all over the range: mu 0.03-3, eta 0.03-2, kappa 0.01-3; on the floor or up to R above."""
-    rng = np.random.default_rng([77, seed])
-
-    def log_uniform(low, high):
-        return float(10 ** rng.uniform(math.log10(low), math.log10(high)))
-
-    p = P.replace(
-        r=rng.uniform(0.05, 0.6) * P.R, mu=log_uniform(0.03, 3), eta=log_uniform(0.03, 2), j=rng.uniform(0.1, 0.66),
-        c=log_uniform(0.01, 3) * UNIT, omega_0=rng.uniform(0.3, 6) * UNIT,
-    )  # fmt: skip
-    y, v_y, h, v_h = 0.0, 0.0, 0.0, 0.0
-    omega_c = rng.uniform(-0.5, 1.5) * p.omega_0
-    slips = rng.normal(size=3) * p.omega_0 * p.R / p.r * 10 ** rng.uniform(-2, 0.3)
-    if rng.random() < 0.5:
-        y, v_y = rng.uniform(0, P.R), rng.normal() * 0.3 * UNIT * P.R
-    if rng.random() < 0.2:
-        h, v_h = rng.uniform(0, 0.9) * P.R, rng.normal() * 0.3 * UNIT * P.R
-    return p, State(y, v_y, omega_c, *slips.tolist(), h, v_h)
 
 
 def fault(seed):

@@ -1,0 +1,55 @@
+"""Event-driven simulation, time stepping and MuJoCo beside each other, at random sets of parameters and starts."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+
+import numpy as np
+import pytest
+
+import analytic
+import mjsim
+from mjsim import ContactSettings
+from model import SimulationError
+from tests.random_motions import random_start
+
+SETS = int(os.environ.get("DUALBALL_SETS", "250"))
+DURATION, STEP = 2.0, 5e-4
+AGREE = 0.005
+"""Difference of omega_c at the end, in units of omega_0, up to which simulators agree."""
+BY_CHANCE = 2
+"""Sets of 250 that may differ more: a start close to the border of two basins ends in either."""
+
+
+def ends(seed):
+    """omega_c/omega_0 after the run by each simulator, and what went wrong."""
+    p, x0 = random_start(seed, on_wall=True)
+    simulators = {
+        "event": partial(analytic.simulate, settings=analytic.Settings()),
+        "time-stepping": partial(analytic.simulate, settings=analytic.Settings(method="time-stepping", step=STEP)),
+        "mujoco": partial(mjsim.simulate, settings=ContactSettings.for_problem(p, STEP)),
+    }
+    values, wrong = {}, []
+    for name, simulate in simulators.items():
+        try:
+            values[name] = float(simulate(p, x0, DURATION, sample_interval=DURATION / 100).omega_c[-1]) / p.omega_0
+        except SimulationError as error:
+            wrong.append(f"{name}: {error}")
+    return seed, values, wrong
+
+
+@pytest.mark.slow
+def test_three_simulators_agree_on_random_sets(capsys):
+    differ, failed = [], []
+    with ProcessPoolExecutor() as pool:
+        for seed, values, wrong in pool.map(ends, range(SETS)):
+            failed += [f"seed {seed}: {line}" for line in wrong]
+            if values and np.ptp(list(values.values())) > AGREE:
+                shown = ", ".join(f"{name} {value:.4f}" for name, value in values.items())
+                differ.append(f"seed {seed}: omega_c/omega_0 by {shown}")
+    with capsys.disabled():
+        print(*["", *differ, *failed], sep="\n", flush=True)
+    assert not failed
+    assert len(differ) <= BY_CHANCE * max(1, SETS / 250)
