@@ -17,7 +17,8 @@ import numpy as np
 
 from analytic import charts_off_wall, dynamics
 from analytic.motion import Chart, Fluid, Moment, Path, natural_units
-from model import Case, Parameters
+from analytic.rigid_body import Forces
+from model import Case, Parameters, State
 from model.arrays import Array
 
 
@@ -30,52 +31,62 @@ def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -
     return _CHARTS[case](case, at, p, omega_0, floor)
 
 
-def _friction_power(x: Sequence[float], f: dynamics.Forces, p: Parameters, omega_0: float) -> float:
+def _power(x: State, f: Forces, p: Parameters, omega_0: float) -> float:
     """Power of drag and contacts on the wall, W: the contact points move with (6)."""
-    v_y, omega_c = x[1], x[2]
-    drag = -p.m * p.c * (p.R**2 * omega_c * (omega_c - omega_0) + v_y**2)
-    at_A = f[0] * (v_y + p.r * x[5]) + f[1] * v_y - f[2] * p.r * x[3]
-    at_B = -f[4] * p.r * x[5] + f[5] * p.r * x[4]
+    drag = -p.m * p.c * (p.R**2 * x.omega_c * (x.omega_c - omega_0) + x.v_y**2)
+    at_A = f.A_x * (x.v_y + p.r * x.slip_z) + f.A_y * x.v_y - f.A_z * p.r * x.slip_x
+    at_B = -f.B_y * p.r * x.slip_z + f.B_z * p.r * x.slip_y
     return float(drag + at_A + at_B)
 
 
-def _signed(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """RS and SR: slip along k alone, (theta, omega_c, speed, work) with a fixed sign."""
-    A_slips = case is Case.SR
-    sign = math.copysign(1.0, math.sin(at.alpha if A_slips else at.beta))
-    forces, index, direction = dynamics.FORCES[case], (3 if A_slips else 4), (sign, 0.0)
-    T, _, w, E = natural_units(p)
-    G = p.m * p.g
+def _rs(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
+    """RS: (theta, omega_c, speed of the slip along k, work); the slip keeps its sign."""
+    sign, (T, _, w, E), G = math.copysign(1.0, math.sin(at.beta)), natural_units(p), p.m * p.g
 
-    def state(z: Sequence[float]) -> list[float]:
-        x = [0.0, 0.0, z[1], 0.0, 0.0, 0.0, 0.0, 0.0]
-        x[index] = sign * z[2]
-        return x
-
-    def loads(t: float, z: Sequence[float]) -> dynamics.Forces:
-        return forces(state(z), p, omega_0(t), direction)
-
-    def rates(t: float, z: list[float]) -> list[float]:
-        x, fluid = state(z), omega_0(t)
-        f = loads(t, z)
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        _, omega_c, speed, _ = z
+        x, fluid = State(omega_c=omega_c, slip_y=sign * speed), omega_0(t)
+        f = dynamics.FORCES[case](x, p, fluid, (sign, 0.0))
         dx = dynamics.newton_euler(case, x, f, p, fluid)
-        return [x[2], dx[2], sign * dx[index], _friction_power(x, f, p, fluid)]
+        return [omega_c, dx.omega_c, sign * dx.slip_y, _power(x, f, p, fluid)]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        f = loads(t, z)
-        if A_slips:
-            return z[2] / w, float(p.eta * f[3] - math.hypot(f[4], f[5])) / G, f[1] / G
-        return z[2] / w, float(p.mu * f[1] - math.hypot(f[0], f[2])) / G
+        _, omega_c, speed, _ = z
+        f = dynamics.FORCES[case](State(omega_c=omega_c), p, omega_0(t), (sign, 0.0))
+        return speed / w, (p.mu * f.A_y - math.hypot(f.A_x, f.A_z)) / G
 
     def path(t: Array, z: Array) -> Path:
-        x = np.zeros((len(t), 8))
-        x[:, 2], x[:, index] = z[1], sign * z[2]
-        turn, none = np.full_like(t, sign * math.pi / 2), np.full_like(t, math.nan)
-        return Path(t, z[0], x, turn if A_slips else none, none if A_slips else turn, z[3])
+        theta, omega_c, speed, work = z
+        x = State(omega_c=omega_c, slip_y=sign * speed).stacked()
+        return Path(t, theta, x, np.full_like(t, math.nan), np.full_like(t, sign * math.pi / 2), work)
 
-    start = [at.theta, at.x.omega_c, sign * at.x[index], at.work]
-    ends = ("A sticks", "B slips", "A lifts") if A_slips else ("B sticks", "A slips")
-    return Chart(case, start, [1.0, 1 / T, w, E], rates, ends, guards, path)
+    start = [at.theta, at.x.omega_c, sign * at.x.slip_y, at.work]
+    return Chart(case, start, [1.0, 1 / T, w, E], rates, ("B sticks", "A slips"), guards, path)
+
+
+def _sr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
+    """SR: (theta, omega_c, speed of the slip along k, work); the slip keeps its sign."""
+    sign, (T, _, w, E), G = math.copysign(1.0, math.sin(at.alpha)), natural_units(p), p.m * p.g
+
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        _, omega_c, speed, _ = z
+        x, fluid = State(omega_c=omega_c, slip_x=sign * speed), omega_0(t)
+        f = dynamics.FORCES[case](x, p, fluid, (sign, 0.0))
+        dx = dynamics.newton_euler(case, x, f, p, fluid)
+        return [omega_c, dx.omega_c, sign * dx.slip_x, _power(x, f, p, fluid)]
+
+    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
+        _, omega_c, speed, _ = z
+        f = dynamics.FORCES[case](State(omega_c=omega_c, slip_x=sign * speed), p, omega_0(t), (sign, 0.0))
+        return speed / w, (p.eta * f.B_x - math.hypot(f.B_y, f.B_z)) / G, f.A_y / G
+
+    def path(t: Array, z: Array) -> Path:
+        theta, omega_c, speed, work = z
+        x = State(omega_c=omega_c, slip_x=sign * speed).stacked()
+        return Path(t, theta, x, np.full_like(t, sign * math.pi / 2), np.full_like(t, math.nan), work)
+
+    start = [at.theta, at.x.omega_c, sign * at.x.slip_x, at.work]
+    return Chart(case, start, [1.0, 1 / T, w, E], rates, ("A sticks", "B slips", "A lifts"), guards, path)
 
 
 def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
@@ -83,107 +94,93 @@ def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
     T, _, w, E = natural_units(p)
     forces, G, least, damping = dynamics.FORCES[case], p.m * p.g, floor * w, 1 / T
 
-    def rates(t: float, z: list[float]) -> list[float]:
+    def rates(t: float, z: Sequence[float]) -> list[float]:
         _, omega_c, q_A, alpha, q_B, beta, _ = z
         sA, cA, sB, cB = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
-        x, fluid = [0.0, 0.0, omega_c, q_A * sA, q_B * sB, q_A * cA, 0.0, 0.0], omega_0(t)
+        x, fluid = State(omega_c=omega_c, slip_x=q_A * sA, slip_y=q_B * sB, slip_z=q_A * cA), omega_0(t)
         f = forces(x, p, fluid, (sA, cA), (sB, cB))
         dx = dynamics.newton_euler(case, x, f, p, fluid)
-        d_x, d_y, d_z = dx[3], dx[4], dx[5]
         bond = damping * (q_B * cB - q_A * cA)
-        return [
-            omega_c, dx[2],
-            d_x * sA + d_z * cA, (d_x * cA - d_z * sA) / max(q_A, least),
-            d_y * sB + d_z * cB - bond * cB, (d_y * cB - d_z * sB) / max(q_B, least),
-            _friction_power(x, f, p, fluid),
-        ]  # fmt: skip
+        dq_A, turn_A = dx.slip_x * sA + dx.slip_z * cA, dx.slip_x * cA - dx.slip_z * sA
+        dq_B, turn_B = dx.slip_y * sB + dx.slip_z * cB - bond * cB, dx.slip_y * cB - dx.slip_z * sB
+        work = _power(x, f, p, fluid)
+        return [omega_c, dx.omega_c, dq_A, turn_A / max(q_A, least), dq_B, turn_B / max(q_B, least), work]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        x = (0.0, 0.0, z[1])  # besides omega_c the forces depend on the directions alone
-        f = forces(x, p, 0.0, (math.sin(z[3]), math.cos(z[3])), (math.sin(z[5]), math.cos(z[5])))
-        return z[2] / w, z[4] / w, f[1] / G, f[3] / G
+        _, omega_c, q_A, alpha, q_B, beta, _ = z
+        directions = (math.sin(alpha), math.cos(alpha)), (math.sin(beta), math.cos(beta))
+        f = forces((0.0, 0.0, omega_c), p, 0.0, *directions)  # depend on nothing else
+        return q_A / w, q_B / w, f.A_y / G, f.B_x / G
 
     def path(t: Array, z: Array) -> Path:
-        zero = np.zeros_like(t)
-        x = np.stack([
-            zero, zero, z[1], z[2] * np.sin(z[3]), z[4] * np.sin(z[5]), z[2] * np.cos(z[3]), zero, zero,
-        ], axis=-1)  # fmt: skip
-        return Path(t, z[0], x, z[3], z[5], z[6])
+        theta, omega_c, q_A, alpha, q_B, beta, work = z
+        slips = q_A * np.sin(alpha), q_B * np.sin(beta), q_A * np.cos(alpha)
+        return Path(t, theta, State(0.0, 0.0, omega_c, *slips).stacked(), alpha, beta, work)
 
     x = at.x
-    start = [at.theta, x[2], math.hypot(x[3], x[5]), at.alpha, math.hypot(x[4], x[5]), at.beta, at.work]
+    q_A, q_B = math.hypot(x.slip_x, x.slip_z), math.hypot(x.slip_y, x.slip_z)
+    start = [at.theta, x.omega_c, q_A, at.alpha, q_B, at.beta, at.work]
     ends = ("A sticks", "B sticks", "A lifts", "B opens")
     return Chart(case, start, [1.0, 1 / T, w, 1.0, w, 1.0, E], rates, ends, guards, path, slips=(2, 4))
 
 
 def _nr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """NR: (theta, y, v_y, omega_c, w_x, work)."""
-    T, v, w, E = natural_units(p)
-    forces, G = dynamics.FORCES[case], p.m * p.g
+    """NR: (theta, y, v_y, omega_c, slip_x, work)."""
+    (T, v, w, E), G = natural_units(p), p.m * p.g
 
-    def state(z: Sequence[float]) -> list[float]:
-        return [z[1], z[2], z[3], z[4], 0.0, 0.0, 0.0, 0.0]
-
-    def rates(t: float, z: list[float]) -> list[float]:
-        x, fluid = state(z), omega_0(t)
-        f = forces(x, p, fluid)
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        _, *active, _ = z
+        x, fluid = State(*active), omega_0(t)
+        f = dynamics.FORCES[case](x, p, fluid)
         dx = dynamics.newton_euler(case, x, f, p, fluid)
-        return [x[2], dx[0], dx[1], dx[2], dx[3], _friction_power(x, f, p, fluid)]
+        return [x.omega_c, dx.y, dx.v_y, dx.omega_c, dx.slip_x, _power(x, f, p, fluid)]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        f = forces(state(z), p, omega_0(t))
-        return float(p.eta * f[3] - math.hypot(f[4], f[5])) / G, z[1] / p.R
+        _, *active, _ = z
+        x = State(*active)
+        f = dynamics.FORCES[case](x, p, omega_0(t))
+        return (p.eta * f.B_x - math.hypot(f.B_y, f.B_z)) / G, x.y / p.R
 
     def path(t: Array, z: Array) -> Path:
-        zero, none = np.zeros_like(t), np.full_like(t, math.nan)
-        x = np.stack([z[1], z[2], z[3], z[4], zero, zero, zero, zero], axis=-1)
-        return Path(t, z[0], x, none, none, z[5])
+        theta, *active, work = z
+        return Path(t, theta, State(*active).stacked(), np.full_like(t, math.nan), np.full_like(t, math.nan), work)
 
-    x = at.x
-    start = [at.theta, x[0], x[1], x[2], x[3], at.work]
+    start = [at.theta, at.x.y, at.x.v_y, at.x.omega_c, at.x.slip_x, at.work]
     return Chart(case, start, [1.0, p.R, v, 1 / T, w, E], rates, ("B slips", "A lands"), guards, path)
 
 
 def _ns(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """NS: (theta, y, v_y, omega_c, w_x, q_B, beta, work)."""
-    T, v, w, E = natural_units(p)
-    forces, least = dynamics.FORCES[case], floor * w
+    """NS: (theta, y, v_y, omega_c, slip_x, q_B, beta, work)."""
+    (T, v, w, E), least = natural_units(p), floor * natural_units(p)[2]
 
-    def rates(t: float, z: list[float]) -> list[float]:
-        _, y, v_y, omega_c, w_x, q, beta, _ = z
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        _, y, v_y, omega_c, slip_x, q, beta, _ = z
         s, c = math.sin(beta), math.cos(beta)
-        x, fluid = [y, v_y, omega_c, w_x, q * s, q * c, 0.0, 0.0], omega_0(t)
-        f = forces(x, p, fluid, (s, c))
+        x, fluid = State(y, v_y, omega_c, slip_x, q * s, q * c), omega_0(t)
+        f = dynamics.FORCES[case](x, p, fluid, (s, c))
         dx = dynamics.newton_euler(case, x, f, p, fluid)
-        return [
-            omega_c, v_y, dx[1], dx[2], dx[3],
-            dx[4] * s + dx[5] * c, (dx[4] * c - dx[5] * s) / max(q, least),
-            _friction_power(x, f, p, fluid),
-        ]  # fmt: skip
+        dq, turn = dx.slip_y * s + dx.slip_z * c, (dx.slip_y * c - dx.slip_z * s) / max(q, least)
+        return [omega_c, v_y, dx.v_y, dx.omega_c, dx.slip_x, dq, turn, _power(x, f, p, fluid)]
+
+    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
+        _, y, *_, q, _, _ = z
+        return q / w, y / p.R
 
     def path(t: Array, z: Array) -> Path:
-        zero, none = np.zeros_like(t), np.full_like(t, math.nan)
-        x = np.stack([z[1], z[2], z[3], z[4], z[5] * np.sin(z[6]), z[5] * np.cos(z[6]), zero, zero], axis=-1)
-        return Path(t, z[0], x, none, z[6], z[7])
+        theta, y, v_y, omega_c, slip_x, q, beta, work = z
+        x = State(y, v_y, omega_c, slip_x, q * np.sin(beta), q * np.cos(beta)).stacked()
+        return Path(t, theta, x, np.full_like(t, math.nan), beta, work)
 
     x = at.x
-    ends = ("B sticks", "A lands")
-    start = [at.theta, x[0], x[1], x[2], x[3], math.hypot(x[4], x[5]), at.beta, at.work]
-    return Chart(
-        case,
-        start,
-        [1.0, p.R, v, 1 / T, w, w, 1.0, E],
-        rates,
-        ends,
-        lambda t, z: (z[5] / w, z[1] / p.R),
-        path,
-        slips=(5,),
-    )
+    q = math.hypot(x.slip_y, x.slip_z)
+    start = [at.theta, x.y, x.v_y, x.omega_c, x.slip_x, q, at.beta, at.work]
+    scale = [1.0, p.R, v, 1 / T, w, w, 1.0, E]
+    return Chart(case, start, scale, rates, ("B sticks", "A lands"), guards, path, slips=(5,))
 
 
 _CHARTS = {
-    Case.RS: _signed,
-    Case.SR: _signed,
+    Case.RS: _rs,
+    Case.SR: _sr,
     Case.SS: _ss,
     Case.NR: _nr,
     Case.NS: _ns,

@@ -11,13 +11,15 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from analytic import flight
 from analytic.motion import Chart, Fluid, Moment, Path, natural_units
-from model import Case, Parameters
+from analytic.rigid_body import Velocities, state, velocities
+from model import Case, Parameters, State
 from model.arrays import Array
 
 
@@ -41,18 +43,20 @@ def rolling(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
     start, unit, energy = _start(at, p), *_units(p)
     share = p.c / (1 + p.j)
 
-    def rates(t: float, z: list[float]) -> list[float]:
-        lag = _lag(t, z, omega_0)
-        return [z[2], z[3], -share * lag.real, -share * lag.imag, _power(lag, z, p)]
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        Z, V = _centre(z)
+        lag = _lag(Z, V, omega_0(t))
+        return [V.real, V.imag, -share * lag.real, -share * lag.imag, _power(lag, V, p)]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        return p.mu - p.j * share * abs(_lag(t, z, omega_0)) / p.g, _gap(z, p)
+        Z, V = _centre(z)
+        return p.mu - p.j * share * abs(_lag(Z, V, omega_0(t))) / p.g, _gap(Z, p)
 
     def path(t: Array, z: Array) -> Path:
-        found = _path(t, z, at, p, start.upright, 1j * (z[2] + 1j * z[3]) / p.r)
-        # slip_x = 0 and v_h + r slip_z = 0 hold exactly.
-        found.x[:, 3], found.x[:, 5] = 0.0, -found.x[:, 7] / p.r
-        return found
+        _, V = _centre(z)
+        rolled = _path(t, z, at, p, start.upright, 1j * V / p.r)
+        x = State.of(rolled.x)  # slip_x = 0 and v_h + r slip_z = 0 hold exactly
+        return replace(rolled, x=x._replace(slip_x=0.0, slip_z=-x.v_h / p.r).stacked())
 
     return Chart(case, [*_pairs(start), at.work], [*unit, energy], rates, ("A slips", "B lands"), guards, path)
 
@@ -60,40 +64,33 @@ def rolling(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
 def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """SN: (Z, dZ/dt, sliding speed at A, its direction in the resting frame, work)."""
     start, unit, energy = _start(at, p), *_units(p)
-    v, lever = unit[2], 1 + 1 / p.j
+    (*_, v), lever = unit, 1 + 1 / p.j
 
-    def rates(t: float, z: list[float]) -> list[float]:
-        lag, along = _lag(t, z, omega_0), cmath.rect(1.0, z[5])
-        push, friction = -p.c * lag, -p.mu * p.g * along
-        force, turning = push + friction, (push + lever * friction) / along
-        work = _power(lag, z, p) - p.m * p.mu * p.g * z[4]
-        return [z[2], z[3], force.real, force.imag, turning.real, turning.imag / max(z[4], floor * v), work]
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        *_, speed, phase, _ = z
+        (Z, V), along = _centre(z), cmath.rect(1.0, phase)
+        lag, friction = _lag(Z, V, omega_0(t)), -p.mu * p.g * along
+        force, turning = -p.c * lag + friction, (-p.c * lag + lever * friction) / along
+        work = _power(lag, V, p) - p.m * p.mu * p.g * speed
+        return [V.real, V.imag, force.real, force.imag, turning.real, turning.imag / max(speed, floor * v), work]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        return z[4] / v, _gap(z, p)
+        *_, speed, _, _ = z
+        return speed / v, _gap(_centre(z)[0], p)
 
     def path(t: Array, z: Array) -> Path:
-        slide = z[4] * np.exp(1j * z[5])
-        found = _path(t, z, at, p, start.upright, (slide - z[2] - 1j * z[3]) / (1j * p.r))
-        place = z[0] + 1j * z[1]
+        *_, speed, phase, _ = z
+        (Z, V), slide = _centre(z), speed * np.exp(1j * phase)
         # e^(i theta)(-a + i b) with a, b along the cosine and minus the sine of alpha (6), (8).
-        back = slide * np.conj(place) / np.abs(place)
-        found.alpha[:] = np.arctan2(-back.imag, -back.real)
-        return found
+        back = slide * np.conj(Z) / np.abs(Z)
+        slid = _path(t, z, at, p, start.upright, (slide - V) / (1j * p.r))
+        return replace(slid, alpha=np.arctan2(-back.imag, -back.real))
 
     # The velocity of the lowest point; at the onset it is zero and only alpha tells its direction.
     speed = abs(start.V + 1j * p.r * start.spin)
     phase = cmath.phase(start.turn * complex(-math.cos(at.alpha), -math.sin(at.alpha)))
-    return Chart(
-        case,
-        [*_pairs(start), speed, phase, at.work],
-        [*unit, v, 1.0, energy],
-        rates,
-        ("A sticks", "B lands"),
-        guards,
-        path,
-        slips=(4,),
-    )
+    first, scale = [*_pairs(start), speed, phase, at.work], [*unit, v, 1.0, energy]
+    return Chart(case, first, scale, rates, ("A sticks", "B lands"), guards, path, slips=(4,))
 
 
 def flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
@@ -101,32 +98,24 @@ def flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) 
     start, unit, energy = _start(at, p), *_units(p)
     y, v_y = at.x.y, at.x.v_y
 
-    def rates(t: float, z: list[float]) -> list[float]:
-        lag, rise = _lag(t, z, omega_0), v_y - (p.c * v_y + p.g) * flight.decay(t - at.time, p.c)
-        return [z[2], z[3], -p.c * lag.real, -p.c * lag.imag, _power(lag, z, p) - p.m * p.c * rise**2]
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        Z, V = _centre(z)
+        lag, rise = _lag(Z, V, omega_0(t)), v_y - (p.c * v_y + p.g) * flight.decay(t - at.time, p.c)
+        return [V.real, V.imag, -p.c * lag.real, -p.c * lag.imag, _power(lag, V, p) - p.m * p.c * rise**2]
+
+    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
+        return (_gap(_centre(z)[0], p),)
 
     def path(t: Array, z: Array) -> Path:
         return _path(t, z, at, p, start.upright, np.full(len(t), start.spin), flight.fall(t - at.time, y, v_y, p))
 
-    return Chart(
-        case,
-        [*_pairs(start), at.work],
-        [*unit, energy],
-        rates,
-        ("B lands",),
-        lambda t, z: (_gap(z, p),),
-        path,
-        landing=at.time + flight.fall_time(y, v_y, p),
-    )
+    first, scale, landing = [*_pairs(start), at.work], [*unit, energy], at.time + flight.fall_time(y, v_y, p)
+    return Chart(case, first, scale, rates, ("B lands",), guards, path, landing=landing)
 
 
 def _start(at: Moment, p: Parameters) -> _Start:
-    turn = cmath.exp(1j * at.theta)
-    _, v_y, omega_c, w_x, w_y, w_z, h, v_h = at.x
-    rho = p.R - h
-    v_k = rho * omega_c
-    spin = turn * complex(-(w_x + v_k / p.r), w_z + v_y / p.r)
-    return _Start(rho * turn, turn * complex(-v_h, v_k), spin, w_y - v_k / p.r, turn)
+    turn, u = cmath.exp(1j * at.theta), velocities(at.x, p)
+    return _Start((p.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k), turn * complex(-u.o_x, u.o_z), u.o_y, turn)
 
 
 def _pairs(start: _Start) -> list[float]:
@@ -139,39 +128,35 @@ def _units(p: Parameters) -> tuple[list[float], float]:
     return [p.R, p.R, v, v], energy
 
 
-def _lag(t: float, z: Sequence[float], omega_0: Fluid) -> complex:
+def _centre(z: Any) -> tuple[Any, Any]:
+    """Z and dZ/dt from the coordinates, of one time or of many."""
+    Z_x, Z_y, V_x, V_y, *_ = z
+    return Z_x + 1j * Z_y, V_x + 1j * V_y
+
+
+def _lag(Z: complex, V: complex, omega_0: float) -> complex:
     """Horizontal velocity relative to the fluid, m s-1."""
-    return complex(z[2], z[3]) - 1j * omega_0(t) * complex(z[0], z[1])
+    return V - 1j * omega_0 * Z
 
 
-def _power(lag: complex, z: Sequence[float], p: Parameters) -> float:
+def _power(lag: complex, V: complex, p: Parameters) -> float:
     """Power of the drag along the floor, W."""
-    return -p.m * p.c * (lag.real * z[2] + lag.imag * z[3])
+    return -p.m * p.c * (lag * V.conjugate()).real
 
 
-def _gap(z: Sequence[float], p: Parameters) -> float:
-    return 1 - math.hypot(z[0], z[1]) / p.R
+def _gap(Z: complex, p: Parameters) -> float:
+    return 1 - abs(Z) / p.R
 
 
 def _path(
     t: Array, z: Array, at: Moment, p: Parameters, upright: float, spin: Any, fall: tuple[Array, Array] | None = None
 ) -> Path:
     """States from (Z, dZ/dt), the horizontal spin in the resting frame, and height and rate of a flight."""
-    height, rise = (np.zeros_like(t), np.zeros_like(t)) if fall is None else fall
-    place, speed = z[0] + 1j * z[1], z[2] + 1j * z[3]
-    radius, back = np.abs(place), np.conj(place) / np.abs(place)
-    speed, spin = speed * back, spin * back
-    rolled = speed.imag / p.r
-    columns = [
-        height,
-        rise,
-        speed.imag / radius,
-        -spin.real - rolled,
-        upright + rolled,
-        spin.imag - rise / p.r,
-        p.R - radius,
-        -speed.real,
-    ]
-    angle = np.unwrap(np.append(at.theta, np.angle(place)))[1:]
-    none = np.full_like(t, math.nan)
-    return Path(t, angle, np.stack(columns, axis=-1), none, none.copy(), z[-1])
+    y, v_y = (np.zeros_like(t), np.zeros_like(t)) if fall is None else fall
+    Z, V = _centre(z)
+    rho, back = np.abs(Z), np.conj(Z) / np.abs(Z)
+    V, spin = V * back, spin * back
+    u = Velocities(-V.real, v_y, V.imag, -spin.real, upright, spin.imag)
+    x = state(y, p.R - rho, u, p)._replace(omega_c=V.imag / rho)  # rho = R - h to the last digit
+    angle, none = np.unwrap(np.append(at.theta, np.angle(Z)))[1:], np.full_like(t, math.nan)
+    return Path(t, angle, x.stacked(), none, none, z[-1])

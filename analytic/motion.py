@@ -52,7 +52,7 @@ class Chart:
     start: list[float]
     scale: list[float]
     """Natural size of each coordinate, for absolute tolerances."""
-    rates: Callable[[float, list[float]], list[float]]
+    rates: Callable[[float, Sequence[float]], list[float]]
     ends: tuple[str, ...]
     """What can end the case."""
     guards: Callable[[float, Sequence[float]], tuple[float, ...]]
