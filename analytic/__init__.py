@@ -2,6 +2,7 @@
 
 from analytic.bifurcation import Thresholds, thresholds
 from analytic.dynamics import contact_forces, vector_field
+from analytic.ensemble import Ensemble, simulate_many
 from analytic.flowmeter import (
     characteristic_slope,
     mean_slope,
@@ -24,6 +25,7 @@ from analytic.stationary import (
 )
 
 __all__ = [
+    "Ensemble",
     "Settings",
     "SlipStability",
     "Stability",
@@ -37,6 +39,7 @@ __all__ = [
     "operating_range",
     "reading_range",
     "simulate",
+    "simulate_many",
     "slope_jump",
     "slowest_time_constant",
     "solution",

@@ -65,8 +65,8 @@ def simulate(
     else:
         from analytic.time_stepping import run
     flow = Flow.steady(p.omega_0) if flow is None else flow
-    x = _start(x0, p, settings)
-    times = _sample_times(t_end, sample_interval)
+    x = start_state(x0, p, settings)
+    times = sample_times(t_end, sample_interval)
     theta_0 = check_number("theta_0", theta_0, "rad")
     start, (first, second, *_) = {"x0": list(x), "theta_0": theta_0}, times.tolist()
     shown = dataclasses.asdict(settings) | start | {"t_end": float(times[-1]), "sample_interval": second - first}
@@ -92,7 +92,7 @@ def _settings(settings: Settings | None, changes: dict[str, Any]) -> Settings:
     return dataclasses.replace(settings or Settings(), **changes)
 
 
-def _start(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
+def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
     """The state at the start, or `InputError` if the ball can't be in it."""
     x = State.one(x0)
     check_number("y", x.y, "m", NOT_NEGATIVE, "to be above the floor it")
@@ -105,7 +105,7 @@ def _start(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
     return x
 
 
-def _sample_times(t_end: float, interval: float | None) -> Array:
+def sample_times(t_end: float, interval: float | None) -> Array:
     """Multiples of the interval, and t_end."""
     t_end = check_number("t_end", t_end, "s", POSITIVE)
     if interval is None:

@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from analytic import simulate, stationary_solutions, thresholds
-from analytic.contact_problem import NotConvergedError
-from analytic.rigid_body import velocities
-from analytic.time_stepping import Ball, step
+from analytic import Settings, simulate, stationary_solutions, thresholds
+from analytic.stepping import TOLERANCE, step
+from analytic.time_stepping import ball, constants
 from model import Case, Flow, Parameters, SimulationError
 
 P = Parameters.named("reference")
@@ -151,24 +150,23 @@ def test_both_methods_follow_any_flow(flow):
     np.testing.assert_allclose(steps.y, events.y, atol=dt * SPEED)
 
 
-def test_energy_balance_is_exact_but_for_the_place_of_landing():
-    """Work at mean velocities balances kinetic energy to round-off; only a landing moves the ball, by half a step."""
+def test_energy_balance_is_exact():
+    """Work at mean velocities balances kinetic energy to what the iteration leaves in each of 500 steps."""
     run = simulate(P.replace(omega_0=25.0), [0, 0, 9.0, 1, 2, 3], 0.5, method="time-stepping", step=1e-3)
-    assert run.header.settings["energy_residual"] < 1e-12 * run.header.settings["energy_scale"]
+    assert run.header.settings["energy_residual"] < 500 * TOLERANCE * run.header.settings["energy_scale"]
 
 
-def test_no_convergence_keeps_the_samples(monkeypatch):
-    calls = iter(range(100))
-
-    def fail(*args, **keywords):
-        if next(calls) > 20:
-            raise NotConvergedError("as asked")
-        return step(*args, **keywords)
-
-    monkeypatch.setattr("analytic.time_stepping.step", fail)
-    with pytest.raises(SimulationError, match="as asked") as caught:
-        simulate(P, [0, 0, 11, 0, 0, 0], 1.0, method="time-stepping", step=0.01, sample_interval=0.01)
-    assert not caught.value.trajectory.complete
+def test_no_convergence_keeps_the_samples():
+    """At rest any step does; as soon as the fluid moves, drag is too strong for it."""
+    with pytest.raises(SimulationError, match="a shorter step") as caught:
+        simulate(
+            P.replace(c=1e4), [0, 0, 0, 0, 0, 0], 1.0, Flow.ramp(0.0, 1.0, 0.1, 0.5), method="time-stepping", step=0.01,
+            sample_interval=0.01,
+        )  # fmt: skip
+    kept = caught.value.trajectory
+    assert not kept.complete
+    assert kept.time[-1] == pytest.approx(0.5)
+    assert np.all(np.isfinite(kept.x))
 
 
 def test_a_step_too_long_for_the_drag_is_named():
@@ -183,10 +181,10 @@ def test_one_step_of_free_rolling_by_hand():
     """RR at rest in the fluid's frame: one step leaves everything as it is, and the forces are those of (23)."""
     p = P.replace(omega_0=10.0)
     x = [0.0, 0.0, 10.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-    ball = step(Ball(0.0, 0.0, 0.0, velocities(x, p)), 1e-3, 10.0, p, 0.0)
+    after = step(ball(x, 0.0, p), 1e-3, 10.0, constants(p, Settings()))
     u = p.m * p.R * 100.0
-    A_x, A_y, A_z, B_x, B_y, B_z = (impulse / 1e-3 for impulse in ball.P)
-    assert ball.case is Case.RR
+    A_x, A_y, A_z, B_x, B_y, B_z = (impulse / 1e-3 for impulse in after.P)
+    assert after.case == Case.RR
     assert A_y + B_y == pytest.approx(p.m * p.g, rel=1e-9)
     assert A_x + B_x == pytest.approx(u, rel=1e-9)
     assert B_y - A_x == pytest.approx(p.j * u, rel=1e-9)

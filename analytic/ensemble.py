@@ -1,0 +1,112 @@
+"""Many runs at once, by time stepping: what comes of many parameter sets and starts, without every motion in full."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.settings import Settings
+from analytic.simulation import sample_times, start_state
+from model import Flow, InputError, Parameters
+from model.arrays import Array
+from model.parameters import POSITIVE, Range, check_number
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """States of many runs at the same times, and what they went through since the time before."""
+
+    time: Array
+    """Shape (samples,), s; the first is the start."""
+    x: Array
+    """States in the order of `model.State`, shape (runs, samples, 8)."""
+    case: npt.NDArray[np.int8]
+    """Codes of the cases, shape (runs, samples)."""
+    low: Array
+    """Least, largest and mean value over all steps since the sample before, shape (runs, samples, 8)."""
+    high: Array
+    mean: Array
+    landings: npt.NDArray[np.int64]
+    """Landings on floor or wall since the sample before, faster than sqrt(g R)/1000, shape (runs, samples)."""
+    end: Array
+    """When each run ended, shape (runs,), s: it was quiet, failed, or reached the last time."""
+    failure: tuple[str, ...]
+    """Why a run failed, empty if it didn't; what it has from there on is nan."""
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+
+def simulate_many(
+    parameters: Parameters | Sequence[Parameters], x0s: npt.ArrayLike, t_end: float,
+    flow: Flow | Sequence[Flow] | None = None, settings: Settings | None = None, *,
+    sample_interval: float | None = None, quiet: float | None = None, threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Ensemble:  # fmt: skip
+    """Time stepping (`time_stepping`) of many runs, on all cores if numba is installed.
+
+    Parameters
+    ----------
+    parameters, flow : one for all, or one for each run; without flow each has its own omega_0
+    x0s : starts, shape (runs, 6 or 8), or one for all
+    t_end, sample_interval : s; a thousandth of t_end if None
+    settings : step and restitution count; one step for all where it is given
+    quiet : end a run in which nothing has landed for that long, s; its last state stands for the rest
+    threads : number of threads, that of the cores if None
+    progress : called with the fraction of runs done
+
+    Raises
+    ------
+    InputError
+        If numbers of runs differ, or as `simulate` for the first run that can't start.
+    """
+    from analytic import marching, time_stepping  # here, because numba takes a while to load
+
+    settings = settings or Settings(method="time-stepping")
+    sets = [parameters] if isinstance(parameters, Parameters) else list(parameters)
+    starts = np.atleast_2d(np.asarray(x0s, dtype=float))
+    flows = [flow] if flow is None or isinstance(flow, Flow) else list(flow)
+    count = max(len(sets), len(starts), len(flows))
+    if {len(sets), len(starts), len(flows)} - {1, count}:
+        raise InputError(
+            f"every run needs parameters, a start and a flow: there are {len(sets)} parameter sets, {len(starts)} "
+            f"starts and {len(flows)} flows; each must be one, or as many as the others"
+        )
+    states = [
+        start_state(x, sets[k % len(sets)], settings) for k, x in enumerate(np.resize(starts, (count, starts.shape[1])))
+    ]
+    times = sample_times(t_end, sample_interval)
+    still = np.inf if quiet is None else check_number("quiet", quiet, "s", POSITIVE)
+    workers = int(check_number("threads", threads or os.cpu_count() or 1, "threads", Range(1, whole=True)))
+
+    shape = (count, len(times))
+    blank: dict[str, Any] = {name: np.full((*shape, 8), np.nan) for name in ("x", "low", "high", "mean")}
+    case, landings = np.full(shape, -1, np.int8), np.zeros(shape, np.int64)
+    end, failure = np.zeros(count), [""] * count
+
+    def carry_out(k: int) -> None:
+        p = sets[k % len(sets)]
+        fluid = flows[k % len(flows)] or Flow.steady(p.omega_0)
+        stretches = time_stepping.Stretches.of(times, fluid, time_stepping.longest_step(p, settings))
+        for name in blank:
+            blank[name][k, 0] = states[k]
+        end[k] = marching.follow(
+            time_stepping.ball(states[k], 0.0, p), *stretches, still,
+            marching.Flow(fluid.start, fluid.value, fluid.slope), time_stepping.constants(p, settings),
+            blank["x"][k], case[k], blank["low"][k], blank["high"][k], blank["mean"][k], landings[k],
+        )  # fmt: skip
+        if end[k] < 0:
+            end[k] *= -1
+            failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"
+        if progress:
+            progress((k + 1) / count)
+
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(carry_out, range(count)))
+    return Ensemble(times, case=case, landings=landings, end=end, failure=tuple(failure), **blank)

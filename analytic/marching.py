@@ -1,0 +1,99 @@
+"""Many steps at once: the loops of time stepping, compiled where numba is installed."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.compiling import compiled
+from analytic.stepping import At, Ball, Constants, step
+from model.arrays import Array
+
+
+class Flow(NamedTuple):
+    """Arrays of a `model.Flow`."""
+
+    start: Array
+    value: Array
+    slope: Array
+
+
+@compiled
+def _state(at: At, p: Constants) -> tuple[float, float, float, float, float, float, float, float]:
+    """The variables of `model.State`."""
+    v_h, v_y, v_k, o_x, o_y, o_z = at.u
+    return at.y, v_y, v_k / (p.R - at.h), o_x - v_k / p.r, o_y + v_k / p.r, o_z - v_y / p.r, at.h, v_h
+
+
+@compiled
+def advance(
+    ball: Ball, start: float, dt: float, first: int, count: int, flow: Flow, p: Constants, events: Array
+) -> tuple[Ball, int, int]:
+    """Go on from step `first` of `count` that begin at `start`; return the ball, the next step, and events noted.
+
+    A row of `events` takes time, code of the case before and after, impulses of landings. It ends early when no row
+    is left, or when a step doesn't converge.
+    """
+    noted, k = 0, first
+    while k < count and noted < len(events):
+        before, ball = ball.case, step(ball, dt, _fluid(flow, start + (k + 0.5) * dt), p)
+        k += 1
+        if ball.residual != 0:
+            break
+        if ball.case != before or ball.impact.A_y > 0 or ball.impact.B_x > 0:
+            events[noted, 0], events[noted, 1], events[noted, 2] = start + k * dt, before, ball.case
+            (events[noted, 3], events[noted, 4], events[noted, 5], events[noted, 6], events[noted, 7],
+             events[noted, 8]) = ball.impact  # fmt: skip
+            noted += 1
+    return ball, k, noted
+
+
+@compiled
+def follow(
+    ball: Ball, starts: Array, dts: Array, counts: npt.NDArray[np.int64], sampled: npt.NDArray[np.bool_], quiet: float,
+    flow: Flow, p: Constants, x: Array, case: npt.NDArray[np.int8], low: Array, high: Array, mean: Array,
+    landings: npt.NDArray[np.int64],
+) -> float:  # fmt: skip
+    """One run through stretches of steps, into the rows of an `Ensemble`; return its end, less than 0 if it failed.
+
+    Rows beyond the end of a run that has been quiet for long repeat its last state.
+    """
+    row, now, landed, steps, known = 1, 0.0, 0.0, 0, 0
+    low[1:], high[1:], mean[1:] = math.inf, -math.inf, 0.0
+    for s in range(len(starts)):
+        for k in range(counts[s]):
+            now = float(starts[s] + (k + 1) * dts[s])
+            ball = step(ball, dts[s], _fluid(flow, now - dts[s] / 2), p)
+            if ball.residual != 0:
+                return -now
+            z = _state(ball.at, p)
+            for i in range(8):
+                low[row, i], high[row, i] = min(low[row, i], z[i]), max(high[row, i], z[i])
+                mean[row, i] += z[i]
+            steps += 1
+            if ball.landings > known:
+                landings[row] += ball.landings - known
+                known, landed = ball.landings, now
+        if sampled[s]:
+            mean[row] /= steps
+            x[row, 0], x[row, 1], x[row, 2], x[row, 3], x[row, 4], x[row, 5], x[row, 6], x[row, 7] = _state(ball.at, p)
+            case[row] = ball.case
+            row, steps = row + 1, 0
+            if now - landed > quiet:
+                for later in range(row, len(x)):
+                    x[later], low[later], high[later], mean[later] = x[row - 1], x[row - 1], x[row - 1], x[row - 1]
+                    case[later] = case[row - 1]
+                return now
+    return now
+
+
+@compiled
+def _fluid(flow: Flow, time: float) -> float:
+    """`model.Flow` at a time."""
+    k = 0
+    if len(flow.start) > 1:
+        k = max(int(np.searchsorted(flow.start, time, side="right")) - 1, 0)
+    return float(flow.value[k] + flow.slope[k] * max(time - flow.start[k], 0.0))

@@ -1,0 +1,148 @@
+"""Where in parameter space does the ball hop for ever? A resumable search that fills the space of its groups evenly.
+
+Every set is a point of a scrambled Sobol sequence over mu, eta, j, r/R, kappa = c sqrt(R/g) and Omega_0 =
+omega_0 sqrt(R/g), and is started from a few random states. What still hops by time stepping is confirmed by the
+event-driven simulation (`analytic.hopping`).
+
+A chunk of sets is a file, named by the hash of all that determines it; it appears only when it is whole. Starting a
+search again does what is missing, and a longer search contains the shorter ones.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterator
+from concurrent.futures import as_completed
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analytic import hopping
+from compare.runs.workers import Workers
+from model import Parameters, SimulationError
+from model.arrays import Array
+from model.files import write_text
+
+CHUNK = 50
+"""Sets in a file."""
+RANGES = {
+    "mu": (0.03, 3.0), "eta": (0.03, 2.0), "j": (0.1, 2 / 3), "r/R": (0.02, 0.6),
+    "kappa": (0.005, 1.0), "Omega_0": (0.3, 6.0),
+}  # fmt: skip
+"""The box that is searched."""
+LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
+"""Groups that are spread evenly in their logarithm."""
+_CODE = ("corner.py", "stepping.py", "marching.py", "time_stepping.py", "ensemble.py", "hopping.py")
+
+
+@dataclass(frozen=True)
+class Search:
+    """A search: how many starts a set, and the seed of both sets and starts."""
+
+    starts: int = 5
+    seed: int = 0
+
+    def key(self, chunk: int) -> str:
+        """Hash of all that determines a chunk: the search, its box, the sources of the screen."""
+        folder = resources.files("analytic")
+        code = hashlib.sha256(b"\0".join(folder.joinpath(name).read_bytes() for name in _CODE)).hexdigest()
+        text = json.dumps([dataclasses.asdict(self), RANGES, LOGARITHMIC, chunk, CHUNK, code])
+        return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
+def groups(search: Search, count: int) -> Array:
+    """The first `count` points of a search, shape (count, 6), in the order of `RANGES`."""
+    from scipy.stats import qmc  # slow to import
+
+    points = qmc.Sobol(len(RANGES), rng=np.random.default_rng(search.seed)).random_base2(
+        max(1, math.ceil(math.log2(count)))
+    )[:count]
+    low, high = np.array(list(RANGES.values())).T
+    log = np.array([name in LOGARITHMIC for name in RANGES])
+    low, high = np.where(log, np.log(low), low), np.where(log, np.log(high), high)
+    spread = low + points * (high - low)
+    return np.asarray(np.where(log, np.exp(spread), spread))
+
+
+def parameters(point: Array) -> Parameters:
+    """The set at a point; R, g and m are those of the reference, and don't matter."""
+    p = Parameters.named("reference")
+    mu, eta, j, size, kappa, Omega_0 = point.tolist()
+    unit = math.sqrt(p.R / p.g)
+    return p.replace(mu=mu, eta=eta, j=j, r=size * p.R, c=kappa / unit, omega_0=Omega_0 / unit)
+
+
+def random_starts(p: Parameters, count: int, rng: np.random.Generator) -> Array:
+    """States (count, 8): orbits from half backwards to twice omega_0, any spin, every other ball off the floor."""
+    x = np.zeros((count, 8))
+    x[:, 0] = rng.uniform(0, p.R, count) * rng.integers(0, 2, count)
+    x[:, 2] = p.omega_0 * rng.uniform(-0.5, 2, count)
+    x[:, 3:6] = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, (count, 3))
+    return x
+
+
+def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
+    """Search the sets of a chunk and write its file."""
+    rows = []
+    for k, point in enumerate(points):
+        p, rng = parameters(point), np.random.default_rng([search.seed, chunk * CHUNK + k])
+        hops, x, failed = hopping.screen(p, random_starts(p, search.starts, rng))
+        row: dict[str, Any] = {"hops": int(hops.sum()), "failed": failed}
+        if hops.any():
+            row |= {"x": x[hops][0].tolist()} | _confirmed(p, x[hops])
+        rows.append(row)
+    write_text(path, json.dumps({"search": dataclasses.asdict(search), "chunk": chunk, "rows": rows}))
+
+
+def _confirmed(p: Parameters, states: Array) -> dict[str, Any]:
+    """What the event-driven simulation says of the first of the states that it confirms."""
+    broken = ""
+    for x in states:
+        try:
+            if found := hopping.confirm(p, x):
+                return {"confirmed": dataclasses.asdict(found)}
+        except SimulationError as error:
+            broken = str(error)
+    return {"confirmed": None, "broken": broken}
+
+
+def run(
+    directory: Path, search: Search, count: int, workers: Workers, report: Callable[[int, int], None]
+) -> list[dict[str, Any]]:
+    """Search `count` sets, rounded up to whole chunks, and return a record of each; finished chunks are read.
+
+    `report` is called with the numbers of chunks that are done and wanted.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    chunks = math.ceil(count / CHUNK)
+    points = groups(search, chunks * CHUNK).reshape(chunks, CHUNK, -1)
+    paths = [directory / f"{search.key(chunk)}.json" for chunk in range(chunks)]
+    todo = [chunk for chunk in range(chunks) if not paths[chunk].exists()]
+    done = chunks - len(todo)
+    report(done, chunks)
+    executor = workers.start()
+    try:
+        futures = [executor.submit(carry_out, search, chunk, points[chunk], paths[chunk]) for chunk in todo]
+        for future in as_completed(futures):
+            future.result()
+            done += 1
+            report(done, chunks)
+    except BaseException:
+        workers.stop(executor, True)
+        raise
+    workers.stop(executor, False)
+    return list(records(paths, points))
+
+
+def records(paths: list[Path], points: Array) -> Iterator[dict[str, Any]]:
+    """A record of every set whose chunk is there: its groups, and what came of it."""
+    for path, chunk in zip(paths, points, strict=True):
+        if path.exists():
+            for row, point in zip(json.loads(path.read_text("utf-8"))["rows"], chunk.tolist(), strict=True):
+                yield dict(zip(RANGES, point, strict=True)) | row
