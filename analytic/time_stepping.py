@@ -31,7 +31,6 @@ from analytic.settings import Settings
 from model import Case, Flow, Parameters
 from model.arrays import Array
 
-if TYPE_CHECKING:
 BLOCK = 256
 """Samples kept before they are handed over."""
 AT_ONCE = 10_000
