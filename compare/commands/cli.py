@@ -59,6 +59,8 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     asked = [module for module, names in _MODULES.items() if words[0:1] and words[0] in names]
     for module in asked or _MODULES:
         importlib.import_module(f"compare.commands.{module}").add(commands)
+    if not asked:
+        importlib.import_module("compare.commands.completion").add(parser)
     return parser
 
 

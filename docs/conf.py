@@ -1,0 +1,134 @@
+"""The documentation site: ``make docs``. Strict, and offline: formulas, search and pictures need no other server."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import os
+import pkgutil
+import re
+import sys
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+from docutils import nodes
+from docutils.utils.math import MathError, latex2mathml
+from sphinx.application import Sphinx
+from sphinx.util import logging
+
+HERE = Path(__file__).parent
+PACKAGES = ("model", "analytic", "mjsim", "compare")
+log = logging.getLogger(__name__)
+
+project = "dualball"
+author = "The dualball developers"
+version = release = tomllib.loads((HERE.parent / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
+exclude_patterns = ["_build", "conf.py"]
+html_theme = "furo"
+html_title = f"dualball {version}"
+
+# Notebooks are scripts with cells, and are run for every build.
+nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600  # a machine may be busy
+nb_merge_streams = True
+os.environ |= {"COLUMNS": "88", "NO_COLOR": "1", "TERM": "dumb"}
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # for !dualball
+myst_enable_extensions = ["dollarmath", "attrs_inline"]
+myst_heading_anchors = 3
+
+default_role = "code"
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True, "show-inheritance": True}
+
+
+def reference(app: Sphinx) -> None:
+    """A page a package, with all of its modules; `compare` has one for each of its rooms."""
+    (HERE / "api").mkdir(exist_ok=True)
+    for name in PACKAGES:
+        page(importlib.import_module(name))
+
+
+def page(package: ModuleType) -> None:
+    """Write the page of a package, and those of the packages in it."""
+    lines = [package.__name__, "=" * len(package.__name__), "", f".. automodule:: {package.__name__}", "   :no-members:"]
+    for each in (getattr(package, name) for name in getattr(package, "__all__", ())):
+        summary = literal_bars(inspect.getdoc(each).split("\n")[0])
+        lines += ["", f"* :py:obj:`~{each.__module__}.{each.__qualname__}`: {summary}"]
+    modules = [found for found in pkgutil.iter_modules(package.__path__) if not found.name.startswith("_")]
+    for found in modules:
+        if not found.ispkg:
+            name = f"{package.__name__}.{found.name}"
+            lines += ["", name, "-" * len(name), "", f".. automodule:: {name}"]
+    rooms = [importlib.import_module(f"{package.__name__}.{found.name}") for found in modules if found.ispkg]
+    rooms = [room for room in rooms if any(pkgutil.iter_modules(room.__path__))]
+    if rooms:
+        lines += ["", ".. toctree::", "   :hidden:", "", *(f"   {room.__name__}" for room in rooms)]
+    (HERE / "api" / f"{package.__name__}.rst").write_text("\n".join(lines) + "\n", "utf-8")
+    for room in rooms:
+        page(room)
+
+
+def source_links(app: Sphinx, page: str, *source: object) -> None:
+    """Links to modules, which a repository shows as files, lead to the reference; those to tests are only names."""
+    text = source[-1]
+
+    def to_reference(link: re.Match[str]) -> str:
+        name = link[2].removesuffix(".py").removesuffix("/__init__").strip("/").replace("/", ".")
+        if importlib.util.find_spec(name) is None:
+            log.warning("there is no module %s", name, location=str(page))
+        return f"{{py:mod}}`{link[1].strip('`')} <{name}>`"
+
+    text[0] = re.sub(
+        rf"\[([^\]]+)\]\((?:\.\./)*((?:{'|'.join(PACKAGES)})/(?:[\w/]*\.py|[\w/]*))\)", to_reference, text[0]
+    )
+    text[0] = re.sub(r"\[([^\]]+)\]\((?:\.\./)*tests/[^)]*\)", r"`\1`", text[0])
+
+
+def as_typed(app: Sphinx, tree: nodes.document) -> None:
+    """Cells of shell commands look like a shell, cells that write a file like that file; formulas are checked."""
+    for block in tree.findall(nodes.literal_block):
+        first, _, rest = block.astext().partition("\n")
+        if first.startswith("!"):
+            block.children = [nodes.Text(re.sub(r"^!", "$ ", block.astext(), flags=re.MULTILINE))]
+            block["language"] = "console"
+        elif first.startswith("%%writefile "):
+            block.children = [nodes.Text(rest)]
+            block["language"] = first.rpartition(".")[2]
+        elif first.startswith("%config "):
+            block.children = [nodes.Text(rest.lstrip())]
+        block.rawsource = block.astext()
+    for formula in tree.findall(lambda node: isinstance(node, nodes.math | nodes.math_block)):
+        try:
+            latex2mathml.tex2mathml(formula.astext())
+        except MathError as error:
+            log.warning("formula %s: %s", formula.astext(), error, location=formula)
+
+
+def docstring(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Plain text with `names` between backticks and sections of numpy's kind, as reStructuredText."""
+    text = "\n".join(lines)
+    text = re.sub(r"^(\w+)\n-{3,}$", r"**\1**\n", text, flags=re.MULTILINE)
+    text = re.sub(r"^(\w[\w, ]*) : ", r"``\1``\n    ", text, flags=re.MULTILINE)
+    text = re.sub(r"(^\S.*\n)\n(?= {4}\S)", r"\1\n::\n\n", text, flags=re.MULTILINE)
+    lines[:] = literal_bars(text).split("\n")
+
+
+def literal_bars(text: str) -> str:
+    """Text in which |x| is an absolute value and no substitution."""
+    return re.sub(r"(`[^`]*`)|\|", lambda found: found[1] or r"\|", text)
+
+
+def setup(app: Sphinx) -> None:
+    """Connect what is done here."""
+    app.connect("builder-inited", reference)
+    app.connect("source-read", source_links)
+    app.connect("include-read", source_links)
+    app.connect("doctree-read", as_typed)
+    app.connect("autodoc-process-docstring", docstring)
