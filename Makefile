@@ -2,7 +2,9 @@
 # make mutants    which claims notice a wrong theory or a wrong engine? writes docs/mutants.md (a quarter of an hour)
 # make test       set everything up and run the tests
 # make test-all   the slow tests, too
-# make check      what CI runs: lint, types, import contracts, a quick validation judged by wrong theories, tests
+# make docs       build the documentation, run its notebooks: docs/_build/html/index.html
+# make wheel      build sdist and wheel, and try the wheel in an empty environment
+# make check      what CI runs: lint, types, import contracts, a quick validation judged by wrong theories, tests, docs, wheel
 # make lock       resolve the dependencies anew (needs uv)
 
 PYTHON ?= python3
@@ -10,7 +12,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 RESULTS ?= results
 
-.PHONY: validate mutants verdicts test test-all check lint lock clean
+.PHONY: validate mutants verdicts test test-all docs wheel check lint lock clean
 
 validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
@@ -35,7 +37,13 @@ lint: $(VENV)/installed-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-check: lint verdicts test
+docs: $(VENV)/installed-dev
+	$(BIN)/sphinx-build -q -W --keep-going docs docs/_build/html
+
+wheel: $(VENV)/installed-dev
+	.ci/wheel $(VENV)
+
+check: lint verdicts test docs wheel
 
 $(VENV)/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "dualball needs Python 3.11 or newer; name one with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
@@ -53,4 +61,4 @@ lock:
 	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
 
 clean:
-	rm -rf $(VENV) build *.egg-info
+	rm -rf $(VENV) build docs/_build docs/api *.egg-info

@@ -61,7 +61,7 @@ flows = np.linspace(0.5, 48, 191)
 listed = []
 for omega_0 in flows:
     q = p.replace(omega_0=float(omega_0))
-    attracting = {(each.case, float(each.x[2])) for each in analytic.attractors(q)}
+    attracting = {(each.case, float(each.x[2])) for each in analytic.stable_solutions(q)}
     listed += [
         (omega_0, each.case, each.x[2], (each.case, float(each.x[2])) in attracting)
         for each in analytic.stationary_solutions(q)
@@ -100,7 +100,7 @@ plt.show()
 
 # %%
 for omega_0, run in zip(starts, runs, strict=True):
-    steady = analytic.attractors(p.replace(omega_0=float(omega_0)))
+    steady = analytic.stable_solutions(p.replace(omega_0=float(omega_0)))
     nearest = min(steady, key=lambda each: abs(each.x[2] - run.omega_c[-1]))
     error = run.omega_c[-1] / nearest.x[2] - 1
     print(f"omega_0 = {omega_0:4.1f}: ends in {run.cases[-1].name}, omega_c off by {error:+.0e}")
