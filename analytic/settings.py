@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from model import InputError
-from model.errors import suggestion
-from model.parameters import POSITIVE, Range, check_number
+from model.parameters import POSITIVE, Range, check_choice, check_number
 
 METHODS = ("event", "time-stepping")
 LEAVING = ("slip-stability", "infeasible")
@@ -46,11 +45,8 @@ class Settings:
     """Let a ball that starts with a speed into a closed contact collide at once, instead of refusing it."""
 
     def __post_init__(self) -> None:
-        for name, known in (("method", METHODS), ("leave_rolling", LEAVING)):
-            if (value := getattr(self, name)) not in known:
-                raise InputError(
-                    f"{name} = {value!r} is unknown{suggestion(str(value), known)}; there are {', '.join(known)}"
-                )
+        check_choice("method", self.method, METHODS)
+        check_choice("leave_rolling", self.leave_rolling, LEAVING)
         if not isinstance(self.initial_impact, bool):
             raise InputError(f"initial_impact = {self.initial_impact!r} must be true or false")
         check_number("rtol", self.rtol, "1", Range(100 * _EPS, 1e-2))

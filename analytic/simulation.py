@@ -12,10 +12,9 @@ import numpy.typing as npt
 
 from analytic.records import Recorder
 from analytic.settings import Settings
-from model import Flow, Header, InputError, Parameters, SimulationError, State, Trajectory
+from model import Flow, Header, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
-from model.errors import suggestion
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names, check_number
 
 MAX_SAMPLES = 5e7
 
@@ -85,10 +84,7 @@ def simulate(
 
 
 def _settings(settings: Settings | None, changes: dict[str, Any]) -> Settings:
-    names = [field.name for field in dataclasses.fields(Settings)]
-    for name in changes:
-        if name not in names:
-            raise InputError(f"unknown setting {name!r}{suggestion(name, names)}; known: {', '.join(names)}")
+    check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
     return dataclasses.replace(settings or Settings(), **changes)
 
 

@@ -29,8 +29,7 @@ import numpy.typing as npt
 
 from model import InputError, Parameters
 from model.arrays import Array
-from model.errors import suggestion
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
 
 CHOICES = {
     "cone": ("elliptic", "pyramidal"),
@@ -95,8 +94,7 @@ class ContactSettings:
         check_number("noslip_iterations", self.noslip_iterations, "1", Range(0, whole=True))
         check_number("facets", self.facets, "1", Range(3, 2000, whole=True))
         for name, known in CHOICES.items():
-            if (value := getattr(self, name)) not in known:
-                raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(str(value), known)}")
+            check_choice(name, getattr(self, name), known)
         if self.order not in (1, 2):
             raise InputError(f"order = {self.order!r} must be 1 or 2")
         if self.wall == "prism" and self.coordinates != "free":
@@ -222,12 +220,7 @@ class ContactSettings:
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
         """Inverse of `to_mapping`; raises `InputError` for an unknown name."""
-        known = [f.name for f in dataclasses.fields(cls)]
-        for name in values:
-            if name not in known:
-                raise InputError(
-                    f"unknown contact setting {name!r}{suggestion(name, known)}; known: {', '.join(known)}"
-                )
+        check_names(values, [f.name for f in dataclasses.fields(cls)], "contact setting")
         changes = dict(values)
         if "solref" in changes:
             changes["solref"] = tuple(changes["solref"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from importlib import resources
@@ -70,6 +70,19 @@ def parse_number(name: str, text: str, unit: str, allowed: Range = ANY) -> float
     return check_number(name, number, unit, allowed)
 
 
+def check_choice(name: str, value: Any, known: Sequence[str]) -> None:
+    """`InputError` if `value` is none of the known ones."""
+    if value not in known:
+        raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(str(value), known)}")
+
+
+def check_names(given: Iterable[str], known: Sequence[str], kind: str) -> None:
+    """`InputError` if a given name is none of the known ones."""
+    for name in given:
+        if name not in known:
+            raise InputError(f"unknown {kind} {name!r}{suggestion(name, known)}; known: {', '.join(known)}")
+
+
 def _shown(number: float) -> str:
     """Short and exact where that can be: 0.1, 2/3."""
     fraction = Fraction(number).limit_denominator(9)
@@ -119,7 +132,7 @@ class Parameters:
 
     def replace(self, **changes: float) -> Self:
         """Return a copy with some values changed; an unknown name is an `InputError`."""
-        _refuse_unknown(changes, [f.name for f in dataclasses.fields(self)], "parameter")
+        check_names(changes, [f.name for f in dataclasses.fields(self)], "parameter")
         return dataclasses.replace(self, **changes)
 
     @classmethod
@@ -152,7 +165,7 @@ class Parameters:
         """
         names = [f.name for f in dataclasses.fields(cls)]
         if "fluid" not in values:
-            _refuse_unknown(values, [*names, "fluid"], "parameter")
+            check_names(values, [*names, "fluid"], "parameter")
             _refuse_missing(values, names, "parameter")
             return cls(**values)
         fluid = values["fluid"]
@@ -162,9 +175,9 @@ class Parameters:
         for name in ("m", "g", "c"):
             if name in rest:
                 raise InputError(f"{name} follows from the [fluid] table and may not be given beside it")
-        _refuse_unknown(rest, names, "parameter")
+        check_names(rest, names, "parameter")
         _refuse_missing(rest, ["r", "R", "mu", "eta"], "parameter")
-        _refuse_unknown(fluid, ["nu_f", "rho_f", "rho_b", "gravity"], "fluid property")
+        check_names(fluid, ["nu_f", "rho_f", "rho_b", "gravity"], "fluid property")
         _refuse_missing(fluid, ["nu_f", "rho_f", "rho_b"], "fluid property")
         return cls.from_fluid(**rest, **fluid)
 
@@ -202,12 +215,6 @@ class Parameters:
             Path(path).write_text(tomli_w.dumps(dataclasses.asdict(self)), "utf-8")
         except OSError as error:
             raise StorageError(f"cannot write parameters to {path}: {error.strerror}") from error
-
-
-def _refuse_unknown(given: Mapping[str, Any], known: list[str], kind: str) -> None:
-    for name in given:
-        if name not in known:
-            raise InputError(f"unknown {kind} {name!r}{suggestion(name, known)}; known: {', '.join(known)}")
 
 
 def _refuse_missing(given: Mapping[str, Any], needed: list[str], kind: str) -> None:

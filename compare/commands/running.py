@@ -16,9 +16,8 @@ from compare.runs.engines import Settings
 from compare.runs.tasks import Task
 from compare.runs.workers import Workers, dask
 from model import Flow, InputError, State, StorageError
-from model.errors import suggestion
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import Range, check_number, parse_number
+from model.parameters import Range, check_names, check_number, parse_number
 
 
 def add_flow(parser: argparse.ArgumentParser) -> None:
@@ -97,8 +96,7 @@ def start(args: argparse.Namespace) -> State:
     units, values = dict(zip(VARIABLES, UNITS, strict=True)), {}
     for item in args.start:
         name, _, value = item.partition("=")
-        if name not in units:
-            raise InputError(f"unknown state variable {name!r}{suggestion(name, VARIABLES)}")
+        check_names([name], VARIABLES, "state variable")
         values[name] = parse_number(name, value, units[name])
     return State(**values)
 

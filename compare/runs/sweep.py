@@ -12,8 +12,7 @@ import numpy as np
 
 from compare.runs.tasks import Task
 from model import Flow, InputError, Parameters
-from model.errors import suggestion
-from model.parameters import Range, check_number, parse_number
+from model.parameters import Range, check_names, check_number, parse_number
 
 FIELDS = tuple(field.name for field in dataclasses.fields(Parameters))
 DIRECTIONS = ("held", "up", "down", "both")
@@ -30,8 +29,7 @@ class Axis:
     def parse(cls, text: str) -> Axis:
         """Read ``name=from:to:count``, ``name=from:to`` or ``name=a,b,c``; raises `InputError`."""
         name, _, rest = text.partition("=")
-        if name not in FIELDS:
-            raise InputError(f"unknown parameter {name!r}{suggestion(name, FIELDS)}; known: {', '.join(FIELDS)}")
+        check_names([name], FIELDS, "parameter")
         unit = Parameters.__dataclass_fields__[name].metadata["unit"]
         if ":" not in rest:
             return cls(name, tuple(parse_number(name, part, unit) for part in rest.split(",")))

@@ -18,8 +18,7 @@ import numpy as np
 
 from mjsim import ContactSettings, scene
 from model import InputError, Parameters, StorageError
-from model.errors import suggestion
-from model.parameters import NOT_NEGATIVE, POSITIVE, check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, check_choice, check_number
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 CONES = ("pyramidal", "elliptic")
@@ -85,9 +84,7 @@ class Native:
         for name in ("iterations", "noslip_iterations", "tolerance"):
             check_number(name, getattr(self, name), "1", NOT_NEGATIVE)
         for name, (known, _) in _CHOICES.items():
-            value = getattr(self, name)
-            if value not in known:
-                raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(value, known)}")
+            check_choice(name, getattr(self, name), known)
 
     def with_contacts(self, **changes: Any) -> Native:
         """A copy with the given fields of both contacts changed."""
