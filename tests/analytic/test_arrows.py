@@ -8,6 +8,7 @@ import pytest
 from analytic import contact_forces, slip_bounds, slip_stability, thresholds
 from analytic.arrows import Arrow, stability_along
 from model import Case, Parameters
+from model.kinematics import slip_directions
 
 P = Parameters.named("reference")
 FLOWS = [0.0, 5.0, 12.0, 20.0, 35.0, -8.0]
@@ -66,8 +67,9 @@ def test_lift(omega_0: float) -> None:
     (sr,) = of(p, Case.SR, Case.NR)
     assert abs(sr.growth) <= 1e-13 * (p.g + p.R * omega_0**2)
     for a in of(p, Case.SS, Case.NS):
-        force_A, _ = contact_forces(Case.SS, a.x, p)
-        expected = -force_A[1] / p.m * (1 + p.mu * p.eta * np.cos(np.arctan2(a.x[3], a.x[5])))
+        (_, A_y, _), _ = contact_forces(Case.SS, a.x, p)
+        alpha, _ = slip_directions(a.x, p)
+        expected = -A_y / p.m * (1 + p.mu * p.eta * np.cos(alpha))
         assert a.growth == pytest.approx(expected, rel=1e-9)
     (rs,) = of(P.replace(omega_0=0.0), Case.RS, Case.NS)
     assert rs.growth == -P.g

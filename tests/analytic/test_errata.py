@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analytic import contact_forces, stationary_solutions, thresholds, vector_field
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.cases import TRAITS
 from model.kinematics import slip_velocities
 
@@ -97,7 +97,7 @@ def test_equation_35() -> None:
 def test_equation_49() -> None:
     """Five unknowns, four printed rows: omega_c = omega_0 is the one that is missing."""
     (s,) = (s for s in stationary_solutions(P.replace(omega_0=9.0)) if s.case is Case.NS)
-    assert s.x[2] == 9.0
+    assert s.state.omega_c == 9.0
 
 
 def test_table_4() -> None:
@@ -109,8 +109,8 @@ def test_table_4() -> None:
 
 def test_equation_62() -> None:
     """A state of RR has omega_c third (19): first, it would be a height."""
-    rate = vector_field(Case.RR, [0, 0, 12.0, 0, 0, 0], P)
-    np.testing.assert_allclose(rate[2], -P.c * (12.0 - P.omega_0) / (1 + 2 * P.j))
+    rate = State.of(vector_field(Case.RR, [0, 0, 12.0, 0, 0, 0], P))
+    np.testing.assert_allclose(rate.omega_c, -P.c * (12.0 - P.omega_0) / (1 + 2 * P.j))
 
 
 def test_equation_66() -> None:
@@ -120,9 +120,11 @@ def test_equation_66() -> None:
     def limit(p: Parameters) -> float:
         factor = p.j * p.c / ((1 + p.j) * (1 + 2 * p.j) * omega_c**2)
         lags = np.linspace(0.0, 500.0, 200_001)
-        rates = vector_field(Case.RS, [[0, 0, omega_c, 0, 1e-9, 0]], p, omega_c + lags[:, None])[:, 0, 4]
-        backwards = vector_field(Case.RS, [[0, 0, omega_c, 0, -1e-9, 0]], p, omega_c + lags[:, None])[:, 0, 4]
-        holds = (rates < 0) & (backwards > 0)
+        forwards, backwards = (
+            State.of(vector_field(Case.RS, State(omega_c=omega_c, slip_y=slip), p, omega_c + lags)).slip_y
+            for slip in (1e-9, -1e-9)
+        )
+        holds = (forwards < 0) & (backwards > 0)
         return float(lags[holds].max() * factor)
 
     step = 500.0 / 200_000
@@ -138,7 +140,8 @@ def test_section_5_3() -> None:
     t = thresholds(p)
     for omega_0, unique in ((0.5 * (t.omega_02 + t.omega_04), False), (1.01 * t.omega_04, True)):
         stable = [s for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.exists and s.stable]
-        assert all(s.x[2] == omega_0 for s in stable) == unique
+        assert stable
+        assert all(s.state.omega_c == omega_0 for s in stable) == unique
 
 
 def test_proposition_3() -> None:

@@ -37,6 +37,7 @@ def test_reading_range(p: Parameters) -> None:
     for omega_0, reads in ((0.999 * min(limit, 1e3), True), (1.001 * limit, False)):
         if np.isfinite(omega_0):
             lasting = stable_solutions(p.replace(omega_0=omega_0))
+            assert lasting
             assert all(np.isclose(s.state.omega_c, omega_0, rtol=1e-12) for s in lasting) == reads
 
 
@@ -65,7 +66,9 @@ def test_characteristic_slope_by_differences(trial: int) -> None:
     p = p.replace(eta=float(p.j * rng.uniform(0.1, 0.9)))
     t, h = thresholds(p), 1e-5
     for omega_0 in (0.5 * t.omega_01, *(t.omega_01 + (t.omega_02 - t.omega_01) * np.array([0.2, 0.5, 0.9]))):
-        below, above = (stable_solutions(p.replace(omega_0=float(omega_0 * f)))[0].x[2] for f in (1 - h, 1 + h))
+        below, above = (
+            stable_solutions(p.replace(omega_0=float(omega_0 * f)))[0].state.omega_c for f in (1 - h, 1 + h)
+        )
         slope = characteristic_slope(p.replace(omega_0=float(omega_0)))
         assert slope == pytest.approx((above - below) / (2 * h * omega_0), rel=1e-5, abs=1e-9)
 
@@ -111,7 +114,7 @@ def test_mean_slope_without_a_fold() -> None:
     """Below eta_cr SS gains on the fluid again until it meets SR at omega_02."""
     p = P.replace(eta=0.5 * thresholds(P).eta_cr)
     t = thresholds(p)
-    near = solution(p.replace(omega_0=t.omega_02 * (1 - 1e-10)), Case.SS).x[2]
+    near = solution(p.replace(omega_0=t.omega_02 * (1 - 1e-10)), Case.SS).state.omega_c
     assert mean_slope(p) == pytest.approx((near - t.omega_01) / (t.omega_02 - t.omega_01), rel=1e-9)
     with pytest.raises(InputError, match=r"eta = 0\.6 is out of range"):
         mean_slope(ROUGH)

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from analytic import contact_forces, dynamics, floor_force, leaning_modes, simulate, solution
-from model import Case, InputError, Parameters
+from model import Case, InputError, Parameters, State
 
 P = Parameters.named("high-wall-friction")
 
@@ -16,12 +16,12 @@ def test_floor_force() -> None:
     """A_y of (29) at random states; zero at the stationary solution."""
     rng = np.random.default_rng(0)
     omega_c, slip_x = rng.normal(0, [20, 60], (50, 2)).T
-    x = np.stack([0 * omega_c, 0 * omega_c, omega_c, slip_x, 0 * omega_c, 0 * omega_c], axis=-1)
+    x = State(omega_c=omega_c, slip_x=slip_x).stacked()
     force_A, _ = contact_forces(Case.SR, x, P)
     scale = P.m * (P.g + P.j * np.abs(omega_c) * (P.R * np.abs(omega_c) + P.r * np.abs(slip_x)))
     assert np.all(np.abs(floor_force(omega_c, slip_x, P) - force_A[:, 1]) <= 1e-14 * scale)
     s = solution(P.replace(omega_0=25.0), Case.SR)
-    assert abs(floor_force(s.x[2], s.x[3], P)) <= 1e-14 * P.m * P.g * 5
+    assert abs(floor_force(s.state.omega_c, s.state.slip_x, P)) <= 1e-14 * P.m * P.g * 5
 
 
 def test_modes_in_closed_form() -> None:
@@ -33,10 +33,10 @@ def test_modes_in_closed_form() -> None:
 
     p = Symbols()
     p.j, p.mu, p.eta, p.c, p.g, p.R, p.r = j, mu, sp.Symbol("eta"), c, g, R, r
-    x = [0, 0, omega_c, slip, 0, 0, 0, 0]
+    x = State(omega_c=omega_c, slip_x=slip)
     rates = dynamics.newton_euler(Case.SR, x, dynamics.FORCES[Case.SR](x, p, w, (sign, 0)), p, w)
     at = {omega_c: w, slip: g / (j * w * r) - w * R / r}
-    J = sp.Matrix([rates[2], rates[3]]).jacobian([omega_c, slip]).subs(at)
+    J = sp.Matrix([rates.omega_c, rates.slip_x]).jacobian([omega_c, slip]).subs(at)
     trace = -(c + mu * sign * (g / (R * w) - (1 + j) * w)) / (1 + j)
     assert sp.simplify(J.trace() - trace) == 0
     assert sp.simplify(J.det() + mu * sign * c * w / (1 + j)) == 0
@@ -47,14 +47,14 @@ def test_modes(omega_0: float) -> None:
     """Sum and product as the docstring has them; leaning grows below omega_03; the vectors lead onto the floor."""
     p = P.replace(omega_0=omega_0)
     values, vectors = leaning_modes(p)
-    x = solution(p, Case.SR, stable=omega_0**2 > p.g / (p.j * p.R)).x
-    drive = p.mu * np.sign(x[3] * omega_0) * abs(omega_0)
+    x = solution(p, Case.SR, stable=omega_0**2 > p.g / (p.j * p.R)).state
+    drive = p.mu * np.sign(x.slip_x * omega_0) * abs(omega_0)
     total = -(p.c + drive * (p.g / (p.R * omega_0**2) - (1 + p.j))) / (1 + p.j)
     np.testing.assert_allclose(values.sum(), total, rtol=1e-12)
     np.testing.assert_allclose(values.prod(), -drive * p.c / (1 + p.j), rtol=1e-12)
     assert (values[0].real > 0) == (omega_0**2 < p.g / (p.j * p.R))
-    for v in vectors.real:
-        assert floor_force(x[2] + 1e-6 * v[0], x[3] + 1e-6 * v[1], p) > 0
+    for along_omega_c, along_slip_x in 1e-6 * vectors.real:
+        assert floor_force(x.omega_c + along_omega_c, x.slip_x + along_slip_x, p) > 0
 
 
 @pytest.mark.parametrize("omega_0", [20.0, 30.0])
@@ -62,10 +62,10 @@ def test_a_leaning_ball_moves_at_that_rate(omega_0: float) -> None:
     """The event-driven simulation from a push of 1e-5 along the vector: the rate is off by the push at most."""
     p = P.replace(omega_0=omega_0)
     values, vectors = leaning_modes(p)
-    x = solution(p, Case.SR, stable=omega_0 > 22.5).x.copy()
-    size = 1e-5 * abs(x[3])
-    start = x.copy()
-    start[[2, 3]] += size * vectors[0].real
+    x = solution(p, Case.SR, stable=omega_0 > 22.5).state
+    size = 1e-5 * abs(x.slip_x)
+    by_omega_c, by_slip_x = size * vectors[0].real
+    start = x._replace(omega_c=x.omega_c + by_omega_c, slip_x=x.slip_x + by_slip_x)
     run = simulate(p, start, 1.0 / abs(values[0]), rtol=1e-12)
     assert set(run.cases) == {Case.SR}
     lean = floor_force(run.omega_c, run.slip_x, p)

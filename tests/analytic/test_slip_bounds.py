@@ -168,11 +168,8 @@ def test_56_at_any_state() -> None:
         n = np.stack([np.sin(beta), np.cos(beta)], axis=-1)
         for x in states_of_nr(p, 10):
             growth = slip_stability.gamma(Case.NR, Case.NS, x, n, p)
-            scale = (
-                np.abs(slip_bounds.gamma_nr(beta, x, p)).max()
-                + p.g / p.r
-                + abs(x[2]) * (abs(x[3]) + p.R / p.r * abs(x[2]))
-            )
+            orbit, spin = abs(State.of(x).omega_c), abs(State.of(x).slip_x)
+            scale = np.abs(slip_bounds.gamma_nr(beta, x, p)).max() + p.g / p.r + orbit * (spin + p.R / p.r * orbit)
             assert np.all(np.abs(slip_bounds.gamma_nr(beta, x, p) - growth) <= 1e-12 * scale / p.j)
 
 

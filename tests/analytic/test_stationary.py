@@ -22,7 +22,7 @@ from analytic import (
 from analytic import branch_stability as stability
 from analytic.jacobian import jacobian
 from analytic.slipping_branch import branch, fold, points_at
-from model import Case, InputError, Parameters
+from model import Case, InputError, Parameters, State
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, slip_directions, slip_speeds
 
@@ -42,11 +42,11 @@ def test_solutions_are_zeros_of_the_fields(omega_0: float, eta: float) -> None:
     p = P.replace(omega_0=omega_0, eta=eta)
     scale = (p.g + p.R * (omega_0**2 + p.c * omega_0)) / (p.j * p.r)
     for s in stationary_solutions(p):
-        rate = vector_field(s.case, s.x, p)
+        rate = State.of(vector_field(s.case, s.x, p))
         if s.case is Case.NS:
             assert s.moves
-            assert rate[0] == s.x[1] < 0
-            rate[0] = 0
+            assert rate.y == s.state.v_y < 0
+            rate = rate._replace(y=0.0)
         assert np.abs(rate).max() <= 100 * EPS * scale, s
         if s.case is not Case.RR:
             force = contact_forces(s.case, s.x, p)
@@ -59,7 +59,7 @@ def test_proposition_1(omega_0: float) -> None:
     (s,) = of_case(p, Case.RR)
     assert s.exists
     assert s.stability is Stability.ASYMPTOTIC
-    assert s.x[2] == omega_0
+    assert s.state.omega_c == omega_0
     assert s.force_A[2] == 0
     np.testing.assert_allclose(s.eigenvalues, [-p.c / (1 + 2 * p.j)], rtol=1e-14)
 
@@ -81,7 +81,9 @@ def test_propositions_3_and_5(eta: float) -> None:
         for case in (Case.SR, Case.NR):
             (s,) = of_case(p, case)
             assert s.exists == s.slip_stable == exists
-            np.testing.assert_allclose(s.x[3], p.g / (p.j * p.omega_0 * p.r) - p.omega_0 * p.R / p.r, rtol=1e-13)
+            np.testing.assert_allclose(
+                s.state.slip_x, p.g / (p.j * p.omega_0 * p.r) - p.omega_0 * p.R / p.r, rtol=1e-13
+            )
             np.testing.assert_allclose(s.force_B, [p.m * p.R * p.omega_0**2, p.m * p.g, 0], rtol=1e-13)
             np.testing.assert_allclose(s.force_A, 0, atol=1e-13 * p.m * p.g)
         (s,) = of_case(p, Case.NR)
@@ -105,7 +107,7 @@ def test_proposition_4(omega_0: float) -> None:
         den = (1 + p.j * cos**2) * p.mu * p.eta + (p.j - p.eta) * cos
         omega_c = np.sqrt(p.mu * p.g / p.R) * np.sqrt((1 + p.eta * cos**2) / den)
         v_A = -p.mu * p.g / (p.j * omega_c) * (p.j - p.eta) * sin / den
-        np.testing.assert_allclose(s.x[2], omega_c, rtol=1e-12)
+        np.testing.assert_allclose(s.state.omega_c, omega_c, rtol=1e-12)
         np.testing.assert_allclose(slip_speeds(s.x, p)[0], v_A, rtol=1e-12)
         drag = p.g * p.mu / (p.R * p.c) * cos * sin * (p.j - p.eta) / den
         np.testing.assert_allclose(omega_0, omega_c - drag, rtol=1e-12)
@@ -217,8 +219,9 @@ def test_jacobian_against_differences(omega_0: float) -> None:
     for s in stationary_solutions(p):
         active = [VARIABLES.index(name) for name in TRAITS[s.case].active]
         exact = jacobian(s.case, s.x, p)
-        step = 1e-5 * max(np.abs(s.x[3:6]).min(where=s.x[3:6] != 0, initial=1.0), 1e-2)
-        x = s.x + (0.1 if s.case in (Case.NR, Case.NS) else 0.0) * np.eye(8)[0]
+        _, _, _, *slips, _, _ = s.x
+        step = 1e-5 * max(min((abs(slip) for slip in slips if slip), default=1.0), 1e-2)
+        x = np.array(s.state._replace(y=0.1 if s.case in (Case.NR, Case.NS) else 0.0))
         numeric = np.stack(
             [
                 (vector_field(s.case, x + step * e, p) - vector_field(s.case, x - step * e, p))[active] / (2 * step)
