@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linear_sum_assignment
 
 from model import Case, InputError, Trajectory
 from model.arrays import Array
@@ -142,6 +141,8 @@ def exponents(at: Callable[[int], Array], interval: float, longest: int) -> npt.
 
 def matched(values: npt.NDArray[np.complex128], to: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
     """Values (d,) in the order in which they are, one to one, nearest to others (d,)."""
+    from scipy.optimize import linear_sum_assignment  # here, because it takes half a second to load
+
     order = linear_sum_assignment(np.abs(to[:, None] - values[None, :]))[1]
     return np.asarray(values[order])
 

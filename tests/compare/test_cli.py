@@ -34,6 +34,14 @@ def test_predict_as_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert "the ball slips (SS)" in capsys.readouterr().out
 
 
+def test_predict_waits_for_no_heavy_package() -> None:
+    """Formulas need numpy only; the engines, scipy and the figures would take most of a second to load."""
+    code = "import sys; from compare.commands import cli; cli.main(['predict']); print(*sys.modules, file=sys.stderr)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stderr.split()
+    assert "analytic.stationary" in loaded
+    assert not {"h5py", "matplotlib", "mujoco", "numba", "scipy"} & set(loaded)
+
+
 def test_predict_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["predict", "--set", "steel-in-water", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
