@@ -8,6 +8,7 @@ import inspect
 import os
 import pkgutil
 import re
+import shutil
 import sys
 import tomllib
 from pathlib import Path
@@ -36,6 +37,7 @@ nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
+nb_execution_show_tb = True
 nb_execution_timeout = 600  # a machine may be busy
 nb_merge_streams = True
 os.environ |= {"COLUMNS": "88", "NO_COLOR": "1", "TERM": "dumb"}
@@ -50,14 +52,16 @@ autodoc_default_options = {"members": True, "show-inheritance": True}
 
 def reference(app: Sphinx) -> None:
     """A page a package, with all of its modules; `compare` has one for each of its rooms."""
-    (HERE / "api").mkdir(exist_ok=True)
+    shutil.rmtree(HERE / "api", ignore_errors=True)
+    (HERE / "api").mkdir()
     for name in PACKAGES:
         page(importlib.import_module(name))
 
 
 def page(package: ModuleType) -> None:
     """Write the page of a package, and those of the packages in it."""
-    lines = [package.__name__, "=" * len(package.__name__), "", f".. automodule:: {package.__name__}", "   :no-members:"]
+    title = package.__name__
+    lines = [title, "=" * len(title), "", f".. automodule:: {title}", "   :no-members:"]
     for each in (getattr(package, name) for name in getattr(package, "__all__", ())):
         summary = literal_bars(inspect.getdoc(each).split("\n")[0])
         lines += ["", f"* :py:obj:`~{each.__module__}.{each.__qualname__}`: {summary}"]
@@ -75,14 +79,14 @@ def page(package: ModuleType) -> None:
         page(room)
 
 
-def source_links(app: Sphinx, page: str, *source: object) -> None:
+def source_links(app: Sphinx, where: object, *source: list[str]) -> None:
     """Links to modules, which a repository shows as files, lead to the reference; those to tests are only names."""
-    text = source[-1]
+    text = source[-1]  # of a page, or of what a page includes
 
     def to_reference(link: re.Match[str]) -> str:
         name = link[2].removesuffix(".py").removesuffix("/__init__").strip("/").replace("/", ".")
         if importlib.util.find_spec(name) is None:
-            log.warning("there is no module %s", name, location=str(page))
+            log.warning("there is no module %s", name, location=str(where))
         return f"{{py:mod}}`{link[1].strip('`')} <{name}>`"
 
     text[0] = re.sub(

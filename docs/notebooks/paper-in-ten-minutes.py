@@ -1,17 +1,18 @@
 # %% [markdown]
 # # The paper in ten minutes
 #
-# M. Antali and G. Stépán, *Discontinuity-induced bifurcations of a dual-point contact ball*, Nonlinear Dynamics (2016),
-# in pictures. They were computed when this page was built: theory by `analytic`, simulation by `mjsim`, which is MuJoCo
-# and knows nothing of the theory. This page is a script with cells; open it as a notebook, or run it with Python.
+# M. Antali and G. Stépán, *Discontinuity-induced bifurcations of a dual-point contact ball*, Nonlinear Dynamics
+# (2016), in pictures. They were computed when this page was built: theory by `analytic`, simulation by `mjsim`, which
+# is MuJoCo and knows nothing of the theory. This page is a script with cells; open it as a notebook, or run it with
+# Python.
 #
 # ## The ball
 #
 # ![The ball in its vessel, with contact forces and slip](../render.png)
 #
-# A ball lies in a round vessel. Water swirls in it with the angular velocity $\omega_0$ and carries the ball round along
-# the wall, with the angular velocity $\omega_c$. This is the moving part of a flowmeter: count how often the ball comes
-# by, and you know the flow, *if* $\omega_c = \omega_0$. When is that so?
+# A ball lies in a round vessel. Water swirls in it with the angular velocity $\omega_0$ and carries the ball round
+# along the wall, with the angular velocity $\omega_c$. This is the moving part of a flowmeter: count how often the
+# ball comes by, and you know the flow, *if* $\omega_c = \omega_0$. When is that so?
 #
 # The ball can touch the floor at A and the wall at B. At each it rolls (R), slips (S), or doesn't touch (N). Two
 # letters, floor first, make nine cases: RR rolls at both, NR has left the floor and rolls along the wall, NN flies.
@@ -25,6 +26,7 @@ import numpy as np
 
 import analytic
 import mjsim
+from analytic.bifurcation import threshold_curves
 from model import Case, Flow, Parameters
 
 plt.rcParams |= {"figure.figsize": (7, 3.8), "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False}
@@ -92,11 +94,11 @@ figure.tight_layout()
 plt.show()
 
 # %% [markdown]
-# Up to $\omega_{01}$ the ball rolls at both points and reads the flow exactly. Then it slips at both and its speed hardly
-# changes any more. Beyond $\omega_{02}$ it may also ride on the wall, where it goes round with the flow again: between
-# $\omega_{02}$ and $\omega_{04}$ what it reads depends on its past.
+# Up to $\omega_{01}$ the ball rolls at both points and reads the flow exactly. Then it slips at both and its speed
+# hardly changes any more. Beyond $\omega_{02}$ it may also ride on the wall, where it goes round with the flow again:
+# between $\omega_{02}$ and $\omega_{04}$ what it reads depends on its past.
 #
-# How far is MuJoCo from the theory? The worst of the circles that have settled:
+# How far is MuJoCo from the theory?
 
 # %%
 for omega_0, run in zip(starts, runs, strict=True):
@@ -108,9 +110,10 @@ for omega_0, run in zip(starts, runs, strict=True):
 # %% [markdown]
 # ## Why eigenvalues can't tell
 #
-# A stationary motion is usually called stable if the eigenvalues of its linearisation have negative real parts. Those of
-# rolling (RR) don't change at $\omega_{01}$. What changes is whether friction can *hold* the contacts: rolling is the edge
-# of slipping, and the equations of motion jump there. So push the ball into a slight slip and see what becomes of it.
+# A stationary motion is usually called stable if the eigenvalues of its linearisation have negative real parts. Those
+# of rolling (RR) don't change at $\omega_{01}$. What changes is whether friction can *hold* the contacts: rolling is
+# the edge of slipping, and the equations of motion jump there. So push the ball into a slight slip and see what
+# becomes of it.
 
 # %%
 figure, axes = plt.subplots()
@@ -130,16 +133,16 @@ figure.tight_layout()
 plt.show()
 
 # %% [markdown]
-# Below $\omega_{01}$ the slip stops within a few milliseconds, as dry friction stops things. Above it the slip grows. At first
-# it grows so fast that it slows the ball down to where rolling is possible, for half a second; the flow speeds it up again,
-# it slips again, and settles in SS.
+# Below $\omega_{01}$ the slip stops within a few milliseconds, as dry friction stops things. Above it the slip grows.
+# At first it grows so fast that it slows the ball down to where rolling is possible, for half a second; the flow
+# speeds it up again, it slips again, and settles in SS.
 #
 # ## The reading that depends on the past
 #
-# Let the flow rise slowly, and fall again. The slipping ball stays in SS up to the fold at $\omega_{04}$. There it has no
-# steady slipping to stay in: it runs up to the speed of the flow and rides on the wall. On the way back it stays there
-# down to $\omega_{02}$, sinks, lands, and slips again. (Both changes take seconds, while the flow goes on changing, so that
-# the curve turns a little late.)
+# Let the flow rise slowly, and fall again. The slipping ball stays in SS up to the fold at $\omega_{04}$. There it
+# has no steady slipping to stay in: it runs up to the speed of the flow and rides on the wall. On the way back it
+# stays there down to $\omega_{02}$, sinks, lands, and slips again. (Both changes take seconds, while the flow goes on
+# changing, so that the curve turns a little late.)
 
 # %%
 there_and_back = Flow.sampled([0, 120, 180], [22, 46, 26])
@@ -163,18 +166,16 @@ plt.show()
 # %% [markdown]
 # ## The choice of the wall
 #
-# The friction of the wall, $\eta$, decides what kind of meter this is. For $\eta < j$ (the ball's dimensionless moment of
-# inertia) rolling ends at $\omega_{01}$ and slipping takes over, up to the fold. For $\eta > j$ there is no slipping
-# motion: the ball goes over from floor to wall and always reads the flow. All thresholds meet at $\eta = j$.
+# The friction of the wall, $\eta$, decides what kind of meter this is. For $\eta < j$ (the ball's dimensionless
+# moment of inertia) rolling ends at $\omega_{01}$ and slipping takes over, up to the fold. For $\eta > j$ there is no
+# slipping motion: the ball goes over from floor to wall and always reads the flow. All thresholds meet at $\eta = j$.
 
 # %%
-from analytic.bifurcation import threshold_curves
-
 eta = np.linspace(0.02, 0.8, 400)
 curves = threshold_curves(p, p.mu, eta)
 figure, axes = plt.subplots()
-for name, colour in (("omega_01", "#0072B2"), ("omega_02", "#009E73"), ("omega_03", "#E69F00"), ("omega_04", "#D55E00")):
-    axes.plot(eta, curves[name], color=colour, label=rf"$\omega_{{{name[-2:]}}}$")
+for name in meanings:
+    axes.plot(eta, curves[name], label=rf"$\omega_{{{name[-2:]}}}$")
 axes.axvline(p.j, color="0.6", lw=0.8, ls=":")
 axes.set(xlabel=r"$\eta$", ylabel=r"$\omega_0\sqrt{R/g}$", ylim=(0, 6))
 axes.legend()
@@ -184,6 +185,7 @@ plt.show()
 # %% [markdown]
 # ## Where to go from here
 #
-# * Every sentence above is a claim that `dualball validate` puts to the test: the [tutorial](../tutorial.md) runs it.
-# * The formulas, and where each is computed: [theory](../theory.md). Where the paper's text is wrong: [errata](../errata.md).
+# * `dualball validate` puts every statement of the paper to the test: the [tutorial](../tutorial.md) runs it.
+# * The formulas, and where each is computed: [theory](../theory.md). Where the paper's text is wrong:
+#   [errata](../errata.md).
 # * What it takes to bring MuJoCo this close: [MuJoCo's settings](../mujoco-settings.md).
