@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compare.measure import onset
-from compare.measure.field import LAG
 from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.questions import lasting
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
@@ -159,8 +158,8 @@ def _numbers(name: str, run: Trajectory, step: float) -> Numbers:
         return _landed(run)
     if name == UPWARDS:
         return {("lift", "first top"): (first_top(run), 0.0)}
-    # It may leave the floor as late as a contact follows its load, and rises so much less.
-    late = LAG * step * float(run.v_y.max())
+    # It leaves the floor at a step, up to one late or early, and rises so much less or more.
+    late = step / 2 * float(run.v_y.max())
     return {("lift", "end"): (float(run.y[-1]), late)} if name == BY_SPIN else {}
 
 
