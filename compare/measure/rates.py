@@ -252,20 +252,24 @@ def _measurements(
 
     at: dict[str, Condition] = {"case": state.case.name, **state_of(state.x)}
     yield measurement(lab, PROTOCOL, state.set, state.p, "modes", len(found), tasks, **at)
+    parts: list[tuple[str, Measured, float, dict[str, Condition]]] = []
     order = [k for k in np.argsort(-found.real) if found[k].imag >= 0]
     for mode, k in enumerate(order, start=1):
         if abs(found[k]) * step > RESOLVED:
             yield _missing(state, f"one of its motions, by {abs(found[k]):.3g} 1/s, is too fast for the time step")
             continue
         decay, frequency, sure = -float(found[k].real), float(found[k].imag), float(uncertainty[k])
-        for quantity, value, other in (("decay_rate", decay, frequency), ("frequency", frequency, decay)):
-            if sure_enough(quantity, Measured(value, sure), natural_size(value, other, state.p)):
-                part = "frequency" if quantity == "decay_rate" else "decay_rate"
-                also: dict[str, Condition] = {"mode": mode, part: other}
-                one = Measured(value, sure)
-                yield measurement(lab, PROTOCOL, state.set, state.p, quantity, one, tasks, **at, **also)
-            else:
-                yield _missing(state, f"the {quantity.replace('_', ' ')} {value:.3g} 1/s is uncertain by {sure:.1g}")
+        parts.append(("decay_rate", Measured(decay, sure), frequency, {"mode": mode, "frequency": frequency}))
+        parts.append(("frequency", Measured(frequency, sure), decay, {"mode": mode, "decay_rate": decay}))
+    # They come from one propagator: where one is too vague for a check, the others are not to be trusted either.
+    for quantity, value, other, _ in parts:
+        if not sure_enough(quantity, value, natural_size(value.value, other, state.p)):
+            yield _missing(
+                state, f"one of its exponents, {value.value:.3g} 1/s, is uncertain by {value.uncertainty:.1g}"
+            )
+            return
+    for quantity, value, _, which in parts:
+        yield measurement(lab, PROTOCOL, state.set, state.p, quantity, value, tasks, **at, **which)
 
 
 def natural_size(rate: float, other: float, p: Parameters) -> float:
