@@ -227,13 +227,15 @@ def _values(edge: Edge) -> dict[str, Measured]:
 def _sure(edge: Edge) -> Array:
     """Standard uncertainty of the crossing, (8,): of the last bracket, and of all moves to come.
 
-    They are taken to shrink as the last two did: together they are at least the last one, and at most ten of its size.
+    They are taken to shrink as the last two did: together they are at least the last one, and at most ten of its size;
+    and no less than what the mean of the last two runs, the centre of a next line, is off the crossing.
     """
     assert edge.found is not None
     assert edge.moved is not None
     last, before = (0.0 if moved is None else float(np.linalg.norm(moved[3:6])) for moved in (edge.moved, edge.before))
     ratio = min(last / before, 0.9) if before else 0.0
-    return np.hypot(edge.found.place.uncertainty * edge.line, edge.moved / (1 - ratio))
+    ahead = np.abs(_onward(edge).centre - edge.crossing)
+    return np.hypot(edge.found.place.uncertainty * edge.line, np.maximum(edge.moved / (1 - ratio), ahead))
 
 
 def _closing(lab: Lab, p: Parameters, name: str, edges: Sequence[Edge]) -> Iterator[Measurement | Missing]:

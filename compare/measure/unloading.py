@@ -17,7 +17,7 @@ import numpy as np
 from compare.measure import onset
 from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.questions import lasting
-from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.measure.settling import Settled, Start, family, high, settle
 from compare.runs.tasks import Task
 from compare.statistics import Measured, settled_case
@@ -134,7 +134,10 @@ def _rows(lab: Lab, trials: Sequence[Trial]) -> Iterator[Measurement | Missing]:
         usual = float(np.median([change for *_, change in rows]))
         for trial, value, own, change in rows:
             sure = Measured(value, math.hypot(max(change, usual) * value, own))
-            yield _record(lab, trial, quantity, sure, event=event)
+            if sure_enough(quantity, sure, abs(value)):
+                yield _record(lab, trial, quantity, sure, event=event)
+            else:
+                yield Missing(PROTOCOL, trial.set, f"{trial.name}: {quantity} is uncertain by {sure.uncertainty:.1g}")
 
 
 def _ended(lab: Lab, trial: Trial, coarse: Case, fine: Case) -> Measurement | Missing:
