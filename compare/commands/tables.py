@@ -14,21 +14,15 @@ from rich.text import Text
 from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.claim import Text as Kind
 from compare.measure.quantities import quantity
+from compare.report import wording
 
-_STYLES = {
-    Outcome.CONFIRMED: ("✓", "green"),
-    Outcome.REFUTED: ("✗", "bold red"),
-    Outcome.INCONCLUSIVE: ("?", "yellow"),
-    Outcome.NOT_RUN: ("·", "dim"),
-    Outcome.ERROR: ("!", "bold red"),
-}
+_STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}
 
 
 def line(verdict: Verdict) -> Text:
     """A claim in one line: verdict, worst deviation over tolerance, resolving power; what went wrong below it."""
-    mark, style = _STYLES[verdict.outcome]
-    if verdict.passed:
-        mark, style = "✓", "green"
+    kind, mark = wording.MARKS[Outcome.CONFIRMED if verdict.passed else verdict.outcome]
+    style = _STYLES[kind]
     shown = Text.assemble((f"{mark} {verdict.outcome:<13}", style), f"{verdict.claim.id:<18}")
     if verdict.checks:
         shown.append(f"{len(verdict.checks):>5} numbers, worst {_ratio(verdict.worst)} of its tolerance")

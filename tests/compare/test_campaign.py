@@ -59,6 +59,26 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
     assert seen[-1] == Progress(4, 4, 0)
 
 
+@pytest.mark.parametrize("workers", [0, 1])
+def test_what_is_handed_over_is_what_the_file_holds(tmp_path: Path, workers: int) -> None:
+    with Campaign(tmp_path, workers, memory=10_000) as campaign:
+        runs = campaign.run(tasks(3))
+        stored = [storage.load(campaign.path(task)) for task in tasks(3)]
+    for run, other in zip(runs, stored, strict=True):
+        assert all(np.array_equal(getattr(run, name), getattr(other, name)) for name in columns(Trajectory))
+        assert run.header.parameters == other.header.parameters
+        assert run.events.time.tolist() == other.events.time.tolist()
+
+
+def test_no_more_is_held_than_there_is_memory_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded: list[Path] = []
+    read = storage.load
+    monkeypatch.setattr(storage, "load", lambda path: [loaded.append(path), read(path)][1])
+    with Campaign(tmp_path, workers=0, memory=300) as campaign:  # a run has 201 samples
+        campaign.run(tasks(3))
+    assert len(loaded) == 2
+
+
 def test_every_input_is_part_of_the_identity() -> None:
     from mjsim import ContactSettings
     from model import Flow
