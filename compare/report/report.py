@@ -99,17 +99,13 @@ def _row(material: Material, verdict: Verdict, option: str) -> dict[str, Any]:
     figures = figures_of(claim.id) if checks else {}
     missing = verdict.missing[:REASONS]
     more = len(verdict.missing) - len(missing)
-    return {
-        "id": claim.id,
-        "section": claim.section,
-        "source": claim.source,
-        "statement": claim.statement,
+    about = {name: getattr(claim, name) for name in ("id", "section", "source", "statement", "reason")}
+    return about | {
         "outcome": verdict.outcome.value,
         "mark": "other" if verdict.passed and mark == "fail" else mark,
         "symbol": symbol,
         "expected": "" if verdict.passed else claim.expected.value,
         "text": claim.text.value,
-        "reason": claim.reason,
         "error": verdict.error,
         "predicted": list(dict.fromkeys(bearing.by for bearing in claim.bearings if bearing.by)),
         "noticed": wording.noticed(verdict),
@@ -125,7 +121,8 @@ def _row(material: Material, verdict: Verdict, option: str) -> dict[str, Any]:
 def _number(material: Material, check: Check) -> dict[str, Any]:
     m = check.measurement
     run = next((name for name in m.runs if (material.directory / name).is_file()), "")
-    return {
+    errors = {name: wording.size(getattr(check, name)) for name in ("tolerance", "resolves")}
+    return errors | {
         "good": check.agrees,
         "coarse": not check.conclusive,
         "set": m.set,
@@ -139,8 +136,6 @@ def _number(material: Material, check: Check) -> dict[str, Any]:
         "measured": wording.value(m, m.value),
         "uncertainty": wording.size(m.uncertainty),
         "deviation": wording.size(check.deviation, "+"),
-        "tolerance": wording.size(check.tolerance),
-        "resolves": wording.size(check.resolves),
         "run": run,
         "more": len(m.runs) - 1 if run else 0,
     }

@@ -91,17 +91,15 @@ def describe(path: Path) -> dict[str, Any]:
 def _described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
     numbers = {name: values for name, values in columns.items() if values.dtype.kind == "f"}
     failures = [text.decode() for text in columns["failure"] if text]
+    codes, counts = np.unique(columns["case"], return_counts=True)
+    finite = {name: values[np.isfinite(values)] for name, values in numbers.items()}
     return {
         "runs": len(columns["run"]),
         "engines": sorted({text.decode() for text in columns["engine"]}),
-        "cases": {
-            Case(code).name: int((columns["case"] == code).sum()) for code in sorted(set(columns["case"])) if code >= 0
-        },
+        "cases": {Case(code).name: int(count) for code, count in zip(codes, counts, strict=True) if code >= 0},
         "failures": failures,
         "varied": _varied(columns),
-        "ranges": {
-            name: [float(np.nanmin(v)), float(np.nanmax(v))] for name, v in numbers.items() if np.isfinite(v).any()
-        },
+        "ranges": {name: [float(v.min()), float(v.max())] for name, v in finite.items() if len(v)},
     }
 
 

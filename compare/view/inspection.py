@@ -29,16 +29,13 @@ def describe(path: Path) -> dict[str, Any]:
                 start = stretches.pop()[1]
             stretches.append((case, start, end))
     header, events = last.header, last.events
-    return {
-        "engine": header.engine,
+    about = {name: getattr(header, name) for name in ("engine", "failure", "commit", "created")}
+    return about | {
         "complete": last.complete,
-        "failure": header.failure,
         "parameters": dataclasses.asdict(header.parameters),
         "flow": header.flow.to_mapping(),
         "settings": dict(header.settings),
         "versions": dict(header.versions),
-        "commit": header.commit,
-        "created": header.created,
         "samples": samples,
         "duration": float(last.time[-1]) if samples else 0.0,
         "cases": [{"case": case.name, "from": start, "to": end} for case, start, end in stretches],
