@@ -35,7 +35,7 @@ def select(material: Material, figure: str) -> Comparison:
     """The scores of the "ladder", or those of the "frontier", which have a cost; `GapError` if there are none."""
     scores = material.ladder if figure == "ladder" else material.frontier
     if not scores:
-        raise GapError(f"the {'ladder of settings' if figure == 'ladder' else 'error against cost'} was not measured")
+        raise GapError(f"{'the ladder of settings' if figure == 'ladder' else 'error against cost'} was not measured")
     return Comparison(figure, scores, material.elsewhere if figure == "frontier" else ())
 
 
