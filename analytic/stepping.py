@@ -9,8 +9,8 @@ from analytic.compiling import compiled
 from analytic.corner import Impulse, both, project
 from analytic.rigid_body import Forces, Velocities
 
-TOLERANCE = 1e-13
-"""Change of the velocities in an iteration at which it stops, relative to sqrt(g R) or to the fastest of them."""
+TOLERANCE = 1e-14
+"""Change of an impulse per mass in a sweep at which it stops, relative to sqrt(g R) or to the fastest velocity."""
 MAX_ITERATIONS = 100
 LOCATING = 10
 """Most solutions of a stretch to locate its landing: the parabola triples the digits with each."""
@@ -93,6 +93,7 @@ def solve(
     m, r, j = p.m, p.r, p.j
     fastest = max(abs(v_h), abs(v_y), abs(v_k), r * max(abs(o_x), abs(o_y), abs(o_z)))
     enough = TOLERANCE * max(math.sqrt(p.g * p.R), fastest)
+    still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
     rest = j / (1 + j)  # share of m that a tangential impulse feels at the contact point
     # Slip to come is added to what there is: half of that is the mean, which friction opposes where a contact slides
     # on. Where it may stop friction opposes what is left at the end, lest it reverse the slip.
@@ -118,7 +119,7 @@ def solve(
         b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * o_y + slip_B[1]))
         residual = 0.0
         if in_A and in_B:
-            A, B, residual = both(a, b, B, p.mu, p.eta, j, enough / 4)
+            A, B, residual = both(a, b, B, p.mu, p.eta, j, enough)
         elif in_A:
             A = project(a.n, a.s, a.t, p.mu)
         elif in_B:
@@ -132,8 +133,8 @@ def solve(
             + r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
         )  # fmt: skip
         new = after
-        # Changes shrink at a steady rate, so that what is left is this one times the rate, and less than round-off.
-        settled = dt == 0 or change <= enough or (change < last / 4 and change * change <= last * enough / 50)
+        # Changes shrink at a steady rate: what is left is this one times the rate.
+        settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
         if settled or not residual <= enough:
             break
         last = change
