@@ -38,7 +38,8 @@ def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Ar
         sample_interval=1 / p.c, quiet=QUIET / p.c, threads=1,
     )  # fmt: skip
     failed = np.array([bool(each) for each in runs.failure])
-    return (runs.end > runs.time[-2]) & ~failed, runs.x[:, -1], int(failed.sum())
+    hops = np.any(runs.landings[:, -int(QUIET) :] > 0, axis=1) & ~failed
+    return hops, runs.x[:, -1], int(failed.sum())
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,7 @@ _MODULES = {
     "simulate": ("simulate",),
     "validate": ("validate", "judge"),
     "sweep": ("sweep", "collect"),
+    "search": ("search",),
     "look": ("report", "figures", "inspect", "render", "view"),
     "grade": ("grade",),
     "benchmark": ("benchmark",),

@@ -14,28 +14,28 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from analytic import hopping
 from compare.runs.workers import Workers
-from model import Parameters, SimulationError
+from model import Parameters, SimulationError, StorageError
 from model.arrays import Array
 from model.files import write_text
 
 CHUNK = 50
 """Sets in a file."""
-RANGES = {
+BOX = {
     "mu": (0.03, 3.0), "eta": (0.03, 2.0), "j": (0.1, 2 / 3), "r/R": (0.02, 0.6),
     "kappa": (0.005, 1.0), "Omega_0": (0.3, 6.0),
 }  # fmt: skip
-"""The box that is searched."""
+"""The box that is searched, unless another one is named."""
 LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
 """Groups that are spread evenly in their logarithm."""
 _CODE = ("corner.py", "stepping.py", "marching.py", "time_stepping.py", "ensemble.py", "hopping.py")
@@ -43,31 +43,31 @@ _CODE = ("corner.py", "stepping.py", "marching.py", "time_stepping.py", "ensembl
 
 @dataclass(frozen=True)
 class Search:
-    """A search: how many starts a set, and the seed of both sets and starts."""
+    """A search: its box, how many starts a set, and the seed of both sets and starts."""
 
+    box: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(BOX))
     starts: int = 5
     seed: int = 0
 
     def key(self, chunk: int) -> str:
-        """Hash of all that determines a chunk: the search, its box, the sources of the screen."""
+        """Hash of all that determines a chunk: the search, and the sources of the screen."""
         folder = resources.files("analytic")
         code = hashlib.sha256(b"\0".join(folder.joinpath(name).read_bytes() for name in _CODE)).hexdigest()
-        text = json.dumps([dataclasses.asdict(self), RANGES, LOGARITHMIC, chunk, CHUNK, code])
+        text = json.dumps([dataclasses.asdict(self), LOGARITHMIC, chunk, CHUNK, code])
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
+    def points(self, count: int) -> Array:
+        """The first `count` points, shape (count, 6), in the order of `BOX`."""
+        from scipy.stats import qmc  # slow to import
 
-def groups(search: Search, count: int) -> Array:
-    """The first `count` points of a search, shape (count, 6), in the order of `RANGES`."""
-    from scipy.stats import qmc  # slow to import
-
-    points = qmc.Sobol(len(RANGES), rng=np.random.default_rng(search.seed)).random_base2(
-        max(1, math.ceil(math.log2(count)))
-    )[:count]
-    low, high = np.array(list(RANGES.values())).T
-    log = np.array([name in LOGARITHMIC for name in RANGES])
-    low, high = np.where(log, np.log(low), low), np.where(log, np.log(high), high)
-    spread = low + points * (high - low)
-    return np.asarray(np.where(log, np.exp(spread), spread))
+        unit = qmc.Sobol(len(BOX), rng=np.random.default_rng(self.seed)).random_base2(
+            max(1, math.ceil(math.log2(count)))
+        )[:count]
+        low, high = np.array([self.box[name] for name in BOX]).T
+        log = np.array([name in LOGARITHMIC for name in BOX])
+        low, high = np.where(log, np.log(low), low), np.where(log, np.log(high), high)
+        spread = low + unit * (high - low)
+        return np.asarray(np.where(log, np.exp(spread), spread))
 
 
 def parameters(point: Array) -> Parameters:
@@ -97,7 +97,7 @@ def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
         if hops.any():
             row |= {"x": x[hops][0].tolist()} | _confirmed(p, x[hops])
         rows.append(row)
-    write_text(path, json.dumps({"search": dataclasses.asdict(search), "chunk": chunk, "rows": rows}))
+    write_text(path, json.dumps({"chunk": chunk, "rows": rows}))
 
 
 def _confirmed(p: Parameters, states: Array) -> dict[str, Any]:
@@ -112,37 +112,72 @@ def _confirmed(p: Parameters, states: Array) -> dict[str, Any]:
     return {"confirmed": None, "broken": broken}
 
 
-def run(
-    directory: Path, search: Search, count: int, workers: Workers, report: Callable[[int, int], None]
-) -> list[dict[str, Any]]:
-    """Search `count` sets, rounded up to whole chunks, and return a record of each; finished chunks are read.
+@dataclass(frozen=True)
+class Searched:
+    """What a search has found: the sets among its first `sets` in which some start still hops by time stepping."""
 
-    `report` is called with the numbers of chunks that are done and wanted.
+    search: Search
+    sets: int
+    rows: tuple[Mapping[str, Any], ...]
+    """The groups of each, "hops": how many starts hop, "confirmed": the fields of `analytic.hopping.Hopping` by the
+    event-driven simulation, or None."""
+    failed: int
+    """Runs that broke down."""
+
+    @property
+    def confirmed(self) -> list[Mapping[str, Any]]:
+        """The rows whose hopping the event-driven simulation confirms."""
+        return [row for row in self.rows if row["confirmed"]]
+
+    def save(self, path: Path) -> None:
+        """Write it as JSON."""
+        write_text(path, json.dumps(dataclasses.asdict(self), indent=0))
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
+        try:
+            data = json.loads(path.read_text("utf-8"))
+            search = data["search"] | {"box": {name: tuple(ends) for name, ends in data["search"]["box"].items()}}
+            return cls(Search(**search), data["sets"], tuple(data["rows"]), data["failed"])
+        except OSError as error:
+            raise StorageError(f"cannot read {path}: {error.strerror}") from error
+        except (ValueError, KeyError, TypeError) as error:
+            raise StorageError(f"{path} holds no search: {error}") from error
+
+
+def run(directory: Path, search: Search, count: int, workers: Workers, report: Callable[[int, int], None]) -> Searched:
+    """Search `count` sets, rounded up to whole chunks; finished chunks are read.
+
+    `report` is called with the numbers of sets that are done and wanted.
     """
     directory.mkdir(parents=True, exist_ok=True)
     chunks = math.ceil(count / CHUNK)
-    points = groups(search, chunks * CHUNK).reshape(chunks, CHUNK, -1)
+    points = search.points(chunks * CHUNK).reshape(chunks, CHUNK, -1)
     paths = [directory / f"{search.key(chunk)}.json" for chunk in range(chunks)]
     todo = [chunk for chunk in range(chunks) if not paths[chunk].exists()]
     done = chunks - len(todo)
-    report(done, chunks)
-    executor = workers.start()
+    report(done * CHUNK, chunks * CHUNK)
+    executor, at_once = workers.start(), True
     try:
-        futures = [executor.submit(carry_out, search, chunk, points[chunk], paths[chunk]) for chunk in todo]
-        for future in as_completed(futures):
+        for future in as_completed(executor.submit(carry_out, search, k, points[k], paths[k]) for k in todo):
             future.result()
             done += 1
-            report(done, chunks)
-    except BaseException:
-        workers.stop(executor, True)
-        raise
-    workers.stop(executor, False)
-    return list(records(paths, points))
+            report(done * CHUNK, chunks * CHUNK)
+        at_once = False
+    finally:
+        workers.stop(executor, at_once)
+    return searched(search, paths, points)
 
 
-def records(paths: list[Path], points: Array) -> Iterator[dict[str, Any]]:
-    """A record of every set whose chunk is there: its groups, and what came of it."""
-    for path, chunk in zip(paths, points, strict=True):
-        if path.exists():
-            for row, point in zip(json.loads(path.read_text("utf-8"))["rows"], chunk.tolist(), strict=True):
-                yield dict(zip(RANGES, point, strict=True)) | row
+def searched(search: Search, paths: Sequence[Path], points: Array) -> Searched:
+    """What finished chunks hold, up to the first that isn't."""
+    sets, failed, rows = 0, 0, []
+    for path, chunk in zip(paths, points.tolist(), strict=True):
+        if not path.exists():
+            break
+        for row, point in zip(json.loads(path.read_text("utf-8"))["rows"], chunk, strict=True):
+            sets, failed = sets + 1, failed + row["failed"]
+            if row["hops"]:
+                rows.append(dict(zip(BOX, point, strict=True)) | row)
+    return Searched(search, sets, tuple(rows), failed)

@@ -151,7 +151,7 @@ def test_both_methods_follow_any_flow(flow):
 
 
 def test_energy_balance_is_exact():
-    """Work at mean velocities balances kinetic energy to what the iteration leaves: 24 TOLERANCE in each of 500 steps."""
+    """Work at mean velocities balances kinetic energy to what the iteration leaves: 24 TOLERANCE in each step."""
     run = simulate(P.replace(omega_0=25.0), [0, 0, 9.0, 1, 2, 3], 0.5, method="time-stepping", step=1e-3)
     assert run.header.settings["energy_residual"] < 500 * 25 * TOLERANCE * run.header.settings["energy_scale"]
 
