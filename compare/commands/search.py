@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markdown import Markdown
 
-from compare.commands import options
+from compare.commands import options, running
 from compare.runs import progress, regions, search
 from compare.runs.search import BOX, Search
 from compare.runs.workers import processes
@@ -30,7 +30,7 @@ def add(commands: options.Commands) -> None:
         "--range", action="append", default=[], metavar="NAME=FROM:TO", help=f"part of the box; {', '.join(BOX)}"
     )
     command.add_argument("-o", "--output", type=Path, default=Path("search"), metavar="DIR")
-    options.add_workers(command)
+    running.add_workers(command)
     command.add_argument("--save", type=Path, metavar="FILE", help="write the sets with hopping as JSON")
     command.add_argument("--page", type=Path, metavar="FILE", help="write the table as Markdown")
     command.add_argument("--json", action="store_true", help="print the sets with hopping as JSON")
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     count = int(check_number("sets", args.sets, "sets", Range(1, whole=True)))
     starts = int(check_number("starts", args.starts, "starts", Range(1, whole=True)))
     box = dict(BOX) | dict(_range(text) for text in args.range)
-    workers = options.workers(args)
+    workers = running.workers(args)
     if workers == 0:
         raise InputError("workers = 0: a search needs processes; must be >= 1")
     with progress.shown(quiet=args.quiet or args.json) as show:

@@ -87,7 +87,7 @@ class Basins:
         """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
         try:
             data: dict[str, Any] = json.loads(path.read_text("utf-8"))
-            arrays = {name: np.array(data.pop(name)) for name in ("x", "y", "fates", "mujoco")}
+            arrays: dict[str, Any] = {name: np.array(data.pop(name)) for name in ("x", "y", "fates", "mujoco")}
             p = Parameters.from_mapping(data.pop("parameters"))
             return cls(parameters=p, start=tuple(data.pop("start")), **data, **arrays)
         except OSError as error:
