@@ -31,6 +31,9 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx-mat
 exclude_patterns = ["_build", "conf.py"]
 html_theme = "furo"
 html_title = f"dualball {version}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+mathjax3_config = {"chtml": {"scale": 0.93}}
 
 # Notebooks are scripts with cells, and are run for every build.
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
@@ -92,7 +95,8 @@ def source_links(app: Sphinx, where: object, *source: list[str]) -> None:
     text[0] = re.sub(
         rf"\[([^\]]+)\]\((?:\.\./)*((?:{'|'.join(PACKAGES)})/(?:[\w/]*\.py|[\w/]*))\)", to_reference, text[0]
     )
-    text[0] = re.sub(r"\[([^\]]+)\]\((?:\.\./)*tests/[^)]*\)", r"`\1`", text[0])
+    text[0] = re.sub(r"\[([^\]]+)\]\((?:(?:\.\./)*tests/[^)]*|CITATION\.cff)\)", r"`\1`", text[0])
+    text[0] = re.sub(r"\]\((CONTRIBUTING|CHANGELOG)\.md\)", lambda link: f"](docs/{link[1].lower()}.md)", text[0])
 
 
 def as_typed(app: Sphinx, tree: nodes.document) -> None:

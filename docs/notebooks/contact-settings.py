@@ -30,8 +30,15 @@ from compare.scorecard.grade import grade
 from mjsim import ContactSettings
 from model import Case, Parameters
 
-warnings.simplefilter("ignore")  # `mjsim` warns of settings that hover, which are the topic here
-plt.rcParams |= {"figure.figsize": (7, 3.4), "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False}
+warnings.simplefilter(
+    "ignore"
+)  # `mjsim` warns of settings that hover, which are the topic here
+plt.rcParams |= {
+    "figure.figsize": (7, 3.4),
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+}
 MINE = """
 <mujoco>
   <option timestep="0.002"/>
@@ -90,12 +97,20 @@ for name, settings, colour in (
 ):
     run = mjsim.simulate(p, slipping.x, 3.0, settings=settings, sample_interval=2e-3)
     last = run.time > 2.9
-    axes.plot(run.time[last], run.force_A[last, 1], color=colour, lw=1, marker=".", ms=3, label=name)
+    axes.plot(
+        run.time[last],
+        run.force_A[last, 1],
+        color=colour,
+        lw=1,
+        marker=".",
+        ms=3,
+        label=name,
+    )
     lost = np.mean(run.force_A[:, 1] == 0)
     print(f"{name:>12}: no contact with the floor in {lost:.0%} of the steps")
 axes.axhline(slipping.force_A[1], color="black", ls="--", lw=0.8, label="theory")
-axes.set(xlabel="time (s)", ylabel="force of the floor (N)")
-axes.legend(loc="upper right")
+axes.set(xlabel="time (s)", ylabel="force of the floor (N)", ylim=(-0.02, 0.45))
+axes.legend(loc="upper right", ncols=3)
 figure.tight_layout()
 plt.show()
 
@@ -151,7 +166,9 @@ Path("repaired.xml").write_text(REPAIRED)
 for name, column in (("mine", graded), ("repaired", better)):
     print(f"{name:>9}: {card.headline(column).removeprefix('yours: ')}")
     for held in column.stationary:
-        print(f"{held.name:>20}: omega_c {held.omega_c:+.1e}, lost contact {held.open:.0%}, creep {held.creep:.0e} m/s")
+        print(
+            f"{held.name:>20}: omega_c {held.omega_c:+.1e}, lost contact {held.open:.0%}, creep {held.creep:.0e} m/s"
+        )
 
 # %% [markdown]
 # What is left is what settings alone can't do: the ball still rolls on a lever that is shorter by what it sinks in,

@@ -29,11 +29,18 @@ import mjsim
 from analytic.bifurcation import threshold_curves
 from model import Case, Flow, Parameters
 
-plt.rcParams |= {"figure.figsize": (7, 3.8), "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False}
+plt.rcParams |= {
+    "figure.figsize": (7, 3.8),
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+}
 MUJOCO = {"color": "black", "lw": 1, "ls": ":"}
 p = Parameters.named("reference")
 for field in dataclasses.fields(p):
-    print(f"{field.name:>8} = {getattr(p, field.name):<6g} {field.metadata['unit']:<9} {field.metadata['meaning']}")
+    print(
+        f"{field.name:>8} = {getattr(p, field.name):<6g} {field.metadata['unit']:<9} {field.metadata['meaning']}"
+    )
 
 # %% [markdown]
 # ## Where the motion changes
@@ -63,7 +70,9 @@ flows = np.linspace(0.5, 48, 191)
 listed = []
 for omega_0 in flows:
     q = p.replace(omega_0=float(omega_0))
-    attracting = {(each.case, float(each.x[2])) for each in analytic.stable_solutions(q)}
+    attracting = {
+        (each.case, float(each.x[2])) for each in analytic.stable_solutions(q)
+    }
     listed += [
         (omega_0, each.case, each.x[2], (each.case, float(each.x[2])) in attracting)
         for each in analytic.stationary_solutions(q)
@@ -74,18 +83,35 @@ starts = np.linspace(4, 44, 11)
 settings = mjsim.ContactSettings.at(4e-3)
 at_rest = [0.0] * 6
 runs = mjsim.simulate_many(
-    [p.replace(omega_0=float(omega_0)) for omega_0 in starts], [at_rest] * len(starts), 40.0, settings=settings
+    [p.replace(omega_0=float(omega_0)) for omega_0 in starts],
+    [at_rest] * len(starts),
+    40.0,
+    settings=settings,
 )
 
 figure, axes = plt.subplots()
 axes.plot(flows, flows, color="0.8", lw=6, label=r"$\omega_c = \omega_0$", zorder=0)
 for case, colour in colours.items():
     for stable, size in ((True, 7), (False, 1)):
-        points = [(omega_0, omega_c) for omega_0, of, omega_c, held in listed if of is case and held is stable]
+        points = [
+            (omega_0, omega_c)
+            for omega_0, of, omega_c, held in listed
+            if of is case and held is stable
+        ]
         label = f"{case.name}{'' if stable else ', unstable'}"
         if points:
-            axes.plot(*zip(*points, strict=True), ".", color=colour, ms=size, label=label)
-axes.plot(starts, [run.omega_c[-1] for run in runs], "o", color="black", mfc="white", ms=6, label="MuJoCo, from rest")
+            axes.plot(
+                *zip(*points, strict=True), ".", color=colour, ms=size, label=label
+            )
+axes.plot(
+    starts,
+    [run.omega_c[-1] for run in runs],
+    "o",
+    color="black",
+    mfc="white",
+    ms=6,
+    label="MuJoCo, from rest",
+)
 for name in ("omega_01", "omega_02", "omega_04"):
     axes.axvline(getattr(limits, name), color="0.6", lw=0.8, ls=":")
 axes.set(xlabel=r"$\omega_0$ (rad/s)", ylabel=r"$\omega_c$ (rad/s)")
@@ -105,7 +131,9 @@ for omega_0, run in zip(starts, runs, strict=True):
     steady = analytic.stable_solutions(p.replace(omega_0=float(omega_0)))
     nearest = min(steady, key=lambda each: abs(each.x[2] - run.omega_c[-1]))
     error = run.omega_c[-1] / nearest.x[2] - 1
-    print(f"omega_0 = {omega_0:4.1f}: ends in {run.cases[-1].name}, omega_c off by {error:+.0e}")
+    print(
+        f"omega_0 = {omega_0:4.1f}: ends in {run.cases[-1].name}, omega_c off by {error:+.0e}"
+    )
 
 # %% [markdown]
 # ## Why eigenvalues can't tell
@@ -122,11 +150,19 @@ for factor, colour in ((0.8, "#0072B2"), (1.2, "#D55E00")):
     rolling = analytic.solution(q, Case.RR, formal=True)
     print(f"{factor:g} omega_01: eigenvalues of RR {np.round(rolling.eigenvalues, 3)}")
     pushed = rolling.x + np.array([0, 0, 0, 0.3, 0, 0.3, 0, 0])
-    for simulate, look in ((analytic.simulate, {"color": colour, "lw": 3}), (mjsim.simulate, MUJOCO)):
+    for simulate, look in (
+        (analytic.simulate, {"color": colour, "lw": 3}),
+        (mjsim.simulate, MUJOCO),
+    ):
         run = simulate(q, pushed, 5.0, sample_interval=1e-3)
         speed = np.maximum(run.slip_speed_A, run.slip_speed_B)
         name = "MuJoCo" if look is MUJOCO else "theory"
-        axes.semilogy(run.time, np.maximum(speed, 1e-7), **look, label=f"{factor:g} $\\omega_{{01}}$, {name}")
+        axes.semilogy(
+            run.time,
+            np.maximum(speed, 1e-7),
+            **look,
+            label=f"{factor:g} $\\omega_{{01}}$, {name}",
+        )
 axes.set(xlabel="time (s)", ylabel="slip speed (m/s)", ylim=(1e-6, 1))
 axes.legend(fontsize=8)
 figure.tight_layout()
@@ -148,13 +184,29 @@ plt.show()
 there_and_back = Flow.sampled([0, 120, 180], [22, 46, 26])
 slipping = analytic.solution(p.replace(omega_0=22.0), Case.SS)
 figure, axes = plt.subplots()
-theory = analytic.simulate(p, slipping.x, 180.0, flow=there_and_back, sample_interval=0.1)
+theory = analytic.simulate(
+    p, slipping.x, 180.0, flow=there_and_back, sample_interval=0.1
+)
 coarse = mjsim.ContactSettings.at(2e-3)
-engine = mjsim.simulate(p, slipping.x, 180.0, flow=there_and_back, sample_interval=0.1, settings=coarse)
+engine = mjsim.simulate(
+    p, slipping.x, 180.0, flow=there_and_back, sample_interval=0.1, settings=coarse
+)
 flow = there_and_back(theory.time)
 rising = theory.time <= 120
-axes.plot(flow[rising], theory.omega_c[rising], color="#D55E00", lw=3, label="theory, flow rising")
-axes.plot(flow[~rising], theory.omega_c[~rising], color="#009E73", lw=3, label="theory, flow falling")
+axes.plot(
+    flow[rising],
+    theory.omega_c[rising],
+    color="#D55E00",
+    lw=3,
+    label="theory, flow rising",
+)
+axes.plot(
+    flow[~rising],
+    theory.omega_c[~rising],
+    color="#009E73",
+    lw=3,
+    label="theory, flow falling",
+)
 axes.plot(there_and_back(engine.time), engine.omega_c, **MUJOCO, label="MuJoCo")
 for name in ("omega_02", "omega_04"):
     axes.axvline(getattr(limits, name), color="0.6", lw=0.8, ls=":")
