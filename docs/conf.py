@@ -33,6 +33,7 @@ html_theme = "furo"
 html_title = f"dualball {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_show_copyright = False
 mathjax3_config = {"chtml": {"scale": 0.93}}
 
 # Notebooks are scripts with cells, and are run for every build.
@@ -43,12 +44,14 @@ nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_execution_timeout = 600  # a machine may be busy
 nb_merge_streams = True
+nb_render_markdown_format = "myst"
 os.environ |= {"COLUMNS": "88", "NO_COLOR": "1", "TERM": "dumb"}
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # for !dualball
 myst_enable_extensions = ["dollarmath", "attrs_inline"]
 myst_heading_anchors = 3
 
 default_role = "code"
+autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike", "Array": "Array"}
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": True}
 

@@ -1,17 +1,19 @@
 # %% [markdown]
 # # Is my contact setting any good?
 #
-# MuJoCo's contacts are soft, and how soft is up to you: `solref`, `solimp`, `impratio`, the friction cone and the
-# time step decide whether a ball that should roll creeps, whether one that should slide chatters, and how far it
-# sinks in. There is rarely an exact answer to compare with. For the ball in the vessel there is one, so it makes a
+# MuJoCo's contacts are soft, and how soft is up to you: `solref`, `solimp`, `impratio`,
+# the friction cone and the time step decide whether a ball that should roll creeps,
+# whether one that should slide chatters, and how far it sinks in. There is rarely an
+# exact answer to compare with. For the ball in the vessel there is one, so it makes a
 # good test piece.
 #
-# This page takes the settings out of an MJCF file, grades them, explains the worst grades, and repairs them.
+# This page takes the settings out of an MJCF file, grades them, explains the worst
+# grades, and repairs them.
 #
 # ## Your file
 #
-# Any MJCF file with a ball that can touch a floor and something beside it will do: only the settings of its contacts
-# are taken. Here is one as many people would write it.
+# Any MJCF file with a ball that can touch a floor and something beside it will do: only
+# the settings of its contacts are taken. Here is one as many people would write it.
 
 # %%
 # %config InlineBackend.figure_formats = ["svg"]
@@ -60,10 +62,11 @@ print(f"floor: solref {mine.A.solref}, solimp {mine.A.solimp}")
 # %% [markdown]
 # ## The score card
 #
-# `dualball grade mine.xml` does this on the command line. The ball runs with your settings, in the vessel of the
-# paper, and is compared with the closed-form theory. `RR at 12` means: it should roll at both points (RR) when the
-# fluid goes round with 12 rad/s; S stands for a contact that slips, N for one that is open. A tick marks a case in
-# which the ball is for at least nine tenths of the time in which it should be.
+# `dualball grade mine.xml` does this on the command line. The ball runs with your
+# settings, in the vessel of the paper, and is compared with the closed-form theory. `RR
+# at 12` means: it should roll at both points (RR) when the fluid goes round with 12
+# rad/s; S stands for a contact that slips, N for one that is open. A tick marks a case
+# in which the ball is for at least nine tenths of the time in which it should be.
 
 # %%
 (graded,) = grade(mine, others=())
@@ -83,9 +86,10 @@ for advice in graded.advice:
 # %% [markdown]
 # ## What hovering looks like
 #
-# "Hovering" deserves a picture. The ball slips at both points (SS at 25). The floor should press on it steadily with
-# its weight, less what the wall carries. With MuJoCo's own contact parameters the contact switches on and off from
-# step to step; softer friction rows and a lower impedance make it continuous.
+# "Hovering" deserves a picture. The ball slips at both points (SS at 25). The floor
+# should press on it steadily with its weight, less what the wall carries. With MuJoCo's
+# own contact parameters the contact switches on and off from step to step; softer
+# friction rows and a lower impedance make it continuous.
 
 # %%
 p = Parameters.named("reference").replace(omega_0=25.0)
@@ -115,13 +119,14 @@ figure.tight_layout()
 plt.show()
 
 # %% [markdown]
-# Whether a contact hovers can be calculated before any run: sliding is continuous while the *hover number* is less
-# than one. It grows with the slip speed and with the stiffness of the friction rows, and falls with the load.
+# Whether a contact hovers can be calculated before any run: sliding is continuous while
+# the *hover number* is less than one. It grows with the slip speed and with the
+# stiffness of the friction rows, and falls with the load.
 #
 # ## What creep looks like
 #
-# A rolling contact needs friction, and a soft contact gives none without a little slip. The theory of the contact
-# model says how much: the higher `impratio`, the less.
+# A rolling contact needs friction, and a soft contact gives none without a little slip.
+# The theory of the contact model says how much: the higher `impratio`, the less.
 
 # %%
 rolling = p.replace(omega_0=12.0)
@@ -143,13 +148,14 @@ figure.tight_layout()
 plt.show()
 
 # %% [markdown]
-# `dualball` itself goes another way: it shifts the velocity of the surface by the last friction force, which takes
-# the creep away at any `impratio`.
+# `dualball` itself goes another way: it shifts the velocity of the surface by the last
+# friction force, which takes the creep away at any `impratio`.
 #
 # ## Repaired
 #
-# The last line of the advice names settings that fit this problem and this step. MuJoCo takes `solreffriction` for a
-# pair of geoms only, so the two pairs have to be named in the file:
+# The last line of the advice names settings that fit this problem and this step. MuJoCo
+# takes `solreffriction` for a pair of geoms only, so the two pairs have to be named in
+# the file:
 
 # %%
 CONTACT = 'solref="0.004 1" solreffriction="4 1" solimp="0.001 0.001 0.0001 0.5 2"'
@@ -167,10 +173,11 @@ for name, column in (("mine", graded), ("repaired", better)):
     print(f"{name:>9}: {card.headline(column).removeprefix('yours: ')}")
     for held in column.stationary:
         print(
-            f"{held.name:>20}: omega_c {held.omega_c:+.1e}, lost contact {held.open:.0%}, creep {held.creep:.0e} m/s"
+            f"{held.name:>20}: omega_c {held.omega_c:+.1e}, creep {held.creep:.0e} m/s"
         )
 
 # %% [markdown]
-# What is left is what settings alone can't do: the ball still rolls on a lever that is shorter by what it sinks in,
-# and rolling contacts still creep a little. [How MuJoCo is set here](../mujoco-settings.md) says what `dualball` adds
-# between the steps to remove these, too, and derives every number on this page.
+# What is left is what settings alone can't do: the ball still rolls on a lever that is
+# shorter by what it sinks in, and rolling contacts still creep a little. [How MuJoCo is
+# set here](../mujoco-settings.md) says what `dualball` adds between the steps to remove
+# these, too, and derives every number on this page.

@@ -1,21 +1,24 @@
 # %% [markdown]
 # # The paper in ten minutes
 #
-# M. Antali and G. Stépán, *Discontinuity-induced bifurcations of a dual-point contact ball*, Nonlinear Dynamics
-# (2016), in pictures. They were computed when this page was built: theory by `analytic`, simulation by `mjsim`, which
-# is MuJoCo and knows nothing of the theory. This page is a script with cells; open it as a notebook, or run it with
+# M. Antali and G. Stépán, *Discontinuity-induced bifurcations of a dual-point contact
+# ball*, Nonlinear Dynamics (2016), in pictures. They were computed when this page was
+# built: theory by `analytic`, simulation by `mjsim`, which is MuJoCo and knows nothing
+# of the theory. This page is a script with cells; open it as a notebook, or run it with
 # Python.
 #
 # ## The ball
 #
 # ![The ball in its vessel, with contact forces and slip](../render.png)
 #
-# A ball lies in a round vessel. Water swirls in it with the angular velocity $\omega_0$ and carries the ball round
-# along the wall, with the angular velocity $\omega_c$. This is the moving part of a flowmeter: count how often the
-# ball comes by, and you know the flow, *if* $\omega_c = \omega_0$. When is that so?
+# A ball lies in a round vessel. Water swirls in it with the angular velocity $\omega_0$
+# and carries the ball round along the wall, with the angular velocity $\omega_c$. This
+# is the moving part of a flowmeter: count how often the ball comes by, and you know the
+# flow, *if* $\omega_c = \omega_0$. When is that so?
 #
-# The ball can touch the floor at A and the wall at B. At each it rolls (R), slips (S), or doesn't touch (N). Two
-# letters, floor first, make nine cases: RR rolls at both, NR has left the floor and rolls along the wall, NN flies.
+# The ball can touch the floor at A and the wall at B. At each it rolls (R), slips (S),
+# or doesn't touch (N). Two letters, floor first, make nine cases: RR rolls at both, NR
+# has left the floor and rolls along the wall, NN flies.
 
 # %%
 # %config InlineBackend.figure_formats = ["svg"]
@@ -38,14 +41,14 @@ plt.rcParams |= {
 MUJOCO = {"color": "black", "lw": 1, "ls": ":"}
 p = Parameters.named("reference")
 for field in dataclasses.fields(p):
-    print(
-        f"{field.name:>8} = {getattr(p, field.name):<6g} {field.metadata['unit']:<9} {field.metadata['meaning']}"
-    )
+    unit, meaning = field.metadata["unit"], field.metadata["meaning"]
+    print(f"{field.name:>8} = {getattr(p, field.name):<6g} {unit:<9} {meaning}")
 
 # %% [markdown]
 # ## Where the motion changes
 #
-# As the flow gets faster, the steady motion changes at certain $\omega_0$, for which the paper has formulas.
+# As the flow gets faster, the steady motion changes at certain $\omega_0$, for which
+# the paper has formulas.
 
 # %%
 limits = analytic.thresholds(p)
@@ -61,8 +64,9 @@ for name, meaning in meanings.items():
 # %% [markdown]
 # ## The characteristic curve
 #
-# For each flow the theory lists the steady motions. Solid: a disturbed ball comes back to it. Dashed: it does not.
-# Circles: MuJoCo, started at rest at each flow and simulated for 40 seconds.
+# For each flow the theory lists the steady motions. Thick: a disturbed ball comes back
+# to it. Thin: it does not. Circles: MuJoCo, started at rest at each flow and simulated
+# for 40 seconds.
 
 # %%
 colours = {Case.RR: "#0072B2", Case.SS: "#D55E00", Case.NR: "#009E73"}
@@ -120,9 +124,10 @@ figure.tight_layout()
 plt.show()
 
 # %% [markdown]
-# Up to $\omega_{01}$ the ball rolls at both points and reads the flow exactly. Then it slips at both and its speed
-# hardly changes any more. Beyond $\omega_{02}$ it may also ride on the wall, where it goes round with the flow again:
-# between $\omega_{02}$ and $\omega_{04}$ what it reads depends on its past.
+# Up to $\omega_{01}$ the ball rolls at both points and reads the flow exactly. Then it
+# slips at both and its speed hardly changes any more. Beyond $\omega_{02}$ it may also
+# ride on the wall, where it goes round with the flow again: between $\omega_{02}$ and
+# $\omega_{04}$ what it reads depends on its past.
 #
 # How far is MuJoCo from the theory?
 
@@ -131,17 +136,17 @@ for omega_0, run in zip(starts, runs, strict=True):
     steady = analytic.stable_solutions(p.replace(omega_0=float(omega_0)))
     nearest = min(steady, key=lambda each: abs(each.x[2] - run.omega_c[-1]))
     error = run.omega_c[-1] / nearest.x[2] - 1
-    print(
-        f"omega_0 = {omega_0:4.1f}: ends in {run.cases[-1].name}, omega_c off by {error:+.0e}"
-    )
+    case = run.cases[-1].name
+    print(f"omega_0 = {omega_0:4.1f}: ends in {case}, omega_c off by {error:+.0e}")
 
 # %% [markdown]
 # ## Why eigenvalues can't tell
 #
-# A stationary motion is usually called stable if the eigenvalues of its linearisation have negative real parts. Those
-# of rolling (RR) don't change at $\omega_{01}$. What changes is whether friction can *hold* the contacts: rolling is
-# the edge of slipping, and the equations of motion jump there. So push the ball into a slight slip and see what
-# becomes of it.
+# A stationary motion is usually called stable if the eigenvalues of its linearisation
+# have negative real parts. Those of rolling (RR) don't change at $\omega_{01}$. What
+# changes is whether friction can *hold* the contacts: rolling is the edge of slipping,
+# and the equations of motion jump there. So push the ball into a slight slip and see
+# what becomes of it.
 
 # %%
 figure, axes = plt.subplots()
@@ -169,16 +174,18 @@ figure.tight_layout()
 plt.show()
 
 # %% [markdown]
-# Below $\omega_{01}$ the slip stops within a few milliseconds, as dry friction stops things. Above it the slip grows.
-# At first it grows so fast that it slows the ball down to where rolling is possible, for half a second; the flow
-# speeds it up again, it slips again, and settles in SS.
+# Below $\omega_{01}$ the slip stops within a few milliseconds, as dry friction stops
+# things. Above it the slip grows. At first it grows so fast that it slows the ball down
+# to where rolling is possible, for half a second; the flow speeds it up again, it slips
+# again, and settles in SS.
 #
 # ## The reading that depends on the past
 #
-# Let the flow rise slowly, and fall again. The slipping ball stays in SS up to the fold at $\omega_{04}$. There it
-# has no steady slipping to stay in: it runs up to the speed of the flow and rides on the wall. On the way back it
-# stays there down to $\omega_{02}$, sinks, lands, and slips again. (Both changes take seconds, while the flow goes on
-# changing, so that the curve turns a little late.)
+# Let the flow rise slowly, and fall again. The slipping ball stays in SS up to the fold
+# at $\omega_{04}$. There it has no steady slipping to stay in: it runs up to the speed
+# of the flow and rides on the wall. On the way back it stays there down to
+# $\omega_{02}$, sinks, lands, and slips again. (Both changes take seconds, while the
+# flow goes on changing, so that the curve turns a little late.)
 
 # %%
 there_and_back = Flow.sampled([0, 120, 180], [22, 46, 26])
@@ -218,9 +225,11 @@ plt.show()
 # %% [markdown]
 # ## The choice of the wall
 #
-# The friction of the wall, $\eta$, decides what kind of meter this is. For $\eta < j$ (the ball's dimensionless
-# moment of inertia) rolling ends at $\omega_{01}$ and slipping takes over, up to the fold. For $\eta > j$ there is no
-# slipping motion: the ball goes over from floor to wall and always reads the flow. All thresholds meet at $\eta = j$.
+# The friction of the wall, $\eta$, decides what kind of meter this is. For $\eta < j$
+# (the ball's dimensionless moment of inertia) rolling ends at $\omega_{01}$ and
+# slipping takes over, up to the fold. For $\eta > j$ there is no slipping motion: the
+# ball goes over from floor to wall and always reads the flow. All thresholds meet at
+# $\eta = j$.
 
 # %%
 eta = np.linspace(0.02, 0.8, 400)
@@ -237,7 +246,9 @@ plt.show()
 # %% [markdown]
 # ## Where to go from here
 #
-# * `dualball validate` puts every statement of the paper to the test: the [tutorial](../tutorial.md) runs it.
-# * The formulas, and where each is computed: [theory](../theory.md). Where the paper's text is wrong:
-#   [errata](../errata.md).
-# * What it takes to bring MuJoCo this close: [MuJoCo's settings](../mujoco-settings.md).
+# * `dualball validate` puts every statement of the paper to the test: the
+#   [tutorial](../tutorial.md) runs it.
+# * The formulas, and where each is computed: [theory](../theory.md). Where the paper's
+#   text is wrong: [errata](../errata.md).
+# * What it takes to bring MuJoCo this close: [MuJoCo's
+#   settings](../mujoco-settings.md).
