@@ -22,7 +22,7 @@ from mjsim.corrections import followed
 from mjsim.stepping import Stepper
 from model import Parameters
 from model.arrays import Array
-from model.kinematics import WorldState, from_world, to_world
+from model.kinematics import Motion, from_world, rotated, to_world
 
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -72,9 +72,9 @@ class _Ball:
         self.model = copy.copy(model)  # its margins move
         self.data = mujoco.MjData(self.model)
         self._p, self._settings, self.theta = p, settings, theta_0
-        world = to_world(x, theta_0, p)
-        self.data.qpos[:] = np.concatenate([world.position, world.quaternion])
-        self.data.qvel[:] = np.concatenate([world.velocity, world.angular_velocity_body])
+        start = to_world(x, theta_0, p)
+        self.data.qpos[:] = [*start.position, 1.0, 0.0, 0.0, 0.0]
+        self.data.qvel[:] = [*start.velocity, *start.spin]
         self._turns = settings.wall == "tangent"
         self._reach = settings.touching(p.g)
 
@@ -96,10 +96,8 @@ class _Ball:
     def joint_coordinates(self) -> tuple[Array, Array]:
         """The state as coordinates of the joint chain, with the orientation upright."""
         qpos, qvel = self.data.qpos, self.data.qvel
-        rotation = np.empty(9)
-        mujoco.mju_quat2Mat(rotation, qpos[3:7])
-        world = WorldState(qpos[:3].copy(), qpos[3:7].copy(), qvel[:3].copy(), rotation.reshape(3, 3) @ qvel[3:6])
-        x, azimuth = from_world(world, self._p)
+        (position, quaternion), (velocity, spin) = np.split(qpos, [3]), np.split(qvel, [3])
+        x, azimuth = from_world(Motion(position, velocity, rotated(quaternion, spin)), self._p)
         self._unwrap(float(azimuth))
         return recorder.joint_state(x, self.theta, self._p)
 

@@ -11,8 +11,7 @@ orbit. The world frame has z along the vessel's axis, up from the floor, and the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -44,20 +43,22 @@ class State(NamedTuple):
     """Its rate, m s-1."""
 
     @classmethod
-    def of(cls, x: npt.ArrayLike) -> Self:
+    def of(cls, x: npt.ArrayLike) -> State:
         """The state in a sequence of 6 or 8 numbers, as floats, or the states in an array (..., 6 or 8), as columns.
 
-        Raises `InputError` as `full_state`.
+        A `State` is returned as it is. Raises `InputError` as `full_state`.
         """
+        if isinstance(x, State):
+            return x
         columns = np.moveaxis(full_state(x), -1, 0)
         return cls(*(columns.tolist() if columns.ndim == 1 else columns))
 
     @classmethod
-    def one(cls, x: npt.ArrayLike) -> Self:
-        """As `of`, for a single state; `InputError` for more."""
+    def one(cls, x: npt.ArrayLike) -> State:
+        """A single state, checked, as floats; raises `InputError` for more than one."""
         if np.ndim(x) > 1:
             raise InputError(f"one state is needed, not an array of shape {np.shape(x)}")
-        return cls.of(x)
+        return cls(*full_state(x).tolist())
 
     def stacked(self) -> Array:
         """The states as one array (..., 8); inverse of `of`."""
@@ -68,23 +69,15 @@ VARIABLES = State._fields
 UNITS = ("m", "m s-1", "rad s-1", "rad s-1", "rad s-1", "rad s-1", "m", "m s-1")
 
 
-@dataclass(frozen=True)
-class WorldState:
-    """A rigid ball in the world frame; arrays of shape (..., 3), quaternion (..., 4) with the scalar first."""
+class Motion(NamedTuple):
+    """Motion of the ball in the world frame; arrays of shape (..., 3)."""
 
     position: Array
-    """Centre of the ball, m."""
-    quaternion: Array
-    """Orientation of the ball, body to world."""
+    """Of the centre, m."""
     velocity: Array
-    """Velocity of the centre, m s-1."""
-    angular_velocity: Array
-    """Angular velocity of the ball in world axes, rad s-1."""
-
-    @property
-    def angular_velocity_body(self) -> Array:
-        """Angular velocity in the ball's own axes, as MuJoCo's free and ball joints hold it, rad s-1."""
-        return rotated(self.quaternion * [1.0, -1.0, -1.0, -1.0], self.angular_velocity)
+    """Of the centre, m s-1."""
+    spin: Array
+    """Angular velocity of the ball, rad s-1."""
 
 
 def rotated(quaternion: Array, vector: Array) -> Array:
@@ -120,17 +113,11 @@ def frame(theta: Array | float) -> Array:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def rolling_part(x: npt.ArrayLike, p: Parameters) -> Array:
-    """Rolling part of the angular velocity (4), shape (..., 3), with rho for R away from the wall."""
-    state = State.of(x)
-    roll = (p.R - state.h) / p.r * state.omega_c
-    return np.stack([roll, -roll, state.v_y / p.r], axis=-1)
-
-
 def angular_velocity(x: npt.ArrayLike, p: Parameters) -> Array:
-    """Angular velocity of the ball (4) in the co-rotating frame, shape (..., 3)."""
-    state = State.of(x)
-    return np.asarray(rolling_part(x, p) + np.stack([state.slip_x, state.slip_y, state.slip_z], axis=-1))
+    """Angular velocity of the ball (4) in the co-rotating frame, shape (..., 3), with rho for R off the wall."""
+    _, v_y, omega_c, slip_x, slip_y, slip_z, h, _ = State.of(x)
+    roll = (p.R - h) / p.r * omega_c
+    return np.stack([roll + slip_x, slip_y - roll, v_y / p.r + slip_z], axis=-1)
 
 
 def slip_velocities(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
@@ -157,50 +144,31 @@ def slip_directions(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
     return np.arctan2(-A_z, A_x), np.arctan2(B_z, -B_y)
 
 
-def to_world(
-    x: npt.ArrayLike,
-    theta: Array | float,
-    p: Parameters,
-    quaternion: Array | tuple[float, ...] = (1.0, 0.0, 0.0, 0.0),
-) -> WorldState:
-    """World coordinates of states x (..., 6 or 8) at azimuths theta (...).
-
-    The orientation of a homogeneous ball is free: `quaternion` is handed through.
-    """
+def to_world(x: npt.ArrayLike, theta: npt.ArrayLike, p: Parameters) -> Motion:
+    """Motion in the world frame of states x (..., 6 or 8) at azimuths theta (...)."""
     state, theta = State.of(x), np.asarray(theta, dtype=float)
     rho = p.R - state.h
-    axes = frame(theta)
-    position = np.stack(np.broadcast_arrays(rho * np.cos(theta), rho * np.sin(theta), p.r + state.y), axis=-1)
+    position = np.broadcast_arrays(rho * np.cos(theta), rho * np.sin(theta), p.r + state.y)
     velocity = np.stack([state.v_h, state.v_y, rho * state.omega_c], axis=-1)
-    return WorldState(
-        position=position,
-        quaternion=np.broadcast_to(np.asarray(quaternion, dtype=float), (*position.shape[:-1], 4)),
-        velocity=_to_world_axes(axes, velocity),
-        angular_velocity=_to_world_axes(axes, angular_velocity(x, p)),
-    )
+    turn = np.swapaxes(frame(theta), -1, -2)
+    return Motion(np.stack(position, axis=-1), _times(turn, velocity), _times(turn, angular_velocity(x, p)))
 
 
-def from_world(world: WorldState, p: Parameters) -> tuple[Array, Array]:
-    """States x (..., 8) and azimuths theta (...) of a ball in world coordinates; the inverse of `to_world`.
+def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:
+    """States, as columns, and azimuths theta (...) of a motion in the world frame; the inverse of `to_world`.
 
     On the axis itself the orbit has no direction: theta is 0 there and omega_c is nan.
     """
-    px, py, pz = np.moveaxis(world.position, -1, 0)
+    px, py, pz = np.moveaxis(motion.position, -1, 0)
     theta, rho = np.arctan2(py, px), np.hypot(px, py)
     axes = frame(theta)
-    v_h, v_y, v_k = np.moveaxis(_to_frame_axes(axes, world.velocity), -1, 0)
-    omega = _to_frame_axes(axes, world.angular_velocity)
+    v_h, v_y, v_k = np.moveaxis(_times(axes, motion.velocity), -1, 0)
+    o_x, o_y, o_z = np.moveaxis(_times(axes, motion.spin), -1, 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         omega_c = np.where(rho > 0, v_k / rho, np.nan)
     # v_k is rho omega_c: the rolling part needs no division by rho.
-    slip = omega - np.stack([v_k / p.r, -v_k / p.r, v_y / p.r], axis=-1)
-    w_x, w_y, w_z = np.moveaxis(slip, -1, 0)
-    return State(pz - p.r, v_y, omega_c, w_x, w_y, w_z, p.R - rho, v_h).stacked(), theta
+    return State(pz - p.r, v_y, omega_c, o_x - v_k / p.r, o_y + v_k / p.r, o_z - v_y / p.r, p.R - rho, v_h), theta
 
 
-def _to_world_axes(axes: Array, vector: Array) -> Array:
-    return np.asarray(np.einsum("...ab,...a->...b", axes, vector))
-
-
-def _to_frame_axes(axes: Array, vector: Array) -> Array:
-    return np.asarray(np.einsum("...ab,...b->...a", axes, vector))
+def _times(matrix: Array, vector: Array) -> Array:
+    return np.asarray(np.einsum("...ab,...b->...a", matrix, vector))
