@@ -15,9 +15,8 @@ from compare.runs import progress, regions, search
 from compare.runs.search import BOX, Search
 from compare.runs.workers import processes
 from model import InputError
-from model.errors import suggestion
 from model.files import write_text
-from model.parameters import POSITIVE, Range, check_number, parse_number
+from model.parameters import POSITIVE, Range, check_names, check_number, parse_number
 
 
 def add(commands: options.Commands) -> None:
@@ -46,26 +45,23 @@ def run(args: argparse.Namespace) -> int:
     if workers == 0:
         raise InputError("workers = 0: a search needs processes; must be >= 1")
     with progress.shown(quiet=args.quiet or args.json) as show:
-        found = search.run(
-            args.output, Search(box, starts, args.seed), count,
-            processes(workers) if isinstance(workers, int) else workers,
-            lambda done, total: show("search", done, total, 0),
-        )  # fmt: skip
+        pool = processes(workers) if isinstance(workers, int) else workers
+        searched = Search(box, starts, args.seed)
+        hopping = search.run(args.output, searched, count, pool, lambda done, total: show("search", done, total, 0))
     if args.save:
-        found.save(args.save)
+        hopping.save(args.save)
     if args.page:
-        write_text(args.page, regions.page(found))
+        write_text(args.page, regions.page(hopping))
     if args.json:
-        print(json.dumps(dataclasses.asdict(found), indent=1))
+        print(json.dumps(dataclasses.asdict(hopping), indent=1))
     else:
-        Console().print(Markdown(regions.page(found)))
+        Console().print(Markdown(regions.page(hopping)))
     return 0
 
 
 def _range(text: str) -> tuple[str, tuple[float, float]]:
     name, _, ends = text.partition("=")
-    if name not in BOX:
-        raise InputError(f"unknown group {name!r}{suggestion(name, BOX)}; known: {', '.join(BOX)}")
+    check_names([name], list(BOX), "group")
     low, separator, high = ends.partition(":")
     if not separator:
         raise InputError(f"{text!r} is no range: write {name}=from:to")
