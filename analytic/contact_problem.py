@@ -55,9 +55,14 @@ class NotConvergedError(ArithmeticError):
 
 
 def solve(
-    free: Six, A: Closed | None, B: Closed | None, p: Parameters,
-    start: Six = NOTHING, tolerance: float = 4e-15, max_sweeps: int = MAX_SWEEPS,
-) -> tuple[Velocities, Forces]:  # fmt: skip
+    free: Six,
+    A: Closed | None,
+    B: Closed | None,
+    p: Parameters,
+    start: Six = NOTHING,
+    tolerance: float = 4e-15,
+    max_sweeps: int = MAX_SWEEPS,
+) -> tuple[Velocities, Forces]:
     """Velocities and impulses that obey Coulomb's law at both contacts.
 
     Parameters
@@ -149,11 +154,8 @@ def _projection_rate(n: float, s: float, t: float, friction: float, slip: tuple[
     if size <= friction * n:
         return np.eye(3)
     a, b, turn = s / size, t / size, friction * n / size
-    return np.array([
-        [1.0, 0.0, 0.0],
-        [friction * a, turn * b * b, -turn * a * b],
-        [friction * b, -turn * a * b, turn * a * a],
-    ])  # fmt: skip
+    sideways = -turn * a * b
+    return np.array([[1.0, 0.0, 0.0], [friction * a, turn * b * b, sideways], [friction * b, sideways, turn * a * a]])
 
 
 def unlocked(error: NotConvergedError, p: Parameters) -> Closed:

@@ -44,11 +44,17 @@ class Ensemble:
 
 
 def simulate_many(
-    parameters: Parameters | Sequence[Parameters], x0s: npt.ArrayLike, t_end: float,
-    flow: Flow | Sequence[Flow] | None = None, settings: Settings | None = None, *,
-    sample_interval: float | None = None, quiet: float | None = None, threads: int | None = None,
+    parameters: Parameters | Sequence[Parameters],
+    x0s: npt.ArrayLike,
+    t_end: float,
+    flow: Flow | Sequence[Flow] | None = None,
+    settings: Settings | None = None,
+    *,
+    sample_interval: float | None = None,
+    quiet: float | None = None,
+    threads: int | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Ensemble:  # fmt: skip
+) -> Ensemble:
     """Time stepping (`time_stepping`) of many runs, on all cores if numba is installed.
 
     Parameters
@@ -96,11 +102,10 @@ def simulate_many(
         stretches = time_stepping.Stretches.of(times, fluid, time_stepping.longest_step(p, settings))
         for name in blank:
             blank[name][k, 0] = states[k]
-        end[k] = marching.follow(
-            time_stepping.ball(states[k], 0.0, p), *stretches, still,
-            marching.Flow(fluid.start, fluid.value, fluid.slope), time_stepping.constants(p, settings),
-            blank["x"][k], case[k], blank["low"][k], blank["high"][k], blank["mean"][k], landings[k],
-        )  # fmt: skip
+        omega_0, p_k = marching.Flow(fluid.start, fluid.value, fluid.slope), time_stepping.constants(p, settings)
+        low, high, mean = blank["low"][k], blank["high"][k], blank["mean"][k]
+        kept = blank["x"][k], case[k], low, high, mean, landings[k]
+        end[k] = marching.follow(time_stepping.ball(states[k], 0.0, p), *stretches, still, omega_0, p_k, *kept)
         if end[k] < 0:
             end[k] *= -1
             failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"

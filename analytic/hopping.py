@@ -33,10 +33,8 @@ def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Ar
 
     One thread; p.c must be positive.
     """
-    runs = simulate_many(
-        p, x0s, DURATION / p.c, settings=Settings(method="time-stepping", step=math.sqrt(p.R / p.g) / STEPS),
-        sample_interval=1 / p.c, quiet=QUIET / p.c, threads=1,
-    )  # fmt: skip
+    settings, lasts, unit = Settings(method="time-stepping", step=math.sqrt(p.R / p.g) / STEPS), DURATION / p.c, 1 / p.c
+    runs = simulate_many(p, x0s, lasts, settings=settings, sample_interval=unit, quiet=QUIET * unit, threads=1)
     failed = np.array([bool(each) for each in runs.failure])
     hops = np.any(runs.landings[:, -int(QUIET) :] > 0, axis=1) & ~failed
     return hops, runs.x[:, -1], int(failed.sum())

@@ -45,18 +45,29 @@ def advance(
             break
         if ball.case != before or ball.impact.A_y > 0 or ball.impact.B_x > 0:
             events[noted, 0], events[noted, 1], events[noted, 2] = start + k * dt, before, ball.case
-            (events[noted, 3], events[noted, 4], events[noted, 5], events[noted, 6], events[noted, 7],
-             events[noted, 8]) = ball.impact  # fmt: skip
+            events[noted, 3], events[noted, 4], events[noted, 5] = ball.impact.A_x, ball.impact.A_y, ball.impact.A_z
+            events[noted, 6], events[noted, 7], events[noted, 8] = ball.impact.B_x, ball.impact.B_y, ball.impact.B_z
             noted += 1
     return ball, k, noted
 
 
 @compiled
 def follow(
-    ball: Ball, starts: Array, dts: Array, counts: npt.NDArray[np.int64], sampled: npt.NDArray[np.bool_], quiet: float,
-    flow: Flow, p: Constants, x: Array, case: npt.NDArray[np.int8], low: Array, high: Array, mean: Array,
+    ball: Ball,
+    starts: Array,
+    dts: Array,
+    counts: npt.NDArray[np.int64],
+    sampled: npt.NDArray[np.bool_],
+    quiet: float,
+    flow: Flow,
+    p: Constants,
+    x: Array,
+    case: npt.NDArray[np.int8],
+    low: Array,
+    high: Array,
+    mean: Array,
     landings: npt.NDArray[np.int64],
-) -> float:  # fmt: skip
+) -> float:
     """One run through stretches of steps, into the rows of an `Ensemble`; return its end, less than 0 if it failed.
 
     Rows beyond the end of a run that has been quiet for long repeat its last state.

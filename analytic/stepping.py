@@ -124,14 +124,10 @@ def solve(
             A = project(a.n, a.s, a.t, p.mu)
         elif in_B:
             B = project(b.n, b.s, b.t, p.eta)
-        after = Velocities(
-            f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t,
-            f_x - A.t / (j * r), o_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r),
-        )  # fmt: skip
-        change = (  # a sum, since max overlooks nan
-            abs(after.v_h - new.v_h) + abs(after.v_y - new.v_y) + abs(after.v_k - new.v_k)
-            + r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
-        )  # fmt: skip
+        n_h, n_y, n_k = f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t
+        after = Velocities(n_h, n_y, n_k, f_x - A.t / (j * r), o_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r))
+        change = abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)  # a sum, since max overlooks nan
+        change += r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
         new = after
         # Changes shrink at a steady rate: what is left is this one times the rate.
         settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
@@ -140,10 +136,9 @@ def solve(
         last = change
     u = _mean(old, new)
     drag = u.v_h * (u.v_h - omega_0 * x_k) + u.v_y * u.v_y + u.v_k * (u.v_k + omega_0 * x_i)
-    work = m * (
-        A.s * (u.v_h + r * u.o_z) + A.n * u.v_y + A.t * (u.v_k - r * u.o_x)
-        + B.n * u.v_h + B.s * (u.v_y - r * u.o_z) + B.t * (u.v_k + r * u.o_y) - dt * p.c * drag
-    )  # fmt: skip
+    at_A = A.s * (u.v_h + r * u.o_z) + A.n * u.v_y + A.t * (u.v_k - r * u.o_x)
+    at_B = B.n * u.v_h + B.s * (u.v_y - r * u.o_z) + B.t * (u.v_k + r * u.o_y)
+    work = m * (at_A + at_B - dt * p.c * drag)
     # A loaded contact has met its target, and round-off must not open it again.
     new = Velocities(to_B if B.n > 0 else new.v_h, to_A if A.n > 0 else new.v_y, new.v_k, new.o_x, new.o_y, new.o_z)
     P = Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)
@@ -152,10 +147,8 @@ def solve(
 
 @compiled
 def _mean(a: Velocities, b: Velocities) -> Velocities:
-    return Velocities(
-        (a.v_h + b.v_h) / 2, (a.v_y + b.v_y) / 2, (a.v_k + b.v_k) / 2,
-        (a.o_x + b.o_x) / 2, (a.o_y + b.o_y) / 2, (a.o_z + b.o_z) / 2,
-    )  # fmt: skip
+    o_x, o_y, o_z = (a.o_x + b.o_x) / 2, (a.o_y + b.o_y) / 2, (a.o_z + b.o_z) / 2
+    return Velocities((a.v_h + b.v_h) / 2, (a.v_y + b.v_y) / 2, (a.v_k + b.v_k) / 2, o_x, o_y, o_z)
 
 
 @compiled
@@ -173,10 +166,9 @@ def _moved(at: At, dt: float, s: Solved, in_A: bool, in_B: bool, R: float) -> At
     x_i, x_k = at.h - R + dt * u.v_h, dt * u.v_k
     rho = math.sqrt(x_i * x_i + x_k * x_k)
     cos, sin = -x_i / rho, x_k / rho
-    turned = Velocities(
-        new.v_h * cos - new.v_k * sin, new.v_y, new.v_k * cos + new.v_h * sin,
-        new.o_x * cos - new.o_z * sin, new.o_y, new.o_z * cos + new.o_x * sin,
-    )  # fmt: skip
+    v_h, v_k = new.v_h * cos - new.v_k * sin, new.v_k * cos + new.v_h * sin
+    o_x, o_z = new.o_x * cos - new.o_z * sin, new.o_z * cos + new.o_x * sin
+    turned = Velocities(v_h, new.v_y, v_k, o_x, new.o_y, o_z)
     return At(at.theta + math.atan2(x_k, -x_i), y, R - rho, turned)
 
 
@@ -219,9 +211,8 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     """The ball a step of dt later, with omega_0 from the middle of the step."""
     nothing = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     at, P, impact, case, work, landings, residual = ball.at, nothing, nothing, ball.case, ball.work, ball.landings, 0.0
-    start = Impulse(
-        (ball.P.B_x - ball.impact.B_x) / p.m, (ball.P.B_y - ball.impact.B_y) / p.m, (ball.P.B_z - ball.impact.B_z) / p.m
-    )  # fmt: skip
+    last, blow = ball.P, ball.impact
+    start = Impulse((last.B_x - blow.B_x) / p.m, (last.B_y - blow.B_y) / p.m, (last.B_z - blow.B_z) / p.m)
     left, count = dt, 0
     while left > 0 and residual == 0:
         in_A, in_B = at.y <= 0 and at.u.v_y <= 0, at.h <= 0 and at.u.v_h <= 0

@@ -112,9 +112,7 @@ def ball(x: Sequence[float], theta: float, p: Parameters) -> stepping.Ball:
 
 def _record(samples: list[tuple[float, stepping.Ball, float]], p: Parameters, recorder: Recorder) -> None:
     times, balls, steps = zip(*samples, strict=True)
-    recorder.add(
-        np.array(times), np.array([ball.at.theta for ball in balls]),
-        np.array([rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p) for ball in balls]),
-        np.array([ball.P for ball in balls]) / np.array(steps)[:, None],
-        np.array([ball.case for ball in balls]), np.array([ball.work for ball in balls]),
-    )  # fmt: skip
+    theta, case, work = (np.array(each) for each in zip(*((b.at.theta, b.case, b.work) for b in balls), strict=True))
+    states = np.array([rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p) for ball in balls])
+    forces = np.array([ball.P for ball in balls]) / np.array(steps)[:, None]
+    recorder.add(np.array(times), theta, states, forces, case, work)

@@ -23,7 +23,7 @@ from analytic.rigid_body import (
     state,
     turned,
     velocities,
-)  # fmt: skip
+)
 from model import Case, Parameters
 from model.kinematics import slip_velocities
 

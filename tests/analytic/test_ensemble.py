@@ -65,20 +65,24 @@ def test_a_run_that_fails_leaves_the_others_alone():
     assert np.all(np.isnan(many.x[1, 1:]))
 
 
-@pytest.mark.parametrize(("sets", "x0s", "message"), [
-    ([P, P], np.zeros((3, 6)), "2 parameter sets, 3 starts"),
-    ([P], [[-0.01, 0, 0, 0, 0, 0]], "y = -0.01 m"),
-    ([P], [[0, 0, 0, 0, 0, 0, 0.06, 0]], "h = 0.06 m"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("sets", "x0s", "message"),
+    [
+        ([P, P], np.zeros((3, 6)), "2 parameter sets, 3 starts"),
+        ([P], [[-0.01, 0, 0, 0, 0, 0]], "y = -0.01 m"),
+        ([P], [[0, 0, 0, 0, 0, 0, 0.06, 0]], "h = 0.06 m"),
+    ],
+)
 def test_bad_input(sets, x0s, message):
     with pytest.raises(InputError, match=message):
         simulate_many(sets, x0s, 0.1)
 
 
 JAMMED = [
-    groups(1.23, 0.17, 0.61, 0.12, 2.1), groups(1.2277, 0.1721, 0.611, 0.1198, 2.099),
+    groups(1.23, 0.17, 0.61, 0.12, 2.1),
+    groups(1.2277, 0.1721, 0.611, 0.1198, 2.099),
     groups(1.7222, 0.0388, 0.482, 0.1099, 2.635),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("p", JAMMED)

@@ -196,10 +196,11 @@ def test_flow_that_jumps_and_ramps():
     p = P.replace(omega_0=0.0)
     flow = Flow.sampled([0.0, 1.0, 2.0], [8.0, 12.0, 10.0])
     run = simulate(p, [0, 0, 8.0, 0, 0, 0], 3.0, flow, sample_interval=0.05)
-    plain = solve_ivp(
-        lambda t, w: -p.c * (w - flow(t)) / (1 + 2 * p.j), (0, 3), [8.0], rtol=1e-11, atol=1e-12, max_step=0.01,
-        t_eval=run.time,
-    )  # fmt: skip
+
+    def rate(t, omega_c):
+        return -p.c * (omega_c - flow(t)) / (1 + 2 * p.j)
+
+    plain = solve_ivp(rate, (0, 3), [8.0], rtol=1e-11, atol=1e-12, max_step=0.01, t_eval=run.time)
     np.testing.assert_allclose(run.omega_c, plain.y[0], rtol=1e-8)
     stairs = simulate(p, [0, 0, 10.0, 0, 0, 0], 3.0, Flow.staircase([10.0, 25.0], 1.0), sample_interval=0.05)
     assert np.all(stairs.omega_c[stairs.time <= 1] == 10.0)

@@ -10,7 +10,7 @@ import pytest
 from analytic import Settings, simulate, stationary_solutions, thresholds
 from analytic.stepping import TOLERANCE, step
 from analytic.time_stepping import ball, constants
-from model import Case, Flow, Parameters, SimulationError
+from model import Case, Flow, Parameters, SimulationError, State
 
 P = Parameters.named("reference")
 SPEED, SPIN = math.sqrt(P.g * P.R), math.sqrt(P.g * P.R) / P.r
@@ -23,10 +23,15 @@ def order(steps, errors):
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
-@pytest.mark.parametrize(("name", "omega_0", "case"), [
-    ("reference", 12.0, Case.RR), ("reference", 20.0, Case.SS), ("reference", 25.0, Case.SS),
-    ("high-wall-friction", 25.0, Case.NR),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "omega_0", "case"),
+    [
+        ("reference", 12.0, Case.RR),
+        ("reference", 20.0, Case.SS),
+        ("reference", 25.0, Case.SS),
+        ("high-wall-friction", 25.0, Case.NR),
+    ],
+)
 def test_stationary_orbits_are_exact_at_large_steps(name, omega_0, case):
     """Axes that turn with the ball make a stationary orbit a fixed point of the scheme, to what the solver leaves."""
     p = Parameters.named(name).replace(omega_0=omega_0)
@@ -86,30 +91,27 @@ def test_restitution():
 def test_finds_the_end_of_two_point_rolling_by_itself(side):
     """Below omega_01 the ball ends up in RR, above it in SS, though the scheme knows of neither."""
     omega_0 = side * thresholds(P).omega_01
-    run = simulate(
-        P.replace(omega_0=omega_0), [0, 0, 0.9 * omega_0, 0, 0, 0], 8.0, method="time-stepping", step=2e-3,
-        sample_interval=0.1,
-    )  # fmt: skip
+    p, x0 = P.replace(omega_0=omega_0), State(omega_c=0.9 * omega_0)
+    run = simulate(p, x0, 8.0, method="time-stepping", step=2e-3, sample_interval=0.1)
     assert run.cases[-1] is (Case.RR if side < 1 else Case.SS)
 
 
 ALL_NINE = [
     # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
-    (P.replace(omega_0=12.0, eta=0.6), [0.022, 0.042, 33.0, 39.6, 8.5, 1.5, 0.034, 0.178],
-     ["NN", "SN", "RN", "NS", "SS", "RS", "RR"]),
+    (12.0, State(0.022, 0.042, 33.0, 39.6, 8.5, 1.5, 0.034, 0.178), ["NN", "SN", "RN", "NS", "SS", "RS", "RR"]),
     # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
-    (P.replace(omega_0=14.5, eta=0.6), [0.0, 0.0, -22.669, -0.266, 27.136, -7.88, 0.015, -0.085],
-     ["SN", "RN", "NR", "NS", "SS", "SR", "RR"]),
-]  # fmt: skip
+    (14.5, State(0.0, 0.0, -22.669, -0.266, 27.136, -7.88, 0.015, -0.085), ["SN", "RN", "NR", "NS", "SS", "SR", "RR"]),
+]
 
 
 def test_the_sequences_below_visit_all_nine_cases():
     assert {name for _, _, visited in ALL_NINE for name in visited} == {case.name for case in Case}
 
 
-@pytest.mark.parametrize(("p", "x0", "visited"), ALL_NINE)
-def test_converges_to_the_event_driven_result(p, x0, visited):
+@pytest.mark.parametrize(("omega_0", "x0", "visited"), ALL_NINE)
+def test_converges_to_the_event_driven_result(omega_0, x0, visited):
     """First order in the step, in the mean over the run, through every kind of transition and impact."""
+    p = P.replace(omega_0=omega_0, eta=0.6)
     events = simulate(p, x0, 0.4, sample_interval=2e-3)
     seen = {Case(code).name for code in (*events.events.from_case, *events.events.to_case)}
     assert seen >= set(visited)
@@ -135,10 +137,15 @@ def test_converges_through_bounces_and_a_ramp():
     assert errors[-1] < 1e-3
 
 
-@pytest.mark.parametrize("flow", [
-    Flow.steady(20.0), Flow.ramp(5.0, 25.0, 0.2, 0.1), Flow.staircase([10.0, 25.0], 0.1),
+FLOWS = [
+    Flow.steady(20.0),
+    Flow.ramp(5.0, 25.0, 0.2, 0.1),
+    Flow.staircase([10.0, 25.0], 0.1),
     Flow.sampled([0.0, 0.1, 0.3], [20.0, 5.0, 15.0]),
-])  # fmt: skip
+]
+
+
+@pytest.mark.parametrize("flow", FLOWS)
 def test_both_methods_follow_any_flow(flow):
     """Off the floor, where omega_0 enters by the drag alone: within a step of its effect, c |omega_0| a second."""
     p, x0, dt = P.replace(c=5.0), [0.3, 0.5, 12.0, 10.0, 20.0, 30.0], 5e-4
@@ -158,11 +165,9 @@ def test_energy_balance_is_exact():
 
 def test_no_convergence_keeps_the_samples():
     """At rest any step does; as soon as the fluid moves, drag is too strong for it."""
+    flow, settings = Flow.ramp(0.0, 1.0, 0.1, 0.5), Settings(method="time-stepping", step=0.01)
     with pytest.raises(SimulationError, match="a shorter step") as caught:
-        simulate(
-            P.replace(c=1e4), [0, 0, 0, 0, 0, 0], 1.0, Flow.ramp(0.0, 1.0, 0.1, 0.5), method="time-stepping", step=0.01,
-            sample_interval=0.01,
-        )  # fmt: skip
+        simulate(P.replace(c=1e4), State(), 1.0, flow, settings, sample_interval=0.01)
     kept = caught.value.trajectory
     assert not kept.complete
     assert kept.time[-1] == pytest.approx(0.5)
