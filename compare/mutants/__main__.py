@@ -17,6 +17,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m compare.mutants", description=trial.__doc__)
     parser.add_argument("directory", type=Path, metavar="DIR", help="results of 'dualball validate --quick'")
     parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
+    parser.add_argument("--beside", type=Path, metavar="DIR", help="results of another level, tried and shown as well")
     parser.add_argument("--page", type=Path, metavar="FILE", help="page to write")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     parser.add_argument(
@@ -24,15 +25,15 @@ def main() -> int:
     )
     args = parser.parse_args()
     try:
-        tried = trial.theories(args.directory, args.workers)
+        levels = [trial.judged(each, args.workers) for each in (args.directory, args.beside) if each]
         measured = trial.wrong_engines(args.directory, args.workers) if args.engines else []
         if args.page:
-            write_text(args.page, trial.page(tried, measured))
+            write_text(args.page, trial.page(levels, measured))
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    missed = [each.what for each in (*tried, *measured) if not each.noticed]
-    count = len(tried) + len(measured)
+    trials = [*(each for level in levels for each in level.trials), *measured]
+    missed, count = [each.what for each in trials if not each.noticed], len(trials)
     print(f"{count - len(missed)} of {count} faults were noticed")
     for what in missed:
         print(f"nobody noticed: {what}")

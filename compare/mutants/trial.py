@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import signal
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -18,9 +18,10 @@ from types import FrameType
 
 from compare import validation
 from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Claim, Outcome, Verdict
+from compare.claims.claim import Claim, Outcome, Text, Verdict
 from compare.claims.judge import forget, judge, verdict
-from compare.measure.lab import Level
+from compare.measure import lab
+from compare.measure.quantities import QUANTITIES
 from compare.measure.record import Records
 from compare.mutants import engines
 from compare.mutants.engines import WRONG_ENGINES
@@ -64,21 +65,65 @@ def _tried(one: Callable[[int], Trial], count: int, processes: int) -> list[Tria
     return tried
 
 
-def page(tried: Sequence[Trial], measured: Sequence[Trial]) -> str:
-    """The page that says which claim notices what, in Markdown."""
+@dataclass(frozen=True)
+class Judged:
+    """What the measurements of a results directory notice."""
+
+    name: str
+    trials: Sequence[Trial]
+    """Of all wrong theories."""
+    power: Mapping[str, float]
+    """By quantity the relative error of a theory that every check of it notices."""
+
+
+def judged(directory: Path, processes: int = 2) -> Judged:
+    """Every wrong theory judged on the measurements stored in a results directory, and their resolving power."""
+    power: dict[str, float] = {}
+    for each in judge(CLAIMS, _stored(directory)[0]):
+        if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
+            for name, value in each.resolving_power.items():
+                power[name] = max(power.get(name, 0.0), value)
+    return Judged(results.load(directory).level.lower(), theories(directory, processes), power)
+
+
+def page(levels: Sequence[Judged], measured: Sequence[Trial]) -> str:
+    """The page that says which claim notices what, in Markdown; the claims are those of the first level."""
+    first, *others = levels
     lines = [
         "# What the verdicts notice",
         "",
         "Every verdict must be able to be lost. Here the theory is replaced by slightly wrong ones, one at a time,",
-        "and the stored measurements of the quick level are judged again; then MuJoCo is replaced by slightly wrong",
-        "engines that measure anew. A fault is noticed if the verdict on a claim changes. Written by `make mutants`.",
+        f"and the stored measurements of the {first.name} level are judged again; then MuJoCo is replaced by",
+        "slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim changes.",
+        "Written by `make mutants`.",
     ]
-    for title, trials in (("Wrong theories", tried), ("Wrong engines", measured)):
+    for other in others:
+        missed = "".join(f"; not {trial.what}" for trial in other.trials if not trial.noticed)
+        seen = sum(bool(trial.noticed) for trial in other.trials)
+        lines += ["", f"At the {other.name} level {seen} of {len(other.trials)} wrong theories are noticed{missed}."]
+    for title, trials in (("Wrong theories", first.trials), ("Wrong engines", measured)):
         if trials:
             seen = sum(bool(trial.noticed) for trial in trials)
             lines += ["", f"## {title}: {seen} of {len(trials)} noticed", "", "| fault | noticed by |", "|---|---|"]
             lines += [f"| {trial.what} | {_told(trial)} |" for trial in trials]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_powers(levels)]) + "\n"
+
+
+def _powers(levels: Sequence[Judged]) -> Iterator[str]:
+    """A table of the resolving powers, of quantities that are no whole numbers."""
+    yield from (
+        "",
+        "## Resolving power",
+        "",
+        "The relative error of a theory that every measurement of a quantity would",
+    )
+    yield from ("notice, of all sets the largest; and the ceiling, beyond which a check is inconclusive.", "")
+    yield f"| quantity | ceiling | {' | '.join(each.name for each in levels)} |"
+    yield "|---" * (2 + len(levels)) + "|"
+    for name, quantity in QUANTITIES.items():
+        if quantity.resolves and any(name in each.power for each in levels):
+            found = (f"{each.power[name]:.1g}" if name in each.power else "–" for each in levels)
+            yield f"| {quantity.symbol} | {quantity.resolves:.1g} | {' | '.join(found)} |"
 
 
 def _told(trial: Trial) -> str:
@@ -121,7 +166,7 @@ def _engine(directory: Path, number: int) -> Trial:
     _, right = _stored(directory)
     apart = directory / "wrong-engines" / f"{number}"
     claims = [claim.id for claim in CLAIMS if claim.protocols and claim.protocols <= PROVING]
-    verdicts = validation.validate(apart, level=Level.QUICK, claims=claims, engine=wrong, workers=0, report=False)
+    verdicts = validation.validate(apart, level=lab.Level.QUICK, claims=claims, engine=wrong, workers=0, report=False)
     return Trial(wrong.name, _changed(right, _outcomes(verdicts)))
 
 

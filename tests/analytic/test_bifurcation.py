@@ -11,6 +11,7 @@ from analytic import stationary_solutions, thresholds
 from analytic.bifurcation import (
     Exists,
     case_map,
+    critical_drag,
     double_points,
     number_of_folds,
     threshold_curves,
@@ -215,3 +216,14 @@ def test_wall_spin() -> None:
     spins = {s.case: wall_spin(s, P) for s in stationary_solutions(P.replace(omega_0=35.0))}
     assert spins[Case.SR] == pytest.approx(P.g / (P.j * 35.0 * P.r), rel=1e-12)
     assert spins[Case.RR] == pytest.approx(35.0 * P.R / P.r, rel=1e-12)
+
+
+@pytest.mark.parametrize("c", [0.3, 1.0, 8.0])
+def test_critical_drag(c: float) -> None:
+    """With a little less drag than that there is a fold, with a little more none."""
+    p = P.replace(c=c)
+    critical = critical_drag(p)
+    assert thresholds(p.replace(c=critical)).eta_cr == pytest.approx(p.eta, rel=1e-14)
+    assert [number_of_folds(p.replace(c=factor * critical)) for factor in (0.999, 1.001)] == [1, 0]
+    with pytest.raises(InputError):
+        critical_drag(p.replace(eta=0.5))

@@ -425,3 +425,29 @@ def test_both_consistent_between_73_and_the_cone() -> None:
 def test_a_state_of_another_case_is_refused() -> None:
     with pytest.raises(InputError, match="slip_x = 1 rad s-1 must be 0 in case RR"):
         slip.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P)
+
+
+@pytest.mark.parametrize(("case", "eta", "name"), [
+    (Case.RR, 0.2, "omega_01"), (Case.RR, 0.6, "omega_03"), (Case.NR, 0.2, "omega_02"), (Case.SR, 0.6, "omega_02"),
+])  # fmt: skip
+def test_neutral_between_stable_and_unstable(case: Case, eta: float, name: str) -> None:
+    """Definition 3 at the thresholds of (82), (74) and (61), from wherever it is looked for."""
+    threshold = getattr(thresholds(P.replace(eta=eta)), name)
+    for factor in (0.95, 1.05):
+        assert slip.neutral_flow(case, P.replace(eta=eta, omega_0=factor * threshold)) == pytest.approx(
+            threshold, 1e-14
+        )
+    assert np.isnan(slip.neutral_flow(case, P.replace(eta=eta, omega_0=0.5 * threshold)))
+
+
+def test_lift_begins_where_the_normal_force_of_the_floor_ends() -> None:
+    """A_y of SR and SS vanishes there; out of RR it is omega_03; out of RS the ball never lifts."""
+    for inner, outer, x in (
+        (Case.SR, Case.NR, State(omega_c=30.0, slip_x=-90.0)),
+        (Case.SS, Case.NS, State(omega_c=30.0, slip_x=20.0, slip_y=5.0, slip_z=50.0)),
+    ):
+        onset = slip.lift_onset(inner, outer, x, P)
+        (_, A_y, _), _ = contact_forces(inner, x._replace(omega_c=onset), P.replace(omega_0=onset))
+        assert abs(A_y) < 1e-12 * P.m * P.g
+    assert slip.lift_onset(Case.RR, Case.NR, rolling(15.0), P) == pytest.approx(thresholds(P).omega_03, 1e-14)
+    assert np.isnan(slip.lift_onset(Case.RS, Case.NS, State(omega_c=15.0, slip_y=40.0), P))

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 import analytic
-from analytic import slip_bounds, slip_stability
+from analytic import bifurcation, slip_bounds, slip_stability
 from compare.claims import cases, equations, formal, slipping
 from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import judge
-from compare.measure import bounds, field, growth, impacts, motions, watched
+from compare.measure import birth, bounds, field, growth, impacts, lift, motions, watched
 from compare.measure.lab import Lab, Level
 from compare.measure.record import Measurement, Records
+from compare.measure.sets import sets
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MUJOCO
 from model import Case, Parameters, storage
@@ -111,9 +112,9 @@ def test_growth_passes_through_zero_where_it_should(lab: Lab, monkeypatch: pytes
     assert outcomes(slipping.CLAIMS, found)["eq-66"].outcome is Outcome.REFUTED
 
 
-def _end(quantity: str) -> Measurement:
+def _end(quantity: str, name: str = "reference") -> Measurement:
     """A flow at which rolling ends, as if it had been measured before."""
-    p = SETS["reference"]
+    p = sets(Level.QUICK)[name]
     value = getattr(analytic.thresholds(p), quantity)
     return Measurement(
         protocol="thresholds",
@@ -121,9 +122,34 @@ def _end(quantity: str) -> Measurement:
         value=value,
         uncertainty=1e-4 * value,
         engine="mujoco",
-        set="reference",
+        set=name,
         parameters=p,
     )
+
+
+def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = Records.of(
+        lift.measure(lab, {name: sets(Level.QUICK)[name] for name in ("rubber-wall", "rough-floor")}, Records())
+    )
+    ids = [f"lift-{inner.name}-{outer.name}" for inner, outer in slip_stability.LIFT_ARROWS]
+    verdicts = outcomes(slipping.CLAIMS, found)
+    assert {verdicts[name].outcome for name in ids} == {Outcome.CONFIRMED}
+    right = slip_stability.lift_acceleration
+    monkeypatch.setattr(
+        slip_stability,
+        "lift_acceleration",
+        lambda a, b, x, p: right(a, b, x, p.replace(j=1.03 * p.j, eta=1.03 * p.eta)),
+    )
+    verdicts = outcomes(slipping.CLAIMS, found)
+    assert [verdicts[name].outcome for name in ids if "RS" not in name] == [Outcome.REFUTED] * 3
+
+
+def test_the_fold_is_born_at_the_critical_drag(lab: Lab) -> None:
+    name = "thick-fluid"
+    known = Records(tuple(_end(quantity, name) for quantity in ("omega_01", "omega_02")))
+    found = Records.of(birth.measure(lab, {name: sets(Level.QUICK)[name]}, known))
+    (m,) = found.measurements
+    assert abs(m.value - bifurcation.critical_drag(m.parameters)) < 3 * m.uncertainty < 5e-3 * m.value
 
 
 def test_without_friction_nothing_rolls_and_the_reader_is_told(lab: Lab) -> None:
