@@ -120,6 +120,17 @@ def test_settles_where_the_other_simulators_do(values):
     assert np.ptp(jammed.omega_c[-50:]) > 1  # sticks and slips for ever
 
 
+def test_a_slight_disturbance_ends_rolling_in_time_stepping_too():
+    """Beyond its end RR may go on undisturbed in time stepping; a slip of 1e-5 of the spin lasts as the rule says."""
+    p, _ = random_start(75)  # a floor with mu = 1.6
+    omega_c = 0.8435 * p.omega_0
+    assert rolling_forces.slip_margin(omega_c, p) < 0 < rolling_forces.margin(omega_c, p)
+    x0 = State(omega_c=omega_c, slip_z=1e-5 * p.omega_0 * p.R / p.r)
+    event, stepped = (simulate(p, x0, 0.2, sample_interval=0.02, method=m) for m in ("event", "time-stepping"))
+    np.testing.assert_allclose(stepped.omega_c, event.omega_c, atol=1e-3 * p.omega_0)
+    assert np.ptp(event.omega_c) > 0.01 * p.omega_0
+
+
 @pytest.mark.parametrize("mu", [0.05, 0.6, 1.7, 3.0])
 @pytest.mark.parametrize("eta", [0.05, 0.3, 0.8, 1.7])
 def test_the_papers_bounds(mu, eta):
