@@ -116,8 +116,8 @@ def test_settles_where_the_other_simulators_do(values):
     run = simulate(p, np.zeros(6), 60 / p.c, sample_interval=1.0)
     assert run.cases[-1] is Case.SS
     np.testing.assert_allclose(run.x[-1], settled.state, atol=1e-6 * p.omega_0)
-    jammed = simulate(p, np.zeros(6), 10.0, sample_interval=0.1, leave_rolling="infeasible")
-    assert np.ptp(jammed.omega_c[-50:]) > 1  # sticks and slips for ever
+    jammed = simulate(p, np.zeros(6), 4.0, sample_interval=0.1, leave_rolling="infeasible")
+    assert np.ptp(jammed.omega_c[-20:]) > 1  # sticks and slips for ever
 
 
 def test_a_slight_disturbance_ends_rolling_in_time_stepping_too():
