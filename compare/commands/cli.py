@@ -41,7 +41,7 @@ _MODULES = {
     "simulate": ("simulate",),
     "validate": ("validate", "judge"),
     "sweep": ("sweep", "collect"),
-    "search": ("search",),
+    "search": ("search", "basins"),
     "look": ("report", "figures", "inspect", "render", "view"),
     "grade": ("grade",),
     "benchmark": ("benchmark",),

@@ -1,4 +1,4 @@
-"""``dualball search``: where in parameter space the ball hops for ever, resumable."""
+"""``dualball search`` and ``dualball basins``: where the ball hops for ever, over parameters and over starts."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from rich.console import Console
 from rich.markdown import Markdown
 
 from compare.commands import options, running
-from compare.runs import progress, regions, search
+from compare.runs import basins, progress, regions, search
 from compare.runs.search import BOX, Search
 from compare.runs.workers import processes
 from model import InputError
 from model.files import write_text
+from model.kinematics import UNITS, VARIABLES
 from model.parameters import POSITIVE, Range, check_names, check_number, parse_number
 
 
@@ -34,6 +35,20 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--page", type=Path, metavar="FILE", help="write the table as Markdown")
     command.add_argument("--json", action="store_true", help="print the sets with hopping as JSON")
     command.add_argument("--quiet", action="store_true", help="no progress")
+
+    command = options.command(
+        commands, "basins", plane, "what becomes of the ball from each start of a plane of states"
+    )
+    options.add_parameters(command)
+    running.add_start(command)
+    for name, example in (("across", "omega_c=0:150:61"), ("up", "slip_x=-900:900:61")):
+        command.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=f"as {example}")
+    command.add_argument(
+        "--mujoco", type=int, default=0, metavar="N", help="MuJoCo, too, on every N-th point both ways"
+    )
+    command.add_argument("--timestep", type=options.number, default=2.5e-4, metavar="s", help="that of MuJoCo")
+    command.add_argument("--save", type=Path, metavar="FILE", help="write the map as JSON")
+    command.add_argument("--json", action="store_true", help="print the shares as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -69,3 +84,33 @@ def _range(text: str) -> tuple[str, tuple[float, float]]:
     if first >= last:
         raise InputError(f"{name} = {first:g}:{last:g} is in the wrong order: a range runs from low to high")
     return name, (first, last)
+
+
+def plane(args: argparse.Namespace) -> int:
+    """Map the basins and show their shares."""
+    p = options.parameters(args)
+    coarse = int(check_number("mujoco", args.mujoco, "points", Range(0, whole=True)))
+    found = basins.basins(p, running.start(args)._asdict(), _axis(args.across), _axis(args.up), coarse, args.timestep)
+    if args.save:
+        found.save(args.save)
+    shares = {fate: found.share(fate) for fate in basins.FATES if found.share(fate)[0]}
+    differ = found.differences().tolist() if coarse else []
+    if args.json:
+        print(json.dumps({"shares": shares, "mujoco": found.mujoco.size, "differences": differ}))
+        return 0
+    for fate, (hits, of) in shares.items():
+        low, high = regions.interval(hits, of)
+        print(f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to {100 * high:.1f} %)")
+    if coarse:
+        print(f"MuJoCo differs at {len(differ)} of {found.mujoco.size} starts, so many cells from a boundary: {differ}")
+    return 0
+
+
+def _axis(text: str) -> tuple[str, float, float, int]:
+    name, _, rest = text.partition("=")
+    low, high, count = [*rest.split(":"), "", "", ""][:3]
+    if name not in VARIABLES:
+        raise InputError(f"unknown state variable {name!r}{suggestion(name, VARIABLES)}; known: {', '.join(VARIABLES)}")
+    unit = UNITS[VARIABLES.index(name)]
+    points = parse_number(f"count of {name}", count, "points", Range(2, whole=True))
+    return name, parse_number(name, low, unit), parse_number(name, high, unit), int(points)

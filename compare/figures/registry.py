@@ -14,6 +14,7 @@ from compare.figures import (
     characteristic,
     deviations,
     flow_curve,
+    hopping,
     parameter_plane,
     settings,
     slipping,
@@ -73,6 +74,20 @@ FIGURES: dict[str, Drawing] = {
     "fig-13-left": _of_paper(flow_curve, "fig-13-left", "Fig. 13, left: hysteresis, η < j"),
     "fig-13-right": _of_paper(flow_curve, "fig-13-right", "Fig. 13, right: η > j"),
     "unloading": _of(unloading, "Section 5.3: the fall at unloading", "", "fig-13-right"),
+    "hopping": Drawing(
+        title="Beyond the paper: where the ball hops for ever",
+        select=hopping.where,
+        draw=hopping.draw_where,
+        caption=hopping.caption_where,
+        background=True,
+    ),
+    "basins": Drawing(
+        title="Beyond the paper: basins",
+        select=hopping.plane,
+        draw=hopping.draw_plane,
+        caption=hopping.caption_plane,
+        background=True,
+    ),
 }
 """Every figure by its file name, in the order of the report."""
 

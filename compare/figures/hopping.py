@@ -1,0 +1,149 @@
+"""Where the ball hops for ever, and the basins of its attractors: drawn from results that are kept beside this module.
+
+`dualball search --save` and `dualball basins --save` write such results.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from compare.figures import style
+from compare.runs.basins import FATES, Basins
+from compare.runs.regions import interval
+from compare.runs.search import LOGARITHMIC, Searched
+from model.kinematics import VARIABLES
+
+_DATA = Path(str(resources.files("compare.figures")))
+_PAIRS = (("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0"))
+_CELLS = 8
+_LABELS = {"mu": "μ", "eta": "η", "kappa": "κ", "Omega_0": "$Ω_0 = ω_0\\sqrt{R/g}$", "j": "j"}
+_COLOURS = ("#F0E442", "#0072B2", "#D55E00", "#009E73", "#000000")
+"""Of `FATES`."""
+
+
+def where(material: object) -> Searched:
+    """The kept search."""
+    return Searched.load(_DATA / "hopping.json")
+
+
+def draw_where(found: Searched) -> Figure:
+    """Sets with hopping over pairs of groups, on the share of sets that have it."""
+    figure = style.figure(10.5, 3.5)
+    points = dict(zip(found.search.box, found.search.points(found.sets).T, strict=True))
+    for axes, (a, b) in zip(figure.subplots(1, len(_PAIRS)), _PAIRS, strict=True):
+        edges = [_edges(name, *found.search.box[name]) for name in (a, b)]
+        rows = found.confirmed
+        tried, *_ = np.histogram2d(points[a], points[b], edges)
+        hopping, *_ = np.histogram2d([r[a] for r in rows], [r[b] for r in rows], edges)
+        with np.errstate(invalid="ignore"):
+            share = axes.pcolormesh(*edges, 100 * (hopping / tried).T, cmap="Blues", vmin=0, zorder=0)
+        figure.colorbar(share, ax=axes, label="sets that hop, %")
+        for simple, mark, colour in ((True, "o", "#D55E00"), (False, "^", "#000000")):
+            own = [r for r in rows if (r["confirmed"]["landings"] == 1) is simple]
+            label = "one landing a period" if simple else "several, or no period"
+            axes.plot([r[a] for r in own], [r[b] for r in own], mark, ms=3.2, mfc="none", color=colour, label=label)
+        _scales(axes, a, b)
+    style.legend(figure.axes[0], loc="lower right", fontsize=7.5)
+    return figure
+
+
+def _edges(name: str, low: float, high: float) -> np.ndarray:
+    return (np.geomspace if name in LOGARITHMIC else np.linspace)(low, high, _CELLS + 1)
+
+
+def _scales(axes: Axes, a: str, b: str) -> None:
+    axes.set(xlabel=_LABELS[a], ylabel=_LABELS[b])
+    if a in LOGARITHMIC:
+        axes.set_xscale("log")
+    if b in LOGARITHMIC:
+        axes.set_yscale("log")
+
+
+def caption_where(found: Searched) -> str:
+    """What was searched, and the share with its confidence."""
+    count = len(found.confirmed)
+    low, high = interval(count, found.sets)
+    box = ", ".join(
+        f"{_LABELS.get(k, k).split(' =')[0].strip('$')} {a:g} … {b:.3g}" for k, (a, b) in found.search.box.items()
+    )
+    return (
+        f"Sets in which the ball hops for ever from some of {found.search.starts} random starts, found by time "
+        f"stepping and confirmed by the event-driven simulation: {count} of {found.sets} sets, "
+        f"{100 * count / found.sets:.2f} % ({100 * low:.2f} to {100 * high:.2f} % with 95 % confidence). Box: {box}. "
+        "r/R plays no part, as it drops out of the equations."
+    )
+
+
+def plane(material: object) -> Basins:
+    """The kept basins."""
+    return Basins.load(_DATA / "basins.json")
+
+
+def draw_plane(basins: Basins) -> Figure:
+    """The map by time stepping, and a point for each run of MuJoCo."""
+    figure = style.figure(6.2, 4.4)
+    axes = figure.subplots()
+    colours = ListedColormap([*_COLOURS])
+    axes.pcolormesh(
+        basins.x, basins.y, basins.fates, cmap=colours, vmin=-0.5, vmax=len(FATES) - 0.5, alpha=0.55, shading="nearest"
+    )
+    present = set(np.unique(basins.fates)) | set(np.unique(basins.mujoco))
+    handles: list[object] = [Patch(color=_COLOURS[k], alpha=0.55, label=FATES[k]) for k in sorted(present)]
+    if basins.coarse:
+        x, y = np.meshgrid(basins.x[:: basins.coarse], basins.y[:: basins.coarse])
+        for k in sorted(set(basins.mujoco.ravel().tolist())):
+            own = basins.mujoco == k
+            axes.plot(x[own], y[own], "o", ms=4, color=_COLOURS[k], mec="k", mew=0.4)
+        differ = basins.mujoco != basins.fates[:: basins.coarse, :: basins.coarse]
+        handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
+        handles += axes.plot([], [], "o", ms=4, color="white", mec="k", mew=0.6, label="MuJoCo")
+    axes.set(xlabel=f"{_SYMBOLS[basins.across]} at the start", ylabel=f"{_SYMBOLS[basins.up]} at the start")
+    axes.legend(handles=handles, fontsize=8, loc="upper left", framealpha=0.95)
+    return figure
+
+
+_SYMBOLS = {
+    "omega_c": style.OMEGA_C, "slip_x": "$\\tilde\\omega_x$ (rad/s)", "slip_y": "$\\tilde\\omega_y$ (rad/s)",
+    "slip_z": "$\\tilde\\omega_z$ (rad/s)", "y": "y (m)", "v_y": "$v_y$ (m/s)", "h": "h (m)", "v_h": "$v_h$ (m/s)",
+}  # fmt: skip
+
+
+def caption_plane(basins: Basins) -> str:
+    """The parameters, the other variables, shares with confidence, and where the two engines differ."""
+    p = basins.parameters
+    fixed = ", ".join(f"{n} = {v:.3g}" for n, v in _fixed(basins))
+    text = (
+        f"What becomes of a ball that starts on a plane of states ({fixed}; all others zero). "
+        f"{style.named(p)}, Ω₀ = {p.omega_0 * math.sqrt(p.R / p.g):.3g}. Ground: time stepping, "
+        f"{basins.fates.size} starts: "
+    )
+    text += "; ".join(_share(basins, fate) for fate in FATES if basins.share(fate)[0])
+    if basins.coarse:
+        far = basins.differences()
+        text += f". Dots: MuJoCo at {1e3 * basins.timestep:g} ms; {len(far)} of {basins.mujoco.size} differ"
+        text += (
+            f", {np.sum(far <= 1)} of them next to a boundary, the others up to {far.max():g} cells away"
+            if len(far)
+            else ""
+        )
+    return text + "."
+
+
+def _fixed(basins: Basins) -> Sequence[tuple[str, float]]:
+    varied = (basins.across, basins.up)
+    return [(n, v) for n, v in zip(VARIABLES, basins.start, strict=True) if v != 0 and n not in varied]
+
+
+def _share(basins: Basins, fate: str) -> str:
+    hits, of = basins.share(fate)
+    low, high = interval(hits, of)
+    return f"{fate} {100 * hits / of:.1f} % ({100 * low:.1f} to {100 * high:.1f} % with 95 % confidence)"
