@@ -12,7 +12,7 @@ from rich.markdown import Markdown
 
 from compare.commands import options, running
 from compare.runs import basins, progress, regions, search
-from compare.runs.search import BOX, Search
+from compare.runs.search import BOX, Search, Searched
 from compare.runs.workers import processes
 from model import InputError
 from model.files import write_text
@@ -31,6 +31,7 @@ def add(commands: options.Commands) -> None:
     )
     command.add_argument("-o", "--output", type=Path, default=Path("search"), metavar="DIR")
     running.add_workers(command)
+    command.add_argument("--kept", action="store_true", help="show the results that come with the program instead")
     command.add_argument("--save", type=Path, metavar="FILE", help="write the sets with hopping as JSON")
     command.add_argument("--page", type=Path, metavar="FILE", help="write the table as Markdown")
     command.add_argument("--json", action="store_true", help="print the sets with hopping as JSON")
@@ -53,6 +54,19 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Search what hasn't been searched yet, and show the table."""
+    searches = [regions.kept(name) for name in regions.KEPT] if args.kept else [_searched(args)]
+    if args.save:
+        searches[0].save(args.save)
+    if args.page:
+        write_text(args.page, regions.page(*searches))
+    if args.json:
+        print(json.dumps([dataclasses.asdict(each) for each in searches], indent=1))
+    else:
+        Console().print(Markdown(regions.page(*searches)))
+    return 0
+
+
+def _searched(args: argparse.Namespace) -> Searched:
     count = int(check_number("sets", args.sets, "sets", Range(1, whole=True)))
     starts = int(check_number("starts", args.starts, "starts", Range(1, whole=True)))
     box = dict(BOX) | dict(_range(text) for text in args.range)
@@ -62,16 +76,7 @@ def run(args: argparse.Namespace) -> int:
     with progress.shown(quiet=args.quiet or args.json) as show:
         pool = processes(workers) if isinstance(workers, int) else workers
         searched = Search(box, starts, args.seed)
-        hopping = search.run(args.output, searched, count, pool, lambda done, total: show("search", done, total, 0))
-    if args.save:
-        hopping.save(args.save)
-    if args.page:
-        write_text(args.page, regions.page(hopping))
-    if args.json:
-        print(json.dumps(dataclasses.asdict(hopping), indent=1))
-    else:
-        Console().print(Markdown(regions.page(hopping)))
-    return 0
+        return search.run(args.output, searched, count, pool, lambda done, total: show("search", done, total, 0))
 
 
 def _range(text: str) -> tuple[str, tuple[float, float]]:
@@ -109,8 +114,7 @@ def plane(args: argparse.Namespace) -> int:
 def _axis(text: str) -> tuple[str, float, float, int]:
     name, _, rest = text.partition("=")
     low, high, count = [*rest.split(":"), "", "", ""][:3]
-    if name not in VARIABLES:
-        raise InputError(f"unknown state variable {name!r}{suggestion(name, VARIABLES)}; known: {', '.join(VARIABLES)}")
+    check_names([name], VARIABLES, "state variable")
     unit = UNITS[VARIABLES.index(name)]
     points = parse_number(f"count of {name}", count, "points", Range(2, whole=True))
     return name, parse_number(name, low, unit), parse_number(name, high, unit), int(points)

@@ -1,4 +1,4 @@
-"""Where the ball hops for ever, and the basins of its attractors: drawn from results that are kept beside this module.
+"""Where the ball hops for ever, and the basins of its attractors: drawn from results that are kept in `compare.runs`.
 
 `dualball search --save` and `dualball basins --save` write such results.
 """
@@ -17,12 +17,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from compare.figures import style
+from compare.runs import regions
 from compare.runs.basins import FATES, Basins
 from compare.runs.regions import interval
 from compare.runs.search import LOGARITHMIC, Searched
 from model.kinematics import VARIABLES
 
-_DATA = Path(str(resources.files("compare.figures")))
 _PAIRS = (("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0"))
 _CELLS = 8
 _LABELS = {"mu": "μ", "eta": "η", "kappa": "κ", "Omega_0": "$Ω_0 = ω_0\\sqrt{R/g}$", "j": "j"}
@@ -32,7 +32,7 @@ _COLOURS = ("#F0E442", "#0072B2", "#D55E00", "#009E73", "#000000")
 
 def where(material: object) -> Searched:
     """The kept search."""
-    return Searched.load(_DATA / "hopping.json")
+    return regions.kept()
 
 
 def draw_where(found: Searched) -> Figure:
@@ -85,7 +85,7 @@ def caption_where(found: Searched) -> str:
 
 def plane(material: object) -> Basins:
     """The kept basins."""
-    return Basins.load(_DATA / "basins.json")
+    return Basins.load(Path(str(resources.files("compare.runs"))) / "basins.json")
 
 
 def draw_plane(basins: Basins) -> Figure:

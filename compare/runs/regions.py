@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
 
 import numpy as np
 
@@ -59,31 +61,38 @@ def extremes(found: Searched) -> dict[str, tuple[float, float]]:
     return {name: (min(r[name] for r in rows), max(r[name] for r in rows)) for name in BOX} if rows else {}
 
 
-def page(found: Searched) -> str:
-    """The result as a page of Markdown."""
-    count, rows = len(found.confirmed), found.rows
-    low, high = interval(count, found.sets)
-    lines = [
-        "# Where the ball hops for ever",
-        "",
-        f"Of {found.sets} sets, each started from {found.search.starts} random states, {count} have a hopping "
-        "attractor that was reached and that the event-driven simulation confirms: "
-        f"{100 * count / found.sets:.2f} % "
-        f"({100 * low:.2f} to {100 * high:.2f} % with {CONFIDENCE:.0%} confidence; an attractor with a small basin is "
-        "missed, so that this is what five starts find and a lower bound of what there is). "
-        f"By time stepping {len(rows)} sets still hopped after 60/c. {found.failed} runs broke down. "
-        "The rest came to rest in a stationary state, or at least did not land any more.",
-        "",
-        "| of those confirmed | sets |", "| :-- | --: |",
-    ]  # fmt: skip
+KEPT = ("hopping-box.json", "hopping-strong-drag.json", "hopping-low-friction.json")
+"""Searches that are kept beside this module: over the whole box, and where that shows that hopping goes on."""
+
+
+def kept(name: str = KEPT[0]) -> Searched:
+    """A search that is kept."""
+    return Searched.load(Path(str(resources.files("compare.runs"))) / name)
+
+
+def page(*searches: Searched) -> str:
+    """Results as a page of Markdown."""
+    return "\n".join(["# Where the ball hops for ever", "", *(line for each in searches for line in _section(each))])
+
+
+def _section(found: Searched) -> list[str]:
+    count, (low, high) = len(found.confirmed), interval(len(found.confirmed), found.sets)
     periods = [row["confirmed"]["landings"] for row in found.confirmed]
-    for landings in sorted(set(periods) - {0}):
-        lines.append(f"| {landings} landing{'s' * (landings > 1)} a period | {periods.count(landings)} |")
-    lines += [f"| no period of up to 16 landings | {periods.count(0)} |", ""]
-    lines += ["| | smallest with hopping | largest | searched |", "| :-- | --: | --: | --: |"]
-    for name, (least, most) in extremes(found).items():
-        a, b = found.search.box[name]
-        lines.append(f"| {name} | {least:.3g} | {most:.3g} | {a:.3g} to {b:.3g} |")
+    kinds = [f"{periods.count(n)} with {n} landing{'s' * (n > 1)} a period" for n in sorted(set(periods) - {0})]
+    box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in found.search.box.items())
+    lines = [
+        f"## {found.sets} sets in {box}",
+        "",
+        f"Each was started from {found.search.starts} random states. In {count} sets some start leads to hopping that "
+        f"the event-driven simulation confirms: {100 * count / found.sets:.2f} %, or {100 * low:.2f} to {100 * high:.2f} % "
+        f"with {CONFIDENCE:.0%} confidence. That is what {found.search.starts} starts find: an attractor with a small "
+        f"basin is missed. Of them {', '.join([*kinds, f'{periods.count(0)} without a period of up to 16 landings'])}. "
+        f"By time stepping {len(found.rows)} sets still hopped after 60/c; {found.failed} runs broke down. In all "
+        "other sets every ball stopped landing.",
+        "",
+    ]  # fmt: skip
+    lines += ["| | smallest with hopping | largest |", "| :-- | --: | --: |"]
+    lines += [f"| {name} | {least:.3g} | {most:.3g} |" for name, (least, most) in extremes(found).items()]
     lines += ["", "| | from | to | sets | hopping | share, % | 95 % interval, % |"]
     lines += ["| :-- | --: | --: | --: | --: | --: | --: |"]
     for part in parts(found):
@@ -93,4 +102,4 @@ def page(found: Searched) -> str:
             f"| {part.group} | {part.low:.3g} | {part.high:.3g} | {part.sets} | {part.hopping} | {share} "
             f"| {100 * low:.2f} … {100 * high:.2f} |"
         )
-    return "\n".join([*lines, ""])
+    return [*lines, ""]

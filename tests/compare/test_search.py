@@ -1,0 +1,118 @@
+"""A search covers its box evenly, goes on where it stopped, and says what it knows with its confidence."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+from analytic import hopping
+from compare.commands import cli
+from compare.runs import regions, search
+from compare.runs.search import BOX, Search, Searched, carry_out, parameters
+from compare.runs.workers import processes
+from model import Parameters, StorageError
+
+QUICK = Search({**BOX, "kappa": (0.5, 1.0)}, starts=2)
+
+
+def hopping_set() -> Parameters:
+    """A set of the kept search whose ball hops once a period, and soon."""
+    row = max((r for r in regions.kept().confirmed if r["confirmed"]["landings"] == 1), key=lambda r: r["kappa"])
+    return parameters(np.array([row[name] for name in BOX]))
+
+
+def test_points_fill_the_box_and_a_longer_search_contains_the_shorter():
+    points = Search().points(64)
+    low, high = np.array(list(BOX.values())).T
+    assert np.all((points >= low) & (points <= high))
+    np.testing.assert_array_equal(Search().points(1000)[:64], points)
+    halves = points[:, 0] < math.sqrt(low[0] * high[0])
+    assert halves.sum() == 32  # a Sobol sequence puts equally many into each half, here of log mu
+
+
+def test_the_groups_of_a_point_are_those_of_its_parameters():
+    point = Search().points(1)[0]
+    p = parameters(point)
+    np.testing.assert_allclose([p.mu, p.eta, p.j, p.r / p.R, p.kappa, p.Omega_0], point)
+
+
+def test_a_search_goes_on_where_it_stopped(tmp_path):
+    """A chunk that is there is read, not computed: nothing is left for the workers to do."""
+    points = QUICK.points(search.CHUNK)[:, :]
+    path = tmp_path / f"{QUICK.key(0)}.json"
+    rows = [{"hops": 0, "failed": 0}] * (search.CHUNK - 1) + [{"hops": 1, "failed": 1, "x": [], "confirmed": None}]
+    path.write_text(json.dumps({"chunk": 0, "rows": rows}), "utf-8")
+    seen = []
+    found = search.run(tmp_path, QUICK, 10, processes(1), lambda done, total: seen.append((done, total)))
+    assert seen == [(search.CHUNK, search.CHUNK)]
+    assert (found.sets, found.failed, len(found.rows), found.confirmed) == (search.CHUNK, 1, 1, [])
+    assert found.rows[0]["mu"] == points[-1, 0]
+
+
+def test_a_chunk_is_the_same_whoever_computes_it(tmp_path):
+    points = QUICK.points(search.CHUNK)[:3]
+    for name in ("a", "b"):
+        carry_out(QUICK, 0, points, tmp_path / name)
+    assert (tmp_path / "a").read_text() == (tmp_path / "b").read_text()
+    assert len(json.loads((tmp_path / "a").read_text())["rows"]) == 3
+
+
+def test_screen_and_confirmation_tell_hopping_from_rest():
+    """A ball hops on in a kept set; in the reference set it comes to rest whatever it starts with."""
+    p = hopping_set()
+    x0s = search.random_starts(p, 20, np.random.default_rng(0))
+    hops, x, failed = hopping.screen(p, x0s)
+    assert failed == 0
+    assert hops.any()
+    found = hopping.confirm(p, x[hops][0])
+    assert found is not None
+    assert found.landings == 1
+    still = Parameters.named("reference").replace(omega_0=25.0)
+    hops, x, _ = hopping.screen(still, search.random_starts(still, 3, np.random.default_rng(0)))
+    assert not hops.any()
+    assert hopping.confirm(still, x[0]) is None
+
+
+def test_intervals_of_shares():
+    """Against the closed form of no hit in n: 1 - (alpha/2)^(1/n)."""
+    assert regions.interval(0, 900)[1] == pytest.approx(1 - 0.025 ** (1 / 900), rel=1e-9)
+    assert regions.interval(0, 0) == (0.0, 1.0)
+
+
+def test_the_parts_of_a_range_are_all_of_it():
+    found = regions.kept()
+    for name in BOX:
+        own = [part for part in regions.parts(found) if part.group == name]
+        assert sum(part.sets for part in own) == found.sets
+        assert sum(part.hopping for part in own) == len(found.confirmed)
+
+
+@pytest.mark.parametrize("name", regions.KEPT)
+def test_kept_searches_are_whole(name, tmp_path):
+    found = regions.kept(name)
+    rows = found.search.points(found.sets)
+    assert found.failed == 0
+    for row in found.rows:
+        assert np.min(np.abs(rows - [row[group] for group in BOX]).sum(axis=1)) < 1e-9
+    found.save(tmp_path / "again.json")
+    assert dataclasses.asdict(Searched.load(tmp_path / "again.json")) == dataclasses.asdict(found)
+
+
+def test_a_file_that_is_no_search(tmp_path):
+    (tmp_path / "no.json").write_text("{}", "utf-8")
+    with pytest.raises(StorageError, match="holds no search"):
+        Searched.load(tmp_path / "no.json")
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    (["--range", "mo=1:2"], "unknown group 'mo'"), (["--range", "mu=2:1"], "wrong order"),
+    (["--range", "mu=2"], "write mu=from:to"), (["--range", "mu=-1:1"], "mu = -1"), (["--sets", "0"], "sets = 0"),
+    (["--workers", "0"], "workers = 0"),
+])  # fmt: skip
+def test_bad_input(words, message, capsys):
+    assert cli.main(["search", *words]) == 2
+    assert message in capsys.readouterr().err
