@@ -84,9 +84,10 @@ def _section(found: Searched) -> list[str]:
         f"## {found.sets} sets in {box}",
         "",
         f"Each was started from {found.search.starts} random states. In {count} sets some start leads to hopping that "
-        f"the event-driven simulation confirms: {100 * count / found.sets:.2f} %, or {100 * low:.2f} to {100 * high:.2f} % "
-        f"with {CONFIDENCE:.0%} confidence. That is what {found.search.starts} starts find: an attractor with a small "
-        f"basin is missed. Of them {', '.join([*kinds, f'{periods.count(0)} without a period of up to 16 landings'])}. "
+        f"the event-driven simulation confirms: {100 * count / found.sets:.2f} %, or {100 * low:.2f} to "
+        f"{100 * high:.2f} % with {CONFIDENCE:.0%} confidence. That is what {found.search.starts} starts find: an "
+        "attractor with a small basin is missed. "
+        f"Of them {', '.join([*kinds, f'{periods.count(0)} without a period of up to 16 landings'])}. "
         f"By time stepping {len(found.rows)} sets still hopped after 60/c; {found.failed} runs broke down. In all "
         "other sets every ball stopped landing.",
         "",
