@@ -1,0 +1,254 @@
+"""Branches of periodic motions: an orbit followed in one parameter to where it is born and where it dies.
+
+The branch is followed by its length (in natural units of the state, and the logarithm of the parameter), so that it may
+turn back: a step along the tangent, then Newton's method across it. Where stability or the sequence of cases changes
+between two orbits, the place is located.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from enum import StrEnum
+
+import numpy as np
+from scipy.optimize import brentq
+
+from analytic.orbits import Changes, Loop, NoOrbitError, Orbit, close, extent, jacobian
+from model import Contact, InputError, Parameters
+from model.arrays import Array
+from model.errors import suggestion
+from model.parameters import check_number
+
+FIRST, SMALLEST, LONGEST = 0.02, 1e-5, 0.5
+"""Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
+EASY = 5
+"""Steps of Newton's method up to which the next step along the branch is longer."""
+SHARP = 1e-6
+"""How sharply a change of stability is located along the branch; a change of the sequence of cases by `HALVINGS`."""
+HALVINGS = 14
+SMALL = 0.05
+"""Extent over the largest of the branch below which an orbit is followed no further, but on to none at all."""
+
+
+class Bifurcation(StrEnum):
+    """What happens to a branch of orbits at a place."""
+
+    FOLD = "fold"
+    """It turns back."""
+    DOUBLING = "period doubling"
+    """A multiplier passes -1."""
+    TORUS = "torus"
+    """A pair of multipliers passes the unit circle (Neimark and Sacker)."""
+    GRAZING = "grazing"
+    """The number of landings in a period changes."""
+    PERSISTENCE = "persistence"
+    """The sequence of cases changes without a landing more or less, and the orbit goes on."""
+    HOPF = "Hopf"
+    """It shrinks to a stationary motion within one case."""
+    BIRTH = "nonsmooth birth"
+    """It shrinks to a stationary motion at which cases meet: its extent falls linearly, not like a root."""
+    LOST = "lost"
+    """No orbit is found any further."""
+    RANGE = "end of the range"
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place on a branch."""
+
+    kind: Bifurcation
+    value: float
+    """The parameter there, SI."""
+    orbit: Orbit
+    """The orbit there, or nearest to it."""
+    reason: str = ""
+    """Why the branch is lost."""
+
+    def __str__(self) -> str:
+        return f"{self.kind} at {self.value:.6g}" + (f" ({self.reason})" if self.reason else "")
+
+
+@dataclass(frozen=True)
+class OrbitBranch:
+    """Orbits along a branch, from one end to the other."""
+
+    name: str
+    """The parameter that varies."""
+    orbits: tuple[Orbit, ...]
+    places: tuple[Place, ...]
+    """Where something happens, in order; the first and the last are its ends."""
+
+    @property
+    def values(self) -> Array:
+        """The parameter at the orbits, SI, shape (n,)."""
+        return np.array([getattr(orbit.p, self.name) for orbit in self.orbits])
+
+    @property
+    def stable(self) -> Array:
+        """Whether each orbit is stable, shape (n,)."""
+        return np.array([orbit.stable for orbit in self.orbits])
+
+
+def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) -> OrbitBranch:
+    """Follow an orbit both ways in a parameter until it leaves [low, high], ends, or `most` orbits are known each way.
+
+    Raises
+    ------
+    InputError
+        If there is no such parameter, or the orbit isn't within the range.
+    """
+    names = [field.name for field in fields(Parameters)]
+    if name not in names:
+        raise InputError(f"unknown parameter {name!r}{suggestion(name, names)}; there are {', '.join(names)}")
+    low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
+    if not low <= (value := getattr(start.p, name)) <= high or value == 0:
+        raise InputError(f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, not 0")
+    down, up = ([*_way(start, name, (low, high), sign, most)] for sign in (-1.0, 1.0))
+    every = [each for each in (*down[::-1], start, *up)]
+    return OrbitBranch(
+        name,
+        tuple(each for each in every if isinstance(each, Orbit)),
+        tuple(each for each in every if isinstance(each, Place)),
+    )
+
+
+def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: int) -> Iterator[Orbit | Place]:
+    """Orbits and places one way from an orbit, to the end."""
+    here, step, before, reason = start, FIRST, [start], ""
+    along = np.append(np.zeros(len(start.loop.free)), sign)
+    for _ in range(most):
+        matrix = jacobian(here.loop, name)
+        along = _tangent(matrix, along)
+        there = None
+        while there is None and step > SMALLEST:
+            try:
+                there = _beside(here, step * along, name, matrix)
+            except NoOrbitError as error:
+                step, reason = step / 2, str(error)
+        if there is None:
+            yield Place(Bifurcation.LOST, getattr(here.p, name), here, reason)
+            return
+        if not span[0] <= getattr(there.p, name) <= span[1]:
+            there = _at_edge(here, there, name, span)
+            yield from (there, Place(Bifurcation.RANGE, getattr(there.p, name), there)) if there else ()
+            return
+        yield from _between(here, there, step * along, name, matrix)
+        yield there
+        step = min(LONGEST, 1.5 * step if there.steps <= EASY else 0.7 * step)
+        here, along = _renewed(there, along)
+        before.append(here)
+        if here.loop.extent < SMALL * max(each.loop.extent for each in before):
+            yield _birth(name, before[-3:])
+            return
+    yield Place(Bifurcation.LOST, getattr(here.p, name), here, f"not followed beyond {most} orbits")
+
+
+def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
+    """The orbit of the branch a step further."""
+    return close(here.loop.moved(by, name), name, matrix)
+
+
+def _tangent(matrix: Array, along: Array) -> Array:
+    """Unit vector along the branch, not against `along`."""
+    tangent = np.linalg.svd(matrix)[2][-1]
+    return np.asarray(tangent * (1.0 if tangent @ along >= 0 else -1.0))
+
+
+def _renewed(orbit: Orbit, along: Array) -> tuple[Orbit, Array]:
+    """The same orbit through a section anew: on the floor orbits may shrink away from one.
+
+    Where the section is another, the parameter alone says which way the branch goes on.
+    """
+    if orbit.loop.x[0] > 0:
+        return replace(orbit, loop=replace(orbit.loop, extent=extent(orbit.cycle))), along
+    fresh = close(Loop.of(orbit.p, orbit.loop.x, orbit.period))
+    if (fresh.loop.case, fresh.loop.fixed) == (orbit.loop.case, orbit.loop.fixed):
+        return fresh, along
+    return fresh, np.append(np.zeros(len(fresh.loop.free)), along[-1])
+
+
+def _at_edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) -> Orbit | None:
+    """The orbit where the branch leaves a range, from those on both sides; None if there is none."""
+    value = min(max(getattr(there.p, name), span[0]), span[1])
+    for orbit in (there, here):
+        try:
+            return close(replace(orbit.loop, p=orbit.p.replace(**{name: value})))
+        except NoOrbitError:
+            continue
+    return None
+
+
+def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:
+    """What happens between an orbit and the next, a step away."""
+    for kind, changed in _TESTS.items():
+        if _outside(here) == _outside(there) or (changed(here) > 0) == (changed(there) > 0):
+            continue
+
+        def test(share: float, changed: Callable[[Orbit], float] = changed) -> float:
+            return changed(_beside(here, share * step, name, matrix))
+
+        try:
+            share = brentq(test, 0.0, 1.0, xtol=SHARP, rtol=SHARP)
+        except (NoOrbitError, ValueError):  # the test is no continuous function where the sequence changes
+            share = 0.5
+        orbit = _beside(here, share * step, name, matrix)
+        yield Place(kind, getattr(orbit.p, name), orbit)
+    if _sequence(here) != _sequence(there):
+        yield _change(here, there, step, name, matrix)
+
+
+def _change(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Place:
+    """Where the sequence of cases changes, by halving."""
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        orbit = _beside(here, middle * step, name, matrix)
+        low, high = (middle, high) if _sequence(orbit) == _sequence(here) else (low, middle)
+    grazing = _landings(here) != _landings(there)
+    return Place(Bifurcation.GRAZING if grazing else Bifurcation.PERSISTENCE, getattr(orbit.p, name), orbit)
+
+
+def _birth(name: str, last: Sequence[Orbit]) -> Place:
+    """Where the extent of shrinking orbits will be zero: by a parabola through the last three."""
+    kind, power = (Bifurcation.BIRTH, 1) if last[-1].changes else (Bifurcation.HOPF, 2)
+    sizes = np.array([each.loop.extent for each in last]) ** power
+    values = np.array([getattr(each.p, name) for each in last])
+    return Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), last[-1])
+
+
+def _sequence(orbit: Orbit) -> Changes:
+    """The changes of case of a period, from wherever it is the least in order."""
+    turns = [orbit.changes[k:] + orbit.changes[:k] for k in range(len(orbit.changes))]
+    return min(turns, default=())
+
+
+def _landings(orbit: Orbit) -> int:
+    return sum(before.A is Contact.N is not after.A for before, after in orbit.changes)
+
+
+def _outside(orbit: Orbit) -> int:
+    return int(np.sum(np.abs(orbit.multipliers) > 1))
+
+
+def _real(orbit: Orbit) -> Array:
+    return np.real(orbit.multipliers[np.isreal(orbit.multipliers)])
+
+
+def _beyond(orbit: Orbit) -> float:
+    """Positive if an odd number of real multipliers is beyond 1."""
+    return -float(np.prod(1 - _real(orbit)))
+
+
+def _doubled(orbit: Orbit) -> float:
+    """Positive if an odd number of real multipliers is beyond -1."""
+    return -float(np.prod(1 + _real(orbit)))
+
+
+def _turned(orbit: Orbit) -> float:
+    """Positive if a complex pair of multipliers is outside the unit circle."""
+    pairs = orbit.multipliers[np.imag(orbit.multipliers) != 0]
+    return float(np.abs(pairs).max(initial=0.0)) - 1
+
+
+_TESTS = {Bifurcation.FOLD: _beyond, Bifurcation.DOUBLING: _doubled, Bifurcation.TORUS: _turned}
