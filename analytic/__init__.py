@@ -3,6 +3,7 @@
 from analytic.bifurcation import Thresholds, thresholds
 from analytic.dynamics import contact_forces, vector_field
 from analytic.ensemble import Ensemble, simulate_many
+from analytic.fates import attractors
 from analytic.flowmeter import (
     characteristic_slope,
     mean_slope,
@@ -31,6 +32,7 @@ __all__ = [
     "Stability",
     "StationarySolution",
     "Thresholds",
+    "attractors",
     "characteristic_slope",
     "contact_forces",
     "floor_force",

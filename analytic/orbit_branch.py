@@ -105,7 +105,7 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
     if not low <= (value := getattr(start.p, name)) <= high or value == 0:
         raise InputError(f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, not 0")
     down, up = ([*_way(start, name, (low, high), sign, most)] for sign in (-1.0, 1.0))
-    every = [each for each in (*down[::-1], start, *up)]
+    every: list[Orbit | Place] = [*down[::-1], start, *up]
     return OrbitBranch(
         name,
         tuple(each for each in every if isinstance(each, Orbit)),

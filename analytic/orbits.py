@@ -22,10 +22,10 @@ from scipy.integrate import solve_ivp
 from analytic import dynamics
 from analytic.motion import natural_units
 from analytic.simulation import simulate
-from model import Case, InputError, Parameters, SimulationError, Trajectory
+from model import Case, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
-from model.kinematics import VARIABLES, full_state
+from model.kinematics import VARIABLES
 
 RTOL = 1e-12
 """Relative tolerance of the simulation under the return map."""
@@ -37,8 +37,6 @@ ITERATIONS = 8
 """Steps of Newton's method after which an orbit is given up."""
 FAST = 10.0
 """Factor by which a step must reduce the defect for the derivatives of a neighbour to be used once more."""
-APART = 1e-6
-"""Distance in natural units of the two motions whose growing apart is the Lyapunov exponent."""
 SAMPLES = 4000
 """Samples of a period from which means and extremes are taken: a parabola's top is then good to 1e-6 of its height."""
 
@@ -141,7 +139,7 @@ class Loop:
         return Return(x, float(self.period + late), changes, float(turn))
 
     def _followed(self, x: Array, duration: float) -> Array:
-        def rates(t: float, z: Array) -> list[float]:
+        def rates(t: float, z: Array) -> State:
             return dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0)
 
         tolerance = RTOL * scale(self.p)
@@ -223,9 +221,9 @@ class Orbit:
     @property
     def mean(self) -> Array:
         """Means of the state variables, shape (8,); that of omega_c from the gain of azimuth."""
-        mean = np.trapezoid(self.cycle.x, self.cycle.time, axis=0) / self.period
+        mean: Array = np.asarray(np.trapezoid(self.cycle.x, self.cycle.time, axis=0)) / self.period
         mean[VARIABLES.index("omega_c")] = self.turn / self.period
-        return np.asarray(mean)
+        return mean
 
 
 def refine(p: Parameters, x: npt.ArrayLike, period: float) -> Orbit:
@@ -259,7 +257,7 @@ def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None)
             neighbour = None
         before = size
         matrix = jacobian(loop, varied) if neighbour is None else neighbour
-        loop = loop.moved(-np.linalg.lstsq(matrix, defect)[0], varied)
+        loop = loop.moved(np.asarray(-np.linalg.lstsq(matrix, defect)[0], dtype=float), varied)
     raise NoOrbitError(
         f"after {ITERATIONS} steps an orbit of period {loop.period:g} s is open by {size:.1e} in natural units"
     )
@@ -292,31 +290,3 @@ def _simulated(p: Parameters, x: npt.ArrayLike, duration: float, samples: int) -
 
 def _active(case: Case) -> list[int]:
     return [VARIABLES.index(name) for name in TRAITS[case].active]
-
-
-def lyapunov(p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, seed: int = 0) -> tuple[float, float]:
-    """Largest Lyapunov exponent of the motion from x over a duration, and its standard error, s-1.
-
-    A second motion starts beside the first, a distance `APART` away in natural units, and is brought back to that
-    distance every `renewed` seconds, as soon as both are in one case; the mean growth between is the exponent
-    (Benettin's method). The error is that of the mean of ten parts of the duration.
-    """
-    first = full_state(np.asarray(x, dtype=float))
-    case = simulate(p, first, renewed, sample_interval=renewed).cases[0]
-    push = np.zeros(8)
-    push[_active(case)] = np.random.default_rng(seed).normal(size=len(_active(case)))
-    second = first + push * scale(p) * APART / np.linalg.norm(push)
-    growth, before = [], APART
-    for _ in range(math.ceil(duration / renewed)):
-        runs = [simulate(p, each, renewed, sample_interval=renewed) for each in (first, second)]
-        first, second = (run.x[-1] for run in runs)
-        apart = second - first
-        distance = float(np.linalg.norm(apart / scale(p)))
-        if distance == 0:
-            return -math.inf, 0.0
-        growth.append(math.log(distance / before))
-        before = distance
-        if runs[0].case[-1] == runs[1].case[-1]:
-            second, before = first + apart * APART / distance, APART
-    parts = np.array([part.mean() for part in np.array_split(np.array(growth), 10)]) / renewed
-    return float(np.mean(growth)) / renewed, float(parts.std(ddof=1) / math.sqrt(len(parts)))

@@ -41,6 +41,7 @@ _MODULES = {
     "simulate": ("simulate",),
     "validate": ("validate", "judge"),
     "sweep": ("sweep", "collect"),
+    "attractors": ("attractors",),
     "search": ("search", "basins"),
     "look": ("report", "figures", "inspect", "render", "view"),
     "grade": ("grade",),

@@ -1,0 +1,301 @@
+"""What motions come to: a stationary motion, a periodic one, or neither; and what balls come to from many starts.
+
+A run is followed window by window until what it does no longer changes. Any simulator may carry it out. What is
+recurrent is closed to an orbit by theory (`orbits`); what is recurrent and no stable orbit is chaotic if neighbours of
+it part exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with what it did last.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import binomtest
+
+from analytic import orbits
+from analytic.motion import natural_units
+from analytic.orbits import NoOrbitError, Orbit, extent, scale
+from analytic.simulation import simulate
+from analytic.stationary import StationarySolution, stable_solutions
+from model import InputError, Parameters, SimulationError, Trajectory
+from model.arrays import Array
+from model.cases import TRAITS
+from model.kinematics import VARIABLES, full_state
+from model.parameters import POSITIVE, Range, check_number
+
+WINDOW, SAMPLES = 100.0, 4000
+"""Length of a window in units of sqrt(R/g), and samples in it."""
+LASTING = 60.0
+"""How long a run is followed, in units of 1/c."""
+STILL = 1e-3
+"""Range of the variables over a window, in natural units, below which a motion that still shrinks is stationary."""
+NEAR = 1e-2
+"""Distance in natural units up to which it is that of a stationary solution."""
+ALIKE = 0.05
+"""Distance over the range of the motion up to which states, means and extremes are the same."""
+GROWING = 400.0
+"""Duration over which the Lyapunov exponent is taken, in units of sqrt(R/g)."""
+APART = 1e-6
+"""Distance in natural units of the two motions whose growing apart is the Lyapunov exponent."""
+
+Run = Callable[[Parameters, Array, float, float], Trajectory]
+"""A simulator: parameters, start (8,), duration in s, sample interval in s. Raises `SimulationError`."""
+
+
+class Kind(StrEnum):
+    """What a motion comes to."""
+
+    STATIONARY = "stationary"
+    PERIODIC = "periodic"
+    QUASI_PERIODIC = "quasi-periodic"
+    CHAOTIC = "chaotic"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What one run came to, and what it did last."""
+
+    kind: Kind
+    last: Trajectory
+    """Its last window."""
+    period: float = math.nan
+    """s, as seen in the window; nan unless it is periodic."""
+    solution: StationarySolution | None = None
+    """The stationary solution that it came to, if theory has it."""
+    orbit: Orbit | None = None
+    """The periodic motion, as theory has it."""
+    exponent: float = math.nan
+    """Largest Lyapunov exponent, s-1, where it was taken."""
+    failure: str = ""
+    """Why the run broke down, if it did."""
+
+    def same(self, other: Fate) -> bool:
+        """Whether two runs came to one attractor; all that are undecided count as one."""
+        if self.kind is not other.kind or (self.solution is None) is not (other.solution is None):
+            return False
+        if self.solution and other.solution:
+            return self.solution.case is other.solution.case
+        return self.kind is Kind.UNDECIDED or _alike(self.last, other.last)
+
+
+@dataclass(frozen=True)
+class Attractor:
+    """What some of the starts came to."""
+
+    fate: Fate
+    """Of the first of them."""
+    count: int
+    starts: int
+    """How many starts came to it, and how many there were."""
+
+    @property
+    def share(self) -> float:
+        """Share of the starts."""
+        return self.count / self.starts
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The share's confidence interval of 95 % (Wilson)."""
+        interval = binomtest(self.count, self.starts).proportion_ci(0.95, "wilson")
+        return float(interval.low), float(interval.high)
+
+    @property
+    def run(self) -> Trajectory:
+        """What it does: a period by theory where there is an orbit, else the last window of the first run."""
+        return self.fate.orbit.cycle if self.fate.orbit else self.fate.last
+
+
+def event_driven(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
+    """The event-driven simulation as a `Run`."""
+    return simulate(p, x0, duration, sample_interval=interval, initial_impact=True)
+
+
+def attractors(
+    p: Parameters,
+    starts: int | npt.ArrayLike = 20,
+    *,
+    seed: int = 0,
+    lasting: float | None = None,
+    run: Run = event_driven,
+) -> list[Attractor]:
+    """What balls come to from many starts, the most frequent first.
+
+    Parameters
+    ----------
+    starts : number of random starts (`random_starts`), or states of shape (n, 6 or 8)
+    lasting : how long a run is followed at most, s; `LASTING`/c if None
+    run : the simulator that carries out the runs
+
+    Raises
+    ------
+    InputError
+        If a start is outside of the vessel, a number out of range, or c = 0 without `lasting`.
+    """
+    if isinstance(starts, int):
+        states = random_starts(p, starts, seed)
+    else:
+        states = np.atleast_2d(full_state(np.asarray(starts, dtype=float)))
+    if lasting is None and p.c == 0:
+        raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")
+    duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
+    groups: list[list[Fate]] = []
+    for x in states:
+        found = settle(p, x, duration, run, [group[0] for group in groups])
+        for group in groups:
+            if group[0].same(found):
+                group.append(found)
+                break
+        else:
+            groups.append([found])
+    groups.sort(key=len, reverse=True)
+    return [Attractor(group[0], len(group), len(states)) for group in groups]
+
+
+def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
+    """States (count, 8): at the wall, half of them on the floor, half up to R above it with speeds up to sqrt(g R).
+
+    omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all evenly spread.
+    """
+    check_number("starts", count, "runs", Range(1, whole=True))
+    rng = np.random.default_rng(seed)
+    size = 2 * abs(p.omega_0) * np.array([1.0, *[p.R / p.r] * 3])
+    x = np.zeros((count, len(VARIABLES)))
+    x[:, 2:6] = rng.uniform(-size, size, (count, 4))
+    flying = rng.random(count) < 0.5
+    x[:, 0] = np.where(flying, rng.uniform(0, p.R, count), 0.0)
+    x[:, 1] = np.where(flying, rng.uniform(-1, 1, count) * math.sqrt(p.g * p.R), 0.0)
+    return x
+
+
+def settle(
+    p: Parameters, x0: npt.ArrayLike, lasting: float, run: Run = event_driven, known: Sequence[Fate] = ()
+) -> Fate:
+    """What the motion from x0 comes to within `lasting` seconds; `known` fates are recognised without a closer look."""
+    solutions, seen = stable_solutions(p), list[Trajectory]()
+    try:
+        for now in windows(p, full_state(np.asarray(x0, dtype=float)), lasting, run):
+            if seen and (fate := _decided(seen[-1], now, solutions, known)):
+                return fate
+            seen = [*seen[-1:], now]
+    except SimulationError as error:
+        return Fate(Kind.UNDECIDED, error.trajectory, failure=str(error))
+    return _aperiodic(seen[-1]) if len(seen) == 2 and _alike(*seen) else Fate(Kind.UNDECIDED, seen[-1])
+
+
+def _decided(
+    before: Trajectory, now: Trajectory, solutions: Sequence[StationarySolution], known: Sequence[Fate]
+) -> Fate | None:
+    """What two windows of a motion show that it comes to; None if not enough."""
+    if extent(now) < STILL and extent(now) <= extent(before):
+        return Fate(Kind.STATIONARY, now, solution=_nearest(now, solutions))
+    if not _alike(before, now):
+        return None
+    same = (fate for fate in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
+    return next(same, None) or _closed(now)
+
+
+def windows(p: Parameters, x: Array, lasting: float, run: Run) -> Iterator[Trajectory]:
+    """The motion from x in windows, each from where the last one ended."""
+    window = WINDOW * natural_units(p)[0]
+    for _ in range(math.ceil(lasting / window)):
+        part = run(p, x, window, window / SAMPLES)
+        if part.header.failure:
+            raise SimulationError(part.header.failure, part)
+        yield part
+        x = part.x[-1]
+
+
+def _alike(a: Trajectory, b: Trajectory) -> bool:
+    """Whether means and extremes of two windows agree, over the range of the motion."""
+    size = scale(a.header.parameters) * max(extent(a), STILL)
+    return all(
+        bool(np.all(np.abs(of(a.x, axis=0) - of(b.x, axis=0)) <= ALIKE * size)) for of in (np.mean, np.min, np.max)
+    )
+
+
+def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> StationarySolution | None:
+    """The stationary solution at which a motion is, of two in one state that of its own case; free variables aside."""
+    x, case = last.x[-1], last.cases[-1]
+    size = scale(last.header.parameters)
+
+    def distance(of: StationarySolution) -> float:
+        bound = [k for k, name in enumerate(VARIABLES) if name not in of.family]
+        return float((np.abs(x - of.x) / size)[bound].max())
+
+    near = [each for each in solutions if distance(each) <= NEAR]
+    return min(near, key=lambda each: (each.case is not case, distance(each)), default=None)
+
+
+def _closed(last: Trajectory) -> Fate | None:
+    """The stable orbit that a recurrent motion follows; None if it doesn't come back, or to an unstable one."""
+    p = last.header.parameters
+    for period in _periods(last):
+        try:
+            orbit = orbits.refine(p, _state(last), period)
+        except NoOrbitError:
+            continue
+        if orbit.stable and _alike(last, orbit.cycle):
+            return Fate(Kind.PERIODIC, last, period, orbit=orbit)
+    return None
+
+
+def _periods(last: Trajectory, most: int = 3) -> Iterator[float]:
+    """Times after which the motion comes back to where it was, as far as half the window shows; the shortest first."""
+    z, n = last.x / scale(last.header.parameters), len(last.x) // 2
+    size, interval = extent(last), float(last.time[1] - last.time[0])
+    away = np.array([np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)])
+    left = int(np.argmax(away > size / 2))
+    dips = np.array([k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]], dtype=int)
+    good = dips[away[dips] <= 2 * away[dips].min(initial=size) + ALIKE * size]
+    yield from (good[:most] * interval).tolist()
+
+
+def _state(last: Trajectory) -> Array:
+    """The highest state of a window, with what its case holds at zero exactly there."""
+    k = int(np.argmax(last.y))
+    held = TRAITS[last.cases[k]].constraints
+    return np.where([name in held for name in VARIABLES], 0.0, last.x[k])
+
+
+def _aperiodic(last: Trajectory) -> Fate:
+    """A recurrent motion that no stable orbit is found for."""
+    p, unit = last.header.parameters, natural_units(last.header.parameters)[0]
+    try:
+        exponent, error = lyapunov(p, _state(last), GROWING * unit, unit)
+    except (SimulationError, InputError) as reason:
+        return Fate(Kind.UNDECIDED, last, failure=str(reason))
+    return Fate(Kind.CHAOTIC if exponent > 3 * error else Kind.QUASI_PERIODIC, last, exponent=exponent)
+
+
+def lyapunov(p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, seed: int = 0) -> tuple[float, float]:
+    """Largest Lyapunov exponent of the motion from x over a duration, and its standard error, s-1.
+
+    A second motion starts beside the first, a distance `APART` away in natural units, and is brought back to that
+    distance every `renewed` seconds, as soon as both are in one case; the mean growth between is the exponent
+    (Benettin's method). The error is that of the mean of ten parts of the duration.
+    """
+    first = full_state(np.asarray(x, dtype=float))
+    case = simulate(p, first, renewed, sample_interval=renewed, initial_impact=True).cases[0]
+    active = [VARIABLES.index(name) for name in TRAITS[case].active]
+    push = np.zeros(8)
+    push[active] = np.random.default_rng(seed).normal(size=len(active))
+    second = first + push * scale(p) * APART / np.linalg.norm(push)
+    growth, before = [], APART
+    for _ in range(math.ceil(duration / renewed)):
+        runs = [simulate(p, each, renewed, sample_interval=renewed, initial_impact=True) for each in (first, second)]
+        first, second = (run.x[-1] for run in runs)
+        apart = second - first
+        distance = float(np.linalg.norm(apart / scale(p)))
+        if distance == 0:
+            return -math.inf, 0.0
+        growth.append(math.log(distance / before))
+        before = distance
+        if runs[0].case[-1] == runs[1].case[-1]:
+            second, before = first + apart * APART / distance, APART
+    parts = np.array([part.mean() for part in np.array_split(np.array(growth), 10)]) / renewed
+    return float(np.mean(growth)) / renewed, float(parts.std(ddof=1) / math.sqrt(len(parts)))

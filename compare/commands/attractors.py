@@ -1,0 +1,182 @@
+"""``dualball attractors``: what balls come to from many starts, and where periodic motions are born and end."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.table import Table
+
+import analytic
+from analytic import orbit_branch
+from analytic.fates import LASTING, Attractor
+from analytic.orbits import Orbit
+from compare.commands import options, running
+from compare.runs.engines import EVENT
+from compare.runs.sweep import Axis, grid
+from compare.runs.tasks import Task, carry_out
+from model import InputError, Parameters, State, Trajectory
+from model.arrays import Array
+from model.kinematics import VARIABLES
+
+
+def add(commands: options.Commands) -> None:
+    """Declare the command."""
+    command = options.command(
+        commands, "attractors", run, "what balls come to from many starts: stationary, periodic, chaotic motions"
+    )
+    options.add_parameters(command)
+    running.add_engine(command)
+    command.set_defaults(engine=EVENT)
+    running.add_start(command)
+    command.add_argument(
+        "--starts", type=int, default=20, metavar="N", help="random starts (default 20), unless one is given by --start"
+    )
+    command.add_argument("--seed", type=int, default=0, help="of the random starts (default 0)")
+    command.add_argument(
+        "--time", type=options.number, metavar="s", help=f"how long to follow a run at most (default {LASTING:g}/c)"
+    )
+    command.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="NAME=FROM:TO:COUNT",
+        help="a range, or NAME=A,B,C; several: grid",
+    )
+    command.add_argument(
+        "--follow", action="append", default=[], metavar="NAME=FROM:TO",
+        help="follow each periodic motion in a parameter, to where it is born and ends",
+    )  # fmt: skip
+    command.add_argument("--json", action="store_true", help="print as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Find the attractors of every set of parameters, and show them."""
+    axes, ways = ([Axis.parse(text) for text in texts] for texts in (args.vary, args.follow))
+    for way in ways:
+        if len(way.values) != 2:
+            raise InputError(f"a motion is followed over a range: write {way.name}=from:to")
+    starts = np.array([running.start(args)]) if args.start else args.starts
+    settings = running.settings(args)
+
+    def simulate(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
+        task = Task(
+            engine=args.engine.name,
+            parameters=p,
+            x0=State.of(x0),
+            t_end=duration,
+            settings=settings,
+            sample_interval=interval,
+        )
+        return carry_out([task])[0]
+
+    found = []
+    for p in grid(options.parameters(args), axes):
+        own = {} if args.engine is EVENT and settings == EVENT.configure({}) else {"run": simulate}
+        attractors = analytic.attractors(p, starts, seed=args.seed, lasting=args.time, **own)
+        branches = [
+            orbit_branch.follow(each.fate.orbit, way.name, way.values[0], way.values[1])
+            for each in attractors
+            if each.fate.orbit
+            for way in ways
+        ]
+        varied = {axis.name: getattr(p, axis.name) for axis in axes}
+        found.append({
+            **varied,
+            "attractors": [attractor_data(each) for each in attractors],
+            "branches": [branch_data(each) for each in branches],
+        })  # fmt: skip
+    options.show({"engine": args.engine.name, "seed": args.seed, "sets": found}, _table, args.json)
+    return 0
+
+
+def attractor_data(of: Attractor) -> dict[str, Any]:
+    """An attractor as JSON-able data, SI."""
+    fate, run = of.fate, of.run
+    mean = fate.orbit.mean if fate.orbit else run.x.mean(axis=0)
+    return {
+        "kind": fate.kind.value,
+        "cases": [case.name for case in _cases(of)],
+        "count": of.count,
+        "starts": of.starts,
+        "share": of.share,
+        "share_95": of.interval,
+        "period": _finite(fate.orbit.period if fate.orbit else fate.period),
+        "period_in_the_run": _finite(fate.period),
+        "multipliers": [[v.real, v.imag] for v in fate.orbit.multipliers] if fate.orbit else [],
+        "lyapunov": _finite(fate.exponent),
+        "theory": fate.solution.case.name if fate.solution else "orbit" if fate.orbit else None,
+        "mean": dict(zip(VARIABLES, mean.tolist(), strict=True)),
+        "low": dict(zip(VARIABLES, run.x.min(axis=0).tolist(), strict=True)),
+        "high": dict(zip(VARIABLES, run.x.max(axis=0).tolist(), strict=True)),
+        "failure": fate.failure,
+    }
+
+
+def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
+    """A branch as JSON-able data, SI."""
+    return {
+        "parameter": branch.name,
+        "places": [{"kind": place.kind.value, "value": place.value, "reason": place.reason} for place in branch.places],
+        "orbits": [orbit_data(orbit, branch.name) for orbit in branch.orbits],
+    }
+
+
+def orbit_data(orbit: Orbit, name: str) -> dict[str, Any]:
+    """An orbit of a branch as JSON-able data, SI."""
+    return {
+        name: getattr(orbit.p, name),
+        "period": orbit.period,
+        "omega_c": float(orbit.mean[VARIABLES.index("omega_c")]),
+        "height": float(orbit.cycle.y.max()),
+        "stable": orbit.stable,
+        "multipliers": [[v.real, v.imag] for v in orbit.multipliers],
+        "x": orbit.loop.x.tolist(),
+    }
+
+
+def _cases(of: Attractor) -> Sequence[Any]:
+    """The cases of a period, or those of the last window in the order in which they first come up."""
+    return of.fate.orbit.cases if of.fate.orbit else list(dict.fromkeys(of.fate.last.cases))
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _table(data: dict[str, Any]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, title=f"What balls come to ({data['engine']})", title_justify="left")
+    varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
+    columns = "motion", "cases", "share of starts (95 %)", "period (s)", "mean ω_c (rad/s)", "from … to"
+    for column in (*varied, *columns, "height (mm)", "largest multiplier", "by theory"):
+        table.add_column(column)
+    for each in data["sets"]:
+        values = [f"{each[name]:.6g}" for name in varied]
+        for row in each["attractors"]:
+            low, high = row["share_95"]
+            factors = [abs(complex(*v)) for v in row["multipliers"]]
+            table.add_row(
+                *values, row["kind"], " ".join(row["cases"]),
+                f"{row['count']}/{row['starts']} ({low:.2f} … {high:.2f})",
+                f"{row['period']:.7g}" if row["period"] else "-", f"{row['mean']['omega_c']:.7g}",
+                f"{row['low']['omega_c']:.6g} … {row['high']['omega_c']:.6g}", f"{1e3 * row['high']['y']:.4g}",
+                f"{max(factors):.4g}" if factors else "-",
+                row["theory"] or row["failure"]
+                or (f"exponent {row['lyapunov']:.2g}/s" if row["lyapunov"] else "unknown"),
+            )  # fmt: skip
+    for each in data["sets"]:
+        for branch in each["branches"]:
+            reached = np.array([orbit[branch["parameter"]] for orbit in branch["orbits"]])
+            table.caption = "\n".join(
+                [
+                    *([str(table.caption)] if table.caption else []),
+                    f"Followed in {branch['parameter']}: {len(reached)} orbits, {reached.min():.6g} … {reached.max():.6g}:",
+                    *(f"  {p['kind']} at {p['value']:.7g} {p['reason']}" for p in branch["places"]),
+                ]
+            )
+            table.caption_justify = "left"
+    return table

@@ -1,0 +1,68 @@
+"""What motions come to, from many starts."""
+
+import numpy as np
+import pytest
+
+from analytic import attractors, fates, stable_solutions
+from analytic.fates import Kind
+from model import InputError, Parameters
+
+HOPPING = Parameters.named("hopping")
+STARTS = (
+    (0, 0, 105.25, 42.85, -68.6, -133.4),
+    (0, 0, 20, 0, 0, 0),
+    (0.03, 0, 69, -100, 0, 0),
+    (6e-3, 0, 57, -106, 0, 0),
+)
+
+
+def test_three_attractors_at_once() -> None:
+    """The hopping set: hopping, slipping at both points, and riding the wall."""
+    found = attractors(HOPPING, STARTS)
+    assert [each.count for each in found] == [2, 1, 1]
+    assert {each.fate.kind for each in found} == {Kind.PERIODIC, Kind.STATIONARY}
+    hop = found[0].fate
+    assert hop.orbit
+    assert hop.orbit.stable
+    # The period as seen in the run is resolved to a sample, that of the orbit to round-off.
+    sample = hop.last.time[1] - hop.last.time[0]
+    assert hop.period == pytest.approx(hop.orbit.period, abs=2 * sample)
+    known = {s.case for s in stable_solutions(HOPPING)}
+    assert {each.fate.solution.case for each in found[1:] if each.fate.solution} <= known
+    low, high = found[0].interval
+    assert 0 < low < found[0].share < high < 1
+
+
+def test_random_starts_are_reproducible_and_inside() -> None:
+    """The same seed gives the same starts; all of them can be simulated."""
+    first, again, other = (fates.random_starts(HOPPING, 50, seed) for seed in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    assert np.all((first[:, 0] >= 0) & (first[:, 0] <= HOPPING.R))
+    assert np.all(first[first[:, 0] == 0, 1] == 0)
+
+
+def test_undecided_says_what_it_did_last() -> None:
+    """A time too short: no verdict, but means and extremes of what there is."""
+    (only,) = attractors(HOPPING, STARTS[1:2], lasting=1.0)
+    assert only.fate.kind is Kind.UNDECIDED
+    assert only.run.omega_c[-1] == pytest.approx(20, rel=0.5)
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"starts": [[-1e-3, 0, 20, 0, 0, 0]]}, "inside the floor"),
+        ({"starts": [[0, 0, 20, 0, 0, 0, 1.0, 0]]}, "h = 1 m"),
+        ({"starts": 0}, "starts = 0"),
+        ({"starts": STARTS[1:2], "lasting": -1.0}, "lasting = -1"),
+    ],
+)
+def test_bad_input(given: dict[str, object], match: str) -> None:
+    with pytest.raises(InputError, match=match):
+        attractors(HOPPING, **given)  # type: ignore[arg-type]
+
+
+def test_without_drag_a_time_must_be_given() -> None:
+    with pytest.raises(InputError, match="lasting"):
+        attractors(HOPPING.replace(c=0.0), 1)
