@@ -232,27 +232,34 @@ def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> Stati
 
 
 def _closed(last: Trajectory) -> Fate | None:
-    """The stable orbit that a recurrent motion follows; None if it doesn't come back, or to an unstable one."""
-    p = last.header.parameters
-    for period in _periods(last):
+    """A recurrent motion that closes: with the stable orbit that theory has near it, or after all that one sees.
+
+    None if it doesn't close.
+    """
+    p, seen = last.header.parameters, _periods(last)
+    for period, _ in seen:
         try:
             orbit = orbits.refine(p, _state(last), period)
         except NoOrbitError:
             continue
-        if orbit.stable and _alike(last, orbit.cycle):
+        if orbit.stable and abs(orbit.period / period - 1) < ALIKE:
             return Fate(Kind.PERIODIC, last, period, orbit=orbit)
-    return None
+    exact = [period for period, defect in seen if defect < STILL * extent(last)]
+    return Fate(Kind.PERIODIC, last, exact[0]) if exact else None
 
 
-def _periods(last: Trajectory, most: int = 3) -> Iterator[float]:
-    """Times after which the motion comes back to where it was, as far as half the window shows; the shortest first."""
+def _periods(last: Trajectory, most: int = 3) -> list[tuple[float, float]]:
+    """Times after which the motion comes back to about where it was, and by how much it misses; the shortest first.
+
+    As far as half the window shows.
+    """
     z, n = last.x / scale(last.header.parameters), len(last.x) // 2
     size, interval = extent(last), float(last.time[1] - last.time[0])
     away = np.array([np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)])
     left = int(np.argmax(away > size / 2))
     dips = np.array([k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]], dtype=int)
     good = dips[away[dips] <= 2 * away[dips].min(initial=size) + ALIKE * size]
-    yield from (good[:most] * interval).tolist()
+    return [(float(k * interval), float(away[k])) for k in good[:most]]
 
 
 def _state(last: Trajectory) -> Array:

@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 from analytic import dynamics
 from analytic.motion import natural_units
 from analytic.simulation import simulate
-from model import Case, InputError, Parameters, SimulationError, State, Trajectory
+from model import Case, InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -139,8 +139,8 @@ class Loop:
         return Return(x, float(self.period + late), changes, float(turn))
 
     def _followed(self, x: Array, duration: float) -> Array:
-        def rates(t: float, z: Array) -> State:
-            return dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0)
+        def rates(t: float, z: Array) -> list[float]:
+            return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))
 
         tolerance = RTOL * scale(self.p)
         return np.asarray(solve_ivp(rates, (0.0, duration), x, "DOP853", rtol=RTOL, atol=tolerance).y[:, -1])

@@ -7,7 +7,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from rich import box
 from rich.table import Table
 
@@ -151,32 +150,37 @@ def _finite(value: float) -> float | None:
 def _table(data: dict[str, Any]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, title=f"What balls come to ({data['engine']})", title_justify="left")
     varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
-    columns = "motion", "cases", "share of starts (95 %)", "period (s)", "mean ω_c (rad/s)", "from … to"
-    for column in (*varied, *columns, "height (mm)", "largest multiplier", "by theory"):
+    columns = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
+    for column in (*varied, *columns):
         table.add_column(column)
     for each in data["sets"]:
         values = [f"{each[name]:.6g}" for name in varied]
         for row in each["attractors"]:
-            low, high = row["share_95"]
-            factors = [abs(complex(*v)) for v in row["multipliers"]]
-            table.add_row(
-                *values, row["kind"], " ".join(row["cases"]),
-                f"{row['count']}/{row['starts']} ({low:.2f} … {high:.2f})",
-                f"{row['period']:.7g}" if row["period"] else "-", f"{row['mean']['omega_c']:.7g}",
-                f"{row['low']['omega_c']:.6g} … {row['high']['omega_c']:.6g}", f"{1e3 * row['high']['y']:.4g}",
-                f"{max(factors):.4g}" if factors else "-",
-                row["theory"] or row["failure"]
-                or (f"exponent {row['lyapunov']:.2g}/s" if row["lyapunov"] else "unknown"),
-            )  # fmt: skip
-    for each in data["sets"]:
-        for branch in each["branches"]:
-            reached = np.array([orbit[branch["parameter"]] for orbit in branch["orbits"]])
-            table.caption = "\n".join(
-                [
-                    *([str(table.caption)] if table.caption else []),
-                    f"Followed in {branch['parameter']}: {len(reached)} orbits, {reached.min():.6g} … {reached.max():.6g}:",
-                    *(f"  {p['kind']} at {p['value']:.7g} {p['reason']}" for p in branch["places"]),
-                ]
-            )
-            table.caption_justify = "left"
+            table.add_row(*values, *_cells(row))
+    table.caption = "\n".join(_way(branch) for each in data["sets"] for branch in each["branches"])
+    table.caption_justify = "left"
     return table
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    """An attractor as cells of the table."""
+    low, high = row["share_95"]
+    largest = max((abs(complex(*each)) for each in row["multipliers"]), default=None)
+    exponent = f"exponent {row['lyapunov']:.2g}/s" if row["lyapunov"] is not None else "none"
+    return [
+        row["kind"],
+        " ".join(row["cases"]),
+        f"{row['count']}/{row['starts']} ({low:.2f}–{high:.2f})",
+        f"{row['period']:.6g}" if row["period"] else "-",
+        f"{row['mean']['omega_c']:.6g} ({row['low']['omega_c']:.5g}–{row['high']['omega_c']:.5g})",
+        f"{1e3 * row['high']['y']:.4g}",
+        f"{largest:.4g}" if largest is not None else "-",
+        row["theory"] or row["failure"] or exponent,
+    ]
+
+
+def _way(branch: dict[str, Any]) -> str:
+    """What happens along a branch, in lines."""
+    values = [orbit[branch["parameter"]] for orbit in branch["orbits"]]
+    first = f"Followed in {branch['parameter']}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:"
+    return "\n".join([first, *(f"  {p['kind']} at {p['value']:.7g} {p['reason']}" for p in branch["places"])])

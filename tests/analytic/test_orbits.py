@@ -66,14 +66,14 @@ def test_multipliers_are_how_disturbances_change(hop: Orbit, swing: Orbit) -> No
 
 def test_hopping_is_born_where_the_wall_begins_to_carry() -> None:
     """Down in omega_0 the hops become ever lower and vanish at omega_02; the multipliers don't tell of it."""
-    low = HOPPING.replace(omega_0=53.0)
-    hop = orbits.refine(low, (4e-4, 0.0, 52.3, -125.6, 0.0, 0.0), 0.241)
-    branch = orbit_branch.follow(hop, "omega_0", 40.0, hop.p.omega_0 * 1.001)
+    low = HOPPING.replace(omega_0=53.77)
+    hop = orbits.refine(low, (7.23e-4, 0.0, 52.54, -84.426, 0.0, 0.0), 0.2403)
+    branch = orbit_branch.follow(hop, "omega_0", 40.0, 53.8)
     birth, edge = branch.places[0], branch.places[-1]
     assert birth.kind is Bifurcation.BIRTH
     assert birth.value == pytest.approx(thresholds(HOPPING).omega_02, rel=1e-4)
     assert edge.kind is Bifurcation.RANGE
-    assert branch.values[-1] == pytest.approx(hop.p.omega_0 * 1.001)
+    assert branch.values[-1] == pytest.approx(53.8)
     assert branch.stable.all()
     heights = [orbit.loop.x[0] for orbit in branch.orbits]
     assert heights == sorted(heights)
@@ -100,21 +100,13 @@ def test_a_torus_bifurcation_and_a_fold(hop: Orbit) -> None:
     assert branch.values.max() == pytest.approx(fold.value, rel=1e-3)
 
 
-def test_lyapunov_exponent_of_an_orbit_is_zero(hop: Orbit) -> None:
-    """Along the orbit disturbances neither grow nor die out."""
-    exponent, error = orbits.lyapunov(hop.p, hop.loop.x, 40 * hop.period, hop.period)
-    # The first of the ten parts has the decay of what lies across, with the modulus of the largest multiplier.
-    decay = -np.log(np.abs(hop.multipliers[0])) / hop.period
-    assert abs(exponent) <= 3 * error + 0.1 * decay
-
-
 def test_no_orbit_and_bad_input(hop: Orbit) -> None:
     """Rolling for ever has no period; a guess far from all orbits doesn't converge; ranges must make sense."""
     with pytest.raises(NoOrbitError, match="rolls at both points"):
         orbits.refine(Parameters.named("reference"), (0, 0, 12, 0, 0, 0), 0.2)
     with pytest.raises(NoOrbitError):
         orbits.refine(HOPPING, (0, 0, 20, 0, 0, 0), 0.2)
-    with pytest.raises(NoOrbitError, match="inside the floor"):
+    with pytest.raises(NoOrbitError, match="above the floor"):
         orbits.refine(HOPPING, (-1e-3, 0, 20, 0, 0, 0), 0.2)
     with pytest.raises(InputError, match="did you mean 'eta'"):
         orbit_branch.follow(hop, "etta", 0.0, 1.0)
