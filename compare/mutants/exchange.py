@@ -64,7 +64,7 @@ def scaled(factor: float, *entries: int) -> Callable[[Function], Function]:
             parts = list(found)
             for k in entries:
                 parts[k] = factor * parts[k]
-            return type(found)(parts)
+            return type(found)(*parts) if hasattr(found, "_fields") else type(found)(parts)
 
         return function
 
