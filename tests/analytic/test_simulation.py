@@ -168,8 +168,8 @@ def test_default_sampling_and_progress(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_progress_within_a_long_stretch(method, monkeypatch):
     """A single case and a single sample: the steps themselves report, so that a caller can stop the run in time."""
-    for module in ("hybrid", "time_stepping"):
-        monkeypatch.setattr(f"analytic.{module}.REPORT_EVERY", 10)
+    for between_two_reports in ("hybrid.REPORT_EVERY", "time_stepping.AT_ONCE"):
+        monkeypatch.setattr(f"analytic.{between_two_reports}", 10)
     p, seen = P.replace(omega_0=25.0), []
     run = simulate(
         p, [0, 0, 13.8, -4, 0.5, 10], 0.2, method=method, step=1e-3, sample_interval=0.2, progress=seen.append
@@ -257,7 +257,7 @@ def test_flow_with_a_sample_that_is_not_finite_is_refused():
 @pytest.mark.parametrize("method", METHODS)
 def test_interruption_keeps_what_there_is(method, monkeypatch):
     """Ctrl-C in the middle of the equations: the samples so far, and a header that says where it stopped."""
-    name = {"event": "analytic.dynamics.newton_euler", "time-stepping": "analytic.rigid_body.smooth_rates"}[method]
+    name = {"event": "analytic.dynamics.newton_euler", "time-stepping": "analytic.marching.advance"}[method]
     calls = iter(range(10**9))
 
     def stop(*args):
