@@ -45,13 +45,15 @@ nb_execution_show_tb = True
 nb_execution_timeout = 600  # a machine may be busy
 nb_merge_streams = True
 nb_render_markdown_format = "myst"
-os.environ |= {"COLUMNS": "88", "NO_COLOR": "1", "TERM": "dumb"}
+os.environ |= {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # for !dualball
 myst_enable_extensions = ["dollarmath", "attrs_inline"]
 myst_heading_anchors = 3
 
 default_role = "code"
+highlight_language = "text"
 autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike", "Array": "Array"}
+suppress_warnings = ["ref.python"]  # two classes of one name in an annotation: neither is linked
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": True}
 
@@ -132,8 +134,17 @@ def docstring(app: Sphinx, what: str, name: str, obj: object, options: object, l
 
 
 def literal_bars(text: str) -> str:
-    """Text in which |x| is an absolute value and no substitution."""
-    return re.sub(r"(`[^`]*`)|\|", lambda found: found[1] or r"\|", text)
+    """Text in which |x| is an absolute value and no substitution; code and formulas stay as they are."""
+    code = r"(^::\n\n(?:(?: {4}.*)?(?:\n|\Z))+|``.+?``|`[^`]*`)"
+    return re.sub(rf"{code}|\|", lambda part: part[1] or r"\|", text, flags=re.MULTILINE)
+
+
+def signature(
+    app: Sphinx, what: str, name: str, obj: object, options: object, arguments: str | None, returned: str | None
+) -> tuple[str | None, str | None]:
+    """Aliases of types by their names."""
+    short = [text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text) for text in (arguments, returned)]
+    return short[0], short[1]
 
 
 def setup(app: Sphinx) -> None:
@@ -143,3 +154,4 @@ def setup(app: Sphinx) -> None:
     app.connect("include-read", source_links)
     app.connect("doctree-read", as_typed)
     app.connect("autodoc-process-docstring", docstring)
+    app.connect("autodoc-process-signature", signature)
