@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analytic import rigid_body
-from analytic.rigid_body import NOTHING, Forces, Six, Velocities
+from analytic.rigid_body import NOTHING, Forces, Velocities
 from model import Parameters
 from model.arrays import Array
 
@@ -55,11 +55,11 @@ class NotConvergedError(ArithmeticError):
 
 
 def solve(
-    free: Six,
+    free: Velocities,
     A: Closed | None,
     B: Closed | None,
     p: Parameters,
-    start: Six = NOTHING,
+    start: Forces = NOTHING,
     tolerance: float = 4e-15,
     max_sweeps: int = MAX_SWEEPS,
 ) -> tuple[Velocities, Forces]:
@@ -96,7 +96,7 @@ def solve(
     )
 
 
-def sweep(u: Six, P: Six, A: Closed | None, B: Closed | None, p: Parameters) -> tuple[Velocities, Forces]:
+def sweep(u: Velocities, P: Forces, A: Closed | None, B: Closed | None, p: Parameters) -> tuple[Velocities, Forces]:
     """Solve A for the present impulse at B, then B for that at A; u already contains P, None is an open contact."""
     v_h, v_y, v_k, o_x, o_y, o_z = u
     A_x, A_y, A_z, B_x, B_y, B_z = P
@@ -106,24 +106,24 @@ def sweep(u: Six, P: Six, A: Closed | None, B: Closed | None, p: Parameters) -> 
         v_h, v_y, v_k = v_h + (s - A_x) / m, v_y + (n - A_y) / m, v_k + (t - A_z) / m
         o_x, o_z = o_x - (t - A_z) / jmr, o_z + (s - A_x) / jmr
         A_x, A_y, A_z = s, n, t
-        u = v_h, v_y, v_k, o_x, o_y, o_z
+        u = Velocities(v_h, v_y, v_k, o_x, o_y, o_z)
     if B is not None:
         n, s, t = _project(*_unlimited_B(u, P, B, p), p.eta, B.slip)
         v_h, v_y, v_k = v_h + (n - B_x) / m, v_y + (s - B_y) / m, v_k + (t - B_z) / m
         o_y, o_z = o_y + (t - B_z) / jmr, o_z - (s - B_y) / jmr
         B_x, B_y, B_z = n, s, t
-        u = v_h, v_y, v_k, o_x, o_y, o_z
-    return Velocities(*u), Forces(A_x, A_y, A_z, B_x, B_y, B_z)
+        u = Velocities(v_h, v_y, v_k, o_x, o_y, o_z)
+    return u, Forces(A_x, A_y, A_z, B_x, B_y, B_z)
 
 
-def _unlimited_A(u: Six, P: Six, A: Closed, p: Parameters) -> tuple[float, float, float]:
+def _unlimited_A(u: Velocities, P: Forces, A: Closed, p: Parameters) -> tuple[float, float, float]:
     """Impulses (normal, along x, along z) that would bring A to its target and to rest, were they not limited."""
     m_t = p.m * p.j / (1 + p.j)  # mass that a tangential impulse feels at the contact point
     (_, v_y, *_), (A_x, A_y, A_z, *_), (slip_x, slip_z) = u, P, rigid_body.slip_at_A(u, p)
     return A_y - p.m * (v_y - A.target), A_x - m_t * slip_x, A_z - m_t * slip_z
 
 
-def _unlimited_B(u: Six, P: Six, B: Closed, p: Parameters) -> tuple[float, float, float]:
+def _unlimited_B(u: Velocities, P: Forces, B: Closed, p: Parameters) -> tuple[float, float, float]:
     """The same at B: (normal, along y, along z)."""
     m_t = p.m * p.j / (1 + p.j)
     (v_h, *_), (*_, B_x, B_y, B_z), (slip_y, slip_z) = u, P, rigid_body.slip_at_B(u, p)
@@ -186,7 +186,7 @@ class Continuation:
     _last: float = field(init=False, default=math.inf)
     _sweeps: int = field(init=False, default=0)
 
-    def next(self, u: Six, before: Six, after: Six, change: float) -> Forces:
+    def next(self, u: Velocities, before: Forces, after: Forces, change: float) -> Forces:
         """Impulses to start the next sweep from; the last took `before` to `after`, with velocities u."""
         self._sweeps += 1
         if self._sweeps <= PLAIN_SWEEPS:
@@ -205,7 +205,7 @@ class Continuation:
         at_B = np.array(before[3:])
         return Forces(*after[:3], *(at_B + np.linalg.solve(matrix, after[3:] - at_B)).tolist())
 
-    def _rate(self, u: Six, P: Six) -> Array:
+    def _rate(self, u: Velocities, P: Forces) -> Array:
         """f': how the impulse (n, s, t) at B after a sweep changes with that before it."""
         p = self.p
         # What a contact's unlimited impulses are changed by those (n, s, t) at the other: the same both ways.

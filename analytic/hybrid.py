@@ -27,7 +27,7 @@ MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
 
 
-def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
+def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
     """Simulate from state x0 and record; the contract of `simulation.simulate`.
 
     Raises
@@ -38,7 +38,7 @@ def run(x0: list[float], theta_0: float, p: Parameters, flow: Flow, settings: Se
     t_end = float(recorder.times[-1])
     knots = [0.0, *(t for t in flow.start.tolist() if 0 < t < t_end), t_end]
     simulator = _Simulator(p, settings, recorder)
-    at, case = Moment(0.0, theta_0, State(*x0)), None
+    at, case = Moment(0.0, theta_0, x0), None
     for start, end in pairwise(knots):
         fluid = _piece(flow, start, end)
         if case is None or flow(start) != flow(np.nextafter(start, -1.0)):

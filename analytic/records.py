@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import rigid_body
-from analytic.rigid_body import NOTHING, Six
+from analytic.rigid_body import NOTHING, Forces
 from model import Case, Events, Header, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import slip_speeds
@@ -27,7 +27,7 @@ class Event(NamedTuple):
     time: float
     from_case: Case
     to_case: Case
-    impulse: Six = NOTHING
+    impulse: Forces = NOTHING
     """Impulses (A_x, A_y, A_z, B_x, B_y, B_z) in N s."""
 
 

@@ -5,14 +5,11 @@ All on plain floats.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from model import Parameters, State
 from model.arrays import Real
-
-Six = tuple[float, float, float, float, float, float]
 
 
 class Velocities(NamedTuple):
@@ -56,25 +53,25 @@ def velocities(x: Sequence[Real], p: Parameters) -> Velocities:
     return Velocities(v_h, v_y, v_k, w_x + v_k / p.r, w_y - v_k / p.r, w_z + v_y / p.r)
 
 
-def state(y: Real, h: Real, u: Six, p: Parameters) -> State:
+def state(y: Real, h: Real, u: Velocities, p: Parameters) -> State:
     """The state of a ball with velocities u; inverse of `velocities`."""
     v_h, v_y, v_k, o_x, o_y, o_z = u
     return State(y, v_y, v_k / (p.R - h), o_x - v_k / p.r, o_y + v_k / p.r, o_z - v_y / p.r, h, v_h)
 
 
-def slip_at_A(u: Six, p: Parameters) -> tuple[float, float]:
+def slip_at_A(u: Velocities, p: Parameters) -> tuple[Real, Real]:
     """Velocity of the lowest point along i and k (6)."""
     v_h, _, v_k, o_x, _, o_z = u
     return v_h + p.r * o_z, v_k - p.r * o_x
 
 
-def slip_at_B(u: Six, p: Parameters) -> tuple[float, float]:
+def slip_at_B(u: Velocities, p: Parameters) -> tuple[Real, Real]:
     """Velocity of the outermost point along j and k (6)."""
     _, v_y, v_k, _, o_y, o_z = u
     return v_y - p.r * o_z, v_k + p.r * o_y
 
 
-def apply(u: Six, P: Six, p: Parameters) -> Velocities:
+def apply(u: Velocities, P: Forces, p: Parameters) -> Velocities:
     """Velocities after impulses P; or with accelerations u, accelerations under forces P besides: (20)."""
     m, jmr = p.m, p.j * p.m * p.r
     (v_h, v_y, v_k, o_x, o_y, o_z), (A_x, A_y, A_z, B_x, B_y, B_z) = u, P
@@ -82,7 +79,7 @@ def apply(u: Six, P: Six, p: Parameters) -> Velocities:
     return Velocities(v_h, v_y, v_k, o_x - A_z / jmr, o_y + B_z / jmr, o_z + (A_x - B_y) / jmr)
 
 
-def smooth_rates(u: Six, at: Place, omega_0: float, p: Parameters) -> Velocities:
+def smooth_rates(u: Velocities, at: Place, omega_0: float, p: Parameters) -> Velocities:
     """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact."""
     v_h, v_y, v_k, o_x, _, o_z = u
     dv_h = -at.spin * v_k - p.c * (v_h - omega_0 * at.x_k)
@@ -90,39 +87,20 @@ def smooth_rates(u: Six, at: Place, omega_0: float, p: Parameters) -> Velocities
     return Velocities(dv_h, -p.g - p.c * v_y, dv_k, -at.spin * o_z, 0.0, at.spin * o_x)
 
 
-def drag_power(u: Six, at: Place, omega_0: float, p: Parameters) -> float:
-    """Power of the drag (9), W."""
-    v_h, v_y, v_k, *_ = u
-    return -p.m * p.c * (v_h * (v_h - omega_0 * at.x_k) + v_y**2 + v_k * (v_k + omega_0 * at.x_i))
-
-
-def contact_work(u: Six, P: Six, p: Parameters) -> float:
+def contact_work(u: Velocities, P: Forces, p: Parameters) -> Real:
     """Work of impulses P at contact points that move with the mean velocities u, J."""
     (v_h, v_y, *_), (A_x, A_y, A_z, B_x, B_y, B_z) = u, P
     (A_s, A_t), (B_s, B_t) = slip_at_A(u, p), slip_at_B(u, p)
     return A_x * A_s + A_y * v_y + A_z * A_t + B_x * v_h + B_y * B_s + B_z * B_t
 
 
-def energy(y: Real, u: Six, p: Parameters) -> Real:
+def energy(y: Real, u: Velocities, p: Parameters) -> Real:
     """Kinetic and potential energy, J; 0 at rest on the floor."""
     v_h, v_y, v_k, o_x, o_y, o_z = u
     spin = p.j * p.r**2 * (o_x**2 + o_y**2 + o_z**2)
     return p.m * ((v_h**2 + v_y**2 + v_k**2 + spin) / 2 + p.g * y)
 
 
-def mean(a: Six, b: Six) -> Velocities:
+def mean(a: Velocities, b: Velocities) -> Velocities:
     """Half the sum."""
     return Velocities(*[(own + other) / 2 for own, other in zip(a, b, strict=True)])
-
-
-def plus(a: Six, factor: float, b: Six) -> Velocities:
-    """a + factor b."""
-    return Velocities(*[own + factor * other for own, other in zip(a, b, strict=True)])
-
-
-def turned(u: Six, angle: float) -> Velocities:
-    """Components of u along axes turned by an angle about j."""
-    v_h, v_y, v_k, o_x, o_y, o_z = u
-    cos, sin = math.cos(angle), math.sin(angle)
-    v_h, v_k = v_h * cos - v_k * sin, v_k * cos + v_h * sin
-    return Velocities(v_h, v_y, v_k, o_x * cos - o_z * sin, o_y, o_z * cos + o_x * sin)

@@ -72,7 +72,7 @@ def simulate(
     recorder = Recorder(p, times, progress)
     failure, cause = "", None
     try:
-        run(list(x), theta_0, p, flow, settings, recorder)
+        run(x, theta_0, p, flow, settings, recorder)
     except KeyboardInterrupt:
         failure = f"interrupted at t = {recorder.time:g} s"
     except ArithmeticError as error:

@@ -17,7 +17,6 @@ compiles where it is installed (the extra `fast`).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -26,9 +25,9 @@ import numpy.typing as npt
 from analytic import marching, rigid_body, stepping
 from analytic.contact_problem import NotConvergedError
 from analytic.records import Event, Recorder
-from analytic.rigid_body import NOTHING, Forces, Velocities
+from analytic.rigid_body import NOTHING, Forces
 from analytic.settings import Settings
-from model import Case, Flow, Parameters
+from model import Case, Flow, Parameters, State
 from model.arrays import Array
 
 BLOCK = 256
@@ -57,7 +56,7 @@ class Stretches(NamedTuple):
         return cls(knots[:-1], length / count, count, np.isin(knots[1:], times))
 
 
-def run(x0: Sequence[float], theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
+def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
     """Step from state x0 and record samples and changes of case; the contract of `simulation.simulate`.
 
     The first sample, before any step, carries the forces and the case of the first step. Raises
@@ -104,9 +103,9 @@ def constants(p: Parameters, settings: Settings) -> stepping.Constants:
     return stepping.Constants(*map(float, given))  # an integer would be compiled for itself
 
 
-def ball(x: Sequence[float], theta: float, p: Parameters) -> stepping.Ball:
-    """The ball in a state of eight variables that no step has led to."""
-    at = stepping.At(theta, float(x[0]), float(x[6]), Velocities(*map(float, rigid_body.velocities(x, p))))
+def ball(x: State, theta: float, p: Parameters) -> stepping.Ball:
+    """The ball in a state that no step has led to."""
+    at = stepping.At(theta, x.y, x.h, rigid_body.velocities(x, p))
     return stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0)
 
 

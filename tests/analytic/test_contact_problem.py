@@ -21,7 +21,6 @@ from analytic.rigid_body import (
     slip_at_B,
     smooth_rates,
     state,
-    turned,
     velocities,
 )
 from model import Case, Parameters
@@ -166,12 +165,11 @@ def test_giving_up_says_so():
         solve((-1.0, -1.0, 0.3, 10.0, -20.0, 5.0), Closed(), Closed(), P, max_sweeps=1)
 
 
-@given(speeds, st.floats(-4, 4), st.floats(0, 0.04))
+@given(speeds, st.floats(0, 0.04))
 @settings(max_examples=50, deadline=None)
-def test_velocities_and_state_are_inverse(u, angle, h):
+def test_velocities_and_state_are_inverse(u, h):
     x = state(0.1, h, u, P)
     np.testing.assert_allclose(velocities(x, P), u, atol=1e-12 * 200)
     v_A, v_B = slip_velocities(np.array(x), P)
     np.testing.assert_allclose(np.array(slip_at_A(u, P)), v_A[[0, 2]], atol=1e-12)
     np.testing.assert_allclose(np.array(slip_at_B(u, P)), v_B[[1, 2]], atol=1e-12)
-    np.testing.assert_allclose(turned(turned(u, angle), -angle), u, atol=1e-12 * 200)
