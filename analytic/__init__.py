@@ -1,9 +1,10 @@
 """The model in closed form: what the equations of the paper say the ball does."""
 
+from typing import TYPE_CHECKING, Any
+
 from analytic.bifurcation import Thresholds, thresholds
 from analytic.dynamics import contact_forces, vector_field
 from analytic.ensemble import Ensemble, simulate_many
-from analytic.fates import attractors
 from analytic.flowmeter import (
     characteristic_slope,
     mean_slope,
@@ -24,6 +25,9 @@ from analytic.stationary import (
     stable_solutions,
     stationary_solutions,
 )
+
+if TYPE_CHECKING:
+    from analytic.fates import attractors
 
 __all__ = [
     "Ensemble",
@@ -51,3 +55,12 @@ __all__ = [
     "unloading_limit",
     "vector_field",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """`attractors` when it is asked for: the formulas don't wait for its integrators and statistics to load."""
+    if name == "attractors":
+        from analytic.fates import attractors
+
+        return attractors
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
