@@ -159,7 +159,7 @@ def _projection_rate(n: float, s: float, t: float, friction: float, slip: tuple[
 
 
 def unlocked(error: NotConvergedError, p: Parameters) -> Closed:
-    """What a contact can aim at when a rebound from both was not found: to stay closed.
+    """What a contact can aim at when no impulses make both rebound: to stay closed.
 
     Raises the error again if friction can't have locked the ball.
     """

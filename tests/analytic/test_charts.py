@@ -81,9 +81,9 @@ def test_vanishing_slip_has_a_direction(case):
     chart = charts.chart(case, at, P, ramp, FLOOR)
     assert chart.least_slip(chart.start) == pytest.approx(0.0, abs=1e-15)
     path = chart.path(np.array([at.time]), np.array(chart.start)[:, None])
-    for given, found in ((at.alpha, path.alpha[0]), (at.beta, path.beta[0])):
+    for given, kept in ((at.alpha, path.alpha[0]), (at.beta, path.beta[0])):
         if not math.isnan(given):
-            assert math.cos(given - found) == pytest.approx(1.0, abs=1e-14)
+            assert math.cos(given - kept) == pytest.approx(1.0, abs=1e-14)
     assert np.all(np.isfinite(chart.rates(at.time, chart.start)))
 
 

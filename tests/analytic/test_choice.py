@@ -77,10 +77,12 @@ def test_a_steep_contact_creeps_exactly_where_the_margin_is_positive():
             return min(100 * eps - np.abs(slip).max(), forces((omega_c, *slip)).A_y)
 
         leaves.terminal = True
-        run = solve_ivp(
-            lambda t, slip, rates=rates, omega_c=omega_c: rates(t, (omega_c, *slip))[1:],
-            (0, 1e4 * eps * p.r / p.g), np.zeros(3), method="LSODA", events=leaves, rtol=1e-6, atol=1e-9 * eps,
-        )  # fmt: skip
+
+        def held(t, slip, rates=rates, omega_c=omega_c):
+            return rates(t, (omega_c, *slip))[1:]
+
+        span, accuracy = (0, 1e4 * eps * p.r / p.g), {"rtol": 1e-6, "atol": 1e-9 * eps}
+        run = solve_ivp(held, span, np.zeros(3), method="LSODA", events=leaves, **accuracy)
         assert (run.status == 0) == (margin > 0), (p, omega_c)
         seen.add((margin > 0, float(rolling_forces.margin(omega_c, p)) > 0))
     assert seen >= {(True, True), (False, False)}
