@@ -333,9 +333,21 @@ def test_a_long_run_that_is_killed_goes_on_to_the_bit(tmp_path: Path) -> None:
 
 def test_interrupted_by_the_keyboard(tmp_path: Path) -> None:
     command = [
-        sys.executable, "-m", "compare", "sweep", "--vary", "omega_0=5:10:200", "--batch", "2", "--workers", "2",
-        "--time", "2", "-o", str(tmp_path),
-    ]  # fmt: skip
+        sys.executable,
+        "-m",
+        "compare",
+        "sweep",
+        "--vary",
+        "omega_0=5:10:200",
+        "--batch",
+        "2",
+        "--workers",
+        "2",
+        "--time",
+        "2",
+        "-o",
+        str(tmp_path),
+    ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while len(list(tmp_path.glob("*.h5"))) < 2:
         time.sleep(0.1)

@@ -63,10 +63,19 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         assert cli.main(["simulate", "--engine", name, "--time", "0.05", "-o", str(kept[name]), "--json"]) == 0
     collection.collect(made / "runs", kept["collection"])
     measured = [
-        Measurement(protocol="settled", quantity=quantity, value=value, uncertainty=1e-9, engine="mujoco",
-                    set="reference", parameters=P, conditions={"case": "RR", "y": 0.1}, runs=("runs/a.h5",))
+        Measurement(
+            protocol="settled",
+            quantity=quantity,
+            value=value,
+            uncertainty=1e-9,
+            engine="mujoco",
+            set="reference",
+            parameters=P,
+            conditions={"case": "RR", "y": 0.1},
+            runs=("runs/a.h5",),
+        )
         for quantity, value in (("omega_c", 11.9), ("force_Ay", 0.1))
-    ]  # fmt: skip
+    ]
     record.save(Records(tuple(measured), (Missing("settled", "x", "it never settles"),)), kept["measurements"], {})
     return kept
 

@@ -79,9 +79,15 @@ def test_every_deviation_is_measured() -> None:
 
 def law(quantity: str, value: float, uncertainty: float, contact: str = "A") -> Measurement:
     return Measurement(
-        protocol="laws", quantity=quantity, value=value, uncertainty=uncertainty, engine="mujoco", set="mine",
-        parameters=P, conditions={"law": "a law", "contact": contact},
-    )  # fmt: skip
+        protocol="laws",
+        quantity=quantity,
+        value=value,
+        uncertainty=uncertainty,
+        engine="mujoco",
+        set="mine",
+        parameters=P,
+        conditions={"law": "a law", "contact": contact},
+    )
 
 
 def table_3(*rows: Measurement) -> Verdict:
@@ -93,9 +99,11 @@ def test_laws_are_judged() -> None:
     good = (law("law", 0.0, 1e-14), law("friction_ratio", P.mu, 1e-9), law("friction_ratio", P.eta, 1e-9, "B"))
     assert table_3(*good).outcome is Outcome.CONFIRMED
     for bad in (
-        law("law", 1e-6, 1e-14), law("law_in_motion", 1e-3, 1e-5), law("friction_ratio", 1.01 * P.mu, 1e-9),
+        law("law", 1e-6, 1e-14),
+        law("law_in_motion", 1e-3, 1e-5),
+        law("friction_ratio", 1.01 * P.mu, 1e-9),
         law("friction_ratio", P.mu, 1e-9, "B"),
-    ):  # fmt: skip
+    ):
         assert table_3(*good, bad).outcome is Outcome.REFUTED
     assert table_3(*good, law("law_in_motion", 0.0, 1e-2)).outcome is Outcome.INCONCLUSIVE
 

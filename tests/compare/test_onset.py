@@ -153,9 +153,15 @@ def test_protocol_on_a_set_without_fold(lab, monkeypatch):
 
 def _measured(quantity, value, protocol="thresholds", p=REFERENCE, **conditions):
     return Measurement(
-        protocol=protocol, quantity=quantity, value=value, uncertainty=1e-6 * abs(value), engine="mujoco",
-        set="reference", parameters=p, conditions=conditions,
-    )  # fmt: skip
+        protocol=protocol,
+        quantity=quantity,
+        value=value,
+        uncertainty=1e-6 * abs(value),
+        engine="mujoco",
+        set="reference",
+        parameters=p,
+        conditions=conditions,
+    )
 
 
 def _records():

@@ -115,9 +115,15 @@ def spectra(*cases: tuple[Case, float, Parameters]) -> Records:
             quantity: str, value: float, sure: float, p: Parameters = p, case: Case = case, **of: float
         ) -> Measurement:
             return Measurement(
-                protocol="rates", quantity=quantity, value=value, uncertainty=sure, engine="mujoco", set="mine",
-                parameters=p, conditions={"case": case.name, **of},
-            )  # fmt: skip
+                protocol="rates",
+                quantity=quantity,
+                value=value,
+                uncertainty=sure,
+                engine="mujoco",
+                set="mine",
+                parameters=p,
+                conditions={"case": case.name, **of},
+            )
 
         rows.append(row("modes", len(values), 0.0))
         slowest_first = sorted((v for v in values if v.imag >= 0), key=lambda v: -v.real)
@@ -151,9 +157,10 @@ def test_eigenvalues_that_are_two_per_cent_off_are_noticed_in_every_case(
 ) -> None:
     records, right = spectra(*ALL), analytic.stationary_solutions
     monkeypatch.setattr(
-        analytic, "stationary_solutions",
+        analytic,
+        "stationary_solutions",
         lambda p: [dataclasses.replace(s, eigenvalues=factor * s.eigenvalues) for s in right(p)],
-    )  # fmt: skip
+    )
     for verdict in judge(stability.CLAIMS, records):
         assert verdict.outcome is Outcome.REFUTED, verdict.claim.id
 
@@ -163,9 +170,10 @@ def test_an_eigenvalue_too_many_or_too_few_is_noticed(monkeypatch: pytest.Monkey
     (claim,) = (claim for claim in stability.CLAIMS if claim.id == "prop-4-rate")
     for change in (lambda v: v[:-1], lambda v: np.append(v, v[-1])):
         monkeypatch.setattr(
-            analytic, "stationary_solutions",
+            analytic,
+            "stationary_solutions",
             lambda p, change=change: [dataclasses.replace(s, eigenvalues=change(s.eigenvalues)) for s in right(p)],
-        )  # fmt: skip
+        )
         assert judge([claim], records)[0].outcome is Outcome.REFUTED
 
 
@@ -185,12 +193,18 @@ def test_the_rate_of_rolling_and_of_spinning_is_measured_with_mujoco(tmp_path: P
     before = Records(
         tuple(
             Measurement(
-                protocol="settled", quantity=name, value=value, uncertainty=0.0, engine="mujoco", set="mine",
-                parameters=p, conditions={"case": "RR", "start": "rest"},
+                protocol="settled",
+                quantity=name,
+                value=value,
+                uncertainty=0.0,
+                engine="mujoco",
+                set="mine",
+                parameters=p,
+                conditions={"case": "RR", "start": "rest"},
             )
             for name, value in values.items()
         )
-    )  # fmt: skip
+    )
     lab = Lab(Campaign(tmp_path, workers=0), MUJOCO, Level.QUICK)
     records = Records.of(rates.measure(lab, {"mine": P}, before))
     verdicts = {verdict.claim.id: verdict for verdict in judge(stability.CLAIMS, records)}

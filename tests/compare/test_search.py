@@ -108,11 +108,17 @@ def test_a_file_that_is_no_search(tmp_path):
         Searched.load(tmp_path / "no.json")
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    (["--range", "mo=1:2"], "unknown group 'mo'"), (["--range", "mu=2:1"], "wrong order"),
-    (["--range", "mu=2"], "write mu=from:to"), (["--range", "mu=-1:1"], "mu = -1"), (["--sets", "0"], "sets = 0"),
-    (["--workers", "0"], "workers = 0"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--range", "mo=1:2"], "unknown group 'mo'"),
+        (["--range", "mu=2:1"], "wrong order"),
+        (["--range", "mu=2"], "write mu=from:to"),
+        (["--range", "mu=-1:1"], "mu = -1"),
+        (["--sets", "0"], "sets = 0"),
+        (["--workers", "0"], "workers = 0"),
+    ],
+)
 def test_bad_input(words, message, capsys):
     assert cli.main(["search", *words]) == 2
     assert message in capsys.readouterr().err

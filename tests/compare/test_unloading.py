@@ -22,9 +22,15 @@ P = sets(Level.QUICK)[NAME]
 @pytest.fixture(scope="module")
 def records(tmp_path_factory):
     limit = Measurement(
-        protocol="thresholds", quantity="omega_02", value=analytic.thresholds(P).omega_02, uncertainty=1e-5,
-        engine="mujoco", set=NAME, parameters=P, conditions={"side": "from above", "by": "hand"},
-    )  # fmt: skip
+        protocol="thresholds",
+        quantity="omega_02",
+        value=analytic.thresholds(P).omega_02,
+        uncertainty=1e-5,
+        engine="mujoco",
+        set=NAME,
+        parameters=P,
+        conditions={"side": "from above", "by": "hand"},
+    )
     with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
         lab, known = Lab(campaign, MUJOCO, Level.QUICK), Records((limit,))
         return known + Records.of(unloading.measure(lab, {NAME: P}, known))
