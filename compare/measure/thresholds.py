@@ -137,13 +137,15 @@ class Rows:
         low, high = onset.GRID[[0, -1]] / time_unit(self.p)
         return f"no flow between omega_0 = {low:.3g} and {high:.3g} rad/s"
 
-    def _bisected(self, quantity: str, of: Bracket, side: str, by: str) -> Measurement:
+    def _bisected(self, quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
         high = of.runs[1]
         assert high is not None
         # Slip that is still too small to count may have begun below: it is proportional to the distance.
         speed = max(slip(high.slip_speed_A, high), slip(high.slip_speed_B, high))
         unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
+        if not sure_enough(quantity, place, place.value):
+            return self._missing(f"{quantity} by {by} is uncertain by {place.uncertainty:.1g} rad/s")
         return self._record(quantity, place, of.tasks, side=side, by=by)
 
     def _extrapolated(
