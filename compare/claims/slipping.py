@@ -10,19 +10,15 @@ import numpy as np
 from analytic import slip_bounds, slip_stability
 from compare.claims.claim import Bearing, Claim, Outcome, Relation, Text
 from compare.claims.equations import state
+from compare.measure.field import slip_unit
 from compare.measure.record import Measurement
-from model import Case, Parameters
+from model import Case
 
 
 def _gamma(m: Measurement) -> float:
     inner, outer = Case[str(m.conditions["inner"])], Case[str(m.conditions["outer"])]
     n = [m.conditions[f"n_{name[-1]}"] for name in slip_stability.normals(inner, outer)]
     return float(slip_stability.gamma(inner, outer, np.array(state(m)), np.array(n, dtype=float), m.parameters))
-
-
-def slip_unit(p: Parameters) -> float:
-    """The rate of slip, rad s-2, that a force as large as the weight makes at a contact."""
-    return p.g * (1 + p.j) / (p.j * p.r)
 
 
 def _along(inner: Case, outer: Case, by: str = "") -> Callable[[Measurement], bool]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.measure.field import DOUBT, LIMIT, floor
+from compare.measure.field import DOUBT, LIMIT, floor, slip_unit
 from compare.measure.growth import LARGE, SMALL, SMOOTH, Push
 from compare.measure.lab import Lab, time_unit
 from compare.measure.quantities import quantity
@@ -129,7 +129,7 @@ def _points(lab: Lab, line: Line, flows: Sequence[float], tasks: Sequence[Task])
         return None
     p = pushes[0].p
     change = rates[:, 0] - rates[:, 1]
-    noise = math.hypot(np.abs(change).max() * DOUBT, fine[:, 1].max(), floor(p) * p.g / p.r)
+    noise = math.hypot(np.abs(change).max() * DOUBT, fine[:, 1].max(), floor(p) * slip_unit(p))
     return _Points(tuple(flows), tuple(fine[:, 0].tolist()), tuple((change * LIMIT).tolist()), noise)
 
 

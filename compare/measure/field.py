@@ -65,8 +65,13 @@ class Sighting:
     """(6,): A_x, A_y, A_z, B_x, B_y, B_z in N."""
 
 
+def slip_unit(p: Parameters) -> float:
+    """The rate of slip in rad s-2 that a force as large as the weight makes at a contact."""
+    return p.g / p.r * (1 + p.j) / p.j
+
+
 def floor(p: Parameters) -> float:
-    """Least uncertainty of a rate over its natural size, which halving the step may by chance not show.
+    """Least uncertainty of a force over the weight, which halving the step may by chance not show.
 
     What lags behind by a time `LAG` is off by half its square, in units of `time_unit`, once the first order is gone.
     """
@@ -211,12 +216,13 @@ def _values(best: Sighting, fine: Sighting, lower: Sighting, p: Parameters) -> I
     pressing = _forces(best)
     weight = p.m * p.g
     rate_change, force_change = (
-        max(floor(p), *(abs(a - b) * DOUBT / LIMIT + abs(b - c) for a, b, c in zip(*rows, strict=True)))
+        max(0.0, *(abs(a - b) * DOUBT / LIMIT + abs(b - c) for a, b, c in zip(*rows, strict=True)))
         for rows in (
             [(each.rates / scales)[moving] for each in (best, fine, lower)],
             [[force / weight for force in _forces(each).values()] or [0.0] for each in (best, fine, lower)],
         )
     )
+    rate_change, force_change = max(rate_change, floor(p) * (1 + p.j) / p.j), max(force_change, floor(p))
     if max(rate_change, force_change) > COARSE:
         return
     for k in moving:

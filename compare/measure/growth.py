@@ -55,7 +55,7 @@ AT_END = float(
 )
 """How many times as uncertain as in the middle of a window of `compare.measure.field` a rate is before a record."""
 COARSE = quantity("gamma").resolves / COVERAGE
-"""Largest uncertainty that counts, in units of (1+j)/j g/r, all that a check may have: where a contact is hardly
+"""Largest uncertainty that counts, in units of `field.slip_unit`, all that a check may have: where a contact is hardly
 loaded, slip turns too fast."""
 SMOOTH = "without friction at both contacts there is nothing that rolls"
 SINKING = 0.5
@@ -170,9 +170,9 @@ def _growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
     size = (value - _vanishing(fine[-2:] + (fine[-2:] - coarse[-2:]) * LIMIT)[0]) / 3
     p = push.p
     # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
-    floor = field.floor(p) * (1.0 if push.outer is Case.RS else AT_END) * p.g / p.r
+    floor = field.floor(p) * (1.0 if push.outer is Case.RS else AT_END) * field.slip_unit(p)
     uncertainty = math.hypot(step, value - lower, size, floor)
-    if uncertainty > COARSE * (1 + p.j) / p.j * p.g / p.r:
+    if uncertainty > COARSE * field.slip_unit(p):
         return None
     return Measured(float(value), uncertainty)
 
