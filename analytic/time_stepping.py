@@ -4,7 +4,8 @@ A step changes the velocities by the smooth forces at the mean of old and new ve
 impulses of the closed contacts, which obey Coulomb's law with the velocities at its end; friction of a contact that
 slides on opposes the mean of its old and new slip. Smooth forces and both contacts are iterated together until the
 velocities settle. A landing is located within the step: the ball is taken there, collides (Newton's restitution), and
-goes on. Slip that begins, dies out or turns within a step, and lift-off, are not located.
+goes on. Slip that begins, dies out or turns within a step, and lift-off, are not located: the scheme is of second
+order between such changes, of first order through them.
 
 While the ball is at the wall, velocities are taken along axes that turn with it, so that the wall's normal is
 constant within the step and a ball that is held at the wall neither drifts off nor into it; a stationary orbit is

@@ -1,4 +1,4 @@
-"""Time stepping: exact where it should be, of first order elsewhere, and in the end the event-driven result."""
+"""Time stepping: exact where it should be, of second order between events, and in the end the event-driven result."""
 
 from __future__ import annotations
 
@@ -73,6 +73,18 @@ def test_flight_is_of_second_order():
         )
         for s in steps
     ]
+    assert order(steps, errors) == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize("x0", [[0, 0, 9, 30, 60, -40], [0, 0, 20, 100, 150, -200]])
+def test_sliding_is_of_second_order(x0):
+    """Friction opposes the mean slip: against the event-driven result while both contacts slide."""
+    p, t = P.replace(omega_0=25.0), 0.1
+    exact = simulate(p, x0, t, rtol=1e-11, sample_interval=t)
+    assert exact.cases == [Case.SS, Case.SS]
+    steps = np.array([1e-3, 5e-4, 2.5e-4])
+    runs = [simulate(p, x0, t, method="time-stepping", step=s, sample_interval=t) for s in steps]
+    errors = [np.max(np.abs(run.x[-1] - exact.x[-1]) / SCALE) for run in runs]
     assert order(steps, errors) == pytest.approx(2.0, abs=0.1)
 
 
