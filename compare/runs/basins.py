@@ -20,7 +20,7 @@ import numpy.typing as npt
 import mjsim
 from analytic import Settings, simulate_many
 from mjsim import ContactSettings
-from model import Case, Contact, InputError, Parameters, StorageError
+from model import Case, Contact, InputError, Parameters, StorageError, Trajectory
 from model.arrays import Array
 from model.errors import suggestion
 from model.files import write_text
@@ -30,10 +30,10 @@ FATES = ("hops", "RR", "SS", "off the floor", "undecided")
 """What may become of a ball. SR and NR are one: in SR the floor carries nothing (Prop. 3)."""
 DURATION, QUIET = 60.0, 6.0
 """How long time stepping follows a ball, and without a landing, in 1/c."""
-MUJOCO_DURATION, LAST = 20.0, 3.0
+MUJOCO_DURATION, LAST = 10.0, 3.0
 """How long MuJoCo follows it, and the part at the end that counts, in 1/c."""
 HOP = 1e-4
-"""Range of y/R at the end from which the ball hops: the least hop known is ten times that, what settles is less."""
+"""Range of y/R from which a ball that lands again and again hops: a hop known to last is six times as high."""
 STEPS = 140
 """Steps of time stepping in sqrt(R/g)."""
 
@@ -129,24 +129,33 @@ def by_stepping(p: Parameters, x0s: Array) -> npt.NDArray[np.int64]:
     )  # fmt: skip
     last = slice(-int(LAST), None)
     rise = runs.high[:, last, 0].max(axis=1) - runs.low[:, last, 0].min(axis=1)
-    return np.array([_fate(r, Case(c), p) if c >= 0 else 4 for r, c in zip(rise, runs.case[:, -1], strict=True)])
+    lands = runs.landings[:, last].any(axis=1)
+    return np.array([
+        FATES.index("undecided") if failure else _fate(bool(landed and r > HOP * p.R), Case(case))
+        for failure, landed, r, case in zip(runs.failure, lands, rise, runs.case[:, -1], strict=True)
+    ])  # fmt: skip
 
 
 def by_mujoco(p: Parameters, x0s: Array, timestep: float) -> npt.NDArray[np.int64]:
     """Fates (n,) of starts (n, 8) by MuJoCo."""
     settings = dataclasses.replace(ContactSettings.for_problem(p), timestep=timestep)
     runs = mjsim.simulate_many([p] * len(x0s), list(x0s), MUJOCO_DURATION / p.c, settings=settings)
-    fates = []
-    for run in runs:
-        late = run.y[run.time > (MUJOCO_DURATION - LAST) / p.c]
-        fates.append(_fate(np.ptp(late), run.cases[-1], p) if run.complete else FATES.index("undecided"))
-    return np.array(fates)
+    return np.array([_of_trajectory(run, p) for run in runs])
 
 
-def _fate(rise: float, case: Case, p: Parameters) -> int:
-    """What a ball comes to that is in a case at the end, and has moved up and down by `rise` of late."""
-    if rise > HOP * p.R:
-        return 0
+def _of_trajectory(run: Trajectory, p: Parameters) -> int:
+    if not run.complete:
+        return FATES.index("undecided")
+    late = (MUJOCO_DURATION - LAST) / p.c
+    changes = zip(run.events.time, run.events.from_case, run.events.to_case, strict=True)
+    lands = any(t > late and Case(a).A is Contact.N and Case(b).A is not Contact.N for t, a, b in changes)
+    return _fate(bool(lands and np.ptp(run.y[run.time > late]) > HOP * p.R), run.cases[-1])
+
+
+def _fate(hops: bool, case: Case) -> int:
+    """What a ball comes to that is in a case at the end."""
+    if hops:
+        return FATES.index("hops")
     if case in (Case.RR, Case.SS):
         return FATES.index(case.name)
-    return FATES.index("off the floor" if case in (Case.SR, Case.NR) or case.A is Contact.N else "undecided")
+    return FATES.index("off the floor" if case is Case.SR or case.A is Contact.N else "undecided")
