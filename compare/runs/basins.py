@@ -129,7 +129,7 @@ def by_stepping(p: Parameters, x0s: Array) -> npt.NDArray[np.int64]:
     )  # fmt: skip
     last = slice(-int(LAST), None)
     rise = runs.high[:, last, 0].max(axis=1) - runs.low[:, last, 0].min(axis=1)
-    lands = runs.landings[:, last].any(axis=1)
+    lands = np.max(runs.landings[:, last], axis=1) > 0
     return np.array([
         FATES.index("undecided") if failure else _fate(bool(landed and r > HOP * p.R), Case(case))
         for failure, landed, r, case in zip(runs.failure, lands, rise, runs.case[:, -1], strict=True)
