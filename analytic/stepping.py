@@ -99,9 +99,9 @@ def solve(
     # on. Where it may stop friction opposes what is left at the end, lest it reverse the slip.
     slip_A, slip_B = (v_h + r * o_z, v_k - r * o_x), (v_y - r * o_z, v_k + r * o_y)
     load = SLIDES * (max(p.g * dt - v_y, 0.0) + max(v_k * v_k / (p.R - at.h) * dt - v_h, 0.0))
-    if dt == 0 or rest * math.hypot(slip_A[0], slip_A[1]) <= p.mu * load:
+    if dt == 0 or rest * _size(slip_A[0], slip_A[1]) <= p.mu * load:
         slip_A = (0.0, 0.0)
-    if dt == 0 or rest * math.hypot(slip_B[0], slip_B[1]) <= p.eta * load:
+    if dt == 0 or rest * _size(slip_B[0], slip_B[1]) <= p.eta * load:
         slip_B = (0.0, 0.0)
     A = Impulse(0.0, 0.0, 0.0)
     B = start if in_A and in_B else A
@@ -146,6 +146,11 @@ def solve(
 
 
 @compiled
+def _size(x: float, y: float) -> float:
+    return math.sqrt(x * x + y * y)  # several times as fast as math.hypot
+
+
+@compiled
 def _mean(a: Velocities, b: Velocities) -> Velocities:
     o_x, o_y, o_z = (a.o_x + b.o_x) / 2, (a.o_y + b.o_y) / 2, (a.o_z + b.o_z) / 2
     return Velocities((a.v_h + b.v_h) / 2, (a.v_y + b.v_y) / 2, (a.v_k + b.v_k) / 2, o_x, o_y, o_z)
@@ -164,7 +169,7 @@ def _moved(at: At, dt: float, s: Solved, in_A: bool, in_B: bool, R: float) -> At
     if in_B:
         return At(at.theta + dt * s.spin, y, 0.0 if s.P.B_x > 0 else at.h + dt * u.v_h, new)
     x_i, x_k = at.h - R + dt * u.v_h, dt * u.v_k
-    rho = math.sqrt(x_i * x_i + x_k * x_k)
+    rho = _size(x_i, x_k)
     cos, sin = -x_i / rho, x_k / rho
     v_h, v_k = new.v_h * cos - new.v_k * sin, new.v_k * cos + new.v_h * sin
     o_x, o_z = new.o_x * cos - new.o_z * sin, new.o_z * cos + new.o_x * sin
@@ -260,7 +265,7 @@ def _case(in_A: bool, in_B: bool, s: Solved, p: Constants) -> int:
     v_h, v_y, v_k, o_x, o_y, o_z = s.new
     still, A, B = ZERO_SLIP * math.sqrt(p.g * p.R), OPEN, OPEN
     if in_A and (s.P.A_y > 0 or v_y <= 0):
-        A = ROLLS if math.hypot(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
+        A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
     if in_B and (s.P.B_x > 0 or v_h <= 0):
-        B = ROLLS if math.hypot(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
+        B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
     return 3 * A + B
