@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from compare.claims import (
+    attractors,
     bifurcations,
     cases,
     equations,
@@ -27,5 +28,6 @@ CLAIMS: tuple[Claim, ...] = (
     *cases.CLAIMS,
     *equations.CLAIMS,
     *formal.CLAIMS,
+    *attractors.CLAIMS,
 )
 """Every claim there is."""

@@ -16,6 +16,7 @@ from compare.measure import (
     newcomer,
     plane,
     rates,
+    recurrent,
     settled,
     slope,
     thresholds,
@@ -42,6 +43,7 @@ PROTOCOLS: tuple[Protocol, ...] = (
     Protocol("watched", watched.measure, ("thresholds",)),
     Protocol("motions", motions.measure),
     Protocol("impacts", impacts.measure),
+    Protocol("recurrent", recurrent.measure),
     Protocol("slope", slope.measure, ("settled", "thresholds")),
 )
 """Every protocol there is; each goes out only from those before it."""

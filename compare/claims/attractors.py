@@ -1,0 +1,72 @@
+"""Claims beyond the paper, which asks whether periodic attractors exist: a ball that hops for ever."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+import analytic
+from analytic import orbits
+from analytic.orbits import NoOrbitError, Orbit
+from compare.claims.claim import Bearing, Claim
+from compare.claims.judge import remembered
+from compare.measure.record import Measurement
+from model import Parameters
+from model.kinematics import VARIABLES
+
+SECTION = "Beyond the paper"
+PROTOCOL = "recurrent"
+
+
+@remembered
+def _orbit(p: Parameters, x: tuple[float, ...], period: float) -> Orbit:
+    """The closed orbit of theory near what was measured; LookupError if there is none."""
+    try:
+        return orbits.refine(p, x, period)
+    except NoOrbitError as error:
+        raise LookupError(str(error)) from error
+
+
+def _of(m: Measurement) -> Orbit:
+    return _orbit(m.parameters, tuple(float(m.conditions[n]) for n in VARIABLES), float(m.conditions["period"]))
+
+
+def _bearing(quantity: str, predict: Callable[[Orbit], float]) -> Bearing:
+    return Bearing(protocol=PROTOCOL, quantity=quantity, predict=lambda m: predict(_of(m)), by="analytic.orbits.refine")
+
+
+CLAIMS = (
+    Claim(
+        id="hopping",
+        section=SECTION,
+        source="Section 5.3, last paragraph",
+        statement="A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on the wall.",
+        bearings=(
+            _bearing("orbit_period", lambda orbit: orbit.period),
+            _bearing("orbit_omega_c", lambda orbit: orbit.turn / orbit.period),
+            _bearing("orbit_height", lambda orbit: float(orbit.cycle.y.max())),
+        ),
+    ),
+    Claim(
+        id="hopping-multiplier",
+        section=SECTION,
+        source="Section 5.3, last paragraph",
+        statement="Disturbances of the hopping shrink from hop to hop by its largest Floquet multiplier.",
+        bearings=(_bearing("orbit_multiplier", lambda orbit: float(np.abs(orbit.multipliers).max())),),
+    ),
+    Claim(
+        id="hopping-birth",
+        section=SECTION,
+        source="Section 5.3, last paragraph, (85)",
+        statement="Hopping begins with hops of no height at ω₀₂, where the wall begins to carry the ball.",
+        bearings=(
+            Bearing(
+                protocol=PROTOCOL,
+                quantity="orbit_birth",
+                predict=lambda m: analytic.thresholds(m.parameters).omega_02,
+                by="analytic.thresholds: omega_02",
+            ),
+        ),
+    ),
+)
