@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import brentq
 
 from analytic.orbits import Changes, Loop, NoOrbitError, Orbit, close, extent, jacobian
@@ -20,7 +21,7 @@ from model.arrays import Array
 from model.errors import suggestion
 from model.parameters import check_number
 
-FIRST, SMALLEST, LONGEST = 0.02, 1e-5, 0.5
+FIRST, SMALLEST, LONGEST = 0.1, 1e-5, 0.5
 """Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
 EASY = 5
 """Steps of Newton's method up to which the next step along the branch is longer."""
@@ -85,9 +86,9 @@ class OrbitBranch:
         return np.array([getattr(orbit.p, self.name) for orbit in self.orbits])
 
     @property
-    def stable(self) -> Array:
+    def stable(self) -> npt.NDArray[np.bool_]:
         """Whether each orbit is stable, shape (n,)."""
-        return np.array([orbit.stable for orbit in self.orbits])
+        return np.array([orbit.stable for orbit in self.orbits], dtype=bool)
 
 
 def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) -> OrbitBranch:
@@ -189,21 +190,23 @@ def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -
             return changed(_beside(here, share * step, name, matrix))
 
         try:
-            share = brentq(test, 0.0, 1.0, xtol=SHARP, rtol=SHARP)
-        except (NoOrbitError, ValueError):  # the test is no continuous function where the sequence changes
-            share = 0.5
-        orbit = _beside(here, share * step, name, matrix)
+            orbit = _beside(here, brentq(test, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix)
+        except (NoOrbitError, ValueError):  # where the sequence of cases changes, too, the test may jump
+            orbit = there
         yield Place(kind, getattr(orbit.p, name), orbit)
     if _sequence(here) != _sequence(there):
         yield _change(here, there, step, name, matrix)
 
 
 def _change(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Place:
-    """Where the sequence of cases changes, by halving."""
-    low, high = 0.0, 1.0
+    """Where the sequence of cases changes, by halving as far as orbits are found."""
+    low, high, orbit = 0.0, 1.0, there
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        orbit = _beside(here, middle * step, name, matrix)
+        try:
+            orbit = _beside(here, middle * step, name, matrix)
+        except NoOrbitError:
+            break
         low, high = (middle, high) if _sequence(orbit) == _sequence(here) else (low, middle)
     grazing = _landings(here) != _landings(there)
     return Place(Bifurcation.GRAZING if grazing else Bifurcation.PERSISTENCE, getattr(orbit.p, name), orbit)

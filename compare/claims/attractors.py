@@ -12,11 +12,13 @@ from analytic.orbits import NoOrbitError, Orbit
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered
 from compare.measure.record import Measurement
-from model import Parameters
+from model import Parameters, Trajectory
 from model.kinematics import VARIABLES
 
 SECTION = "Beyond the paper"
 PROTOCOL = "recurrent"
+LASTS = 60.0
+"""How long theory simulates a motion that settles, in units of 1/c: the slowest part decays in 2 (1 + 2 j)/c."""
 
 
 @remembered
@@ -36,7 +38,32 @@ def _bearing(quantity: str, predict: Callable[[Orbit], float]) -> Bearing:
     return Bearing(protocol=PROTOCOL, quantity=quantity, predict=lambda m: predict(_of(m)), by="analytic.orbits.refine")
 
 
+@remembered
+def _settled(p: Parameters) -> Trajectory:
+    """What theory's simulation comes to from rest."""
+    return analytic.simulate(p, [0.0] * 6, LASTS / p.c, sample_interval=LASTS / p.c)
+
+
+def _after_rest(quantity: str, predict: Callable[[Trajectory], float]) -> Bearing:
+    return Bearing(
+        protocol="choice",
+        quantity=quantity,
+        predict=lambda m: predict(_settled(m.parameters)),
+        by="analytic.simulate, which leaves rolling by Definitions 1-3",
+    )
+
+
 CLAIMS = (
+    Claim(
+        id="choice",
+        section=SECTION,
+        source="Definitions 1-3",
+        statement="For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip grows.",
+        bearings=(
+            _after_rest("case", lambda run: float(run.case[-1])),
+            _after_rest("omega_c", lambda run: float(run.omega_c[-1])),
+        ),
+    ),
     Claim(
         id="hopping",
         section=SECTION,

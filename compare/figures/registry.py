@@ -16,6 +16,7 @@ from compare.figures import (
     flow_curve,
     hopping,
     parameter_plane,
+    periodic,
     settings,
     slipping,
     unloading,
@@ -74,6 +75,20 @@ FIGURES: dict[str, Drawing] = {
     "fig-13-left": _of_paper(flow_curve, "fig-13-left", "Fig. 13, left: hysteresis, η < j"),
     "fig-13-right": _of_paper(flow_curve, "fig-13-right", "Fig. 13, right: η > j"),
     "unloading": _of(unloading, "Section 5.3: the fall at unloading", "", "fig-13-right"),
+    "hopping-orbit": Drawing(
+        title="Beyond the paper: a ball that hops for ever",
+        select=periodic.select,
+        draw=periodic.draw_orbit,
+        caption=periodic.caption_orbit,
+        claims=("hopping",),
+    ),
+    "hopping-branch": Drawing(
+        title="Beyond the paper: Figs. 9, 10 and 13 with hopping",
+        select=periodic.select,
+        draw=periodic.draw_branch,
+        caption=periodic.caption_branch,
+        claims=("hopping-birth",),
+    ),
     "hopping": Drawing(
         title="Beyond the paper: where the ball hops for ever",
         select=hopping.where,

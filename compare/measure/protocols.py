@@ -5,6 +5,7 @@ from __future__ import annotations
 from compare.measure import (
     birth,
     bounds,
+    choice,
     edge,
     field,
     growth,
@@ -44,6 +45,7 @@ PROTOCOLS: tuple[Protocol, ...] = (
     Protocol("motions", motions.measure),
     Protocol("impacts", impacts.measure),
     Protocol("recurrent", recurrent.measure),
+    Protocol("choice", choice.measure),
     Protocol("slope", slope.measure, ("settled", "thresholds")),
 )
 """Every protocol there is; each goes out only from those before it."""

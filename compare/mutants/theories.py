@@ -148,6 +148,10 @@ THEORIES: tuple[WrongTheory, ...] = (
     # Motions
     WrongTheory("motions of a ball with 2 % more inertia", "analytic.simulation", "simulate", given(other(j=1.02))),
     WrongTheory("motions with 2 % more wall friction", "analytic.simulation", "simulate", given(other(eta=1.02))),
+    # Beyond the paper
+    WrongTheory("rolling goes on while forces allow it", "analytic.simulation", "simulate",
+                lambda right: lambda *given, **named: right(*given, **named | {"leave_rolling": "infeasible"})),
+    WrongTheory("hops with 10 % more floor friction", "analytic.orbits", "refine", given(other(mu=1.1))),
 )  # fmt: skip
 
 
