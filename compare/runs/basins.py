@@ -138,7 +138,7 @@ def by_stepping(p: Parameters, x0s: Array) -> npt.NDArray[np.int64]:
 
 def by_mujoco(p: Parameters, x0s: Array, timestep: float) -> npt.NDArray[np.int64]:
     """Fates (n,) of starts (n, 8) by MuJoCo."""
-    settings = dataclasses.replace(ContactSettings.for_problem(p), timestep=timestep)
+    settings = ContactSettings.for_problem(p, timestep)
     runs = mjsim.simulate_many([p] * len(x0s), list(x0s), MUJOCO_DURATION / p.c, settings=settings)
     return np.array([_of_trajectory(run, p) for run in runs])
 

@@ -61,8 +61,8 @@ def extremes(found: Searched) -> dict[str, tuple[float, float]]:
     return {name: (min(r[name] for r in rows), max(r[name] for r in rows)) for name in BOX} if rows else {}
 
 
-KEPT = ("hopping-box.json", "hopping-strong-drag.json", "hopping-low-friction.json")
-"""Searches that are kept beside this module: over the whole box, and where that shows that hopping goes on."""
+KEPT = ("hopping-box.json", "hopping-strong-drag.json")
+"""Searches that are kept beside this module: over the whole box, and beyond its largest kappa."""
 
 
 def kept(name: str = KEPT[0]) -> Searched:
