@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from compare.runs.sweep import Axis, grid
 from compare.runs.tasks import Task, carry_out
 from model import InputError, Parameters, State, Trajectory
 from model.arrays import Array
+from model.files import write_text
 from model.kinematics import VARIABLES
 
 
@@ -51,6 +53,7 @@ def add(commands: options.Commands) -> None:
         "--follow", action="append", default=[], metavar="NAME=FROM:TO",
         help="follow each periodic motion in a parameter, to where it is born and ends",
     )  # fmt: skip
+    command.add_argument("--page", type=Path, metavar="FILE", help="write the tables as Markdown, too")
     command.add_argument("--json", action="store_true", help="print as JSON")
 
 
@@ -90,7 +93,10 @@ def run(args: argparse.Namespace) -> int:
             "attractors": [attractor_data(each) for each in attractors],
             "branches": [branch_data(each) for each in branches],
         })  # fmt: skip
-    options.show({"engine": args.engine.name, "seed": args.seed, "sets": found}, _table, args.json)
+    data = {"engine": args.engine.name, "seed": args.seed, "sets": found}
+    if args.page:
+        write_text(args.page, _page(data))
+    options.show(data, _table, args.json)
     return 0
 
 
@@ -148,25 +154,60 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+_COLUMNS = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
+
+
+def _varied(data: dict[str, Any]) -> list[str]:
+    return [name for name in data["sets"][0] if name not in ("attractors", "branches")]
+
+
+def _rows(data: dict[str, Any]) -> Iterator[list[str]]:
+    for each in data["sets"]:
+        for row in each["attractors"]:
+            yield [*(f"{each[name]:.6g}" for name in _varied(data)), *_cells(row)]
+
+
 def _table(data: dict[str, Any]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, title=f"What balls come to ({data['engine']})", title_justify="left")
-    varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
-    columns = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
-    for column in (*varied, *columns):
+    for column in (*_varied(data), *_COLUMNS):
         table.add_column(column)
-    for each in data["sets"]:
-        values = [f"{each[name]:.6g}" for name in varied]
-        for row in each["attractors"]:
-            table.add_row(*values, *_cells(row))
+    for row in _rows(data):
+        table.add_row(*row)
     table.caption = "\n".join(_way(branch) for each in data["sets"] for branch in each["branches"])
     table.caption_justify = "left"
     return table
 
 
+def _page(data: dict[str, Any]) -> str:
+    """The same in Markdown, with the orbits of each branch."""
+    lines = _markdown([*_varied(data), *_COLUMNS], _rows(data))
+    for branch in (branch for each in data["sets"] for branch in each["branches"]):
+        name = branch["parameter"]
+        lines += ["", *(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}" for p in branch["places"]), ""]
+        head = [name, "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"]
+        lines += _markdown(head, (_orbit_cells(orbit, name) for orbit in branch["orbits"]))
+    return "\n".join(lines) + "\n"
+
+
+def _orbit_cells(orbit: dict[str, Any], name: str) -> list[str]:
+    numbers = orbit[name], orbit["period"], orbit["omega_c"], 1e3 * orbit["height"], _largest(orbit)
+    return [*(f"{number:.7g}" for number in numbers), "yes" if orbit["stable"] else "no"]
+
+
+def _largest(row: dict[str, Any]) -> float:
+    """The largest modulus of the multipliers; nan if there are none."""
+    return max((abs(complex(*each)) for each in row["multipliers"]), default=math.nan)
+
+
+def _markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """A table of Markdown, line by line."""
+    cells = [head, ["---"] * len(head), *rows]
+    return ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells]
+
+
 def _cells(row: dict[str, Any]) -> list[str]:
     """An attractor as cells of the table."""
     low, high = row["share_95"]
-    largest = max((abs(complex(*each)) for each in row["multipliers"]), default=None)
     exponent = f"exponent {row['lyapunov']:.2g}/s" if row["lyapunov"] is not None else "none"
     return [
         row["kind"],
@@ -175,7 +216,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
         f"{row['period']:.6g}" if row["period"] else "-",
         f"{row['mean']['omega_c']:.6g} ({row['low']['omega_c']:.5g}–{row['high']['omega_c']:.5g})",
         f"{1e3 * row['high']['y']:.4g}",
-        f"{largest:.4g}" if largest is not None else "-",
+        f"{_largest(row):.4g}" if row["multipliers"] else "-",
         row["theory"] or row["failure"] or exponent,
     ]
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+import analytic
 from analytic import bifurcation, orbit_branch, orbits
 from analytic.orbit_branch import OrbitBranch
 from compare.figures import style
@@ -70,13 +71,17 @@ def draw_branch(of: Hopping) -> Figure:
     carried = np.linspace(t.omega_02, flows[1], 100)
     sinking = np.array([flows[0], t.omega_02])
     for axes, ratio in ((orbit, 0.0), (spin, p.R / p.r)):
-        slipping(axes, p, functools.partial(_spin, ratio), "SS", (0.9, (0, 6)), (0.0, (0, 0)))
+        slipping(axes, p, functools.partial(_spin, ratio), "", (0.5, (0, 0)), (0.5, (0, 0)))
         riding = lifted(carried, p) if ratio else carried
         sunk = p.eta / p.j * sinking * p.R / p.r if ratio else sinking
         axes.plot(carried, riding, color=style.COLOURS[Case.NR], lw=2)
         axes.plot(sinking, sunk, color=style.COLOURS[Case.NS], lw=2)
         style.name(axes, float(carried[60]), float(riding[60]), "SR, NR", (-5, 5), style.COLOURS[Case.NR])
         style.name(axes, float(sinking[0]), float(sunk[0]), "NS", (6, 5), style.COLOURS[Case.NS])
+        for stable, label in ((True, "SS"), (False, "SS, unstable")):
+            x = analytic.solution(p.replace(omega_0=0.97 * float(flows[1])), Case.SS, stable=stable).x
+            at = float(_spin(ratio, x[3], x[2]))
+            style.name(axes, 0.97 * float(flows[1]), at, label, (-5, -5), style.COLOURS[Case.SS])
         _hops(axes, ratio)
         axes.set_xlim(*flows)
         axes.set_xlabel(style.OMEGA_0)

@@ -64,6 +64,16 @@ def test_multipliers_are_how_disturbances_change(hop: Orbit, swing: Orbit) -> No
         assert np.abs(windows @ polynomial).max() < 0.01 * np.abs(series).max()
 
 
+def test_a_branch_ends_at_the_range(hop: Orbit) -> None:
+    """In a short range the branch has an orbit at either end, and all are stable."""
+    branch = orbit_branch.follow(hop, "omega_0", 69.0, 69.4)
+    assert branch.values[[0, -1]] == pytest.approx([69.0, 69.4])
+    assert [place.kind for place in branch.places] == [Bifurcation.RANGE] * 2
+    assert branch.stable.all()
+    assert np.all(np.diff([orbit.cycle.y.max() for orbit in branch.orbits]) > 0)
+
+
+@pytest.mark.slow
 def test_hopping_is_born_where_the_wall_begins_to_carry() -> None:
     """Down in omega_0 the hops become ever lower and vanish at omega_02; the multipliers don't tell of it."""
     low = HOPPING.replace(omega_0=53.77)
