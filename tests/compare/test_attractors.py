@@ -1,0 +1,89 @@
+"""The command of attractors, and how hops are measured."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compare.commands.cli import main
+from compare.measure import recurrent
+from model import Events, Flow, Header, Parameters, Trajectory
+from model.arrays import Array
+from model.trajectory import SAMPLE
+
+HOPPING = Parameters.named("hopping")
+
+
+def test_undecided_with_what_it_did_last(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """JSON, and a page with a row for each set."""
+    page = tmp_path / "page.md"
+    given = ["--set", "hopping", "--start", "omega_c=20", "--time", "1", "--vary", "omega_0=60,70", "--page", str(page)]
+    assert main(["attractors", *given, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert [each["omega_0"] for each in data["sets"]] == [60, 70]
+    for each in data["sets"]:
+        (only,) = each["attractors"]
+        assert only["kind"] == "undecided"
+        assert only["low"]["omega_c"] <= only["mean"]["omega_c"] <= only["high"]["omega_c"]
+    rows = [line for line in page.read_text("utf-8").splitlines() if line.startswith("|")]
+    assert len(rows) == 2 + 2
+    assert len({row.replace("\\|", "").count("|") for row in rows}) == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        (["--start", "y=-1"], "y = -1 m is out of range"),
+        (["--follow", "omega_0=60"], "omega_0=from:to"),
+        (["--follow", "omega=60:70"], "unknown parameter 'omega'"),
+        (["--starts", "0"], "starts = 0"),
+        (["--c", "0", "--starts", "1"], "say how long"),
+    ],
+)
+def test_bad_input(given: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["attractors", *given]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_tops_of_known_hops() -> None:
+    """Parabolas of one period and height: the tops come out between the samples."""
+    period, height = 0.2217, 4e-3
+    time = np.arange(0, 5, 1e-3)
+    phase = np.mod(time, period) / period - 0.5
+    run = _run(time, height * (1 - 4 * phase**2), 57.0 * time)
+    hops = recurrent.tops(run, 1.0, 4.0)
+    # The parabola through three samples is the hop itself.
+    assert hops.values["orbit_period"] == pytest.approx(period, rel=1e-9)
+    assert hops.values["orbit_height"] == pytest.approx(height, rel=1e-9)
+    assert hops.drift < 1e-9
+    assert len(recurrent.tops(_run(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
+
+
+def test_shrinking_is_the_modulus_of_the_eigenvalue() -> None:
+    """States that follow a linear map with a complex pair and a fast root."""
+    size, angle = 0.9, 0.23
+    turn = size * np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 0]])
+    turn[2, 2] = 0.03
+    mixed = np.array([[1, 0.3, 0.2], [0.1, 1, 0.4], [0.5, -0.2, 1]])
+    states, z = np.zeros((12, 8)), np.array([1e-3, 2e-3, 1e-3])
+    for state in states:
+        state[[0, 2, 3]] = np.array([5e-3, 57.0, -100.0]) + mixed @ z * np.array([0.05, 14.0, 31.0])
+        z = turn @ z
+    assert recurrent.shrinking(states, HOPPING) == pytest.approx(size, rel=1e-6)
+
+
+def test_birth_is_where_the_height_vanishes() -> None:
+    rows = [(w, 4e-4 * (w - 52) - 1e-6 * (w - 52) ** 2, 4e-4 * (w - 52)) for w in (58.0, 56.0, 54.0)]
+    found = recurrent.birth(rows)
+    assert found.value == pytest.approx(52.0, abs=1e-9)
+    assert 0 < found.uncertainty < 0.1
+
+
+def _run(time: Array, y: Array, theta: Array) -> Trajectory:
+    block = np.zeros(len(time), SAMPLE)
+    block["time"], block["y"], block["theta"], block["omega_c"] = time, y, theta, np.gradient(theta, time)
+    return Trajectory.from_blocks(Header("mujoco", HOPPING, Flow.steady(HOPPING.omega_0)), [block], Events())
