@@ -50,9 +50,12 @@ def add(commands: options.Commands) -> None:
         help="a range, or NAME=A,B,C; several: grid",
     )
     command.add_argument(
-        "--follow", action="append", default=[], metavar="NAME=FROM:TO",
+        "--follow",
+        action="append",
+        default=[],
+        metavar="NAME=FROM:TO",
         help="follow each periodic motion in a parameter, to where it is born and ends",
-    )  # fmt: skip
+    )
     command.add_argument("--page", type=Path, metavar="FILE", help="write the tables as Markdown, too")
     command.add_argument("--json", action="store_true", help="print as JSON")
 
@@ -88,11 +91,13 @@ def run(args: argparse.Namespace) -> int:
             for way in ways
         ]
         varied = {axis.name: getattr(p, axis.name) for axis in axes}
-        found.append({
-            **varied,
-            "attractors": [attractor_data(each) for each in attractors],
-            "branches": [branch_data(each) for each in branches],
-        })  # fmt: skip
+        found.append(
+            {
+                **varied,
+                "attractors": [attractor_data(each) for each in attractors],
+                "branches": [branch_data(each) for each in branches],
+            }
+        )
     data = {"engine": args.engine.name, "seed": args.seed, "sets": found}
     if args.page:
         write_text(args.page, _page(data))

@@ -32,9 +32,13 @@ from model.files import write_text
 CHUNK = 50
 """Sets in a file."""
 BOX = {
-    "mu": (0.03, 3.0), "eta": (0.03, 2.0), "j": (0.1, 2 / 3), "r/R": (0.02, 0.6),
-    "kappa": (0.005, 1.0), "Omega_0": (0.3, 6.0),
-}  # fmt: skip
+    "mu": (0.03, 3.0),
+    "eta": (0.03, 2.0),
+    "j": (0.1, 2 / 3),
+    "r/R": (0.02, 0.6),
+    "kappa": (0.005, 1.0),
+    "Omega_0": (0.3, 6.0),
+}
 """The box that is searched, unless another one is named."""
 LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
 """Groups that are spread evenly in their logarithm."""

@@ -15,9 +15,17 @@ BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
 
 def made_up(fates, mujoco=((0, 0), (0, 0)), coarse=2) -> Basins:
     return Basins(
-        BISTABLE, (0.0,) * 8, "omega_c", "slip_x", np.arange(4.0), np.arange(4.0), np.array(fates), coarse,
-        np.array(mujoco), 1e-3,
-    )  # fmt: skip
+        BISTABLE,
+        (0.0,) * 8,
+        "omega_c",
+        "slip_x",
+        np.arange(4.0),
+        np.arange(4.0),
+        np.array(fates),
+        coarse,
+        np.array(mujoco),
+        1e-3,
+    )
 
 
 def test_fates_are_the_stable_solutions_that_theory_has():
@@ -53,10 +61,14 @@ def test_kept_as_a_file(tmp_path):
         Basins.load(tmp_path / "b.json")
 
 
-@pytest.mark.parametrize(("changes", "start", "message"), [
-    ({"c": 0.0}, {}, "there are no basins"), ({}, {"omega": 1.0}, "unknown state variable 'omega'"),
-    ({}, {"h": 0.06}, "h = 0.06 m"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("changes", "start", "message"),
+    [
+        ({"c": 0.0}, {}, "there are no basins"),
+        ({}, {"omega": 1.0}, "unknown state variable 'omega'"),
+        ({}, {"h": 0.06}, "h = 0.06 m"),
+    ],
+)
 def test_bad_input(changes, start, message):
     with pytest.raises(InputError, match=message):
         basins(BISTABLE.replace(**changes), start, ("omega_c", 0.0, 1.0, 2), ("slip_x", 0.0, 1.0, 2))
