@@ -228,13 +228,16 @@ def _sure(edge: Edge) -> Array:
     """Standard uncertainty of the crossing, (8,): of the last bracket, and of all moves to come.
 
     They are taken to shrink as the last two did: together they are at least the last one, and at most ten of its size;
-    and no less than what the mean of the last two runs, the centre of a next line, is off the crossing.
+    and no less than what a next line, through the mean of the last two runs, would pass by the crossing at.
     """
     assert edge.found is not None
     assert edge.moved is not None
     last, before = (0.0 if moved is None else float(np.linalg.norm(moved[3:6])) for moved in (edge.moved, edge.before))
     ratio = min(last / before, 0.9) if before else 0.0
-    ahead = np.abs(_onward(edge).centre - edge.crossing)
+    onward, roll = _onward(edge), edge.p.R / edge.p.r
+    alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
+    off, along = (onward.centre - edge.crossing) * alike, onward.line * alike
+    ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
     return np.hypot(edge.found.place.uncertainty * edge.line, np.maximum(edge.moved / (1 - ratio), ahead))
 
 
