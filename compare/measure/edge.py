@@ -238,7 +238,8 @@ def _sure(edge: Edge) -> Array:
     alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
     off, along = (onward.centre - edge.crossing) * alike, onward.line * alike
     ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
-    return np.hypot(edge.found.place.uncertainty * edge.line, np.maximum(edge.moved / (1 - ratio), ahead))
+    moves = np.maximum(edge.moved / (1 - ratio), ahead)
+    return np.asarray(np.hypot(edge.found.place.uncertainty * edge.line, moves))
 
 
 def _closing(lab: Lab, p: Parameters, name: str, edges: Sequence[Edge]) -> Iterator[Measurement | Missing]:
