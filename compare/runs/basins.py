@@ -33,7 +33,7 @@ DURATION, QUIET = 60.0, 6.0
 MUJOCO_DURATION, LAST = 10.0, 3.0
 """How long MuJoCo follows it, and the part at the end that counts, in 1/c."""
 SAMPLES = 4000
-"""Samples of that. A ball that hops is seen within a tenth of its height of the floor; a landing may be too short to."""
+"""Samples of that: of a hop, one is within a tenth of its height. The landing itself may be shorter than a step."""
 HOP = 1e-4
 """Range of y/R from which a ball that lands again and again hops: a hop known to last is six times as high."""
 STEPS = 140
