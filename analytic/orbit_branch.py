@@ -22,15 +22,16 @@ from model.arrays import Array
 from model.errors import suggestion
 from model.parameters import check_number
 
-FIRST, SMALLEST, LONGEST = 0.05, 1e-5, 0.5
+FIRST, SMALLEST, LONGEST = 0.1, 1e-5, 0.5
 """Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
-STRAY = 0.5
-"""How far Newton's method may correct a step, in units of the step."""
+STRAY, GRAZING = 0.5, 0.01
+"""How far Newton's method may correct a step, in units of the step; and the longest step in which the number of
+landings may change: other branches, as of balls that ride the wall, are near."""
 EASY = 5
 """Steps of Newton's method up to which the next step along the branch is longer."""
 SHARP = 1e-6
 """How sharply a change of stability is located along the branch; a change of the sequence of cases by `HALVINGS`."""
-HALVINGS = 14
+HALVINGS = 10
 SMALL = 0.05
 """Extent over the largest of the branch below which an orbit is followed no further, but on to none at all."""
 
@@ -153,7 +154,8 @@ def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
     aim = here.loop.moved(by, name)
     found = close(aim, name, matrix)
     strayed = np.append(aim.coordinates(found.loop.x - aim.x), math.log(getattr(found.p, name) / getattr(aim.p, name)))
-    if np.linalg.norm(strayed) > STRAY * np.linalg.norm(by):
+    step = np.linalg.norm(by)
+    if np.linalg.norm(strayed) > STRAY * step or (step > GRAZING and _landings(found) != _landings(here)):
         raise NoOrbitError("the nearest orbit is one of another branch")
     return found
 

@@ -22,7 +22,7 @@ from model.arrays import Array
 SET = Parameters.named("hopping")
 TOP, PERIOD = (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222
 """About a state and the period of the orbit; Newton's method does the rest."""
-LOW, HIGH = 0.9, 1.55
+LOW, HIGH = 0.9, 1.4
 """Flows shown, in units of omega_02."""
 
 
