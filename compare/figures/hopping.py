@@ -52,7 +52,7 @@ def draw_where(found: Searched) -> Figure:
             label = "one landing a period" if simple else "several, or no period"
             axes.plot([r[a] for r in own], [r[b] for r in own], mark, ms=3.2, mfc="none", color=colour, label=label)
         _scales(axes, a, b)
-    style.legend(figure.axes[0], loc="lower right", fontsize=7.5)
+    style.legend(figure.axes[0], loc="upper left", fontsize=7.5)
     return figure
 
 
@@ -104,7 +104,8 @@ def draw_plane(basins: Basins) -> Figure:
             own = basins.mujoco == k
             axes.plot(x[own], y[own], "o", ms=4, color=_COLOURS[k], mec="k", mew=0.4)
         differ = basins.mujoco != basins.fates[:: basins.coarse, :: basins.coarse]
-        handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
+        if np.any(differ):
+            handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
         handles += axes.plot([], [], "o", ms=4, color="white", mec="k", mew=0.6, label="MuJoCo")
     axes.set(xlabel=f"{_SYMBOLS[basins.across]} at the start", ylabel=f"{_SYMBOLS[basins.up]} at the start")
     axes.legend(handles=handles, fontsize=8, loc="upper left", framealpha=0.95)
