@@ -51,7 +51,7 @@ def validate(
 
     Parameters
     ----------
-    claims : ids; all for None
+    claims : ids; all that the level measures for None
     sets : parameter sets by name; those of the level for None
 
     Raises
@@ -61,7 +61,7 @@ def validate(
     StorageError
         If the directory can't be written or holds results of another version.
     """
-    output, chosen = Path(output), select(CLAIMS, claims)
+    output, chosen = Path(output), [each for each in select(CLAIMS, claims) if claims or each.level <= level]
     sets = sets_of(level) if sets is None else sets
     results.open_directory(output)
     kept = programme.directory(output, engine, level, sets)

@@ -11,6 +11,7 @@ from analytic import orbits
 from analytic.orbits import NoOrbitError, Orbit
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered
+from compare.measure.lab import Level
 from compare.measure.record import Measurement
 from model import Parameters, Trajectory
 from model.kinematics import VARIABLES
@@ -77,6 +78,7 @@ CLAIMS = (
     ),
     Claim(
         id="hopping-multiplier",
+        level=Level.DEFAULT,
         section=SECTION,
         source="Section 5.3, last paragraph",
         statement="Disturbances of the hopping shrink from hop to hop by its largest Floquet multiplier.",
@@ -84,6 +86,7 @@ CLAIMS = (
     ),
     Claim(
         id="hopping-birth",
+        level=Level.DEFAULT,
         section=SECTION,
         source="Section 5.3, last paragraph, (85)",
         statement="Hopping begins with hops of no height at ω₀₂, where the wall begins to carry the ball.",

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from compare.measure.lab import Level
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement
 from compare.statistics import Measured
@@ -128,6 +129,8 @@ class Claim:
     reason: str = ""
     """What had to be corrected, or why a refutation is expected."""
     expected: Outcome = Outcome.CONFIRMED
+    level: Level = Level.QUICK
+    """The least level at which it is measured."""
 
     def __post_init__(self) -> None:
         if (self.algebra is not None) != (self.text is Text.FORMAL) or bool(self.bearings) == bool(self.algebra):
