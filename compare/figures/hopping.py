@@ -94,7 +94,15 @@ def draw_plane(basins: Basins) -> Figure:
     axes = figure.subplots()
     colours = ListedColormap([*_COLOURS])
     axes.pcolormesh(
-        basins.x, basins.y, basins.fates, cmap=colours, vmin=-0.5, vmax=len(FATES) - 0.5, alpha=0.55, shading="nearest"
+        basins.x,
+        basins.y,
+        basins.fates,
+        cmap=colours,
+        vmin=-0.5,
+        vmax=len(FATES) - 0.5,
+        alpha=0.55,
+        shading="nearest",
+        rasterized=True,
     )
     present = set(np.unique(basins.fates)) | set(np.unique(basins.mujoco))
     handles: list[object] = [Patch(color=_COLOURS[k], alpha=0.55, label=FATES[k]) for k in sorted(present)]

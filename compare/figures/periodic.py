@@ -143,9 +143,14 @@ def draw_orbit(of: Hopping) -> Figure:
         for case in dict.fromkeys(cycle.cases):
             part = cycle.case == case
             ax.plot(
-                np.where(part, x, np.nan), np.where(part, 1e3 * cycle.y, np.nan), ".", ms=2.5,
-                color=style.COLOURS[case], label=case.name,
-            )  # fmt: skip
+                x[part],
+                1e3 * cycle.y[part],
+                ".",
+                ms=2.5,
+                rasterized=True,
+                color=style.COLOURS[case],
+                label=case.name,
+            )
         ax.set_xlabel(label)
     axes[0].set_ylabel("y (mm)")
     style.legend(axes[0], loc="lower right", markerscale=4)
