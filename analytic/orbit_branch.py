@@ -7,7 +7,6 @@ between two orbits, the place is located.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
@@ -22,11 +21,10 @@ from model.arrays import Array
 from model.errors import suggestion
 from model.parameters import check_number
 
-FIRST, SMALLEST, LONGEST = 0.1, 1e-5, 0.5
+FIRST, SMALLEST, LONGEST = 0.05, 1e-5, 0.5
 """Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
-STRAY, GRAZING = 0.5, 0.01
-"""How far Newton's method may correct a step, in units of the step; and the longest step in which the number of
-landings may change: other branches, as of balls that ride the wall, are near."""
+GRAZING = 0.01
+"""Longest step in which the number of landings may change: other branches, as of balls that ride the wall, are near."""
 EASY = 5
 """Steps of Newton's method up to which the next step along the branch is longer."""
 SHARP = 1e-6
@@ -150,12 +148,9 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
 
 
 def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
-    """The orbit of the branch a step further; `NoOrbitError` also where Newton's method strays to another branch."""
-    aim = here.loop.moved(by, name)
-    found = close(aim, name, matrix)
-    strayed = np.append(aim.coordinates(found.loop.x - aim.x), math.log(getattr(found.p, name) / getattr(aim.p, name)))
-    step = np.linalg.norm(by)
-    if np.linalg.norm(strayed) > STRAY * step or (step > GRAZING and _landings(found) != _landings(here)):
+    """The orbit of the branch a step further; `NoOrbitError` also where a long step comes to other landings."""
+    found = close(here.loop.moved(by, name), name, matrix)
+    if np.linalg.norm(by) > GRAZING and _landings(found) != _landings(here):
         raise NoOrbitError("the nearest orbit is one of another branch")
     return found
 
