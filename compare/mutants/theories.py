@@ -35,9 +35,7 @@ def _without_drag_on_y(right: Function) -> Function:
 
     def function(case: Case, x: Any, f: Any, p: Parameters, omega_0: Any) -> Any:
         rate = right(case, x, f, p, omega_0)
-        if case.A.name == "N":
-            rate[1] = rate[1] + p.c * x[1]
-        return rate
+        return rate._replace(v_y=rate.v_y + p.c * x[1]) if case.A.name == "N" else rate
 
     return function
 

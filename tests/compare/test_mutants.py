@@ -12,6 +12,7 @@ import analytic
 from analytic import dynamics, stationary
 from compare.claims import stationary as claims
 from compare.claims.claim import Outcome
+from compare.measure.field import constrained
 from compare.measure.lab import Lab, Level
 from compare.mutants import engines, trial
 from compare.mutants.engines import WRONG_ENGINES
@@ -37,6 +38,23 @@ def test_each_replaces_a_function_that_exists_and_gives_it_back(wrong: WrongTheo
     with believed(wrong):
         assert getattr(module, wrong.function) is not right
     assert getattr(module, wrong.function) is right
+
+
+@pytest.mark.parametrize("wrong", [w for w in THEORIES if w.module == "analytic.dynamics"], ids=lambda w: w.what)
+def test_wrong_equations_of_motion_are_wrong_and_not_broken(wrong: WrongTheory) -> None:
+    """Another number somewhere, and no error: a theory that can't be evaluated would be noticed by anybody."""
+
+    p, x = P.replace(mu=0.3), np.array([0.0, 0.1, 12.0, 1.0, 2.0, 3.0, 0.0, 0.0])
+    states = [(case, constrained(case, x, p)) for case in Case]
+
+    def numbers() -> list[float]:
+        answers = [(analytic.vector_field(*at, p), *analytic.contact_forces(*at, p)) for at in states]
+        return np.concatenate([np.ravel(each) for answer in answers for each in answer]).tolist()
+
+    right = numbers()
+    assert np.all(np.isfinite(right))
+    with believed(wrong):
+        assert numbers() != right
 
 
 def test_a_fault_shows_wherever_the_function_is_known_by_name() -> None:
