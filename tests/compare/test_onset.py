@@ -134,8 +134,7 @@ def test_edge_tells_by_the_way_a_run_still_goes():
         assert _falls_behind(SimpleNamespace(time=np.arange(101), omega_c=np.full(101, end)), edge) is falls
 
 
-def test_protocol_on_a_set_without_fold(lab, monkeypatch):
-    monkeypatch.setattr(onset, "WIDTH", {Level.QUICK: 1e-3})
+def test_protocol_on_a_set_without_fold(lab):
     name = "thick-fluid"
     p = sets(Level.QUICK)[name]
     records = Records.of(thresholds.measure(lab, {name: p}, Records()))
