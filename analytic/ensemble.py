@@ -109,9 +109,9 @@ def simulate_many(
         if end[k] < 0:
             end[k] *= -1
             failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"
-        if progress:
-            progress((k + 1) / count)
 
     with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(carry_out, range(count)))
+        for done, _ in enumerate(pool.map(carry_out, range(count)), 1):
+            if progress:
+                progress(done / count)
     return Ensemble(times, case=case, landings=landings, end=end, failure=tuple(failure), **blank)

@@ -18,8 +18,7 @@ from scipy.optimize import brentq
 from analytic.orbits import Changes, Loop, NoOrbitError, Orbit, close, extent, jacobian
 from model import Contact, InputError, Parameters
 from model.arrays import Array
-from model.errors import suggestion
-from model.parameters import check_number
+from model.parameters import check_names, check_number
 
 FIRST, SMALLEST, LONGEST = 0.05, 1e-5, 0.5
 """Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
@@ -102,8 +101,7 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
         If there is no such parameter, or the orbit isn't within the range.
     """
     names = [field.name for field in fields(Parameters)]
-    if name not in names:
-        raise InputError(f"unknown parameter {name!r}{suggestion(name, names)}; there are {', '.join(names)}")
+    check_names([name], names, "parameter")
     low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
     if not low <= (value := getattr(start.p, name)) <= high or value == 0:
         raise InputError(f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, not 0")

@@ -18,7 +18,8 @@ from compare.measure.lab import Lab, Level
 from compare.measure.record import Measurement, Missing, Records
 from compare.runs.engines import Engine
 from compare.runs.tasks import sources
-from model import Parameters, StorageError
+from model import Parameters
+from model.files import make_directory
 
 DIRECTORY = "measurements"
 Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
@@ -72,10 +73,7 @@ def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], befo
             *protocol.measure(lab, settling, before),
             *(Missing(protocol.name, name, UNDAMPED) for name in sets if name not in settling),
         ]
-        try:
-            kept.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StorageError(f"cannot write to {kept}: {error.strerror}") from error
+        make_directory(kept)
         about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
         record.save(Records.of(rows), path, about)
     return record.load(path)

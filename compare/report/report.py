@@ -21,7 +21,7 @@ from compare.measure.record import Records
 from compare.report import pictures, results, wording
 from compare.report.results import Summary
 from model.errors import StorageError
-from model.files import write_text
+from model.files import make_directory, write_text
 
 ROWS = 50
 """Checks of a claim that are listed, the worst first; a longer page would open slowly."""
@@ -37,10 +37,7 @@ def write(material: Material, summary: Summary) -> Path:
     """
     directory = material.directory
     results.save(summary, directory)
-    try:
-        (directory / results.FIGURES).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(f"cannot write to {directory / results.FIGURES}: {error.strerror}") from error
+    make_directory(directory / results.FIGURES)
     path = directory / results.REPORT
     write_text(path, render(material, summary))
     return path

@@ -18,7 +18,7 @@ from compare.measure.lab import Level
 from compare.measure.record import Records
 from compare.statistics import plain
 from model.errors import StorageError
-from model.files import write_text
+from model.files import make_directory, write_text
 from model.trajectory import current_commit, current_versions
 
 SUMMARY, REPORT, RUNS, FIGURES = "summary.json", "report.html", "runs", "figures"
@@ -74,12 +74,8 @@ def open_directory(directory: Path) -> None:
 
     Raises `StorageError` if the directory can't be written or holds results of another version of the program.
     """
-    try:
-        (directory / RUNS).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(f"cannot write to {directory}: {error.strerror}") from error
-    if not os.access(directory, os.W_OK | os.X_OK):
-        raise StorageError(f"cannot write to {directory}: Permission denied")
+    make_directory(directory)
+    make_directory(directory / RUNS)
     if (directory / SUMMARY).exists():
         load(directory)
 

@@ -22,9 +22,9 @@ from analytic import Settings, simulate_many
 from mjsim import ContactSettings
 from model import Case, Contact, InputError, Parameters, StorageError, Trajectory
 from model.arrays import Array
-from model.errors import suggestion
 from model.files import write_text
 from model.kinematics import VARIABLES
+from model.parameters import check_names
 
 FATES = ("hops", "RR", "SS", "off the floor", "undecided")
 """What may become of a ball. SR and NR are one: in SR the floor carries nothing (Prop. 3)."""
@@ -106,9 +106,7 @@ def basins(
 
     Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball can't start.
     """
-    for name in (*start, across[0], up[0]):
-        if name not in VARIABLES:
-            raise InputError(f"unknown state variable {name!r}{suggestion(name, VARIABLES)}")
+    check_names((*start, across[0], up[0]), VARIABLES, "state variable")
     if p.c == 0:
         raise InputError("c = 0 1/s: without drag a ball doesn't settle, and there are no basins")
     x, y = np.linspace(*across[1:]), np.linspace(*up[1:])

@@ -17,17 +17,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
 from analytic import hopping
+from compare.runs.engines import EVENT
+from compare.runs.tasks import sources
 from compare.runs.workers import Workers
 from model import Parameters, SimulationError, StorageError
 from model.arrays import Array
-from model.files import write_text
+from model.files import make_directory, write_text
 
 CHUNK = 50
 """Sets in a file."""
@@ -42,7 +43,6 @@ BOX = {
 """The box that is searched, unless another one is named."""
 LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
 """Groups that are spread evenly in their logarithm."""
-_CODE = ("corner.py", "stepping.py", "marching.py", "time_stepping.py", "ensemble.py", "hopping.py")
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,8 @@ class Search:
     seed: int = 0
 
     def key(self, chunk: int) -> str:
-        """Hash of all that determines a chunk: the search, and the sources of the screen."""
-        folder = resources.files("analytic")
-        code = hashlib.sha256(b"\0".join(folder.joinpath(name).read_bytes() for name in _CODE)).hexdigest()
-        text = json.dumps([dataclasses.asdict(self), LOGARITHMIC, chunk, CHUNK, code])
+        """Hash of all that determines a chunk: the search, and the sources of screen and confirmation."""
+        text = json.dumps([dataclasses.asdict(self), LOGARITHMIC, chunk, CHUNK, sources(*EVENT.sources)])
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
     def points(self, count: int) -> Array:
@@ -155,7 +153,7 @@ def run(directory: Path, search: Search, count: int, workers: Workers, report: C
 
     `report` is called with the numbers of sets that are done and wanted.
     """
-    directory.mkdir(parents=True, exist_ok=True)
+    make_directory(directory)
     chunks = math.ceil(count / CHUNK)
     points = search.points(chunks * CHUNK).reshape(chunks, CHUNK, -1)
     paths = [directory / f"{search.key(chunk)}.json" for chunk in range(chunks)]
