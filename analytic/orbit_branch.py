@@ -8,7 +8,7 @@ between two orbits, the place is located.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -100,7 +100,7 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
     InputError
         If there is no such parameter, or the orbit isn't within the range.
     """
-    names = [field.name for field in fields(Parameters)]
+    names = [field.name for field in Parameters.quantities()]
     check_names([name], names, "parameter")
     low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
     if not low <= (value := getattr(start.p, name)) <= high or value == 0:

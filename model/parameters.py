@@ -14,6 +14,7 @@ from typing import Any, Self
 
 import tomli_w
 
+from model import drag as laws
 from model.errors import InputError, StorageError, suggestion
 
 _SETS = resources.files("model") / "parameter_sets"
@@ -89,19 +90,22 @@ def _shown(number: float) -> str:
     return f"{number:g}" if float(f"{number:g}") == number or float(fraction) != number else str(fraction)
 
 
-def _quantity(symbol: str, unit: str, meaning: str, allowed: Range) -> Any:
+def _quantity(symbol: str, unit: str, meaning: str, allowed: Range, **default: Any) -> Any:
     """Declare a parameter."""
-    return dataclasses.field(metadata={"symbol": symbol, "unit": unit, "meaning": meaning, "allowed": allowed})
+    return dataclasses.field(
+        metadata={"symbol": symbol, "unit": unit, "meaning": meaning, "allowed": allowed}, **default
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
-    """Everything the model of the paper depends on, in SI units (Table 1).
+    """Everything the model depends on, in SI units: Table 1 of the paper, and the law of drag (`model.drag`).
 
     Raises
     ------
     InputError
-        If a value is not a finite number in its range; the message names field, value, unit and range.
+        If a value is not a finite number in its range, or the law of drag lacks the fluid's viscosity; the message
+        names field, value, unit and range.
     """
 
     m: float = _quantity("m", "kg", "mass of the ball", POSITIVE)
@@ -113,12 +117,33 @@ class Parameters:
     g: float = _quantity("g", "m s-2", "gravitational acceleration reduced by buoyancy", POSITIVE)
     c: float = _quantity("c", "s-1", "viscous drag coefficient over mass", NOT_NEGATIVE)
     omega_0: float = _quantity("ω₀", "rad s-1", "angular velocity of the fluid", ANY)
+    nu_f: float = _quantity(
+        "ν_f", "m2 s-1", "kinematic viscosity of the fluid, 0 if not known", NOT_NEGATIVE, default=0.0
+    )
+    C_D: float = _quantity("C_D", "1", "drag coefficient of the quadratic law", POSITIVE, default=0.44)
+    density_ratio: float = _quantity(
+        "ρ_f/ρ_b",
+        "1",
+        "density of the fluid over that of the ball, 0 if not known",
+        Range(0.0, 1.0, below=True),
+        default=0.0,
+    )
+    drag: str = laws.STOKES
+    """The law of drag, one of `model.drag.LAWS`."""
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
+        for field in self.quantities():
             unit, allowed, meaning = (field.metadata[key] for key in ("unit", "allowed", "meaning"))
             value = check_number(field.name, getattr(self, field.name), unit, allowed, meaning)
             object.__setattr__(self, field.name, value)
+        check_choice("drag", self.drag, laws.LAWS)
+        if self.drag != laws.STOKES and self.nu_f == 0:
+            raise InputError(f"drag = {self.drag!r} needs the Reynolds number: nu_f in m2 s-1 must be given")
+
+    @classmethod
+    def quantities(cls) -> list[dataclasses.Field[float]]:
+        """The parameters that are numbers: all but the law of drag."""
+        return [field for field in dataclasses.fields(cls) if field.metadata]
 
     @property
     def kappa(self) -> float:
@@ -130,14 +155,14 @@ class Parameters:
         """Dimensionless angular velocity of the fluid, omega_0 sqrt(R/g)."""
         return self.omega_0 * math.sqrt(self.R / self.g)
 
-    def replace(self, **changes: float) -> Self:
+    def replace(self, **changes: Any) -> Self:
         """Return a copy with some values changed; an unknown name is an `InputError`."""
         check_names(changes, [f.name for f in dataclasses.fields(self)], "parameter")
         return dataclasses.replace(self, **changes)
 
     @classmethod
     def from_fluid(
-        cls, *, nu_f: float, rho_f: float, rho_b: float, r: float, gravity: float = 9.81, j: float = 0.4, **rest: float
+        cls, *, nu_f: float, rho_f: float, rho_b: float, r: float, gravity: float = 9.81, j: float = 0.4, **rest: Any
     ) -> Self:
         """Parameters of a uniform ball in a fluid: mass, Stokes drag by (10), gravity less buoyancy.
 
@@ -146,7 +171,7 @@ class Parameters:
         nu_f : kinematic viscosity of the fluid, m2 s-1, > 0
         rho_f, rho_b : densities of fluid and ball, kg m-3; the ball must be the denser
         gravity : gravitational acceleration in vacuum, m s-2
-        r, j, rest : R, mu, eta and omega_0 (0 if not given), as in `Parameters`
+        r, j, rest : R, mu, eta and omega_0 (0 if not given), drag and C_D, as in `Parameters`
         """
         check_number("nu_f", nu_f, "m2 s-1", POSITIVE)
         check_number("rho_f", rho_f, "kg m-3", POSITIVE)
@@ -154,25 +179,28 @@ class Parameters:
         check_number("r", r, "m", POSITIVE)
         check_number("gravity", gravity, "m s-2", POSITIVE)
         m, c = 4 / 3 * math.pi * r**3 * rho_b, 9 * nu_f / (2 * r**2) * rho_f / rho_b
-        return cls(m=m, r=r, j=j, g=gravity * (1 - rho_f / rho_b), c=c, **{"omega_0": 0.0} | rest)
+        fluid = {"nu_f": nu_f, "density_ratio": rho_f / rho_b}
+        return cls(m=m, r=r, j=j, g=gravity * (1 - rho_f / rho_b), c=c, **{"omega_0": 0.0} | rest | fluid)
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
-        """Build from a mapping: the nine parameters, or the arguments of `from_fluid` with a ``fluid`` table.
+        """Build from a mapping: the parameters, or the arguments of `from_fluid` with a ``fluid`` table.
 
-        The table ``fluid`` holds nu_f, rho_f, rho_b and optionally gravity; m, g and c then follow from it
-        and may not be given. Raises `InputError` for an unknown, missing or contradictory key.
+        The table ``fluid`` holds nu_f, rho_f, rho_b and optionally gravity; m, g, c and density_ratio then follow from
+        it and may not be given. Raises `InputError` for an unknown, missing or contradictory key.
         """
         names = [f.name for f in dataclasses.fields(cls)]
         if "fluid" not in values:
             check_names(values, [*names, "fluid"], "parameter")
-            _refuse_missing(values, names, "parameter")
+            _refuse_missing(
+                values, [f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING], "parameter"
+            )
             return cls(**values)
         fluid = values["fluid"]
         if not isinstance(fluid, Mapping):
             raise InputError(f"fluid = {fluid!r} must be a table with nu_f, rho_f and rho_b")
         rest = {k: v for k, v in values.items() if k != "fluid"}
-        for name in ("m", "g", "c"):
+        for name in ("m", "g", "c", "nu_f", "density_ratio"):
             if name in rest:
                 raise InputError(f"{name} follows from the [fluid] table and may not be given beside it")
         check_names(rest, names, "parameter")
@@ -210,7 +238,7 @@ class Parameters:
             raise InputError(f"{path}: {error}") from error
 
     def save(self, path: str | Path) -> None:
-        """Write the nine values as TOML, exactly."""
+        """Write the values as TOML, exactly."""
         try:
             Path(path).write_text(tomli_w.dumps(dataclasses.asdict(self)), "utf-8")
         except OSError as error:

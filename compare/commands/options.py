@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from model import Parameters
+from model import Parameters, drag
 
 Parser = argparse.ArgumentParser
 Commands = Any
@@ -38,10 +38,11 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
     source = group.add_mutually_exclusive_group()
     source.add_argument("--set", metavar="NAME", default="reference", help=f"one of {', '.join(Parameters.names())}")
     source.add_argument("--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table")
-    for field in dataclasses.fields(Parameters):
+    for field in Parameters.quantities():
         option, meaning = f"--{field.name.replace('_', '-')}", "{meaning} ({allowed})".format_map(field.metadata)
         dest, unit = f"parameter_{field.name}", field.metadata["unit"]
         group.add_argument(option, dest=dest, metavar=unit, type=number, help=meaning)
+    group.add_argument("--drag", dest="parameter_drag", metavar="LAW", help=f"law of drag: {', '.join(drag.LAWS)}")
 
 
 def parameters(args: argparse.Namespace) -> Parameters:

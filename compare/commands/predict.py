@@ -82,7 +82,7 @@ def tables(p: Parameters) -> list[Table | str]:
     """Thresholds, solutions and the reading, for the terminal."""
     look: dict[str, Any] = {"title_justify": "left", "title_style": "bold"}
     head = Table(title="Parameters", show_header=False, box=None, **look)
-    for field in dataclasses.fields(p):
+    for field in p.quantities():
         meta = field.metadata
         unit = "" if meta["unit"] == "1" else meta["unit"]
         head.add_row(meta["symbol"], f"{getattr(p, field.name):.8g} {unit}", f"[dim]{meta['meaning']}")

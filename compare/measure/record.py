@@ -180,7 +180,7 @@ def _columns(rows: Sequence[Measurement]) -> dict[str, list[Any]]:
     """Columns by name; a condition that a row doesn't have is nan, or empty where it is text."""
     columns: dict[str, list[Any]] = {name: [getattr(m, name) for m in rows] for name in _OWN if name != "runs"}
     columns["runs"] = [" ".join(m.runs) for m in rows]
-    columns |= {name: [float(getattr(m.parameters, name)) for m in rows] for name in _PARAMETERS}
+    columns |= {name: [getattr(m.parameters, name) for m in rows] for name in _PARAMETERS}
     kinds = {name: isinstance(value, str) for m in rows for name, value in m.conditions.items()}
     for name, text in kinds.items():
         empty: Condition = "" if text else np.nan

@@ -32,7 +32,7 @@ _CHOSEN = {
 def sets(level: Level) -> dict[str, Parameters]:
     """The sets of a level by name."""
     named = {name: Parameters.named(name) for name in ("reference", "high-wall-friction")}
-    chosen = {name: Parameters(**values, omega_0=1.0) for name, values in _CHOSEN.items()}
+    chosen = {name: Parameters.from_mapping(values | {"omega_0": 1.0}) for name, values in _CHOSEN.items()}
     return named | chosen | (_design(COUNT[level] - 7) if level > Level.QUICK else {})
 
 
@@ -45,5 +45,5 @@ def _design(count: int) -> dict[str, Parameters]:
         values = dict(zip(LOW, row, strict=True))
         ratio, kappa = values.pop("r/R"), values.pop("kappa")
         c = kappa * math.sqrt(values["g"] / values["R"])
-        designed[f"design-{k}"] = Parameters(**values, r=ratio * values["R"], c=c, omega_0=1.0)
+        designed[f"design-{k}"] = Parameters.from_mapping(values | {"r": ratio * values["R"], "c": c, "omega_0": 1.0})
     return designed

@@ -142,7 +142,7 @@ def settled(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def _write(rows: list[dict[str, Any]], output: Path) -> None:
-    units = {f.name: f.metadata["unit"] for f in dataclasses.fields(Parameters)}
+    units = {f.name: f.metadata["unit"] for f in Parameters.quantities()}
     units |= dict(zip(VARIABLES, UNITS, strict=True)) | {"duration": "s"}
     units |= {f"{name}_uncertainty": unit for name, unit in zip(VARIABLES, UNITS, strict=True)}
     columns = {name: [row[name] for row in rows] for name in rows[0]}

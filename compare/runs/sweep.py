@@ -14,7 +14,7 @@ from compare.runs.tasks import Task
 from model import Flow, InputError, Parameters
 from model.parameters import Range, check_names, check_number, parse_number
 
-FIELDS = tuple(field.name for field in dataclasses.fields(Parameters))
+FIELDS = tuple(field.name for field in Parameters.quantities())
 DIRECTIONS = ("held", "up", "down", "both")
 
 

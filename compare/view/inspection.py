@@ -54,10 +54,10 @@ def table(about: dict[str, Any], most: int = 20) -> Table:
     rows.add_column()
     rows.add_row("engine", f"{about['engine']} (" + ", ".join(f"{k} {v}" for k, v in about["versions"].items()) + ")")
     rows.add_row("made", f"{about['created']} {about['commit'][:12]}".strip())
-    fields = dataclasses.fields(Parameters)
-    units = {f.name: "" if f.metadata["unit"] == "1" else f.metadata["unit"] for f in fields}
+    units = {f.name: "" if f.metadata["unit"] == "1" else f.metadata["unit"] for f in Parameters.quantities()}
     values = (f"{name} = {about['parameters'][name]:g} {unit}" for name, unit in units.items())
     rows.add_row("parameters", ", ".join(value.strip() for value in values))
+    rows.add_row("drag", about["parameters"]["drag"])
     rows.add_row("flow", _flow(Flow.from_mapping(about["flow"])))
     rows.add_row("settings", ", ".join(f"{k} = {_short(v)}" for k, v in about["settings"].items()))
     rows.add_row("samples", f"{about['samples']} over {about['duration']:g} s")

@@ -22,7 +22,6 @@
 
 # %%
 # %config InlineBackend.figure_formats = ["svg"]
-import dataclasses
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -40,7 +39,7 @@ plt.rcParams |= {
 }
 MUJOCO = {"color": "black", "lw": 1, "ls": ":"}
 p = Parameters.named("reference")
-for field in dataclasses.fields(p):
+for field in p.quantities():
     unit, meaning = field.metadata["unit"], field.metadata["meaning"]
     print(f"{field.name:>8} = {getattr(p, field.name):<6g} {unit:<9} {meaning}")
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from model import InputError, Parameters, StorageError
 from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, Range, check_number, parse_number
 
-FIELDS = [f.name for f in dataclasses.fields(Parameters)]
+FIELDS = [f.name for f in Parameters.quantities()]
 positive = st.floats(1e-9, 1e9)
 valid = st.builds(
     Parameters,
@@ -81,6 +81,9 @@ BAD = {
     "g": [0.0, -9.81],
     "c": [-1.0],
     "omega_0": [],
+    "nu_f": [-1e-6],
+    "C_D": [0.0, -0.44],
+    "density_ratio": [-0.1, 1.0],
 }
 
 
