@@ -145,13 +145,13 @@ def attractors(
     duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
     groups: list[list[Fate]] = []
     for x in states:
-        found = settle(p, x, duration, run, [group[0] for group in groups])
+        fate = settle(p, x, duration, run, [group[0] for group in groups])
         for group in groups:
-            if group[0].same(found):
-                group.append(found)
+            if group[0].same(fate):
+                group.append(fate)
                 break
         else:
-            groups.append([found])
+            groups.append([fate])
     groups.sort(key=len, reverse=True)
     return [Attractor(group[0], len(group), len(states)) for group in groups]
 

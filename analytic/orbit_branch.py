@@ -147,10 +147,10 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
 
 def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
     """The orbit of the branch a step further; `NoOrbitError` also where a long step comes to other landings."""
-    found = close(here.loop.moved(by, name), name, matrix)
-    if np.linalg.norm(by) > GRAZING and _landings(found) != _landings(here):
+    orbit = close(here.loop.moved(by, name), name, matrix)
+    if np.linalg.norm(by) > GRAZING and _landings(orbit) != _landings(here):
         raise NoOrbitError("the nearest orbit is one of another branch")
-    return found
+    return orbit
 
 
 def _tangent(matrix: Array, along: Array) -> Array:

@@ -129,14 +129,14 @@ def exponents(at: Callable[[int], Array], interval: float, longest: int) -> npt.
     Each is followed to lags that are longer by a factor of two, up to its own time constant or `longest`: a longer lag
     shows what is slow more sharply, and what is fast has gone by then.
     """
-    lag, found = 1, _logarithms(at(1)) / interval
+    lag, rates = 1, _logarithms(at(1)) / interval
     while 2 * lag <= longest:
         lag *= 2
-        slow = np.abs(found) * lag * interval < 1
+        slow = np.abs(rates) * lag * interval < 1
         if not slow.any():
             break
-        found = np.where(slow, matched(_logarithms(at(lag)) / (lag * interval), found), found)
-    return found
+        rates = np.where(slow, matched(_logarithms(at(lag)) / (lag * interval), rates), rates)
+    return rates
 
 
 def matched(values: npt.NDArray[np.complex128], to: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:

@@ -49,8 +49,8 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     try:
         checks = tuple(claim.algebra() if claim.algebra else _checks(claim.bearings, records))
     except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other
-        told = f"{type(error).__name__}: {error}"
-        return Verdict(claim=claim, outcome=Outcome.ERROR, error=told, missing=missing)
+        reason = f"{type(error).__name__}: {error}"
+        return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
     if not checks:
         outcome = Outcome.NOT_RUN
     elif not all(check.agrees for check in checks):

@@ -25,10 +25,10 @@ def spectrum(p: Parameters, case: Case) -> tuple[complex, ...]:
 
     In NS y is cyclic, (48): it adds a zero to the eigenvalues of the reduced field. SR may be unstable.
     """
-    found = [s for s in states(p) if s.case is case and (s.stable or case is Case.SR)]
-    if len(found) != 1:
-        raise LookupError(f"{case.name} has {len(found)} stationary states at omega_0 = {p.omega_0:g} rad/s")
-    (state,) = found
+    those = [s for s in states(p) if s.case is case and (s.stable or case is Case.SR)]
+    if len(those) != 1:
+        raise LookupError(f"{case.name} has {len(those)} stationary states at omega_0 = {p.omega_0:g} rad/s")
+    (state,) = those
     return (*([0.0] if case is Case.NS else []), *(complex(value) for value in state.eigenvalues))
 
 

@@ -52,10 +52,10 @@ def detected(m: Measurement) -> Case:
 
 def reached(m: Measurement) -> StationarySolution:
     """The lasting state of the case that was detected; LookupError if theory has none."""
-    found = next((s for s in lasting(m.parameters) if s.case is detected(m)), None)
-    if found is None:
+    state = next((s for s in lasting(m.parameters) if s.case is detected(m)), None)
+    if state is None:
         raise LookupError(f"no state of case {detected(m).name} lasts")
-    return found
+    return state
 
 
 def leaning(m: Measurement) -> StationarySolution:

@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
         )
         return carry_out([task])[0]
 
-    found = []
+    rows = []
     for p in grid(options.parameters(args), axes):
         own = {} if args.engine is EVENT and settings == EVENT.configure({}) else {"run": simulate}
         attractors = analytic.attractors(p, starts, seed=args.seed, lasting=args.time, **own)
@@ -91,14 +91,14 @@ def run(args: argparse.Namespace) -> int:
             for way in ways
         ]
         varied = {axis.name: getattr(p, axis.name) for axis in axes}
-        found.append(
+        rows.append(
             {
                 **varied,
                 "attractors": [attractor_data(each) for each in attractors],
                 "branches": [branch_data(each) for each in branches],
             }
         )
-    data = {"engine": args.engine.name, "seed": args.seed, "sets": found}
+    data = {"engine": args.engine.name, "seed": args.seed, "sets": rows}
     if args.page:
         write_text(args.page, _page(data))
     options.show(data, _table, args.json)

@@ -95,19 +95,21 @@ def plane(args: argparse.Namespace) -> int:
     """Map the basins and show their shares."""
     p = options.parameters(args)
     coarse = int(check_number("mujoco", args.mujoco, "points", Range(0, whole=True)))
-    found = basins.basins(p, running.start(args)._asdict(), _axis(args.across), _axis(args.up), coarse, args.timestep)
+    mapped = basins.basins(p, running.start(args)._asdict(), _axis(args.across), _axis(args.up), coarse, args.timestep)
     if args.save:
-        found.save(args.save)
-    shares = {fate: found.share(fate) for fate in basins.FATES if found.share(fate)[0]}
-    differ = found.differences().tolist() if coarse else []
+        mapped.save(args.save)
+    shares = {fate: mapped.share(fate) for fate in basins.FATES if mapped.share(fate)[0]}
+    differ = mapped.differences().tolist() if coarse else []
     if args.json:
-        print(json.dumps({"shares": shares, "mujoco": found.mujoco.size, "differences": differ}))
+        print(json.dumps({"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}))
         return 0
     for fate, (hits, of) in shares.items():
         low, high = regions.interval(hits, of)
         print(f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to {100 * high:.1f} %)")
     if coarse:
-        print(f"MuJoCo differs at {len(differ)} of {found.mujoco.size} starts, so many cells from a boundary: {differ}")
+        print(
+            f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a boundary: {differ}"
+        )
     return 0
 
 

@@ -35,13 +35,13 @@ def where(material: object) -> Searched:
     return regions.kept()
 
 
-def draw_where(found: Searched) -> Figure:
+def draw_where(record: Searched) -> Figure:
     """Sets with hopping over pairs of groups, on the share of sets that have it."""
     figure = style.figure(10.5, 3.5)
-    points = dict(zip(found.search.box, found.search.points(found.sets).T, strict=True))
+    points = dict(zip(record.search.box, record.search.points(record.sets).T, strict=True))
     for axes, (a, b) in zip(figure.subplots(1, len(_PAIRS)), _PAIRS, strict=True):
-        edges = [_edges(name, *found.search.box[name]) for name in (a, b)]
-        rows = found.confirmed
+        edges = [_edges(name, *record.search.box[name]) for name in (a, b)]
+        rows = record.confirmed
         tried, *_ = np.histogram2d(points[a], points[b], edges)
         hopping, *_ = np.histogram2d([r[a] for r in rows], [r[b] for r in rows], edges)
         with np.errstate(invalid="ignore"):
@@ -68,17 +68,17 @@ def _scales(axes: Axes, a: str, b: str) -> None:
         axes.set_yscale("log")
 
 
-def caption_where(found: Searched) -> str:
-    """What was searched, and the share with its confidence."""
-    count = len(found.confirmed)
-    low, high = interval(count, found.sets)
+def caption_where(record: Searched) -> str:
+    """What was found, and the share with its confidence."""
+    count = len(record.confirmed)
+    low, high = interval(count, record.sets)
     box = ", ".join(
-        f"{_LABELS.get(k, k).split(' =')[0].strip('$')} {a:g} … {b:.3g}" for k, (a, b) in found.search.box.items()
+        f"{_LABELS.get(k, k).split(' =')[0].strip('$')} {a:g} … {b:.3g}" for k, (a, b) in record.search.box.items()
     )
     return (
-        f"Sets in which the ball hops for ever from some of {found.search.starts} random starts, found by time "
-        f"stepping and confirmed by the event-driven simulation: {count} of {found.sets} sets, "
-        f"{100 * count / found.sets:.2f} % ({100 * low:.2f} to {100 * high:.2f} % with 95 % confidence). Box: {box}. "
+        f"Sets in which the ball hops for ever from some of {record.search.starts} random starts, found by time "
+        f"stepping and confirmed by the event-driven simulation: {count} of {record.sets} sets, "
+        f"{100 * count / record.sets:.2f} % ({100 * low:.2f} to {100 * high:.2f} % with 95 % confidence). Box: {box}. "
         "r/R plays no part, as it drops out of the equations."
     )
 

@@ -29,7 +29,7 @@ NEAR = (0.02, 0.035, 0.055, 0.08, 0.12)
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The drag at which the slope vanishes, by slopes over 1/c: what a force makes a ball lag by is proportional."""
-    ranges = {name: found for name in sets if (found := _range(records, name))}
+    ranges = {name: flows for name in sets if (flows := _range(records, name))}
     first = {(name, kappa / time_unit(sets[name])) for name in ranges for kappa in STRONG}
     rough = _slopes(lab, sets, ranges, sorted(first))
     near = {name: 1 / lag.value for name in ranges if (lag := _lag(rough, name)) and lag.value > 0}
@@ -49,10 +49,10 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 def _range(records: Records, name: str) -> tuple[float, float] | None:
     """The measured flows at which slipping begins and at which the wall begins to carry; None without either."""
-    found = [
+    ends = [
         [m.value for m in records.select("thresholds", q, lambda m: m.set == name)] for q in ("omega_01", "omega_02")
     ]
-    return (found[0][0], found[1][0]) if all(found) and found[0][0] < found[1][0] else None
+    return (ends[0][0], ends[1][0]) if all(ends) and ends[0][0] < ends[1][0] else None
 
 
 Slopes = dict[tuple[str, float], tuple[Measured, list[Settled]]]
@@ -71,13 +71,13 @@ def _slopes(
         for low, high in [ranges[name]]
         for part in NEAR
     ]
-    ended, found = iter(settle(lab, starts)), Slopes()
+    ended, slopes = iter(settle(lab, starts)), Slopes()
     for drag in drags:
         states = [state for state in [next(ended) for _ in NEAR] if not state.failure and state.case is Case.SS]
         if len(states) == len(NEAR):
             flows = np.array([state.start.p.omega_0 for state in states])
-            found[drag] = initial_slope(flows, [state.values["force_Ay"] for state in states]), states
-    return found
+            slopes[drag] = initial_slope(flows, [state.values["force_Ay"] for state in states]), states
+    return slopes
 
 
 def _lag(slopes: Slopes, name: str) -> Measured | None:

@@ -101,11 +101,11 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 def _tasks(lab: Lab, line: Line, flows: Sequence[float], first: bool) -> list[Task]:
     """Two sizes with the shorter step for every flow; with `first`, one with the longer step, too."""
     large, small = line.sizes
-    found = []
+    tasks = []
     for push in map(line.push, flows):
-        found += [push.task(lab, large, 2), push.task(lab, small, 2)]
-        found += [push.task(lab, large)] if first else []
-    return found
+        tasks += [push.task(lab, large, 2), push.task(lab, small, 2)]
+        tasks += [push.task(lab, large)] if first else []
+    return tasks
 
 
 @dataclass(frozen=True)

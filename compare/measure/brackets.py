@@ -63,26 +63,26 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
 
     With `careful` the ends of the brackets are asked once more with half the time step, see `Bracket.shift`.
     """
-    found = [search.begin for search in searches]
-    before = list(found)
+    brackets = [search.begin for search in searches]
+    before = list(brackets)
     todo = list(range(len(searches)))
-    while todo := [k for k in todo if found[k].high - found[k].low > searches[k].width]:
-        for k, bracket in zip(todo, _round(lab, [searches[k] for k in todo], [found[k] for k in todo]), strict=True):
-            before[k], found[k] = found[k], bracket
-        todo = [k for k in todo if found[k].high - found[k].low < (before[k].high - before[k].low) / 2]
-    return _checked(lab, searches, found, before) if careful else found
+    while todo := [k for k in todo if brackets[k].high - brackets[k].low > searches[k].width]:
+        for k, bracket in zip(todo, _round(lab, [searches[k] for k in todo], [brackets[k] for k in todo]), strict=True):
+            before[k], brackets[k] = brackets[k], bracket
+        todo = [k for k in todo if brackets[k].high - brackets[k].low < (before[k].high - before[k].low) / 2]
+    return _checked(lab, searches, brackets, before) if careful else brackets
 
 
 def _checked(
-    lab: Lab, searches: Sequence[Search], found: Sequence[Bracket], before: Sequence[Bracket]
+    lab: Lab, searches: Sequence[Search], brackets: Sequence[Bracket], before: Sequence[Bracket]
 ) -> list[Bracket]:
     """Ask at the ends of the brackets with half the time step; one that doesn't hold is as wide as that before it."""
-    tasks = [s.task(v, b, FINER) for s, b in zip(searches, found, strict=True) for v in (b.low, b.high)]
+    tasks = [s.task(v, b, FINER) for s, b in zip(searches, brackets, strict=True) for v in (b.low, b.high)]
     runs = lab.run(tasks)
     answers = [(s.answer(low), s.answer(high)) for s, low, high in zip(searches, runs[::2], runs[1::2], strict=True)]
     return [
         replace(bracket, shift=wide.high - wide.low) if low is False or high is True else bracket
-        for bracket, wide, (low, high) in zip(found, before, answers, strict=True)
+        for bracket, wide, (low, high) in zip(brackets, before, answers, strict=True)
     ]
 
 

@@ -58,7 +58,7 @@ class Edge:
     """Direction and unit of the line."""
     reach: tuple[float, float]
     """The part of the line that is searched, from its centre, in units of the distance of the states."""
-    found: Bracket | None = None
+    bracket: Bracket | None = None
     moved: Array | None = None
     """How far the crossing is from that of the line before; None for the first line, and after one without crossing."""
     before: Array | None = None
@@ -69,13 +69,13 @@ class Edge:
     @property
     def crossing(self) -> Array:
         """The state in the middle of the last bracket, (8,)."""
-        assert self.found is not None
-        return np.asarray(self.centre + self.found.place.value * self.line)
+        assert self.bracket is not None
+        return np.asarray(self.centre + self.bracket.place.value * self.line)
 
     @property
     def tasks(self) -> tuple[Task, ...]:
         """The runs that the crossing follows from."""
-        return self.found.tasks if self.found else ()
+        return self.bracket.tasks if self.bracket else ()
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -103,10 +103,10 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 def _limits(records: Records, name: str) -> tuple[float, float] | None:
     """omega_02 and omega_04 of a set, as measured; None without either."""
-    found = [
+    ends = [
         [m.value for m in records.select("thresholds", q, lambda m: m.set == name)] for q in ("omega_02", "omega_04")
     ]
-    return (found[0][0], found[1][0]) if all(found) else None
+    return (ends[0][0], ends[1][0]) if all(ends) else None
 
 
 def _part(edge: Edge, low: float, high: float) -> float:
@@ -154,10 +154,10 @@ def _followed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
             if None in bracket.runs:
                 current[k] = replace(current[k], moved=None, stretched=current[k].stretched + 1)
             else:
-                crossed = replace(lines[k], found=bracket, stretched=0)
-                moved = np.abs(crossed.crossing - current[k].crossing) if current[k].found else None
+                crossed = replace(lines[k], bracket=bracket, stretched=0)
+                moved = np.abs(crossed.crossing - current[k].crossing) if current[k].bracket else None
                 current[k] = replace(crossed, moved=moved, before=current[k].moved)
-    return [edge for edge in current if edge.found and edge.moved is not None]
+    return [edge for edge in current if edge.bracket and edge.moved is not None]
 
 
 def _search(lab: Lab, edge: Edge, width: float) -> Search:
@@ -185,9 +185,9 @@ def _falls_behind(run: Trajectory, edge: Edge) -> bool:
 
 def _onward(edge: Edge) -> Edge:
     """A line through the mean of the time in which the last two runs have stayed together, the way they part."""
-    if edge.found is None:
+    if edge.bracket is None:
         return edge
-    low, high = (run.x for run in edge.found.runs if run is not None)
+    low, high = (run.x for run in edge.bracket.runs if run is not None)
     along = np.abs((high - low) @ edge.line / float(edge.line @ edge.line))
     together = int(np.argmax(along > TOGETHER)) or len(along)
     length = max(together - together // 4, 1)
@@ -230,7 +230,7 @@ def _sure(edge: Edge) -> Array:
     They are taken to shrink as the last two did: together they are at least the last one, and at most ten of its size;
     and no less than what a next line, through the mean of the last two runs, would pass by the crossing at.
     """
-    assert edge.found is not None
+    assert edge.bracket is not None
     assert edge.moved is not None
     last, before = (0.0 if moved is None else float(np.linalg.norm(moved[3:6])) for moved in (edge.moved, edge.before))
     ratio = min(last / before, 0.9) if before else 0.0
@@ -239,7 +239,7 @@ def _sure(edge: Edge) -> Array:
     off, along = (onward.centre - edge.crossing) * alike, onward.line * alike
     ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
     moves = np.maximum(edge.moved / (1 - ratio), ahead)
-    return np.asarray(np.hypot(edge.found.place.uncertainty * edge.line, moves))
+    return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
 
 
 def _closing(lab: Lab, p: Parameters, name: str, edges: Sequence[Edge]) -> Iterator[Measurement | Missing]:

@@ -92,22 +92,22 @@ def deviations(runs: Sequence[Trajectory]) -> Deviations:
 
     nan where too few samples show it.
     """
-    found: Deviations = {}
+    worst: Deviations = {}
     for contact in "AB":
         rows = [_rows(run, contact) for run in runs]
         normal, friction, limit, against, speed, gap, letter = (np.concatenate(row) for row in zip(*rows, strict=True))
         slides = (speed > SLIPS) & (normal > PRESSES)
         closed = letter != "N"
-        found["law", "(12): the contact presses", contact] = float(np.max(-normal, initial=0.0))
-        found["law", "(13): friction is within its limit", contact] = float(np.max(friction - limit, initial=0.0))
+        worst["law", "(12): the contact presses", contact] = float(np.max(-normal, initial=0.0))
+        worst["law", "(13): friction is within its limit", contact] = float(np.max(friction - limit, initial=0.0))
         for law, values in (
             ("where it rolls it doesn't slip", speed[letter == "R"]),
             ("where it is closed there is no gap", np.abs(gap[closed])),
             (f"({14 if contact == 'A' else 15}): friction opposes the slip", against[slides]),
         ):
-            found["law_in_motion", law, contact] = _typical(values)
-        found["friction_ratio", "friction over normal force", contact] = _typical(friction[slides] / normal[slides])
-    return found
+            worst["law_in_motion", law, contact] = _typical(values)
+        worst["friction_ratio", "friction over normal force", contact] = _typical(friction[slides] / normal[slides])
+    return worst
 
 
 def _typical(values: Array) -> float:

@@ -92,11 +92,11 @@ def pieces(run: Trajectory, count: int) -> list[int]:
         return []
     # As many pieces with a change of case in them as without, as far as there are.
     inside = np.array([np.any((changes > first) & (changes < first + LENGTH)) for first in firsts])
-    found: set[int] = set()
+    chosen: set[int] = set()
     for some in (firsts[inside], firsts[~inside]):
         if len(some):
-            found |= set(some[np.linspace(0, len(some) - 1, count // 2).round().astype(int)].tolist())
-    return sorted(found)
+            chosen |= set(some[np.linspace(0, len(some) - 1, count // 2).round().astype(int)].tolist())
+    return sorted(chosen)
 
 
 def _plain(run: Trajectory) -> npt.NDArray[np.bool_]:

@@ -134,12 +134,12 @@ def lifts(end: Bracket) -> bool:
     return bool(run.force_A[tail(run), 1].mean() < PRESSES * p.m * p.g)
 
 
-def settled_beside(lab: Lab, sets: Mapping[str, Parameters], found: Brackets) -> dict[Key, list[Settled]]:
+def settled_beside(lab: Lab, sets: Mapping[str, Parameters], brackets: Brackets) -> dict[Key, list[Settled]]:
     """Settled states beside every change, the nearest first; only those that did settle in the case that belongs."""
     begin = {
         (name, kind): [Start(name, q, kind, start(q, q.omega_0)) for q in (p.replace(omega_0=float(w)) for w in omegas)]
         for name, p in sets.items()
-        for kind, (omegas, start) in _places(name, found).items()
+        for kind, (omegas, start) in _places(name, brackets).items()
     }
     states = iter(settle(lab, [start for some in begin.values() for start in some], loose=LOOSE[lab.level]))
     belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
@@ -151,33 +151,33 @@ def settled_beside(lab: Lab, sets: Mapping[str, Parameters], found: Brackets) ->
     }
 
 
-def _places(name: str, found: Brackets) -> dict[str, tuple[Array, From]]:
+def _places(name: str, brackets: Brackets) -> dict[str, tuple[Array, From]]:
     """Flows at which states of a set are settled, and from where, by what they are for."""
     places: dict[str, tuple[Array, From]] = {}
-    if (carried := found.get((name, "riding"))) is not None:
+    if (carried := brackets.get((name, "riding"))) is not None:
         places["riding"] = carried.high * (1 + RIDES), wall
         places["sinking"] = carried.low * (1 - NEAR), wall
-    if (end := found.get((name, "rolling"))) is not None and lifts(end):
+    if (end := brackets.get((name, "rolling"))) is not None and lifts(end):
         places["lifted"] = end.high * (1 + RIDES), wall
-    elif end is not None and (last := found.get((name, "slipping"))) is not None:
+    elif end is not None and (last := brackets.get((name, "slipping"))) is not None:
         span = last.low - end.high
         places["slipping"] = end.high + NEAR * min(span, end.high), rest
         places["turning"] = last.low - TURNS * span, rest
     return places
 
 
-def refined(lab: Lab, sets: Mapping[str, Parameters], found: Brackets, states: States) -> dict[Key, Bracket]:
+def refined(lab: Lab, sets: Mapping[str, Parameters], brackets: Brackets, states: States) -> dict[Key, Bracket]:
     """The brackets that begin from settled states: of riding and leaning."""
     searches: dict[Key, Search] = {}
     width = WIDTH[lab.level]
     for name, p in sets.items():
         if len(riding := states.get((name, "riding"), [])) == len(RIDES):
-            begin = found[name, "riding"]
+            begin = brackets[name, "riding"]
             searches[name, "riding"] = Search(
                 begin, _asker(lab, p, rider(riding, high(p)), 5), slides, width * begin.high
             )
         if len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
-            end = found[name, "rolling"]
+            end = brackets[name, "rolling"]
             around = Bracket(end.low * (1 - ROUGH_WIDTH), end.high * (1 + ROUGH_WIDTH))
             searches[name, "leaning"] = Search(
                 around, _asker(lab, p, leaning(lifted), 20), rolls_again, width * end.high

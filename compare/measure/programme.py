@@ -39,8 +39,8 @@ class Protocol:
 
 def directory(results: Path, engine: Engine, level: Level, sets: Mapping[str, Parameters]) -> Path:
     """Where measurements of one engine, level and choice of sets are kept: others, and other programs', are apart."""
-    told = [engine.name, level.name, {name: asdict(p) for name, p in sets.items()}, _program(engine)]
-    return results / DIRECTORY / hashlib.sha256(json.dumps(told).encode()).hexdigest()[:16]
+    identity = [engine.name, level.name, {name: asdict(p) for name, p in sets.items()}, _program(engine)]
+    return results / DIRECTORY / hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
 
 
 @cache

@@ -90,8 +90,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield _missing(state, "pushed, the ball doesn't stay in this case")
             continue
         step = coarse_step(state.p) / REFINE[lab.level][1]
-        found, uncertainty = spectrum(state, answers, step)
-        yield from _measurements(lab, state, found, uncertainty, step, pushes[-1])
+        exponents, uncertainty = spectrum(state, answers, step)
+        yield from _measurements(lab, state, exponents, uncertainty, step, pushes[-1])
     for name in sets:
         there = {state.case for state in states if state.set == name}
         for case in STATES:
@@ -107,9 +107,9 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> list[State]
     unit = time_unit(p)
     still = np.array([0.0, 0.0, 0.0, 0.0, SPIN / unit * p.R / p.r, 0.0, 0.0, 0.0])
     kept = [State(name, p.replace(omega_0=0.0), Case.RS, still)]
-    found = [state for state in settled(records, name) if _suits(state)]
+    states = [state for state in settled(records, name) if _suits(state)]
     for case, most in STATES.items():
-        alike = sorted((s for s in found if s.case is case), key=lambda s: s.p.omega_0)
+        alike = sorted((s for s in states if s.case is case), key=lambda s: s.p.omega_0)
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
         places = {int((k + 0.5) * len(alike) / (more * most)) for k in range(more * most)} if alike else set()
@@ -230,35 +230,35 @@ def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Expon
         return exponents(at, interval, last // 3)
 
     coarse, large, small = answers[0], answers[1], answers[-1]
-    found = exponents_of(large, small)
-    plain = matched(exponents_of(small, small), found)
+    values = exponents_of(large, small)
+    plain = matched(exponents_of(small, small), values)
     correction = (plain - matched(exponents_of(coarse, coarse), plain)) / 3
-    half = np.abs(found - matched(exponents_of(large, small, 0.5), found))
-    bent = np.abs(found - plain)
+    half = np.abs(values - matched(exponents_of(large, small, 0.5), values))
+    bent = np.abs(values - plain)
     size = PUSH.get(state.case, SMALL) ** ORDER.get(state.case, 2)
-    bent *= np.clip(bent / np.maximum(np.abs(found), np.finfo(float).tiny), size, 1.0)
-    stepped = np.abs(found) * (np.abs(found).max() * step) ** 2 / 12
+    bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size, 1.0)
+    stepped = np.abs(values) * (np.abs(values).max() * step) ** 2 / 12
     solved = SOLVED / (PUSH.get(state.case, SMALL) * interval)
     uncertainty = np.sqrt(np.abs(correction) ** 2 + half**2 + bent**2 + stepped**2 + solved**2)
     # Relative errors of one propagator have the same causes; that of one exponent may vanish by chance.
-    alike = np.abs(found) * uncertainty.max() / np.abs(found).max()
-    return found + correction, np.maximum(uncertainty, alike)
+    alike = np.abs(values) * uncertainty.max() / np.abs(values).max()
+    return values + correction, np.maximum(uncertainty, alike)
 
 
 def _measurements(
-    lab: Lab, state: State, found: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
+    lab: Lab, state: State, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
 ) -> Iterator[Measurement | Missing]:
     """One of each pair of conjugates, in the order of their decay, slowest first; and how many there are in all."""
 
     at: dict[str, Condition] = {"case": state.case.name, **state_of(state.x)}
-    yield measurement(lab, PROTOCOL, state.set, state.p, "modes", len(found), tasks, **at)
+    yield measurement(lab, PROTOCOL, state.set, state.p, "modes", len(exponents), tasks, **at)
     parts: list[tuple[str, Measured, float, dict[str, Condition]]] = []
-    order = [k for k in np.argsort(-found.real) if found[k].imag >= 0]
+    order = [k for k in np.argsort(-exponents.real) if exponents[k].imag >= 0]
     for mode, k in enumerate(order, start=1):
-        if abs(found[k]) * step > RESOLVED:
-            yield _missing(state, f"one of its motions, by {abs(found[k]):.3g} 1/s, is too fast for the time step")
+        if abs(exponents[k]) * step > RESOLVED:
+            yield _missing(state, f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step")
             continue
-        decay, frequency, sure = -float(found[k].real), float(found[k].imag), float(uncertainty[k])
+        decay, frequency, sure = -float(exponents[k].real), float(exponents[k].imag), float(uncertainty[k])
         parts.append(("decay_rate", Measured(decay, sure), frequency, {"mode": mode, "frequency": frequency}))
         parts.append(("frequency", Measured(frequency, sure), decay, {"mode": mode, "decay_rate": decay}))
     # They come from one propagator: where one is too vague for a check, the others are not to be trusted either.

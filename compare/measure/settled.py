@@ -105,7 +105,7 @@ def unsettled(protocol: str, states: Sequence[Settled]) -> Iterator[Missing]:
 
 def combined(fine: Settled, coarse: Sequence[Settled]) -> dict[str, Measured]:
     """The values with half the step; by group, what step and start change is added to their uncertainty."""
-    found: dict[str, Measured] = {}
+    values: dict[str, Measured] = {}
     p = fine.start.p
     for group in GROUPS:
         alike = [q for q in group if q in fine.values and all(q in each.values for each in coarse)]
@@ -113,8 +113,8 @@ def combined(fine: Settled, coarse: Sequence[Settled]) -> dict[str, Measured]:
         change = max(changes, default=0.0)
         for q in alike:
             own = fine.values[q]
-            found[q] = Measured(own.value, math.hypot(own.uncertainty, change * scale(q, p)))
-    return found
+            values[q] = Measured(own.value, math.hypot(own.uncertainty, change * scale(q, p)))
+    return values
 
 
 def _key(each: Settled) -> tuple[str, float, int]:

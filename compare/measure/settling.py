@@ -89,11 +89,11 @@ def scale(name: str, p: Parameters) -> float:
 def columns(run: Trajectory) -> dict[str, Array]:
     """Quantities of a settled state by name, each (n,)."""
     p, A, B = run.header.parameters, run.force_A, run.force_B
-    found = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
-    found["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
-    found |= {f"force_{c}{axis}": force[:, k] for c, force in (("A", A), ("B", B)) for k, axis in enumerate("xyz")}
+    values = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
+    values["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
+    values |= {f"force_{c}{axis}": force[:, k] for c, force in (("A", A), ("B", B)) for k, axis in enumerate("xyz")}
     sums = {"force_Ax-By": A[:, 0] - B[:, 1], "force_Ay+By": A[:, 1] + B[:, 1], "force_Bx+By": B[:, 0] + B[:, 1]}
-    return found | sums
+    return values | sums
 
 
 def determined(case: Case) -> tuple[str, ...]:
@@ -166,17 +166,17 @@ def _onward(state: Settled) -> Start:
 
 def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:
     """What a run has come to, over the window in which it drifts the least; `loose` as in `settle`."""
-    found = (_judged(start, task, run, int(share * len(run.time)), loose) for share in SHARES)
-    return min(found, key=lambda state: state.excess)
+    windows = (_judged(start, task, run, int(share * len(run.time)), loose) for share in SHARES)
+    return min(windows, key=lambda state: state.excess)
 
 
 def _judged(start: Start, task: Task, run: Trajectory, length: int, loose: float) -> Settled:
     counts = np.bincount(run.case[-length:])
     case, p = Case(int(counts.argmax())), start.p
-    found = columns(run)
-    swings = max(float(np.ptp(found[q][-length:])) / scale(q, p) for q in determined(case))
-    means, drifts = steady_mean(np.stack([*found.values(), *run.x.T]), length)
-    sure = dict(zip(found, zip(means.tolist(), drifts.tolist(), strict=False), strict=False))
+    series = columns(run)
+    swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in determined(case))
+    means, drifts = steady_mean(np.stack([*series.values(), *run.x.T]), length)
+    sure = dict(zip(series, zip(means.tolist(), drifts.tolist(), strict=False), strict=False))
     solved = SOLVED / (p.c * coarse_step(p))
     values: dict[str, Measured] = {}
     for group in GROUPS:
@@ -192,7 +192,7 @@ def _judged(start: Start, task: Task, run: Trajectory, length: int, loose: float
     elif excess > loose:
         way = "drifts" if drift > loose else "swings"
         failure = f"in {case.name} it still {way} {excess:.2g} times as much as it may"
-    return Settled(start, case, values, means[len(found) :], task, excess, failure)
+    return Settled(start, case, values, means[len(series) :], task, excess, failure)
 
 
 def steady_mean(values: Array, length: int) -> tuple[Array, Array]:

@@ -115,8 +115,8 @@ def _wide(name: str, p: Parameters, records: Records) -> Iterator[Curve]:
 
 def _threshold(records: Records, name: str, threshold: str) -> Measured | None:
     """The surest measurement of a threshold, by whatever protocol."""
-    found = [m for m in records.measurements if m.set == name and m.quantity == threshold]
-    best = min(found, key=lambda m: m.uncertainty, default=None)
+    measured = [m for m in records.measurements if m.set == name and m.quantity == threshold]
+    best = min(measured, key=lambda m: m.uncertainty, default=None)
     return Measured(best.value, best.uncertainty) if best else None
 
 

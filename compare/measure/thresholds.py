@@ -33,10 +33,10 @@ PROTOCOL = "thresholds"
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Bracket every change on the grid, settle states beside it, then bisect and extrapolate."""
     maps = onset.look(lab, sets)
-    found = onset.ends_of_rolling(lab, sets, maps)
-    found |= onset.neighbourhoods(lab, sets, maps, found)
-    states = onset.settled_beside(lab, sets, found)
-    carried = {key: b for key, b in found.items() if key[1] != "riding"} | onset.refined(lab, sets, found, states)
+    brackets = onset.ends_of_rolling(lab, sets, maps)
+    brackets |= onset.neighbourhoods(lab, sets, maps, brackets)
+    states = onset.settled_beside(lab, sets, brackets)
+    carried = {key: b for key, b in brackets.items() if key[1] != "riding"} | onset.refined(lab, sets, brackets, states)
     tops = {name: extrapolated(states.get((name, "turning"), []), "slip_x", turning) for name in sets}
     ends = {name: top for name in sets if (top := tops[name]) and not _reaches_wall(lab, name, carried, states)}
     folds = onset.folded(lab, sets, ends, states)
@@ -59,10 +59,10 @@ def extrapolated(
     return place if math.isfinite(place.uncertainty) else None
 
 
-def _reaches_wall(lab: Lab, name: str, found: onset.Brackets, states: onset.States) -> bool:
+def _reaches_wall(lab: Lab, name: str, brackets: onset.Brackets, states: onset.States) -> bool:
     """Whether the floor's force on a slipping ball falls to zero just where the wall begins to carry it."""
     unloaded = extrapolated(states.get((name, "turning"), []), "force_Ay", vanishing)
-    riding = found.get((name, "riding"))
+    riding = brackets.get((name, "riding"))
     if unloaded is None or riding is None:
         return False
     near = onset.FOLD_WIDTH[lab.level] * riding.high

@@ -84,8 +84,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _limit(records: Records, name: str, quantities: Sequence[str]) -> float | None:
-    found = [m.value for q in quantities for m in records.select("thresholds", q, lambda m: m.set == name)]
-    return found[0] if found else None
+    values = [m.value for q in quantities for m in records.select("thresholds", q, lambda m: m.set == name)]
+    return values[0] if values else None
 
 
 def _unloading(lab: Lab, state: Settled, landing: bool) -> Trial:

@@ -73,7 +73,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tuple[list[Slight], list[Missing]]:
     hanging = _hanging(lab, sets, records)
-    found, missing = [], []
+    slights, missing = [], []
     for quantity, case in ENDS.items():
         ends = ends_of_rolling(records, quantity)
         for name, p in sets.items():
@@ -85,8 +85,10 @@ def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tupl
                 x = np.array([0.0, 0.0, q.omega_0, 0, 0, 0, 0, 0])
                 if case is Case.NR:  # the spin about the radial axis is the same, whatever the orbit
                     x[0], x[3] = HIGH * p.R, hanging[name] - p.R / p.r * q.omega_0
-                found += [Slight(name, q, case, x, n, side, quantity) for n in directions(case, DIRECTIONS[lab.level])]
-    return found, missing
+                slights += [
+                    Slight(name, q, case, x, n, side, quantity) for n in directions(case, DIRECTIONS[lab.level])
+                ]
+    return slights, missing
 
 
 def ends_of_rolling(records: Records, quantity: str) -> dict[str, float]:

@@ -58,13 +58,13 @@ def scaled(factor: float, *entries: int) -> Callable[[Function], Function]:
 
     def wrong(right: Function) -> Function:
         def function(*args: Any, **named: Any) -> Any:
-            found = right(*args, **named)
+            result = right(*args, **named)
             if not entries:
-                return factor * found
-            parts = list(found)
+                return factor * result
+            parts = list(result)
             for k in entries:
                 parts[k] = factor * parts[k]
-            return type(found)(*parts) if hasattr(found, "_fields") else type(found)(parts)
+            return type(result)(*parts) if hasattr(result, "_fields") else type(result)(parts)
 
         return function
 
@@ -108,14 +108,14 @@ def answer(change: Callable[[Any], Any]) -> Callable[[Function], Function]:
 
 def fields(**changes: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """The answer with some of its fields changed."""
-    return lambda found: replace(found, **{name: change(getattr(found, name)) for name, change in changes.items()})
+    return lambda answer: replace(answer, **{name: change(getattr(answer, name)) for name, change in changes.items()})
 
 
 def each(case: Case | None, change: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Of a list of solutions those of a case are changed, all for None; None in the place of one takes it away."""
 
-    def changed(found: list[Any]) -> list[Any]:
-        rows = [change(s) if case in (None, s.case) else s for s in found]
+    def changed(solutions: list[Any]) -> list[Any]:
+        rows = [change(s) if case in (None, s.case) else s for s in solutions]
         return [s for s in rows if s is not None]
 
     return changed

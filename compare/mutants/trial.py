@@ -122,8 +122,8 @@ def _powers(levels: Sequence[Judged]) -> Iterator[str]:
     yield "|---" * (2 + len(levels)) + "|"
     for name, quantity in QUANTITIES.items():
         if quantity.resolves and any(name in each.power for each in levels):
-            found = (f"{each.power[name]:.1g}" if name in each.power else "–" for each in levels)
-            yield f"| {quantity.symbol} | {quantity.resolves:.1g} | {' | '.join(found)} |"
+            powers = (f"{each.power[name]:.1g}" if name in each.power else "–" for each in levels)
+            yield f"| {quantity.symbol} | {quantity.resolves:.1g} | {' | '.join(powers)} |"
 
 
 def _told(trial: Trial) -> str:
@@ -174,5 +174,5 @@ def _outcomes(verdicts: Sequence[Verdict]) -> Outcomes:
     return {verdict.claim.id: verdict.outcome for verdict in verdicts}
 
 
-def _changed(right: Outcomes, found: Outcomes) -> tuple[tuple[str, Outcome], ...]:
-    return tuple((name, outcome) for name, outcome in found.items() if outcome is not right[name])
+def _changed(right: Outcomes, outcomes: Outcomes) -> tuple[tuple[str, Outcome], ...]:
+    return tuple((name, outcome) for name, outcome in outcomes.items() if outcome is not right[name])

@@ -91,12 +91,12 @@ def worst(verdict: Verdict) -> str:
     if not verdict.checks:
         return ""
     check = ranked(verdict.checks)[0]
-    told = f"{SYMBOLS[check.measurement.quantity]}, {check.measurement.set}"
+    where = f"{SYMBOLS[check.measurement.quantity]}, {check.measurement.set}"
     if quantity(check.measurement.quantity).resolves == 0:
-        return "all equal" if check.agrees else f"not equal: {told}"
+        return "all equal" if check.agrees else f"not equal: {where}"
     if math.isnan(check.predicted):
-        return f"theory knows no such state: {told}"
-    return f"{verdict.worst:.2g} of its tolerance ({told})"
+        return f"theory knows no such state: {where}"
+    return f"{verdict.worst:.2g} of its tolerance ({where})"
 
 
 def ranked(checks: Sequence[Check]) -> list[Check]:

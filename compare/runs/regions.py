@@ -43,21 +43,21 @@ def interval(hits: int, of: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def parts(found: Searched) -> Iterator[Part]:
+def parts(record: Searched) -> Iterator[Part]:
     """Every part of the range of every group."""
-    points = found.search.points(found.sets)
+    points = record.search.points(record.sets)
     for k, name in enumerate(BOX):
-        low, high = found.search.box[name]
+        low, high = record.search.box[name]
         edges = np.geomspace(low, high, PARTS + 1) if name in LOGARITHMIC else np.linspace(low, high, PARTS + 1)
         all_sets, _ = np.histogram(points[:, k], edges)
-        hopping, _ = np.histogram([row[name] for row in found.confirmed], edges)
+        hopping, _ = np.histogram([row[name] for row in record.confirmed], edges)
         for a, b, n, hits in zip(edges, edges[1:], all_sets.tolist(), hopping.tolist(), strict=False):
             yield Part(name, float(a), float(b), n, hits)
 
 
-def extremes(found: Searched) -> dict[str, tuple[float, float]]:
+def extremes(record: Searched) -> dict[str, tuple[float, float]]:
     """Smallest and largest value of each group with confirmed hopping; empty if there is none."""
-    rows = found.confirmed
+    rows = record.confirmed
     return {name: (min(r[name] for r in rows), max(r[name] for r in rows)) for name in BOX} if rows else {}
 
 
@@ -75,28 +75,28 @@ def page(*searches: Searched) -> str:
     return "\n".join(["# Where the ball hops for ever", "", *(line for each in searches for line in _section(each))])
 
 
-def _section(found: Searched) -> list[str]:
-    count, (low, high) = len(found.confirmed), interval(len(found.confirmed), found.sets)
-    periods = [row["confirmed"]["landings"] for row in found.confirmed]
+def _section(record: Searched) -> list[str]:
+    count, (low, high) = len(record.confirmed), interval(len(record.confirmed), record.sets)
+    periods = [row["confirmed"]["landings"] for row in record.confirmed]
     kinds = [f"{periods.count(n)} with {n} landing{'s' * (n > 1)} a period" for n in sorted(set(periods) - {0})]
-    box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in found.search.box.items())
+    box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in record.search.box.items())
     lines = [
-        f"## {found.sets} sets in {box}",
+        f"## {record.sets} sets in {box}",
         "",
-        f"Each was started from {found.search.starts} random states. In {count} sets some start leads to hopping that "
-        f"the event-driven simulation confirms: {100 * count / found.sets:.2f} %, or {100 * low:.2f} to "
-        f"{100 * high:.2f} % with {CONFIDENCE:.0%} confidence. That is what {found.search.starts} starts find: an "
+        f"Each was started from {record.search.starts} random states. In {count} sets some start leads to hopping that "
+        f"the event-driven simulation confirms: {100 * count / record.sets:.2f} %, or {100 * low:.2f} to "
+        f"{100 * high:.2f} % with {CONFIDENCE:.0%} confidence. That is what {record.search.starts} starts find: an "
         "attractor with a small basin is missed. "
         f"Of them {', '.join([*kinds, f'{periods.count(0)} without a period of up to 16 landings'])}. "
-        f"By time stepping {len(found.rows)} sets still hopped after 60/c; {found.failed} runs broke down. In all "
+        f"By time stepping {len(record.rows)} sets still hopped after 60/c; {record.failed} runs broke down. In all "
         "other sets every ball stopped landing.",
         "",
     ]  # fmt: skip
     lines += ["| | smallest with hopping | largest |", "| :-- | --: | --: |"]
-    lines += [f"| {name} | {least:.3g} | {most:.3g} |" for name, (least, most) in extremes(found).items()]
+    lines += [f"| {name} | {least:.3g} | {most:.3g} |" for name, (least, most) in extremes(record).items()]
     lines += ["", "| | from | to | sets | hopping | share, % | 95 % interval, % |"]
     lines += ["| :-- | --: | --: | --: | --: | --: | --: |"]
-    for part in parts(found):
+    for part in parts(record):
         low, high = part.interval
         share = f"{100 * part.hopping / part.sets:.2f}" if part.sets else ""
         lines.append(

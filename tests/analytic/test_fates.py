@@ -13,19 +13,19 @@ HOPS, SLIPS, RIDES = (6.37e-3, 0, 57.3, -106.2, 0, 0), (0, 0, 20, 0, 0, 0), (0.0
 
 def test_three_attractors_at_once() -> None:
     """The hopping set: hopping, slipping at both points, and riding the wall."""
-    found = attractors(HOPPING, (HOPS, SLIPS, RIDES))
-    assert [each.count for each in found] == [1, 1, 1]
-    assert {each.fate.kind for each in found} == {Kind.PERIODIC, Kind.STATIONARY}
-    hop = found[0].fate
+    groups = attractors(HOPPING, (HOPS, SLIPS, RIDES))
+    assert [each.count for each in groups] == [1, 1, 1]
+    assert {each.fate.kind for each in groups} == {Kind.PERIODIC, Kind.STATIONARY}
+    hop = groups[0].fate
     assert hop.orbit
     assert hop.orbit.stable
     # The period as seen in the run is resolved to a sample, that of the orbit to round-off.
     sample = hop.last.time[1] - hop.last.time[0]
     assert hop.period == pytest.approx(hop.orbit.period, abs=2 * sample)
     known = {s.case for s in stable_solutions(HOPPING)}
-    assert {each.fate.solution.case for each in found[1:] if each.fate.solution} <= known
-    low, high = found[0].interval
-    assert 0 < low < found[0].share < high < 1
+    assert {each.fate.solution.case for each in groups[1:] if each.fate.solution} <= known
+    low, high = groups[0].interval
+    assert 0 < low < groups[0].share < high < 1
 
 
 def test_random_starts_are_reproducible_and_inside() -> None:

@@ -78,9 +78,9 @@ def test_shrinking_is_the_modulus_of_the_eigenvalue() -> None:
 
 def test_birth_is_where_the_height_vanishes() -> None:
     rows = [(w, 4e-4 * (w - 52) - 1e-6 * (w - 52) ** 2, 4e-4 * (w - 52)) for w in (58.0, 56.0, 54.0)]
-    found = recurrent.birth(rows)
-    assert found.value == pytest.approx(52.0, abs=1e-9)
-    assert 0 < found.uncertainty < 0.1
+    place = recurrent.birth(rows)
+    assert place.value == pytest.approx(52.0, abs=1e-9)
+    assert 0 < place.uncertainty < 0.1
 
 
 def _run(time: Array, y: Array, theta: Array) -> Trajectory:

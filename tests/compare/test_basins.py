@@ -31,10 +31,10 @@ def made_up(fates, mujoco=((0, 0), (0, 0)), coarse=2) -> Basins:
 def test_fates_are_the_stable_solutions_that_theory_has():
     """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both engines alike."""
     assert {s.case.name for s in stable_solutions(BISTABLE)} == {"SS", "SR", "NR"}
-    found = basins(BISTABLE, {"y": 0.002}, ("omega_c", 5.0, 45.0, 3), ("slip_x", -1.0, 1.0, 2), coarse=2)
-    assert {FATES[k] for k in found.fates.ravel()} == {"SS", "off the floor"}
-    np.testing.assert_array_equal(found.mujoco, found.fates[::2, ::2])
-    assert len(found.differences()) == 0
+    basin = basins(BISTABLE, {"y": 0.002}, ("omega_c", 5.0, 45.0, 3), ("slip_x", -1.0, 1.0, 2), coarse=2)
+    assert {FATES[k] for k in basin.fates.ravel()} == {"SS", "off the floor"}
+    np.testing.assert_array_equal(basin.mujoco, basin.fates[::2, ::2])
+    assert len(basin.differences()) == 0
 
 
 def test_distance_from_a_boundary_in_cells():

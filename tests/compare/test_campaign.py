@@ -191,9 +191,9 @@ def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
     with Campaign(tmp_path, workers=2, batch=3) as campaign:
         failures = campaign.complete(tasks())
     assert failures == [Failure(tasks()[2], "its worker died (killed, or out of memory)")]
-    found = data(tmp_path)
-    assert len(found) == 8
-    assert found.items() <= undisturbed.items()
+    stored = data(tmp_path)
+    assert len(stored) == 8
+    assert stored.items() <= undisturbed.items()
 
 
 def test_a_full_disk_is_reported_for_each_task(tmp_path: Path) -> None:

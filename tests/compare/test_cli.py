@@ -44,23 +44,23 @@ def test_predict_waits_for_no_heavy_package() -> None:
 
 def test_predict_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["predict", "--set", "steel-in-water", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["parameters"]["c"] == Parameters.named("steel-in-water").c
-    assert {s["case"] for s in told["solutions"]} >= {"RR", "NS"}
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["parameters"]["c"] == Parameters.named("steel-in-water").c
+    assert {s["case"] for s in printed["solutions"]} >= {"RR", "NS"}
 
 
 def test_simulate_inspect_and_xarray(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = tmp_path / "run.h5"
     argv = ["simulate", "--omega-0", "25", "--start", "omega_c=13.8", "--time", "0.5", "-o", str(run), "--json"]
     assert cli.main(argv) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["complete"]
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["complete"]
     assert cli.main(["inspect", str(run), "--plot", str(tmp_path / "run.png")]) == 0
     assert "omega_0 = 25" in capsys.readouterr().out
     assert (tmp_path / "run.png").stat().st_size > 10_000
     with xarray.open_dataset(run, engine="h5netcdf") as data:
         assert data.time[-1] == pytest.approx(0.5)
-        assert float(data.omega_c[-1]) == told["last"]["omega_c"]
+        assert float(data.omega_c[-1]) == printed["last"]["omega_c"]
 
 
 @pytest.mark.parametrize(
@@ -109,12 +109,12 @@ from compare.runs import tasks
 from mjsim.journal import Journal
 tasks.LONG, stop_after = 1000, int(sys.argv[1])
 tasks.Journal = lambda directory: Journal(directory, interval=0.0)
-store, told = tasks.store, 0
+store, stored = tasks.store, 0
 def pressing(tasks, paths, stop):
     def pressed():
-        global told
-        told += 1
-        if told == stop_after:
+        global stored
+        stored += 1
+        if stored == stop_after:
             os.kill(os.getpid(), signal.SIGINT)
         return stop()
     return store(tasks, paths, stop=pressed)

@@ -128,12 +128,12 @@ def test_a_scene_of_our_own_is_read_back(tmp_path: Path) -> None:
     settings = ContactSettings.at(5e-4)
     path = tmp_path / "scene.xml"
     path.write_text(scene.build(Parameters.named("reference"), settings)[1])
-    found = native.read(path)
-    assert (found.timestep, found.cone, found.impratio) == (5e-4, "elliptic", settings.impratio)
-    for touch in (found.A, found.B):
+    of_scene = native.read(path)
+    assert (of_scene.timestep, of_scene.cone, of_scene.impratio) == (5e-4, "elliptic", settings.impratio)
+    for touch in (of_scene.A, of_scene.B):
         assert touch.solref == settings.solref
         assert touch.solreffriction[0] == settings.solreffriction
-        theory = found.theory(touch, 9.81)
+        theory = of_scene.theory(touch, 9.81)
         for name in ("b_f", "k", "softness"):
             assert getattr(theory, name) == pytest.approx(getattr(settings, name), rel=1e-12)
 
@@ -147,13 +147,13 @@ def test_geoms_are_mixed_as_the_engine_does(tmp_path: Path) -> None:
     )
     path = tmp_path / "scene.xml"
     path.write_text(mjcf(world))
-    found = native.read(path)
+    of_scene = native.read(path)
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert data.ncon == 2
     for contact in data.contact:
-        touch = found.A if model.geom("floor").id in contact.geom else found.B
+        touch = of_scene.A if model.geom("floor").id in contact.geom else of_scene.B
         assert touch.solref == pytest.approx(tuple(contact.solref))
         assert touch.solimp == pytest.approx(tuple(contact.solimp))
         assert touch.margin - touch.gap == pytest.approx(contact.includemargin)
@@ -213,10 +213,10 @@ def test_a_floor_is_one_wherever_the_ball_begins(tmp_path: Path, height: float) 
 def test_what_stands_for_what_is_missing(tmp_path: Path, world: str, lacks: str) -> None:
     path = tmp_path / "scene.xml"
     path.write_text(mjcf(world))
-    found = native.read(path)
-    assert re.search(lacks, found.note)
-    assert "\n" not in found.note
-    assert (found.A == found.B) is bool(found.note)
+    of_scene = native.read(path)
+    assert re.search(lacks, of_scene.note)
+    assert "\n" not in of_scene.note
+    assert (of_scene.A == of_scene.B) is bool(of_scene.note)
 
 
 @pytest.mark.parametrize(

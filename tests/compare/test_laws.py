@@ -48,14 +48,14 @@ def values(run: Trajectory) -> dict[tuple[str, str], float]:
 
 
 def test_a_motion_that_obeys_the_laws_shows_no_deviation() -> None:
-    found = values(sliding())
+    worst = values(sliding())
     for contact, coefficient, number in (("A", P.mu, "(14)"), ("B", P.eta, "(15)")):
-        assert found["(12)", contact] == 0.0
-        assert found["(13)", contact] <= laws.ROUNDING
-        assert found[number, contact] <= laws.ROUNDING
-        assert found["friction over normal force", contact] == pytest.approx(coefficient, rel=laws.ROUNDING)
+        assert worst["(12)", contact] == 0.0
+        assert worst["(13)", contact] <= laws.ROUNDING
+        assert worst[number, contact] <= laws.ROUNDING
+        assert worst["friction over normal force", contact] == pytest.approx(coefficient, rel=laws.ROUNDING)
         # Nothing rolls: that law has no samples.
-        assert np.isnan(found["where it rolls it doesn't slip", contact])
+        assert np.isnan(worst["where it rolls it doesn't slip", contact])
 
 
 def test_every_deviation_is_measured() -> None:

@@ -33,10 +33,10 @@ NUMBERS = SimpleNamespace(run=list)
 
 def test_bisection_closes_in_on_the_change():
     search = Search(Bracket(0.0, 1.0), lambda v, b, care: v, lambda v: v < math.pi / 10, 1e-6)
-    (found,) = narrow(NUMBERS, [search])
-    assert found.low < math.pi / 10 < found.high
-    assert found.high - found.low <= 1e-6
-    assert found.shift == 0
+    (bracket,) = narrow(NUMBERS, [search])
+    assert bracket.low < math.pi / 10 < bracket.high
+    assert bracket.high - bracket.low <= 1e-6
+    assert bracket.shift == 0
 
 
 def test_undecided_runs_are_repeated_and_else_left_open():
@@ -47,41 +47,41 @@ def test_undecided_runs_are_repeated_and_else_left_open():
         return value < 0.5
 
     search = Search(Bracket(0.0, 1.0), lambda v, b, care: (v, care), answer, 1e-3)
-    (found,) = narrow(NUMBERS, [search], careful=False)
-    assert found.low < 0.47 <= 0.5 < found.high
-    assert found.high - found.low > 0.1
+    (bracket,) = narrow(NUMBERS, [search], careful=False)
+    assert bracket.low < 0.47 <= 0.5 < bracket.high
+    assert bracket.high - bracket.low > 0.1
 
 
 def test_a_change_that_moves_with_the_time_step_is_uncertain():
     def task(value, bracket, care):
         return value, 0.31 if care is FINER else 0.3
 
-    (found,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), task, lambda run: run[0] < run[1], 1e-4)])
-    assert found.low < 0.3 < found.high
-    assert found.shift > 0
-    assert found.place.uncertainty >= found.shift
+    (bracket,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), task, lambda run: run[0] < run[1], 1e-4)])
+    assert bracket.low < 0.3 < bracket.high
+    assert bracket.shift > 0
+    assert bracket.place.uncertainty >= bracket.shift
 
 
 def test_an_end_that_was_never_asked_shows():
-    (found,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), lambda v, b, care: v, lambda v: True, 0.5)], careful=False)
-    assert found.runs[1] is None
+    (bracket,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), lambda v, b, care: v, lambda v: True, 0.5)], careful=False)
+    assert bracket.runs[1] is None
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6])
 def test_extrapolated_zero_is_as_sure_as_it_says(noise):
     where = 2.0 * (1 + onset.NEAR)
     values = [Measured(math.sin(w - 2) * (1 + w), noise) for w in where]
-    found = vanishing(where, values)
-    assert abs(found.value - 2.0) < 3 * found.uncertainty
-    assert found.uncertainty < 1e-4
+    bracket = vanishing(where, values)
+    assert abs(bracket.value - 2.0) < 3 * bracket.uncertainty
+    assert bracket.uncertainty < 1e-4
 
 
 def test_extrapolated_maximum_is_as_sure_as_it_says():
     slip = 1 + np.sqrt(onset.TURNS)  # its maximum is at slip = 1, with a cubic part
     where = 3 - (slip - 1) ** 2 * (1 + 0.5 * (slip - 1) + 0.2 * (slip - 1) ** 2)
-    found = turning(where, [Measured(-float(s), 1e-9) for s in slip])
-    assert abs(found.value - 3) < 3 * found.uncertainty
-    assert found.uncertainty < 1e-3
+    bracket = turning(where, [Measured(-float(s), 1e-9) for s in slip])
+    assert abs(bracket.value - 3) < 3 * bracket.uncertainty
+    assert bracket.uncertainty < 1e-3
 
 
 def test_a_line_has_no_maximum():
@@ -138,9 +138,9 @@ def test_protocol_on_a_set_without_fold(lab):
     name = "thick-fluid"
     p = sets(Level.QUICK)[name]
     records = Records.of(thresholds.measure(lab, {name: p}, Records()))
-    found = {(m.quantity, m.conditions.get("by")) for m in records.measurements}
-    assert len(found) == 6
-    assert {quantity for quantity, _ in found} == {"omega_01", "omega_02", "folds"}
+    kinds = {(m.quantity, m.conditions.get("by")) for m in records.measurements}
+    assert len(kinds) == 6
+    assert {quantity for quantity, _ in kinds} == {"omega_01", "omega_02", "folds"}
     assert any("no omega_04" in each.reason for each in records.missing)
     verdicts = {v.claim.id: v for v in judge(bifurcations.CLAIMS, records)}
     for claim in ("table-5-P3", "table-5-P2", "table-5-F", "eta-critical"):

@@ -50,11 +50,11 @@ def mixed(*values: complex) -> Array:
 def test_all_exponents_of_a_linear_motion_are_measured(values: tuple[complex, ...]) -> None:
     J, interval = mixed(*values), 1e-3
     D = linear(J, interval)
-    found = exponents(lambda lag: propagator(D, lag), interval, len(D) // 3)
+    rates = exponents(lambda lag: propagator(D, lag), interval, len(D) // 3)
     wanted = np.linalg.eigvals(J).astype(complex)
     # The normal equations square the condition of the record; the least logarithm is over one interval.
     rounding = EPS * np.linalg.cond(np.concatenate(D, axis=1)) ** 2 / interval
-    assert np.abs(matched(wanted, found) - found).max() <= 10 * rounding
+    assert np.abs(matched(wanted, rates) - rates).max() <= 10 * rounding
 
 
 def test_a_long_lag_makes_slow_exponents_sharper() -> None:
@@ -63,8 +63,8 @@ def test_a_long_lag_makes_slow_exponents_sharper() -> None:
     D = D + noise * np.random.default_rng(2).normal(size=D.shape)
 
     def error(longest: int) -> float:
-        found = exponents(lambda lag: propagator(D, lag), interval, longest)
-        return float(np.abs(found + 0.5).min())
+        rates = exponents(lambda lag: propagator(D, lag), interval, longest)
+        return float(np.abs(rates + 0.5).min())
 
     assert error(128) < error(1)
 
@@ -85,11 +85,11 @@ def test_what_depends_on_the_size_of_the_push_and_on_the_step_is_extrapolated() 
         return linear(J + (bent * size + (5.0 * h) ** 2) * other, interval)
 
     coarse, large, small = (answer(size, h) for size, h in zip((0.05, 0.1, 0.05), (2 * step, step, step), strict=True))
-    found, uncertainty = rates.spectrum(leaning, (coarse, large, small), step)
-    wanted = matched(np.linalg.eigvals(J).astype(complex), found)
+    values, uncertainty = rates.spectrum(leaning, (coarse, large, small), step)
+    wanted = matched(np.linalg.eigvals(J).astype(complex), values)
     plain = np.linalg.eigvals(J + bent * 0.05 * other).astype(complex)
-    assert np.all(np.abs(found - wanted) <= 3 * uncertainty)
-    assert np.abs(found - wanted).max() < np.abs(matched(plain, found) - wanted).max() / 10
+    assert np.all(np.abs(values - wanted) <= 3 * uncertainty)
+    assert np.abs(values - wanted).max() < np.abs(matched(plain, values) - wanted).max() / 10
 
 
 def test_a_run_counts_up_to_where_the_ball_leaves_the_case(tmp_path: Path) -> None:
@@ -108,8 +108,8 @@ def spectra(*cases: tuple[Case, float, Parameters]) -> Records:
     rows = []
     for case, omega_0, base in cases:
         p = base.replace(omega_0=omega_0)
-        (found,) = (s for s in analytic.stationary_solutions(p) if s.case is case and (s.stable or case is Case.SR))
-        values = [*found.eigenvalues, *([0.0j] if case is Case.NS else [])]
+        (solution,) = (s for s in analytic.stationary_solutions(p) if s.case is case and (s.stable or case is Case.SR))
+        values = [*solution.eigenvalues, *([0.0j] if case is Case.NS else [])]
 
         def row(
             quantity: str, value: float, sure: float, p: Parameters = p, case: Case = case, **of: float

@@ -79,30 +79,34 @@ def test_errors_are_those_of_the_run(exact: Trajectory) -> None:
 def test_ladder_as_records(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     rungs = settings.ladder(STEP)
     monkeypatch.setattr(settings, "ladder", lambda step: [rungs[3], rungs[-1]])
-    found = scores.ladder(campaign, STEP)
-    assert [score.quantity for score in found] == 2 * [*(state.name for state in STATES), trials.TRANSIENT]
-    poor, ours = found[: len(found) // 2], found[len(found) // 2 :]
+    scored = scores.ladder(campaign, STEP)
+    assert [score.quantity for score in scored] == 2 * [*(state.name for state in STATES), trials.TRANSIENT]
+    poor, ours = scored[: len(scored) // 2], scored[len(scored) // 2 :]
     for worse, better in zip(poor, ours, strict=True):
         assert better.error < worse.error
         assert better.open == 0
-    plain = json.loads(json.dumps([score.to_mapping() for score in found]))
+    plain = json.loads(json.dumps([score.to_mapping() for score in scored]))
     assert plain[0]["method"] == settings.name(rungs[3])
     assert plain[0]["cost"] is None  # JSON has no nan
-    assert repr([Score.from_mapping(values) for values in plain]) == repr(found)
+    assert repr([Score.from_mapping(values) for values in plain]) == repr(scored)
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_run_that_breaks_down_has_no_error(campaign: Campaign) -> None:
     """Known to diverge: a pyramidal cone with a low impedance."""
     wild = ContactSettings.at(STEP, solimp=0.1, solreffriction=20 * STEP, cone="pyramidal", memory=False, order=1)
-    found = scores.scores(campaign, [wild])
-    assert all(math.isnan(score.error) for score in found if score.quantity == ROLLING.name)
+    scored = scores.scores(campaign, [wild])
+    assert all(math.isnan(score.error) for score in scored if score.quantity == ROLLING.name)
 
 
 def test_frontier_has_a_cost_that_is_measured_once(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(settings, "rivals", lambda step: [ContactSettings.at(step)])
     monkeypatch.setattr(scores, "BATCH", 2)
-    found = scores.frontier(campaign, [STEP])
-    assert {(score.method, score.step) for score in found} == {("ours", STEP), ("time-stepping", STEP), ("event", None)}
-    assert all(score.cost > 0 for score in found)
-    assert scores.frontier(campaign, [STEP]) == found
+    scored = scores.frontier(campaign, [STEP])
+    assert {(score.method, score.step) for score in scored} == {
+        ("ours", STEP),
+        ("time-stepping", STEP),
+        ("event", None),
+    }
+    assert all(score.cost > 0 for score in scored)
+    assert scores.frontier(campaign, [STEP]) == scored

@@ -47,10 +47,10 @@ def test_a_search_goes_on_where_it_stopped(tmp_path):
     rows = [{"hops": 0, "failed": 0}] * (search.CHUNK - 1) + [{"hops": 1, "failed": 1, "x": [], "confirmed": None}]
     path.write_text(json.dumps({"chunk": 0, "rows": rows}), "utf-8")
     seen = []
-    found = search.run(tmp_path, QUICK, 10, processes(1), lambda done, total: seen.append((done, total)))
+    record = search.run(tmp_path, QUICK, 10, processes(1), lambda done, total: seen.append((done, total)))
     assert seen == [(search.CHUNK, search.CHUNK)]
-    assert (found.sets, found.failed, len(found.rows), found.confirmed) == (search.CHUNK, 1, 1, [])
-    assert found.rows[0]["mu"] == points[-1, 0]
+    assert (record.sets, record.failed, len(record.rows), record.confirmed) == (search.CHUNK, 1, 1, [])
+    assert record.rows[0]["mu"] == points[-1, 0]
 
 
 def test_a_chunk_is_the_same_whoever_computes_it(tmp_path):
@@ -68,9 +68,9 @@ def test_screen_and_confirmation_tell_hopping_from_rest():
     hops, x, failed = hopping.screen(p, x0s)
     assert failed == 0
     assert hops.any()
-    found = hopping.confirm(p, x[hops][0])
-    assert found is not None
-    assert found.landings == 1
+    record = hopping.confirm(p, x[hops][0])
+    assert record is not None
+    assert record.landings == 1
     still = Parameters.named("reference").replace(omega_0=25.0)
     hops, x, _ = hopping.screen(still, search.random_starts(still, 3, np.random.default_rng(0)))
     assert not hops.any()
@@ -84,22 +84,22 @@ def test_intervals_of_shares():
 
 
 def test_the_parts_of_a_range_are_all_of_it():
-    found = regions.kept()
+    record = regions.kept()
     for name in BOX:
-        own = [part for part in regions.parts(found) if part.group == name]
-        assert sum(part.sets for part in own) == found.sets
-        assert sum(part.hopping for part in own) == len(found.confirmed)
+        own = [part for part in regions.parts(record) if part.group == name]
+        assert sum(part.sets for part in own) == record.sets
+        assert sum(part.hopping for part in own) == len(record.confirmed)
 
 
 @pytest.mark.parametrize("name", regions.KEPT)
 def test_kept_searches_are_whole(name, tmp_path):
-    found = regions.kept(name)
-    rows = found.search.points(found.sets)
-    assert found.failed == 0
-    for row in found.rows:
+    record = regions.kept(name)
+    rows = record.search.points(record.sets)
+    assert record.failed == 0
+    for row in record.rows:
         assert np.min(np.abs(rows - [row[group] for group in BOX]).sum(axis=1)) < 1e-9
-    found.save(tmp_path / "again.json")
-    assert dataclasses.asdict(Searched.load(tmp_path / "again.json")) == dataclasses.asdict(found)
+    record.save(tmp_path / "again.json")
+    assert dataclasses.asdict(Searched.load(tmp_path / "again.json")) == dataclasses.asdict(record)
 
 
 def test_a_file_that_is_no_search(tmp_path):

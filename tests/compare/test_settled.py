@@ -85,10 +85,10 @@ class TestSettled:
         monkeypatch.setattr(settled, "QUICK", (0.6,))
         monkeypatch.setattr(settling, "ROUNDS", 1)
         monkeypatch.setattr(settling, "SOLVED", 1e-3)
-        found = Records.of(settled.measure(lab, {"thick": THICK}, Records()))
-        assert not found.measurements
-        assert all(isinstance(each, Missing) and "still drifts" in each.reason for each in found.missing)
-        assert len(found.missing) == 4
+        measured = Records.of(settled.measure(lab, {"thick": THICK}, Records()))
+        assert not measured.measurements
+        assert all(isinstance(each, Missing) and "still drifts" in each.reason for each in measured.missing)
+        assert len(measured.missing) == 4
 
     def test_states_of_different_steps_share_what_separates_them(self, records: Records) -> None:
         # Half of the step is measured from the mean of the whole: the difference is part of the uncertainty.
@@ -114,8 +114,8 @@ class TestSteadyMean:
 
 class TestOthers:
     def test_slopes_are_one_for_what_follows_the_fluid(self, lab: Lab, records: Records) -> None:
-        found = Records.of(slope.measure(lab, {"thick": THICK}, records))
-        by_case = {str(m.conditions["case"]): m for m in found.measurements}
+        measured = Records.of(slope.measure(lab, {"thick": THICK}, records))
+        by_case = {str(m.conditions["case"]): m for m in measured.measurements}
         assert set(by_case) == {"RR", "SS", "NR"}
         for name in ("RR", "NR"):
             assert by_case[name].value == pytest.approx(1.0, abs=3 * by_case[name].uncertainty)
@@ -138,13 +138,13 @@ class TestOthers:
             assert "jump" in only.reason
 
     def test_the_flow_is_raised_and_lowered(self, lab: Lab, records: Records) -> None:
-        found = Records.of(hysteresis.measure(lab, {"thick": THICK}, records))
-        sides = {str(m.conditions["side"]) for m in found.select("hysteresis", "case")}
+        measured = Records.of(hysteresis.measure(lab, {"thick": THICK}, records))
+        sides = {str(m.conditions["side"]) for m in measured.select("hysteresis", "case")}
         assert sides == {"up", "down"}
-        first, *_, last = found.select("hysteresis", "case")
+        first, *_, last = measured.select("hysteresis", "case")
         assert first.value == last.value == Case.RR
         assert last.conditions["before"] == "SS"
-        assert Case.NR in {Case(int(m.value)) for m in found.select("hysteresis", "case")}
+        assert Case.NR in {Case(int(m.value)) for m in measured.select("hysteresis", "case")}
 
     def test_no_loop_without_a_change_from_slipping_to_riding(self, lab: Lab) -> None:
         (only,) = hysteresis.measure(lab, {"thick": THICK}, Records())

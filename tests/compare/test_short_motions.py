@@ -102,14 +102,14 @@ def test_a_wrong_growth_is_noticed(
 
 def test_growth_passes_through_zero_where_it_should(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     known = Records(tuple(_end(quantity) for quantity in ("omega_01", "omega_02")))
-    found = Records.of([*bounds.measure(lab, SETS, known), *watched.measure(lab, SETS, known)])
+    measured = Records.of([*bounds.measure(lab, SETS, known), *watched.measure(lab, SETS, known)])
     ids = ("eq-61", "eq-66", "eq-67", "eq-82", "eq-83", "fig-4-5")
-    verdicts = outcomes(slipping.CLAIMS, found)
+    verdicts = outcomes(slipping.CLAIMS, measured)
     assert {name: verdicts[name].outcome for name in ids} == dict.fromkeys(ids, Outcome.CONFIRMED)
     right = slip_bounds.rr_to_rs
     # As (66) is printed, with mu for eta; on a set on which they differ by 3 %.
     monkeypatch.setattr(slip_bounds, "rr_to_rs", lambda p, w, side: right(p.replace(eta=1.03 * p.eta), w, side))
-    assert outcomes(slipping.CLAIMS, found)["eq-66"].outcome is Outcome.REFUTED
+    assert outcomes(slipping.CLAIMS, measured)["eq-66"].outcome is Outcome.REFUTED
 
 
 def _end(quantity: str, name: str = "reference") -> Measurement:
@@ -128,11 +128,11 @@ def _end(quantity: str, name: str = "reference") -> Measurement:
 
 
 def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = Records.of(
+    measured = Records.of(
         lift.measure(lab, {name: sets(Level.QUICK)[name] for name in ("rubber-wall", "rough-floor")}, Records())
     )
     ids = [f"lift-{inner.name}-{outer.name}" for inner, outer in slip_stability.LIFT_ARROWS]
-    verdicts = outcomes(slipping.CLAIMS, found)
+    verdicts = outcomes(slipping.CLAIMS, measured)
     assert {verdicts[name].outcome for name in ids} == {Outcome.CONFIRMED}
     right = slip_stability.lift_acceleration
     monkeypatch.setattr(
@@ -140,36 +140,36 @@ def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest
         "lift_acceleration",
         lambda a, b, x, p: right(a, b, x, p.replace(j=1.03 * p.j, eta=1.03 * p.eta)),
     )
-    verdicts = outcomes(slipping.CLAIMS, found)
+    verdicts = outcomes(slipping.CLAIMS, measured)
     assert [verdicts[name].outcome for name in ids if "RS" not in name] == [Outcome.REFUTED] * 3
 
 
 def test_the_fold_is_born_at_the_critical_drag(lab: Lab) -> None:
     name = "thick-fluid"
     known = Records(tuple(_end(quantity, name) for quantity in ("omega_01", "omega_02")))
-    found = Records.of(birth.measure(lab, {name: sets(Level.QUICK)[name]}, known))
-    (m,) = found.measurements
+    measured = Records.of(birth.measure(lab, {name: sets(Level.QUICK)[name]}, known))
+    (m,) = measured.measurements
     assert abs(m.value - bifurcation.critical_drag(m.parameters)) < 3 * m.uncertainty < 5e-3 * m.value
 
 
 def test_without_friction_nothing_rolls_and_the_reader_is_told(lab: Lab) -> None:
     smooth = {"ice": SETS["reference"].replace(eta=0.0)}
     for protocol in (growth, bounds):
-        found = Records.of(protocol.measure(lab, smooth, Records()))
-        assert not found.measurements
-        assert growth.SMOOTH in [each.reason for each in found.missing]
+        measured = Records.of(protocol.measure(lab, smooth, Records()))
+        assert not measured.measurements
+        assert growth.SMOOTH in [each.reason for each in measured.missing]
 
 
 def test_pieces_of_motions_end_in_the_predicted_cases(lab: Lab) -> None:
-    found = Records.of(motions.measure(lab, SETS, Records()))
-    verdict = outcomes(cases.CLAIMS, found)["cases"]
+    measured = Records.of(motions.measure(lab, SETS, Records()))
+    verdict = outcomes(cases.CLAIMS, measured)["cases"]
     assert verdict.outcome is Outcome.CONFIRMED
     assert len({check.predicted for check in verdict.checks}) >= 7
 
 
 def test_pieces_keep_away_from_changes_of_case(lab: Lab) -> None:
-    found = Records.of(motions.measure(lab, SETS, Records()))
-    path = Path(lab.campaign.directory) / Path(found.measurements[0].runs[0]).name
+    measured = Records.of(motions.measure(lab, SETS, Records()))
+    path = Path(lab.campaign.directory) / Path(measured.measurements[0].runs[0]).name
     run = storage.load(path)
     changes = np.flatnonzero(np.diff(run.case)) + 1
     for first in motions.pieces(run, 12):
@@ -178,11 +178,11 @@ def test_pieces_keep_away_from_changes_of_case(lab: Lab) -> None:
 
 
 def test_landings_do_not_rebound(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = Records.of(impacts.measure(lab, SETS, Records()))
-    assert outcomes(cases.CLAIMS, found)["impacts"].outcome is Outcome.CONFIRMED
+    measured = Records.of(impacts.measure(lab, SETS, Records()))
+    assert outcomes(cases.CLAIMS, measured)["impacts"].outcome is Outcome.CONFIRMED
     right = analytic.simulate
     monkeypatch.setattr(analytic, "simulate", lambda *given, **more: right(*given, restitution=0.25, **more))
-    assert outcomes(cases.CLAIMS, found)["impacts"].outcome is Outcome.REFUTED
+    assert outcomes(cases.CLAIMS, measured)["impacts"].outcome is Outcome.REFUTED
 
 
 def test_figure_12_is_algebra() -> None:

@@ -96,15 +96,15 @@ JUDGED = (
 
 
 def test_the_right_theory_is_confirmed(records: Records) -> None:
-    found = _outcomes(records)
-    assert {found[name] for name in JUDGED} == {Outcome.CONFIRMED}
-    assert found["operating-range"] is found["unloading-limit"] is Outcome.CONFIRMED
-    assert found["slope-jump"] is found["fig-13-left"] is Outcome.NOT_RUN
+    outcome_of = _outcomes(records)
+    assert {outcome_of[name] for name in JUDGED} == {Outcome.CONFIRMED}
+    assert outcome_of["operating-range"] is outcome_of["unloading-limit"] is Outcome.CONFIRMED
+    assert outcome_of["slope-jump"] is outcome_of["fig-13-left"] is Outcome.NOT_RUN
 
 
 def test_coarse_measurements_tell_nothing() -> None:
-    found = _outcomes(_records(coarse=2.0))
-    assert found["prop-1"] is found["prop-4"] is found["fig-9"] is Outcome.INCONCLUSIVE
+    outcome_of = _outcomes(_records(coarse=2.0))
+    assert outcome_of["prop-1"] is outcome_of["prop-4"] is outcome_of["fig-9"] is Outcome.INCONCLUSIVE
 
 
 def _changed(monkeypatch: pytest.MonkeyPatch, change: Any) -> None:
@@ -167,9 +167,9 @@ WRONG = {
 def test_a_wrong_theory_is_refuted(name: str, records: Records, monkeypatch: pytest.MonkeyPatch) -> None:
     change, noticed = WRONG[name]
     _changed(monkeypatch, change)
-    found = _outcomes(records)
-    assert {claim for claim in JUDGED if found[claim] is Outcome.REFUTED} >= noticed
-    assert Outcome.ERROR not in found.values()
+    outcome_of = _outcomes(records)
+    assert {claim for claim in JUDGED if outcome_of[claim] is Outcome.REFUTED} >= noticed
+    assert Outcome.ERROR not in outcome_of.values()
 
 
 def test_a_wall_that_carries_at_other_flows_is_refuted(records: Records, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,8 +177,8 @@ def test_a_wall_that_carries_at_other_flows_is_refuted(records: Records, monkeyp
         return None if s.case in (Case.NR, Case.SR) and p.Omega_0 < 3.0 else s
 
     _changed(monkeypatch, change)
-    found = _outcomes(records)
-    assert found["prop-3-5"] is found["fig-7"] is Outcome.REFUTED
+    outcome_of = _outcomes(records)
+    assert outcome_of["prop-3-5"] is outcome_of["fig-7"] is Outcome.REFUTED
 
 
 def test_a_wrong_range_is_refuted(records: Records, monkeypatch: pytest.MonkeyPatch) -> None:
