@@ -51,8 +51,9 @@ def _plain() -> Show:
         now = time.monotonic()
         if what != doing:  # the rate is that of what is being done now, and of this session
             doing, start, first, last = what, now, done, now
+            print(what, file=sys.stderr)
             return
-        if now - last < PLAIN_INTERVAL and done < total:
+        if now - last < PLAIN_INTERVAL:  # many short campaigns make up one thing that is being done
             return
         last = now
         eta = f", about {(now - start) / (done - first) * (total - done):.0f} s to go" if first < done < total else ""
