@@ -13,7 +13,7 @@ import numpy as np
 
 from compare.measure.extrapolation import initial_slope
 from compare.measure.lab import Lab, time_unit
-from compare.measure.record import Measurement, Missing, Records, measurement
+from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
 from compare.measure.settling import Settled, Start, settle
 from compare.statistics import Measured, straight_line
 from model import Case, Parameters
@@ -42,6 +42,11 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield Missing(PROTOCOL, name, "too few states of slipping at both points settle near the end of the branch")
         else:
             drag = Measured(1 / lag.value, lag.uncertainty / lag.value**2)
+            if not sure_enough("critical_drag", drag, drag.value):
+                yield Missing(
+                    PROTOCOL, name, f"the drag where the fold is born is too vague: {drag.uncertainty:.2g} 1/s"
+                )
+                continue
             tasks = [state.task for states in own for state in states]
             q = p.replace(c=drag.value)
             yield measurement(lab, PROTOCOL, name, q, "critical_drag", drag, tasks)

@@ -71,7 +71,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     lines = [Line(name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
     first = [[line.task(lab, Omega / time_unit(line.p)) for Omega in ORBITS] for line in lines]
     lab.complete([task for row in first for task in row])
-    seen = [lab.run(row) for row in first]
+    seen = [_direct(line, lab.run(row)) for line, row in zip(lines, first, strict=True)]
     about = [_about(runs) for runs in seen]
     near = [
         [line.task(lab, where * (1 - part), times) for part in NEAR for times in (1, 2)] if where else []
@@ -80,8 +80,10 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     lab.complete([task for row in near for task in row])
     for line, orbits, begun, tasks in zip(lines, first, seen, near, strict=True):
         lifted = next((run for run in begun if _force(run) is None), None)
-        if lifted is None:
-            yield _record(lab, line, "lifts", ORBITS[-1] / time_unit(line.p), 0.0, orbits[-1:])
+        if not begun:
+            yield Missing(NAME, line.set, f"the ball doesn't stay in {line.inner.name} at any orbit")
+        elif lifted is None:
+            yield _record(lab, line, "lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
         elif Case(int(lifted.case[-1])) is not line.outer:
             to = Case(int(lifted.case[-1])).name
             yield Missing(NAME, line.set, f"out of {line.inner.name} the ball leaves the floor for {to}")
@@ -89,6 +91,13 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield Missing(NAME, line.set, f"where the ball leaves {line.inner.name} the floor's contact comes and goes")
         else:
             yield _record(lab, line, "lift_onset", value.value, value, tasks)
+
+
+def _direct(line: Line, runs: Sequence[Trajectory]) -> list[Trajectory]:
+    """The first runs in a row in which the ball passes into no case but the two ends of the arrow."""
+    strays = [not np.isin(run.case[SKIPPED:], [line.inner, line.outer]).all() for run in runs]
+    begin = [*strays, False].index(False)
+    return list(runs[begin : [*strays, True].index(True, begin)])
 
 
 def _record(

@@ -51,6 +51,10 @@ LATE = 2.0
 """Steps, of which two landings may come one late each. What weight does to a slip in that time is the least slip at the
 ends of a piece: where two contacts roll one may creep so fast, since how they share a load is not determined.
 """
+LEFT = 0.01
+"""Least share of the friction limit that a rolling contact leaves at the ends of a piece: with less left it creeps by
+what the limit changes, as fast as a slip that has just begun or is about to end.
+"""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -100,11 +104,18 @@ def pieces(run: Trajectory, count: int) -> list[int]:
 
 
 def _plain(run: Trajectory) -> npt.NDArray[np.bool_]:
-    """Whether every open contact is open and every slipping one slips by more than a trace, at every sample (n,)."""
-    p = run.header.parameters
+    """Whether contacts plainly are what they are called, at every sample (n,).
+
+    An open one is open, a slipping one slips by more than a trace, and a rolling one needs less friction than it may.
+    """
+    p, A, B = run.header.parameters, run.force_A.T, run.force_B.T
     plain = np.full(len(run.time), True)
-    for side, gap, speed in (("A", run.y, run.slip_speed_A), ("B", run.h, run.slip_speed_B)):
+    for side, gap, speed, friction, limit in (
+        ("A", run.y, run.slip_speed_A, np.hypot(A[0], A[2]), p.mu * A[1]),
+        ("B", run.h, run.slip_speed_B, np.hypot(B[1], B[2]), p.eta * B[0]),
+    ):
         contact = np.array([getattr(case, side).name for case in Case])[run.case]
+        plain &= (contact != "R") | (friction <= (1 - LEFT) * limit)
         plain &= (contact != "N") | (gap > NARROW * p.R)
         plain &= (contact != "S") | (speed > LATE * p.g * coarse_step(p) / REFINED)
     return plain
