@@ -50,6 +50,15 @@ def gamma_nr(beta: npt.ArrayLike, x: npt.ArrayLike, p: Parameters) -> Array:
     return np.asarray(pull * np.cos(beta) + lag * np.sin(beta) - friction)
 
 
+def steepest_nr(x: npt.ArrayLike, p: Parameters) -> Array:
+    """beta_1 (58) in rad: the direction along which slip at the wall grows the most out of states x (...) of NR.
+
+    Along beta_2 = beta_1 + pi it dies out the fastest: a state is stable where gamma along beta_1 is negative, (59).
+    """
+    pull, lag, _ = _nr_terms(x, p)
+    return np.arctan2(lag, pull)
+
+
 def nr_to_ns(p: Parameters, side: int = 1) -> SlipBound:
     """(60), (61): slip of the wall contact out of the stationary NR, along beta = 0 (side 1) or beta = pi (side -1)."""
     unit = (1 + p.j) / (p.j * p.r)

@@ -1,4 +1,4 @@
-"""Fig. 12: with (12) released the bifurcations of Table 5 appear for eta > j as well. Algebra is all there is."""
+"""What no ball shows, since a contact would have to pull: algebra is all there is. Fig. 12, and (83) for eta > 1."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from scipy.optimize import brentq
 
 import analytic
-from analytic import bifurcation, branch_stability, dynamics, jacobian, slipping_branch
+from analytic import bifurcation, branch_stability, dynamics, jacobian, slip_bounds, slipping_branch
 from compare.claims.claim import Check, Claim, Text
 from compare.measure.record import Measurement
 from compare.statistics import COVERAGE
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.arrays import Array
 
 FORMAL = Parameters.named("reference").replace(eta=0.43)
@@ -46,6 +46,28 @@ def _figure_12() -> Iterator[Check]:
     yield _check("omega_04", "F: ω₀ where the branch turns", float(along[k]), released["omega_04"], spacing)
     yield _check("law", "greatest rate on the branch over g/r", rates, 0.0)
     yield _check("law", "points with A_y ≥ 0", float(np.sum(pushed >= 0)), 0.0)
+
+
+def _pulling() -> Iterator[Check]:
+    """The normal forces of slip at its onset, on either bound and a grid of friction coefficients."""
+    grid = [FORMAL.replace(mu=mu, eta=eta) for mu in np.geomspace(0.05, 3.0, 13) for eta in np.geomspace(0.05, 3.0, 13)]
+    presses = {side: [(p.eta, *_normal_forces(p, side)) for p in grid if _reached(p, side)] for side in (1, -1)}
+    yield _check("law", "(83): friction at which the wall presses", sum(B_x >= 0 for _, _, B_x in presses[-1]), 0.0)
+    wrong = sum((A_y > 0) != (eta < FORMAL.j) for eta, A_y, _ in presses[1])
+    yield _check("law", "(82): friction at which the floor presses and η > j, or pulls and η < j", wrong, 0.0)
+    smooth = sum(eta <= 1 for eta, _, _ in presses[-1])
+    yield _check("law", "(83): friction with a bound and η ≤ 1", smooth, 0.0)
+
+
+def _reached(p: Parameters, side: int) -> bool:
+    return 0 < slip_bounds.rr_to_ss(p, side).zero < math.inf
+
+
+def _normal_forces(p: Parameters, side: int) -> tuple[float, float]:
+    """A_y and B_x in N of slip along (0, 0), side 1, or (pi, pi) at its onset by (82) or (83)."""
+    omega, direction = math.sqrt(slip_bounds.rr_to_ss(p, side).zero), (0.0, float(side))
+    forces = dynamics.forces(Case.SS, State(omega_c=omega), p, omega, direction, direction)
+    return float(forces.A_y), float(forces.B_x)
 
 
 def _check(quantity: str, what: str, value: float, predicted: float, uncertainty: float = 0.0) -> Check:
@@ -83,5 +105,14 @@ CLAIMS = (
         algebra=_figure_12,
         text=Text.FORMAL,
         reason="The floor would have to pull: no ball and no engine does this.",
+    ),
+    Claim(
+        id="eq-83-rough",
+        section="Formal",
+        source="(82), (83), end of section 4.3",
+        statement="(83) is a bound for η > 1 only, and contradicts (12) there; (82) does so unless η < j.",
+        algebra=_pulling,
+        text=Text.FORMAL,
+        reason="At (83) the wall would have to pull, and at (82) for η > j the floor.",
     ),
 )

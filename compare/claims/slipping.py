@@ -199,6 +199,20 @@ CLAIMS = (
     *(_arrow(inner, outer) for inner, outer in slip_stability.SLIP_ARROWS),
     *(_lifting(inner, outer) for inner, outer in slip_stability.LIFT_ARROWS),
     _claim(
+        "eq-58",
+        "(58)",
+        "Out of rolling on the wall alone, slip grows the most along β₁, whatever the state.",
+        (
+            Bearing(
+                protocol="steepest",
+                quantity="steepest",
+                predict=lambda m: float(slip_bounds.steepest_nr(np.array(state(m)), m.parameters)),
+                scale=lambda p: 1.0,
+                by="slip_bounds.steepest_nr",
+            ),
+        ),
+    ),
+    _claim(
         "eq-61",
         "(60), (61)",
         "Rolling on the wall alone is stable with respect to slipping above ω₀₂.",

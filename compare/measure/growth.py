@@ -44,7 +44,7 @@ REFINED = 16
 STEPS, SKIPPED = 18, 3
 """Steps of a record, and those at its start in which contact forces build up."""
 LARGE, SMALL, BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
-"""Slips at the start in units of `_slip_unit`: so large that they neither end nor turn much in a record; small where
+"""Slips at the start in units of `start_unit`: so large that they neither end nor turn much in a record; small where
 one contact has to hold, or the ball goes round slowly and the wall carries little; and three where the direction of a
 contact that slips already depends on the size."""
 DEGREES = (4, 3)
@@ -81,10 +81,10 @@ class Push:
     fluid at rest; empty for one at random."""
 
     def task(self, lab: Lab, size: float, times: int = 1) -> Task:
-        """The run with one size of slip, in units of `_slip_unit`, and `times` as many steps."""
+        """The run with one size of slip, in units of `start_unit`, and `times` as many steps."""
         p, step = self.p, coarse_step(self.p) / REFINED
         x = self.x.copy()
-        x[3:6] += size * _slip_unit(p, x) * self.n
+        x[3:6] += size * start_unit(p, x) * self.n
         return lab.task(p, x, STEPS * step, step / times, samples=STEPS * times)
 
     def rate(self, run: Trajectory, times: int = 1) -> Array:
@@ -109,12 +109,12 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
     yield from (Missing(NAME, name, SMOOTH) for name in sets if name not in rough)
     pushes = [push for name, p in rough.items() for push in _pushes(name, p, MORE[lab.level])]
-    planned = [_tasks(lab, push) for push in pushes]
+    planned = [tasks_of(lab, push) for push in pushes]
     lab.complete([task for tasks in planned for task in tasks])
     left = Counter[tuple[str, Case, Case]]()
     before: tuple[Push, Measured] | None = None
     for push, tasks in zip(pushes, planned, strict=True):
-        value = _growth(push, lab.run(tasks))
+        value = growth(push, lab.run(tasks))
         if value is None:
             left[push.set, push.inner, push.outer] += 1
             continue
@@ -150,12 +150,12 @@ def _sizes(push: Push) -> tuple[float, ...]:
     return SMALL if push.outer in (Case.RS, Case.SR) else LARGE
 
 
-def _tasks(lab: Lab, push: Push) -> list[Task]:
+def tasks_of(lab: Lab, push: Push) -> list[Task]:
     """Every size, with either step."""
     return [push.task(lab, size, times) for times in (1, 2) for size in _sizes(push)]
 
 
-def _growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
+def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
     """gamma for a vanishing size and step, None if a record was not in the case or is too coarse.
 
     Its uncertainty is what the step and a degree of the polynomials change, and for three sizes a third of what the
@@ -203,7 +203,7 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[Push]:
             slides = {Case.RS: 4, Case.SR: 3}.get(inner)
             # A slip that is there already is so fast that a slower one beside it hardly turns it.
             if inner is Case.RS:
-                x[4] = rng.choice([-1, 1]) * rng.uniform(3.0, 5.0) * _slip_unit(p, x)
+                x[4] = rng.choice([-1, 1]) * rng.uniform(3.0, 5.0) * start_unit(p, x)
             if inner is Case.SR:  # the faster the ball spins about its radial axis, the faster slip_z sets in
                 x[3] = -rng.uniform(2.0, 3.0) * p.R / p.r * x[2]
             n = np.zeros(3)
@@ -224,6 +224,6 @@ def _orbit(inner: Case, outer: Case, p: Parameters, rng: np.random.Generator) ->
     return None
 
 
-def _slip_unit(p: Parameters, x: Array) -> float:
+def start_unit(p: Parameters, x: Array) -> float:
     """The slip that the weight, and at the wall the centrifugal force, makes in the unit of time, rad s-1."""
     return (p.g + p.R * float(x[2]) ** 2) / 2 / p.r * time_unit(p)

@@ -58,6 +58,7 @@ _ALL = (
     Quantity("frequency", "Im λ", "rad s-1", 2e-2),
     Quantity("modes", "number of eigenvalues", "1", 0.0),
     Quantity("gamma", "γ", "rad s-2", 2e-2),
+    Quantity("steepest", "β₁", "rad", 2e-2),
     Quantity("filippov_share", "δ", "1", 2e-2),
     Quantity("gamma_zero", "ω₀ at γ = 0", "rad s-1", 2e-2),
     Quantity("gamma_slope", "dγ/dω₀", "s-1", 2e-2),

@@ -126,6 +126,7 @@ THEORIES: tuple[WrongTheory, ...] = (
     WrongTheory("(56) with 3 % more drag", _BOUNDS, "gamma_nr", given(other(c=1.03))),
     WrongTheory("(56) with 3 % more wall friction", _BOUNDS, "gamma_nr", given(other(eta=1.03))),
     WrongTheory("(56) with sin β of the wrong sign", _BOUNDS, "gamma_nr", _mirrored),
+    WrongTheory("(58) with 5 % more drag", _BOUNDS, "steepest_nr", given(other(c=1.05))),
     WrongTheory("lift out of RR, SR and SS with 2 % more inertia", "analytic.slip_stability", "lift_acceleration",
                 given(other(j=1.02))),
     WrongTheory("lift with 2 % more wall friction", "analytic.slip_stability", "lift_acceleration",
