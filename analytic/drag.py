@@ -1,0 +1,87 @@
+"""The drag -m c(|w|) w of each law of `model.drag` as a function of the speed |w| relative to the fluid.
+
+With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^0.687, blunt |w|): Stokes' has the first
+term alone, the quadratic one the last. So c never falls as |w| grows, and a drag force belongs to one speed.
+
+All take floats or arrays, and complex ones for derivatives by complex steps; `rate` is also compiled.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic import roots
+from model import Parameters
+from model.arrays import Array, Real
+from model.drag import SCHILLER_NAUMANN, STOKES
+
+EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
+"""Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
+POWERS = (1.0, 1.0 + EXPONENT, 2.0)
+"""How the force of each term of `Law` grows with the speed."""
+
+
+class Law(NamedTuple):
+    """c(|w|) = max(linear + wake |w|^0.687, blunt |w|) in s-1, with |w| in m s-1."""
+
+    linear: float
+    wake: float
+    blunt: float
+
+
+def law(p: Parameters) -> Law:
+    """The law of a parameter set."""
+    if p.drag == STOKES:
+        return Law(p.c, 0.0, 0.0)
+    per_speed = 2 * p.r / p.nu_f
+    if p.drag == SCHILLER_NAUMANN:
+        return Law(p.c, WAKE * p.c * per_speed**EXPONENT, BLUNT / 24 * p.c * per_speed)
+    return Law(0.0, 0.0, p.C_D / 24 * p.c * per_speed)
+
+
+def rate(speed: Real, law: Law) -> Real:
+    """c(|w|) of a law, s-1."""
+    slow, fast = law.linear + law.wake * speed**EXPONENT, law.blunt * speed
+    return slow * (slow >= fast) + fast * (slow < fast)  # max, for all kinds of numbers
+
+
+def coefficient(speed: Real, p: Parameters) -> Real:
+    """c(|w|) at a speed |w| >= 0 (m s-1) relative to the fluid, s-1: the drag on the ball is -m c(|w|) w, N."""
+    return p.c if p.drag == STOKES else rate(speed, law(p))
+
+
+def slope(speed: Real, p: Parameters) -> Real:
+    """d(c(|w|) |w|)/d|w|, s-1: how the drag per mass answers a change along w; across w it is `coefficient`."""
+    if p.drag == STOKES:
+        return p.c
+    linear, wake, blunt = law(p)
+    slow, fast = wake * speed**EXPONENT, blunt * speed
+    return (linear + (1 + EXPONENT) * slow) * (linear + slow >= fast) + 2 * fast * (linear + slow < fast)
+
+
+def speed_of(acceleration: npt.ArrayLike, p: Parameters) -> Array:
+    """The speed |w| (m s-1) at which the drag per mass c(|w|) |w| is a given one >= 0 (m s-2); inf where c = 0."""
+    given, terms = np.asarray(acceleration, dtype=float), law(p)
+    alone = [(given / term) ** (1 / power) for term, power in zip(terms, POWERS, strict=True) if term > 0]
+    if not alone:
+        return np.where(given > 0, np.inf, given)
+    speed: Array = np.minimum.reduce(alone)
+    if len(alone) == 1:
+        return speed
+    # One term alone makes the drag of this speed too great, but that of half of it is too small.
+    return roots.bisected(lambda speed: rate(speed, terms) * speed - given, speed / 2, speed)
+
+
+def reynolds(speed: Real, p: Parameters) -> Real:
+    """Reynolds number 2 r |w|/nu_f; nan if the viscosity isn't known."""
+    return 2 * p.r / p.nu_f * speed if p.nu_f else math.nan * speed
+
+
+def speed(v_h: Real, v_y: Real, w_k: Real) -> Real:
+    """|w| of a velocity relative to the fluid, inward, upward and along the orbit, rho (omega_c - omega_0); m s-1."""
+    square = v_h * v_h + v_y * v_y + w_k * w_k
+    return math.sqrt(square) if isinstance(square, float) else np.sqrt(square)
