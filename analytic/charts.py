@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analytic import charts_off_wall, dynamics
+from analytic import charts_off_wall, drag, dynamics
 from analytic.motion import Chart, Fluid, Moment, Path, natural_units
 from analytic.rigid_body import Forces
 from model import Case, Parameters, State
@@ -33,10 +33,11 @@ def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -
 
 def _power(x: State, f: Forces, p: Parameters, omega_0: float) -> float:
     """Power of drag and contacts on the wall, W: the contact points move with (6)."""
-    drag = -p.m * p.c * (p.R**2 * x.omega_c * (x.omega_c - omega_0) + x.v_y**2)
+    c = drag.of_velocity(0.0, x.v_y, p.R * (x.omega_c - omega_0), p)
+    fluid = -p.m * c * (p.R**2 * x.omega_c * (x.omega_c - omega_0) + x.v_y**2)
     at_A = f.A_x * (x.v_y + p.r * x.slip_z) + f.A_y * x.v_y - f.A_z * p.r * x.slip_x
     at_B = -f.B_y * p.r * x.slip_z + f.B_z * p.r * x.slip_y
-    return float(drag + at_A + at_B)
+    return float(fluid + at_A + at_B)
 
 
 def _rs(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:

@@ -16,11 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from analytic import flight
+from analytic import drag, flight
 from analytic.motion import Chart, Fluid, Moment, Path, natural_units
 from analytic.rigid_body import Velocities, state, velocities
 from model import Case, Parameters, State
 from model.arrays import Array
+from model.drag import STOKES
 
 
 class _Start(NamedTuple):
@@ -41,16 +42,20 @@ class _Start(NamedTuple):
 def rolling(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """RN: (Z, dZ/dt, work); the spin follows."""
     start, unit, energy = _start(at, p), *_units(p)
-    share = p.c / (1 + p.j)
+
+    def lag_and_share(t: float, Z: complex, V: complex) -> tuple[complex, float]:
+        lag = _lag(Z, V, omega_0(t))
+        return lag, _coefficient(lag, p) / (1 + p.j)
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         Z, V = _centre(z)
-        lag = _lag(Z, V, omega_0(t))
+        lag, share = lag_and_share(t, Z, V)
         return [V.real, V.imag, -share * lag.real, -share * lag.imag, _power(lag, V, p)]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
         Z, V = _centre(z)
-        return p.mu - p.j * share * abs(_lag(Z, V, omega_0(t))) / p.g, _gap(Z, p)
+        lag, share = lag_and_share(t, Z, V)
+        return p.mu - p.j * share * abs(lag) / p.g, _gap(Z, p)
 
     def path(t: Array, z: Array) -> Path:
         _, V = _centre(z)
@@ -70,7 +75,8 @@ def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float
         *_, speed, phase, _ = z
         (Z, V), along = _centre(z), cmath.rect(1.0, phase)
         lag, friction = _lag(Z, V, omega_0(t)), -p.mu * p.g * along
-        force, turning = -p.c * lag + friction, (-p.c * lag + lever * friction) / along
+        c = _coefficient(lag, p)
+        force, turning = -c * lag + friction, (-c * lag + lever * friction) / along
         work = _power(lag, V, p) - p.m * p.mu * p.g * speed
         return [V.real, V.imag, force.real, force.imag, turning.real, turning.imag / max(speed, floor * v), work]
 
@@ -94,14 +100,40 @@ def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float
 
 
 def flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """NN: (Z, dZ/dt, work); height and fall are known (`flight`), and the whole spin rests."""
+    """NN, where the whole spin rests."""
+    return (_flying_by_stokes if p.drag == STOKES else _flying)(case, at, p, omega_0)
+
+
+def _flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid) -> Chart:
+    """(Z, dZ/dt, y, v_y, work): c depends on all components of the velocity."""
+    start, (unit, energy) = _start(at, p), _units(p)
+
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        (Z, V), v_y = _centre(z), z[5]
+        lag = _lag(Z, V, omega_0(t))
+        c = _coefficient(lag, p, v_y)
+        work = _power(lag, V, p, v_y)
+        return [V.real, V.imag, -c * lag.real, -c * lag.imag, v_y, -p.g - c * v_y, work]
+
+    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
+        return _gap(_centre(z)[0], p), z[4] / p.R
+
+    def path(t: Array, z: Array) -> Path:
+        return _path(t, z, at, p, start.upright, np.full(len(t), start.spin), (z[4], z[5]))
+
+    first, scale = [*_pairs(start), at.x.y, at.x.v_y, at.work], [*unit, p.R, unit[-1], energy]
+    return Chart(case, first, scale, rates, ("B lands", "A lands"), guards, path)
+
+
+def _flying_by_stokes(case: Case, at: Moment, p: Parameters, omega_0: Fluid) -> Chart:
+    """(Z, dZ/dt, work); height and fall are known (`flight`)."""
     start, unit, energy = _start(at, p), *_units(p)
     y, v_y = at.x.y, at.x.v_y
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         Z, V = _centre(z)
         lag, rise = _lag(Z, V, omega_0(t)), v_y - (p.c * v_y + p.g) * flight.decay(t - at.time, p.c)
-        return [V.real, V.imag, -p.c * lag.real, -p.c * lag.imag, _power(lag, V, p) - p.m * p.c * rise**2]
+        return [V.real, V.imag, -p.c * lag.real, -p.c * lag.imag, _power(lag, V, p, rise)]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
         return (_gap(_centre(z)[0], p),)
@@ -139,9 +171,14 @@ def _lag(Z: complex, V: complex, omega_0: float) -> complex:
     return V - 1j * omega_0 * Z
 
 
-def _power(lag: complex, V: complex, p: Parameters) -> float:
-    """Power of the drag along the floor, W."""
-    return -p.m * p.c * (lag * V.conjugate()).real
+def _coefficient(lag: complex, p: Parameters, v_y: float = 0.0) -> float:
+    """c(|w|), s-1."""
+    return float(drag.of_velocity(lag.real, v_y, lag.imag, p))
+
+
+def _power(lag: complex, V: complex, p: Parameters, v_y: float = 0.0) -> float:
+    """Power of the drag, W."""
+    return -p.m * _coefficient(lag, p, v_y) * ((lag * V.conjugate()).real + v_y**2)
 
 
 def _gap(Z: complex, p: Parameters) -> float:

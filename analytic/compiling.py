@@ -21,7 +21,7 @@ else:
     # What is compiled is kept on disk. Of itself numba compiles a function again when its own file has changed; it
     # must also do so when one of those has that it calls.
     _SOURCES = [path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py"))]
-    _STAMP = hashlib.sha256(b"".join(source for source in _SOURCES if b"@compiled" in source)).hexdigest()
+    _STAMP = hashlib.sha256(b"".join(source for source in _SOURCES if b"compiled" in source)).hexdigest()
 
     def compiled(function: F) -> F:
         """The function, compiled at its first call; threads can run it at once."""

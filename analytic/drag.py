@@ -3,7 +3,7 @@
 With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^0.687, blunt |w|): Stokes' has the first
 term alone, the quadratic one the last. So c never falls as |w| grows, and a drag force belongs to one speed.
 
-All take floats or arrays, and complex ones for derivatives by complex steps; `rate` is also compiled.
+All take floats or arrays, and complex ones for derivatives by complex steps; `analytic.stepping` compiles `rate`.
 """
 
 from __future__ import annotations
@@ -54,6 +54,17 @@ def coefficient(speed: Real, p: Parameters) -> Real:
     return p.c if p.drag == STOKES else rate(speed, law(p))
 
 
+def of_velocity(w_h: Real, w_y: Real, w_k: Real, p: Parameters) -> Real:
+    """c(|w|) of a velocity relative to the fluid, inward, upward and along the orbit, rho (omega_c - omega_0); s-1."""
+    return p.c if p.drag == STOKES else rate(speed(w_h, w_y, w_k), law(p))
+
+
+def speed(w_h: Real, w_y: Real, w_k: Real) -> Real:
+    """|w| of the same components, m s-1."""
+    square = w_h * w_h + w_y * w_y + w_k * w_k
+    return math.sqrt(square) if isinstance(square, float) else np.sqrt(square)
+
+
 def slope(speed: Real, p: Parameters) -> Real:
     """d(c(|w|) |w|)/d|w|, s-1: how the drag per mass answers a change along w; across w it is `coefficient`."""
     if p.drag == STOKES:
@@ -79,9 +90,3 @@ def speed_of(acceleration: npt.ArrayLike, p: Parameters) -> Array:
 def reynolds(speed: Real, p: Parameters) -> Real:
     """Reynolds number 2 r |w|/nu_f; nan if the viscosity isn't known."""
     return 2 * p.r / p.nu_f * speed if p.nu_f else math.nan * speed
-
-
-def speed(v_h: Real, v_y: Real, w_k: Real) -> Real:
-    """|w| of a velocity relative to the fluid, inward, upward and along the orbit, rho (omega_c - omega_0); m s-1."""
-    square = v_h * v_h + v_y * v_y + w_k * w_k
-    return math.sqrt(square) if isinstance(square, float) else np.sqrt(square)

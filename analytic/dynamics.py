@@ -5,7 +5,8 @@ the same way in every case (`rates`). Both take floats or arrays and check nothi
 its innermost loop. `contact_forces` and `vector_field` are for everyone else: they take arrays of states and check
 them against the case.
 
-Away from the wall the drag (9) is extended by a radial part -m c rho', and the fluid rotates as one rigid body.
+Away from the wall the drag (9) is extended by a radial part -m c rho', and the fluid rotates as one rigid body. c is
+c(|w|), see `analytic.drag`.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from analytic import rolling_forces
+from analytic import drag, rolling_forces
 from analytic.rigid_body import Forces as Forces
 from model import Case, Contact, InputError, Parameters, State
 from model.arrays import Array, Real
@@ -125,10 +126,10 @@ def newton_euler(case: Case, x: Sequence[Real], f: Sequence[Real], p: Parameters
     """
     _, v_y, omega_c, w_x, _, w_z, h, v_h = x
     A_x, A_y, A_z, B_x, B_y, B_z = f
-    rho, jmr = p.R - h, p.j * p.m * p.r
-    push = (A_z + B_z) / p.m - p.c * rho * (omega_c - omega_0)
-    dv_y = (A_y + B_y) / p.m - p.g - p.c * v_y
-    dv_h = (A_x + B_x) / p.m - p.c * v_h - rho * omega_c**2
+    rho, jmr, c = p.R - h, p.j * p.m * p.r, _drag(x, p, omega_0)
+    push = (A_z + B_z) / p.m - c * rho * (omega_c - omega_0)
+    dv_y = (A_y + B_y) / p.m - p.g - c * v_y
+    dv_h = (A_x + B_x) / p.m - c * v_h - rho * omega_c**2
     droll = (push + v_h * omega_c) / p.r  # (rho omega_c)'/r, the rate of the rolling part (4)
     dw_x = -A_z / jmr - omega_c * (v_y / p.r + w_z) - droll
     dw_z = (A_x - B_y) / jmr + omega_c * (rho * omega_c / p.r + w_x) - dv_y / p.r
@@ -164,8 +165,15 @@ def forces(
 def rolling_family(omega_c: Real, p: Parameters, omega_0: Real, B_y: Real) -> Forces:
     """The forces of RR with the one free component B_y in N: (21) with (23)."""
     u = p.m * p.R * omega_c**2
-    z = p.j * p.m * p.R * p.c * (omega_c - omega_0) / (1 + 2 * p.j)
+    c = drag.of_velocity(0.0, 0.0, p.R * (omega_c - omega_0), p)
+    z = p.j * p.m * p.R * c * (omega_c - omega_0) / (1 + 2 * p.j)
     return Forces(B_y - p.j * u, p.m * p.g - B_y, z, (1 + p.j) * u - B_y, B_y, z)
+
+
+def _drag(x: Sequence[Real], p: Parameters, omega_0: Real) -> Real:
+    """c(|w|) in a state, s-1."""
+    _, v_y, omega_c, _, _, _, h, v_h = x
+    return drag.of_velocity(v_h, v_y, (p.R - h) * (omega_c - omega_0), p)
 
 
 def _rs(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> Forces:
@@ -174,7 +182,7 @@ def _rs(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> F
     u = p.m * p.R * omega_c**2
     B_x = (1 + p.j) * u
     B_z = -p.eta * B_x * sine
-    A_z = p.j * (p.m * p.R * p.c * (omega_c - omega_0) - B_z) / (1 + p.j)
+    A_z = p.j * (p.m * p.R * _drag(x, p, omega_0) * (omega_c - omega_0) - B_z) / (1 + p.j)
     return Forces(-p.j * u, p.m * p.g, A_z, B_x, 0.0, B_z)
 
 
@@ -184,7 +192,7 @@ def _sr(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction) -> F
     B_y = p.j * p.m * (p.R * omega_c**2 + p.r * omega_c * w_x)
     A_y = p.m * p.g - B_y
     A_z = p.mu * A_y * sine
-    B_z = p.j * (p.m * p.R * p.c * (omega_c - omega_0) - A_z) / (1 + p.j)
+    B_z = p.j * (p.m * p.R * _drag(x, p, omega_0) * (omega_c - omega_0) - A_z) / (1 + p.j)
     return Forces(0.0, A_y, A_z, p.m * p.R * omega_c**2, B_y, B_z)
 
 
@@ -201,9 +209,9 @@ def _ss(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction, slip
 
 def _nr(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
     """(27)."""
-    _, v_y, omega_c, w_x, *_ = x
-    B_y = p.j * p.m * (p.g + p.c * v_y + p.R * omega_c**2 + p.r * omega_c * w_x) / (1 + p.j)
-    B_z = p.j * p.m * p.R * p.c * (omega_c - omega_0) / (1 + p.j)
+    (_, v_y, omega_c, w_x, *_), c = x, _drag(x, p, omega_0)
+    B_y = p.j * p.m * (p.g + c * v_y + p.R * omega_c**2 + p.r * omega_c * w_x) / (1 + p.j)
+    B_z = p.j * p.m * p.R * c * (omega_c - omega_0) / (1 + p.j)
     return Forces(0.0, 0.0, 0.0, p.m * p.R * omega_c**2, B_y, B_z)
 
 
@@ -217,7 +225,7 @@ def _ns(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> F
 def _rn(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
     """Rolling on the floor away from the wall: drag alone drives the friction."""
     _, _, omega_c, _, _, _, h, v_h = x
-    share = p.j * p.m * p.c / (1 + p.j)
+    share = p.j * p.m * _drag(x, p, omega_0) / (1 + p.j)
     return Forces(share * v_h, p.m * p.g, share * (p.R - h) * (omega_c - omega_0))
 
 

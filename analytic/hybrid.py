@@ -1,7 +1,7 @@
 """Event-driven simulation: each case by its own equations, from one change of case to the next.
 
-Within a case `integrator` follows the coordinates of `charts` (RR is known in closed form) up to the guard that turns
-negative first, and `transitions` says how to go on.
+Within a case `integrator` follows the coordinates of `charts` up to the guard that turns negative first (with Stokes'
+drag RR is known in closed form), and `transitions` says how to go on.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ import numpy.typing as npt
 
 from analytic import charts, dynamics, rolling_forces, transitions, two_point_rolling
 from analytic.integrator import StalledError, Stretch
-from analytic.motion import Fluid, Moment, Path
+from analytic.motion import Chart, Fluid, Moment, Path
 from analytic.records import REPORT_EVERY, Event, Recorder
 from analytic.rigid_body import NOTHING, Forces
 from analytic.settings import Settings
 from analytic.transitions import Shortest
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
+from model.drag import STOKES
 
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
@@ -72,14 +73,16 @@ class _Simulator:
     def shortest(self) -> Shortest:
         """A hop that lasts T rises by g T^2/8, well above the tolerance of lengths where it is integrated."""
         unit = math.sqrt(self.p.R / self.p.g)
-        return Shortest(self.settings.rtol * unit, math.sqrt(8 * self.absolute) * unit)
+        integrated = math.sqrt(8 * self.absolute) * unit
+        return Shortest(self.settings.rtol * unit if self.p.drag == STOKES else integrated, integrated)
 
     def advance(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[Case, Moment]:
         """Go on through all events before `until`."""
         at_once = 0
         while at.time < until:
             start = at.time
-            guard, at = self._roll(at, until, fluid) if case is Case.RR else self._follow(case, at, until, fluid)
+            known = case is Case.RR and self.p.drag == STOKES
+            guard, at = self._roll(at, until, fluid) if known else self._follow(case, at, until, fluid)
             if guard:
                 before = case
                 case, at, impulse = self._react(guard, case, at, fluid)
@@ -137,7 +140,7 @@ class _Simulator:
         return Forces(*path_forces(case, path, self.p, np.array([fluid(at.time)]))[0].tolist())
 
     def _roll(self, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
-        """RR up to its end or `until`."""
+        """RR with Stokes' drag up to its end or `until`."""
         p = self.p
         end = two_point_rolling.end(at, until, p, fluid, self.settings.leave_rolling)
         stop = until if end is None else end
@@ -148,12 +151,15 @@ class _Simulator:
 
     def _follow(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
         """One case up to the first guard or `until`; samples are recorded even if it is interrupted."""
-        motion = charts.chart(case, at, self.p, fluid, self.settings.rtol)
+        if case is Case.RR:
+            motion = two_point_rolling.chart(at, self.p, fluid, self.settings.leave_rolling)
+        else:
+            motion = charts.chart(case, at, self.p, fluid, self.settings.rtol)
         lands, until = motion.landing <= until, min(until, motion.landing)
         times, states = [at.time], [motion.start]
         sampled, guard = [self.recorder.taken == 0], None
         stretch = Stretch(motion, at.time, until, self.recorder.times, self.settings.rtol, self.absolute)
-        hop = self._hop(case, at, fluid)
+        hop = self._hop(motion, at, fluid)
         try:
             for count, step in enumerate(stretch.steps(hop / 20 if hop < until - at.time else None), 1):
                 times += [*step.sample_times, step.time]
@@ -167,12 +173,13 @@ class _Simulator:
             self._record(case, path, np.array(sampled), fluid)
         return guard or ("A lands" if lands else None), _moment(path, -1)
 
-    def _hop(self, case: Case, at: Moment, fluid: Fluid) -> float:
+    def _hop(self, motion: Chart, at: Moment, fluid: Fluid) -> float:
         """About how long the ball will be off floor or wall if it is just rebounding from it, s; else inf."""
         x = at.x
-        if not ((x.y == 0 < x.v_y and case is not Case.NN) or x.h == 0 < x.v_h):
+        if not ((x.y == 0 < x.v_y and motion.landing == math.inf) or x.h == 0 < x.v_h):
             return math.inf
-        dx = dynamics.newton_euler(case, x, self._forces_at(case, at, fluid), self.p, fluid(at.time))
+        forces = self._forces_at(motion.case, at, fluid)
+        dx = dynamics.newton_euler(motion.case, x, forces, self.p, fluid(at.time))
         hops = [2 * v / -a for gap, v, a in ((x.y, x.v_y, dx.v_y), (x.h, x.v_h, dx.v_h)) if gap == 0 < v and a < 0]
         return min(hops, default=math.inf)
 

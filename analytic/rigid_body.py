@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from analytic import drag
 from model import Parameters, State
 from model.arrays import Real
 
@@ -82,9 +83,10 @@ def apply(u: Velocities, P: Forces, p: Parameters) -> Velocities:
 def smooth_rates(u: Velocities, at: Place, omega_0: float, p: Parameters) -> Velocities:
     """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact."""
     v_h, v_y, v_k, o_x, _, o_z = u
-    dv_h = -at.spin * v_k - p.c * (v_h - omega_0 * at.x_k)
-    dv_k = at.spin * v_h - p.c * (v_k + omega_0 * at.x_i)
-    return Velocities(dv_h, -p.g - p.c * v_y, dv_k, -at.spin * o_z, 0.0, at.spin * o_x)
+    w_h, w_k = v_h - omega_0 * at.x_k, v_k + omega_0 * at.x_i
+    c = drag.of_velocity(w_h, v_y, w_k, p)
+    dv_h, dv_k = -at.spin * v_k - c * w_h, at.spin * v_h - c * w_k
+    return Velocities(dv_h, -p.g - c * v_y, dv_k, -at.spin * o_z, 0.0, at.spin * o_x)
 
 
 def contact_work(u: Velocities, P: Forces, p: Parameters) -> Real:

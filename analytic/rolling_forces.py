@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analytic import roots
+from analytic import drag, roots
 from model import Parameters
 from model.arrays import Array
 
@@ -111,8 +111,8 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
 def _loads(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None) -> tuple[Array, Array]:
     """Centrifugal load u and common friction |z| of (23), in units of G."""
     omega_c, fluid = np.asarray(omega_c, dtype=float), np.asarray(p.omega_0 if omega_0 is None else omega_0)
-    u = p.R / p.g * omega_c**2
-    return np.asarray(u), np.asarray(p.j * p.c * p.R / p.g * np.abs(omega_c - fluid) / (1 + 2 * p.j))
+    u, lag = p.R / p.g * omega_c**2, np.abs(omega_c - fluid)
+    return np.asarray(u), np.asarray(p.j * drag.coefficient(p.R * lag, p) * p.R / p.g * lag / (1 + 2 * p.j))
 
 
 def _interval(u: Array, z: Array, p: Parameters) -> tuple[Array, Array]:

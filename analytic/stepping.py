@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from analytic import drag
 from analytic.compiling import compiled
 from analytic.corner import Impulse, both, project
 from analytic.rigid_body import Forces, Velocities
@@ -26,9 +27,13 @@ ROLLS, SLIPS, OPEN = 0, 1, 2
 """State of a contact; three times that of A plus that of B is the code of the case, see `model.Case`."""
 
 
+_rate = compiled(drag.rate)
+
+
 class Constants(NamedTuple):
     """What a step needs of parameters and settings."""
 
+    law: drag.Law
     m: float
     r: float
     R: float
@@ -36,7 +41,6 @@ class Constants(NamedTuple):
     mu: float
     eta: float
     g: float
-    c: float
     e: float
     """Coefficient of restitution."""
 
@@ -111,9 +115,11 @@ def solve(
         x_i = at.h - p.R + dt / 2 * u.v_h
         x_k, spin = (0.0, -u.v_k / x_i) if in_B else (dt / 2 * u.v_k, 0.0)
         # (20) with (9), no contact
-        f_h = v_h - dt * (spin * u.v_k + p.c * (u.v_h - omega_0 * x_k))
-        f_y = v_y - dt * (p.g + p.c * u.v_y)
-        f_k = v_k + dt * (spin * u.v_h - p.c * (u.v_k + omega_0 * x_i))
+        w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
+        c = _rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law) if p.law.blunt > 0 else p.law.linear
+        f_h = v_h - dt * (spin * u.v_k + c * w_h)
+        f_y = v_y - dt * (p.g + c * u.v_y)
+        f_k = v_k + dt * (spin * u.v_h - c * w_k)
         f_x, f_z = o_x - dt * spin * u.o_z, o_z + dt * spin * u.o_x
         a = Impulse(to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1]))
         b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * o_y + slip_B[1]))
@@ -135,10 +141,10 @@ def solve(
             break
         last = change
     u = _mean(old, new)
-    drag = u.v_h * (u.v_h - omega_0 * x_k) + u.v_y * u.v_y + u.v_k * (u.v_k + omega_0 * x_i)
+    power = u.v_h * (u.v_h - omega_0 * x_k) + u.v_y * u.v_y + u.v_k * (u.v_k + omega_0 * x_i)
     at_A = A.s * (u.v_h + r * u.o_z) + A.n * u.v_y + A.t * (u.v_k - r * u.o_x)
     at_B = B.n * u.v_h + B.s * (u.v_y - r * u.o_z) + B.t * (u.v_k + r * u.o_y)
-    work = m * (at_A + at_B - dt * p.c * drag)
+    work = m * (at_A + at_B - dt * c * power)
     # A loaded contact has met its target, and round-off must not open it again.
     new = Velocities(to_B if B.n > 0 else new.v_h, to_A if A.n > 0 else new.v_y, new.v_k, new.o_x, new.o_y, new.o_z)
     P = Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)

@@ -23,7 +23,7 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from analytic import marching, rigid_body, stepping
+from analytic import drag, marching, rigid_body, stepping
 from analytic.contact_problem import NotConvergedError
 from analytic.records import Event, Recorder
 from analytic.rigid_body import NOTHING, Forces
@@ -100,8 +100,8 @@ def longest_step(p: Parameters, settings: Settings) -> float:
 
 def constants(p: Parameters, settings: Settings) -> stepping.Constants:
     """What a step needs of parameters and settings."""
-    given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, p.c, settings.restitution
-    return stepping.Constants(*map(float, given))  # an integer would be compiled for itself
+    given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution
+    return stepping.Constants(drag.law(p), *map(float, given))  # an integer would be compiled for itself
 
 
 def ball(x: State, theta: float, p: Parameters) -> stepping.Ball:

@@ -1,20 +1,22 @@
-"""Motion in RR, in closed form, and the moment when it ends.
+"""Motion in RR, with Stokes' drag in closed form, and the moment when it ends.
 
-(23) is linear, omega_c' = -k (omega_c - omega_0) with k = c/(1+2j), and omega_0 is linear in time between the
-breakpoints of the flow. What RR leaves open is its forces: where it ends is the choice of `Settings.leave_rolling`.
+There (23) is linear, omega_c' = -k (omega_c - omega_0) with k = c/(1+2j), and omega_0 is linear in time between the
+breakpoints of the flow; `chart` is for the other laws. What RR leaves open is its forces: where it ends is the choice
+of `Settings.leave_rolling`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic import dynamics, flight, rolling_forces
-from analytic.motion import Fluid, Moment, Path
+from analytic import drag, dynamics, flight, rolling_forces
+from analytic.motion import Chart, Fluid, Moment, Path, natural_units
 from analytic.rigid_body import Forces
 from model import Case, Parameters
 from model.arrays import Array
@@ -69,6 +71,27 @@ def end(at: Moment, until: float, p: Parameters, omega_0: Fluid, leave_rolling: 
     if first == 0:
         return at.time
     return float(brentq(value, times[first - 1], times[first], xtol=4 * math.ulp(until), rtol=4 * math.ulp(1.0)))
+
+
+def chart(at: Moment, p: Parameters, omega_0: Fluid, leave_rolling: str) -> Chart:
+    """Coordinates (theta, omega_c, work) and rates (23) for any law of drag."""
+    margin, (T, _, _, E) = MARGINS[leave_rolling], natural_units(p)
+
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        omega_c, lag = z[1], z[1] - omega_0(t)
+        pull = -drag.coefficient(p.R * abs(lag), p) * lag
+        return [omega_c, pull / (1 + 2 * p.j), p.m * p.R**2 * pull * omega_c]
+
+    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
+        return (float(margin(z[1], p, omega_0(t))),)
+
+    def path(t: Array, z: Array) -> Path:
+        x, none = np.zeros((len(t), 8)), np.full_like(t, np.nan)
+        x[:, 2] = z[1]
+        return Path(t, z[0], x, none, none, z[2])
+
+    start = [at.theta, at.x.omega_c, at.work]
+    return Chart(Case.RR, start, [1.0, 1 / T, E], rates, ("RR ends",), guards, path)
 
 
 def last_forces(omega_c: float, p: Parameters, omega_0: float) -> Forces:

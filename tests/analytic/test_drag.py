@@ -10,30 +10,15 @@ import pytest
 from analytic import drag
 from model import Parameters
 from model.drag import LAWS
-
-BALL = Parameters.named("steel-in-water")
-
-
-def ball(law: str) -> Parameters:
-    return BALL.replace(drag=law, C_D=0.6)
-
-
-def coefficient_of_drag(Re: float, law: str) -> float:
-    """C_D of a sphere."""
-    if law == "stokes":
-        return 24 / Re
-    if law == "quadratic":
-        return 0.6
-    wake = 24 / Re * (1 + 0.15 * Re**0.687)
-    return wake if Re < 900 or (Re < 1100 and wake > 0.44) else 0.44
+from tests.drag_laws import BALL, BY_LAW, resistance
 
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("Re", [1e-6, 0.3, 50.0, 800.0, 985.0, 1200.0, 1e5])
-def test_the_drag_is_half_the_dynamic_pressure_times_area_and_coefficient(law, Re):
-    p, rho_f = ball(law), 998.2
+def test_the_drag_is_that_of_its_coefficient(law, Re):
+    p = BY_LAW[law]
     speed = Re * p.nu_f / (2 * p.r)
-    force = rho_f / 2 * speed**2 * math.pi * p.r**2 * coefficient_of_drag(Re, law)
+    force = p.m * float(resistance(speed, p)) * speed
     assert p.m * drag.coefficient(speed, p) * speed == pytest.approx(force, rel=1e-12)
     assert drag.reynolds(speed, p) == pytest.approx(Re, rel=1e-14)
     assert drag.speed_of(force / p.m, p) == pytest.approx(speed, rel=1e-12)
@@ -42,9 +27,15 @@ def test_the_drag_is_half_the_dynamic_pressure_times_area_and_coefficient(law, R
     assert drag.slope(speed, p) == pytest.approx((drag.coefficient(whole, p) * whole).imag / step, rel=1e-12)
 
 
+def test_the_drag_is_half_the_dynamic_pressure_times_area_and_coefficient():
+    p, rho_f, speed = BY_LAW["quadratic"], 998.2, 0.7
+    force = rho_f / 2 * speed**2 * math.pi * p.r**2 * p.C_D
+    assert p.m * drag.coefficient(speed, p) * speed == pytest.approx(force, rel=1e-13)
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_arrays_and_floats_agree_and_rest_has_no_drag(law):
-    p, speeds = ball(law), np.array([0.0, 1e-9, 0.01, 0.5])
+    p, speeds = BY_LAW[law], np.array([0.0, 1e-9, 0.01, 0.5])
     for function in (drag.coefficient, drag.slope):
         each = [function(speed, p) for speed in speeds.tolist()]
         assert np.broadcast_to(function(speeds, p), 4) == pytest.approx(each, rel=1e-15)

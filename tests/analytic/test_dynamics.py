@@ -21,7 +21,9 @@ from analytic import contact_forces, dynamics, vector_field
 from analytic.rigid_body import Forces
 from model import Case, Contact, InputError, Parameters, State
 from model.cases import TRAITS
+from model.drag import LAWS
 from model.kinematics import VARIABLES, slip_velocities
+from tests.drag_laws import resistance
 
 spec = importlib.util.spec_from_file_location("newton_euler", Path(__file__).with_name("newton_euler.py"))
 ne = importlib.util.module_from_spec(spec)
@@ -56,7 +58,7 @@ def test_newton_euler_symbolically(case: Case) -> None:
     solution = sp.solve([e.subs(ne.held(case)) for e in ne.balance() + ne.closure(case)], unknowns, dict=True)
     assert len(solution) == 1, "the system must have a unique solution"
     x = [sp.sympify(v).subs(ne.held(case)) for v in ne.STATE]
-    p = SimpleNamespace(m=ne.m, r=ne.r, R=ne.R, j=ne.j, mu=ne.mu, eta=ne.eta, g=ne.g, c=ne.c)
+    p = SimpleNamespace(m=ne.m, r=ne.r, R=ne.R, j=ne.j, mu=ne.mu, eta=ne.eta, g=ne.g, c=ne.c, drag="stokes")
     slips = {}
     if case.A is Contact.S:
         slips["slip_A"] = (sp.sin(ne.alpha), sp.cos(ne.alpha))
@@ -82,7 +84,7 @@ def test_rolling_at_both_points_symbolically() -> None:
     solution = sp.solve(equations, rank_unknowns, dict=True)
     assert len(solution) == 1
     omega_c, B_y = ne.STATE[2], ne.FORCE_B[1]
-    p = SimpleNamespace(m=ne.m, r=ne.r, R=ne.R, j=ne.j, mu=ne.mu, eta=ne.eta, g=ne.g, c=ne.c)
+    p = SimpleNamespace(m=ne.m, r=ne.r, R=ne.R, j=ne.j, mu=ne.mu, eta=ne.eta, g=ne.g, c=ne.c, drag="stokes")
     family = dynamics.rolling_family(omega_c, p, ne.omega_0, B_y)
     for name, mine in zip([*ne.FORCE_A, *ne.FORCE_B], family, strict=True):
         assert sp.simplify(mine - solution[0].get(name, name)) == 0, str(name)
@@ -123,9 +125,10 @@ def linear_solution(case: Case, x: np.ndarray, p: Parameters) -> tuple[np.ndarra
             size[:, k] = sum(np.abs(part) * one for part in rhs)
         k += 1
 
-    row(p.m * rho * oc**2, p.m * p.c * vh, A_x=1, B_x=1, v_h=-p.m)
-    row(p.m * p.g, p.m * p.c * v_y, A_y=1, B_y=1, v_y=-p.m)
-    drag = p.m * p.c * rho * oc, -p.m * p.c * rho * p.omega_0
+    c = resistance(np.sqrt(vh**2 + v_y**2 + (rho * (oc - p.omega_0)) ** 2), p)
+    row(p.m * rho * oc**2, p.m * c * vh, A_x=1, B_x=1, v_h=-p.m)
+    row(p.m * p.g, p.m * c * v_y, A_y=1, B_y=1, v_y=-p.m)
+    drag = p.m * c * rho * oc, -p.m * c * rho * p.omega_0
     row(-2 * p.m * vh * oc, *drag, A_z=1, B_z=1, omega_c=-p.m * rho)
     row(jmr * vh * oc / p.r, -jmr * oc * oz, A_z=1, omega_c=jmr * droll, slip_x=jmr)
     row(jmr * vh * oc / p.r, B_z=1, omega_c=jmr * droll, slip_y=-jmr)
@@ -166,26 +169,28 @@ def linear_solution(case: Case, x: np.ndarray, p: Parameters) -> tuple[np.ndarra
     return force, dx, np.concatenate([largest, np.repeat(load[:, None], 6, axis=1)], axis=1)
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("case", list(Case))
-def test_against_the_linear_system(case: Case) -> None:
-    x = random_states(case, N)
-    force, dx, scale = linear_solution(case, x, P)
+def test_against_the_linear_system(case: Case, law: str) -> None:
+    x, p = random_states(case, N), P.replace(drag=law, nu_f=1e-5)
+    force, dx, scale = linear_solution(case, x, p)
     if case is Case.RR:
-        mine = np.stack(np.broadcast_arrays(*dynamics.rolling_family(x[:, 2], P, P.omega_0, 0.0)), axis=-1)
+        mine = np.stack(np.broadcast_arrays(*dynamics.rolling_family(x[:, 2], p, p.omega_0, 0.0)), axis=-1)
     else:
-        mine = np.concatenate(contact_forces(case, x, P), axis=-1)
-    error = np.abs(np.concatenate([vector_field(case, x, P) - dx, mine - force], axis=1))
+        mine = np.concatenate(contact_forces(case, x, p), axis=-1)
+    error = np.abs(np.concatenate([vector_field(case, x, p) - dx, mine - force], axis=1))
     assert np.max(error / np.where(scale > 0, scale, 1.0)) <= 1e-12
 
 
+@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("case", list(Case))
-def test_floats_and_arrays_agree(case: Case) -> None:
+def test_floats_and_arrays_agree(case: Case, law: str) -> None:
     """An integrator's eight floats and an array of states give the same rates to the last digits."""
-    x = random_states(case, 20)
-    many = vector_field(case, x, P)
+    x, p = random_states(case, 20), P.replace(drag=law, nu_f=1e-5)
+    many = vector_field(case, x, p)
     scale = np.abs(many).max(axis=0)
     for one, expected in zip(x, many, strict=True):
-        rate = dynamics.rates(case, one.tolist(), P, P.omega_0)
+        rate = dynamics.rates(case, one.tolist(), p, p.omega_0)
         assert np.all(np.abs(rate - expected) <= 1e-13 * np.maximum(scale, np.abs(expected)))
 
 
