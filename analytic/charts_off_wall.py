@@ -178,7 +178,8 @@ def _coefficient(lag: complex, p: Parameters, v_y: float = 0.0) -> float:
 
 def _power(lag: complex, V: complex, p: Parameters, v_y: float = 0.0) -> float:
     """Power of the drag, W."""
-    return -p.m * _coefficient(lag, p, v_y) * ((lag * V.conjugate()).real + v_y**2)
+    mc = p.m * _coefficient(lag, p, v_y)
+    return -mc * (lag * V.conjugate()).real - mc * v_y**2
 
 
 def _gap(Z: complex, p: Parameters) -> float:
