@@ -27,11 +27,14 @@ class Thresholds:
     omega_04: float
     """(88): the fold of SS. nan unless eta_cr < eta < j, mu > 0 and c > 0."""
     eta_cr: float
-    """(87): c^2 R/(4 g mu^2). inf for mu = 0 (no fold at any eta), nan for mu = c = 0."""
+    """(87): c^2 R/(4 g mu^2), but 0 for the quadratic law of drag.
+
+    inf for mu = 0 (no fold at any eta), nan for mu = c = 0.
+    """
 
 
 def thresholds(p: Parameters) -> Thresholds:
-    """Thresholds of a set of parameters; p.omega_0 plays no part."""
+    """Thresholds of a set of parameters; p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only."""
     Omega = threshold_curves(p, p.mu, p.eta)
     unit = np.sqrt(p.g / p.R)
     omega = {name: float(Omega[name] * unit) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
@@ -48,16 +51,16 @@ def threshold_curves(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, relea
     divisor = mu * eta * (1 + p.j) + p.j - eta
     real = (divisor > 0) & ((eta <= p.j) | released)
     Omega_01 = np.where(real, np.sqrt(mu * (1 + eta) / np.where(real, divisor, 1.0)), np.nan)
-    fold = slipping_branch.fold(p.j, mu, eta, p.kappa, released)
+    fold = slipping_branch.fold(p, mu, eta, released)
     folds = np.isfinite(fold)
-    safe = np.where(folds, mu, 1.0), np.where(folds, eta, p.j / 2)
-    turning = slipping_branch.branch(np.where(folds, fold, 0.0), p.j, *safe, p.kappa if folds.any() else 1.0)
+    Omega_04 = np.full(mu.shape, np.nan)
+    Omega_04[folds] = slipping_branch.branch(fold[folds], p, mu[folds], eta[folds]).Omega_0
     return {
         "omega_01": np.asarray(Omega_01),
         "omega_02": np.where(eta > 0, 1 / np.sqrt(np.where(eta > 0, eta, 1.0)), np.nan),
         "omega_03": np.full(mu.shape, 1 / np.sqrt(p.j)),
-        "omega_04": np.where(folds, turning.Omega_0, np.nan),
-        "eta_cr": np.broadcast_to(slipping_branch.eta_critical(mu, p.kappa), mu.shape),
+        "omega_04": Omega_04,
+        "eta_cr": np.broadcast_to(slipping_branch.eta_critical(mu, p), mu.shape),
     }
 
 
@@ -67,16 +70,18 @@ def number_of_folds(p: Parameters) -> int:
     `InputError` unless 0 < eta < j, mu > 0 and c > 0.
     """
     check_branch(p)
-    return slipping_branch.sign_changes(p.j, p.mu, p.eta, p.kappa)
+    return slipping_branch.sign_changes(p)
 
 
 def critical_drag(p: Parameters) -> float:
     """The drag c in s-1 at which p.eta is eta_cr, (87): for less of it SS has a fold. eta_cr rises like c^2.
 
-    `InputError` unless 0 < eta < j, mu > 0 and p.c > 0; else p.c plays no part.
+    inf for the quadratic law, under which there is always a fold. `InputError` unless 0 < eta < j, mu > 0 and p.c > 0;
+    else p.c plays no part.
     """
     check_branch(p)
-    return p.c * float(np.sqrt(p.eta / slipping_branch.eta_critical(p.mu, p.kappa)))
+    eta_cr = float(slipping_branch.eta_critical(p.mu, p))
+    return p.c * float(np.sqrt(p.eta / eta_cr)) if eta_cr else np.inf
 
 
 def check_branch(p: Parameters) -> None:
@@ -105,7 +110,8 @@ def double_points(p: Parameters, equal: bool = False) -> list[DoublePoint]:
     At eta_cr, for equal friction (kappa^2/4)^(1/3), where the fold is born; and at eta = j.
     """
     unit = np.sqrt(p.g / p.R)
-    eta_cr = float(np.cbrt(p.kappa**2 / 4) if equal else slipping_branch.eta_critical(p.mu, p.kappa))
+    light = slipping_branch.light_drag(p)
+    eta_cr = float(np.cbrt(light**2 / 4) if equal else slipping_branch.eta_critical(p.mu, p))
     folds = 0 < eta_cr < p.j
     points = [DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04"))] if folds else []
     if equal or p.mu > 0:

@@ -12,7 +12,7 @@ from model.arrays import Array
 
 def states(s: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
     """States (..., 8) of SS at places s of its branch (`slipping_branch`), and their flows omega_0 (37), (41)."""
-    b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
+    b = slipping_branch.branch(s, p)
     unit, w = np.sqrt(p.g / p.R), b.v_A * np.sqrt(p.g * p.R) / p.r
     turn = np.sign(p.eta - p.j) * b.sin
     return State(omega_c=b.Omega_c * unit, slip_x=w * turn, slip_z=w * b.cos).stacked(), b.Omega_0 * unit
@@ -24,7 +24,7 @@ def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128
     Those of `jacobian.jacobian`, from the coordinates omega_c, v_A/r, alpha and slip_y/slip_z instead: near the
     ends, where slip vanishes and two directions stiffen like 1/v_A, the others would drown in its round-off.
     """
-    b = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa)
+    b = slipping_branch.branch(s, p)
     unit = np.sqrt(p.g / p.R)
     omega_c, fluid, q = b.Omega_c * unit, b.Omega_0 * unit, b.v_A * np.sqrt(p.g * p.R) / p.r
     sin, cos = np.sign(p.eta - p.j) * b.sin, b.cos
@@ -48,7 +48,7 @@ def hopf_places(p: Parameters) -> list[float]:
     branch has a gap, as far beyond j.
     """
     s = np.linspace(-30.0, 30.0, 1201)
-    if not np.all(np.isfinite(slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa).Omega_c)):
+    if not np.all(np.isfinite(slipping_branch.branch(s, p).Omega_c)):
         raise InputError(f"eta = {p.eta:g} is out of range: SS has no whole branch, so far beyond j = {p.j:g}")
 
     def pair_sums(s: npt.ArrayLike) -> Array:

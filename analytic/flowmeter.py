@@ -61,7 +61,7 @@ def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
     if slips == {False}:
         return 1.0
     s = np.log(np.abs(np.tan(followed[0].alpha)))
-    return float(slipping_branch.characteristic_slope(s, p.j, p.mu, p.eta, p.kappa))
+    return float(slipping_branch.characteristic_slope(s, p))
 
 
 def slope_jump(p: Parameters) -> float:
@@ -70,7 +70,7 @@ def slope_jump(p: Parameters) -> float:
     The first bit of slip turns the friction at the floor without changing the load: omega_c doesn't rise at first.
     """
     bifurcation.check_branch(p)
-    return float(slipping_branch.characteristic_slope(-slipping_branch.END, p.j, p.mu, p.eta, p.kappa)) - 1.0
+    return float(slipping_branch.characteristic_slope(-slipping_branch.END, p)) - 1.0
 
 
 def mean_slope(p: Parameters) -> float:
@@ -82,7 +82,6 @@ def mean_slope(p: Parameters) -> float:
     t = bifurcation.thresholds(p)
     if np.isnan(t.omega_04):
         return 1.0
-    Omega_02 = t.omega_02 * np.sqrt(p.R / p.g)
-    s = slipping_branch.points_at(Omega_02, p.j, p.mu, p.eta, p.kappa)[0]
-    omega_c = float(slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa).Omega_c) * np.sqrt(p.g / p.R)
+    s = slipping_branch.points_at(p.replace(omega_0=t.omega_02))[0]
+    omega_c = float(slipping_branch.branch(s, p).Omega_c) * np.sqrt(p.g / p.R)
     return float((omega_c - t.omega_01) / (t.omega_02 - t.omega_01))

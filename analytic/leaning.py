@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from analytic import jacobian, stationary
+from analytic import drag, jacobian, stationary
 from model import Case, InputError, Parameters
 from model.arrays import Array
 
@@ -28,7 +28,7 @@ def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArra
     The first is that of leaning on the floor, which decays for omega_0 > omega_03 and grows below; the second that
     of the orbit, the one closer to -c/(1+j). Vectors are over (omega_c, slip_x) and lead to A_y > 0. With s the sign
     of slip_x the sum of the two is -(c + mu s (g/(R omega_0) - (1+j) omega_0))/(1+j), their product
-    -mu s c omega_0/(1+j).
+    -mu s c omega_0/(1+j), where c is that of a vanishing lag.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArra
         )
     (x,) = leaning
     values, vectors = np.linalg.eig(jacobian.jacobian(Case.SR, x, p).astype(complex))
-    first = int(np.argmax(np.abs(values + p.c / (1 + p.j))))
+    first = int(np.argmax(np.abs(values + drag.coefficient(0.0, p) / (1 + p.j))))
     order = [first, 1 - first]
     # How A_y falls with omega_c and slip_x.
     falls = np.array([2 * p.R * x.omega_c + p.r * x.slip_x, p.r * x.omega_c])

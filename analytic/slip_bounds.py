@@ -1,9 +1,9 @@
 """Where slip begins to grow (sections 3.2 and 4): gamma in closed form along each arrow, with its zero and its slope.
 
-Out of NR gamma is known at every state, (56)-(61). Out of RR each bound of the paper is a straight line: gamma over
-omega_0 at a fixed omega_c, for a ball that lags behind the fluid or leads, (66) and (73); or gamma over omega_0^2 where
-the ball goes round with the fluid, (61), (67), (74), (82), (83). `slip_stability.gamma` gives the same from the vector
-fields, along any direction.
+Out of NR gamma is known at every state, (56)-(61). Where the ball goes round with the fluid gamma is a straight line
+over omega_0^2, (61), (67), (74), (82), (83): `SlipBound`. At a fixed omega_c, for a ball that lags behind the fluid or
+leads, it is one over the fluid's push, with Stokes' law over omega_0, (66), (73): `HeldBound`. `slip_stability.gamma`
+gives the same from the vector fields, along any direction.
 """
 
 from __future__ import annotations
@@ -14,31 +14,63 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analytic import dynamics
+from analytic import drag, dynamics
 from model import Case, InputError, Parameters
 from model.arrays import Array
 
 
 @dataclass(frozen=True)
 class SlipBound:
-    """gamma = offset + slope * q in rad s-2, with q = omega_0 (rad s-1) or omega_0^2 (rad2 s-2)."""
+    """gamma = offset + slope * omega_0^2 in rad s-2, of a ball that goes round with the fluid."""
 
-    power: int
-    """1: q = omega_0. 2: q = omega_0^2."""
     offset: float
     slope: float
 
     @property
     def zero(self) -> float:
-        """The value of q at which slip neither grows nor dies out; inf where gamma doesn't depend on the flow.
+        """omega_0^2 (rad2 s-2) at which slip neither grows nor dies out; inf where gamma doesn't depend on the flow.
 
-        Negative for power 2 means that no flow reaches it.
+        Negative: no flow reaches it.
         """
         return -self.offset / self.slope if self.slope else math.inf
 
     def gamma(self, omega_0: npt.ArrayLike) -> Array:
         """gamma in rad s-2 at flows omega_0 in rad s-1, any shape."""
-        return np.asarray(self.offset + self.slope * np.asarray(omega_0, dtype=float) ** self.power)
+        return np.asarray(self.offset + self.slope * np.asarray(omega_0, dtype=float) ** 2)
+
+
+@dataclass(frozen=True)
+class HeldBound:
+    """gamma = side * push/((1+j) r) - hold in rad s-2, of a ball that rolls at omega_c.
+
+    The fluid's push is c(|w|) w in m s-2 with w = R (omega_0 - omega_c).
+    """
+
+    p: Parameters
+    omega_c: float
+    side: int
+    hold: float
+    """Friction's part, rad s-2."""
+
+    @property
+    def zero(self) -> float:
+        """omega_0 in rad s-1 at which slip neither grows nor dies out; inf without drag."""
+        if self.p.c == 0:
+            return math.inf
+        push = self.side * (1 + self.p.j) * self.p.r * self.hold
+        return self.omega_c + math.copysign(float(drag.speed_of(abs(push), self.p)) / self.p.R, push)
+
+    @property
+    def slope(self) -> float:
+        """d gamma/d omega_0 at the zero, s-1."""
+        lag = self.p.R * abs(self.zero - self.omega_c)
+        return self.side * float(drag.slope(lag, self.p)) * self.p.R / ((1 + self.p.j) * self.p.r)
+
+    def gamma(self, omega_0: npt.ArrayLike) -> Array:
+        """gamma in rad s-2 at flows omega_0 in rad s-1, any shape."""
+        lag = self.p.R * (np.asarray(omega_0, dtype=float) - self.omega_c)
+        push = drag.coefficient(np.abs(lag), self.p) * lag
+        return np.asarray(self.side * push / ((1 + self.p.j) * self.p.r) - self.hold)
 
 
 def gamma_nr(beta: npt.ArrayLike, x: npt.ArrayLike, p: Parameters) -> Array:
@@ -62,37 +94,35 @@ def steepest_nr(x: npt.ArrayLike, p: Parameters) -> Array:
 def nr_to_ns(p: Parameters, side: int = 1) -> SlipBound:
     """(60), (61): slip of the wall contact out of the stationary NR, along beta = 0 (side 1) or beta = pi (side -1)."""
     unit = (1 + p.j) / (p.j * p.r)
-    return SlipBound(2, side * unit * p.g, -unit * p.eta * p.R)
+    return SlipBound(side * unit * p.g, -unit * p.eta * p.R)
 
 
-def rr_to_rs(p: Parameters, omega_c: float, side: int) -> SlipBound:
+def rr_to_rs(p: Parameters, omega_c: float, side: int) -> HeldBound:
     """(66) with eta for its mu: slip at B along slip_y > 0 (side 1) or < 0 (side -1) of a ball that rolls at omega_c.
 
-    Zero at omega_0 = omega_c + side * eta (1+j)(1+2j) omega_c^2/(j c).
+    For Stokes' law zero at omega_0 = omega_c + side * eta (1+j)(1+2j) omega_c^2/(j c).
     """
-    slope = side * p.c * p.R / ((1 + p.j) * p.r)
-    return SlipBound(1, -slope * omega_c - p.eta * (1 + 2 * p.j) * p.R * omega_c**2 / (p.j * p.r), slope)
+    return HeldBound(p, omega_c, side, p.eta * (1 + 2 * p.j) * p.R * omega_c**2 / (p.j * p.r))
 
 
 def rr_to_rs_stationary(p: Parameters) -> SlipBound:
     """(67): slip at B, of either side, where omega_c = omega_0; it dies out at every flow but omega_0 = 0."""
-    return SlipBound(2, 0.0, -p.eta * (1 + 2 * p.j) * p.R / (p.j * p.r))
+    return SlipBound(0.0, -p.eta * (1 + 2 * p.j) * p.R / (p.j * p.r))
 
 
-def rr_to_sr(p: Parameters, omega_c: float, side: int) -> SlipBound:
+def rr_to_sr(p: Parameters, omega_c: float, side: int) -> HeldBound:
     """(73): slip at A along slip_x > 0 (side 1) or < 0 (side -1) of a ball that rolls at omega_c.
 
-    Zero at omega_0 = omega_c - side * (1+2j) mu (g - j R omega_c^2)/(j R c).
+    For Stokes' law zero at omega_0 = omega_c - side * (1+2j) mu (g - j R omega_c^2)/(j R c).
     """
-    slope = -side * p.c * p.R / ((1 + p.j) * p.r)
     weight = p.g - p.j * p.R * omega_c**2
-    return SlipBound(1, -slope * omega_c - p.mu * (1 + 2 * p.j) * weight / (p.j * (1 + p.j) * p.r), slope)
+    return HeldBound(p, omega_c, -side, p.mu * (1 + 2 * p.j) * weight / (p.j * (1 + p.j) * p.r))
 
 
 def rr_to_sr_stationary(p: Parameters) -> SlipBound:
     """(74): slip at A, of either side, where omega_c = omega_0; it dies out below omega_03."""
     unit = p.mu * (1 + 2 * p.j) / ((1 + p.j) * p.r)
-    return SlipBound(2, -unit * p.g / p.j, unit * p.R)
+    return SlipBound(-unit * p.g / p.j, unit * p.R)
 
 
 def rr_to_ss(p: Parameters, side: int = 1) -> SlipBound:
@@ -103,7 +133,7 @@ def rr_to_ss(p: Parameters, side: int = 1) -> SlipBound:
     """
     unit = 1 / (p.j * p.r * (1 + p.mu * p.eta))
     drive = side * (p.mu * p.eta * (1 + p.j) + p.j) - p.eta
-    return SlipBound(2, -unit * p.mu * p.g * (1 + side * p.eta), unit * p.R * drive)
+    return SlipBound(-unit * p.mu * p.g * (1 + side * p.eta), unit * p.R * drive)
 
 
 def filippov_share(outer: Case, omega_c: float, p: Parameters) -> float:
@@ -122,5 +152,7 @@ def filippov_share(outer: Case, omega_c: float, p: Parameters) -> float:
 def _nr_terms(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array, Array]:
     """Coefficients of cos beta and sin beta in (56), and the friction that resists, rad s-2."""
     _, v_y, omega_c, slip_x, *_ = dynamics.check_state(Case.NR, x, p)
-    pull = (p.g + p.c * v_y + p.R * omega_c**2) / p.r + omega_c * slip_x
-    return pull, p.c * p.R / p.r * (p.omega_0 - omega_c), p.eta * p.R * (1 + p.j) / (p.j * p.r) * omega_c**2
+    lag = p.R * (p.omega_0 - omega_c)
+    c = drag.coefficient(drag.speed(0.0, v_y, lag), p)
+    pull = (p.g + c * v_y + p.R * omega_c**2) / p.r + omega_c * slip_x
+    return np.asarray(pull), np.asarray(c * lag / p.r), p.eta * p.R * (1 + p.j) / (p.j * p.r) * omega_c**2

@@ -2,7 +2,8 @@
 
 A solution of a case's equations (31) is listed whether or not its forces are admissible; `StationarySolution.exists`
 says so. Stability within the case comes from the eigenvalues of the exact Jacobian, taken by complex steps through the
-vector field itself. For omega_0 < 0 everything is the mirror image of omega_0 > 0.
+vector field itself. For omega_0 < 0 everything is the mirror image of omega_0 > 0. The law of drag shifts SS and the
+speed at which the ball sinks in NS; all else goes round with the fluid, whatever the law.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from analytic import branch_stability, dynamics, jacobian, rolling_forces, slip_stability, slipping_branch
+from analytic import branch_stability, drag, dynamics, jacobian, rolling_forces, slip_stability, slipping_branch
 from analytic.slip_stability import SlipStability
 from model import Case, InputError, Parameters, State
 from model.arrays import Array
+from model.drag import QUADRATIC, STOKES
 
 _MIRROR = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
 """Signs of the state of the other sense of rotation."""
@@ -28,6 +30,8 @@ class Stability(Enum):
     """Stability within the case's own state space."""
 
     ASYMPTOTIC = "asymptotically stable"
+    ALGEBRAIC = "asymptotically stable, but approached more slowly than exponentially"
+    """Where the fluid takes the ball along under the quadratic law, whose drag has no part linear in the lag."""
     NEUTRAL = "neutrally stable"
     UNSTABLE = "unstable"
 
@@ -114,7 +118,9 @@ def stable_solutions(p: Parameters) -> list[StationarySolution]:
 
 
 def slowest_time_constant(of: StationarySolution) -> float:
-    """Slowest time constant in s of the disturbances that die out within the case; inf if none does."""
+    """Slowest time constant in s of the disturbances that die out within the case; inf if none does exponentially."""
+    if of.stability is Stability.ALGEBRAIC:
+        return np.inf
     rates = -of.eigenvalues.real
     decaying = rates[rates > _ROUND_OFF * np.abs(of.eigenvalues).max()]
     return float(1 / decaying.min()) if decaying.size else np.inf
@@ -141,6 +147,12 @@ def _solution(
         values, zeros = jacobian.eigenvalues(jacobian.jacobian(case, x, p)[1:, 1:]), zeros - 1
     elif values is None:
         values = jacobian.eigenvalues(jacobian.jacobian(case, x, p))
+    stability = _stability(values, zeros, bool(family) or case is Case.NS)
+    if p.drag == QUADRATIC and p.c > 0 and case not in (Case.SS, Case.NS):
+        # No lag, so no drag to first order. The eigenvalues that it leaves at zero go where any little drag sends them.
+        damped = jacobian.eigenvalues(jacobian.jacobian(case, x, p.replace(drag=STOKES)))
+        stability = _stability(damped, zeros, bool(family))
+        stability = Stability.ALGEBRAIC if stability is Stability.ASYMPTOTIC else stability
     return StationarySolution(
         case=case,
         x=np.array(x),
@@ -148,7 +160,7 @@ def _solution(
         force_B=np.array(force[3:]),
         eigenvalues=values,
         exists=bool(exists),
-        stability=_stability(values, zeros, bool(family) or case is Case.NS),
+        stability=stability,
         slip_stability=slip_stability.stability(case, p, x.omega_c),
         family=family,
         alpha=alpha,
@@ -200,7 +212,7 @@ def _ss(p: Parameters) -> list[StationarySolution]:
         x = State(omega_c=p.omega_0, slip_x=-p.omega_0 * p.R / p.r, slip_y=1.0)
         return [_solution(Case.SS, p, x, True, family=smooth)]
     solutions = []
-    for s in slipping_branch.points_at(p.Omega_0, p.j, p.mu, p.eta, p.kappa):
+    for s in slipping_branch.points_at(p):
         x, alpha = State.of(branch_stability.states(s, p)[0]), -float(np.arctan(np.exp(s)))
         solutions.append(_solution(Case.SS, p, x, True, smooth, alpha, branch_stability.eigenvalues_at(s, p)))
     return solutions
@@ -219,7 +231,7 @@ def _ns(p: Parameters) -> list[StationarySolution]:
     sink = p.g - p.eta * p.R * p.omega_0**2
     if p.c == 0 or sink <= 0:
         return []
-    v_y, slip_x = -sink / p.c, (p.eta - p.j) / p.j * p.omega_0 * p.R / p.r
+    v_y, slip_x = -float(drag.speed_of(sink, p)), (p.eta - p.j) / p.j * p.omega_0 * p.R / p.r
     x = State(v_y=v_y, omega_c=p.omega_0, slip_x=slip_x, slip_z=-v_y / p.r)
     return [_solution(Case.NS, p, x, True, family=("y", "slip_y") if p.eta == 0 else ("y",))]
 

@@ -34,7 +34,7 @@ def _figure_12() -> Iterator[Check]:
     states, fluid = branch_stability.states(s, p)
     ends, _ = branch_stability.states(np.array([-40.0, 40.0]), p)
     rates = max(_residual(x, p.replace(omega_0=float(w))) for x, w in zip(states, fluid, strict=True))
-    pushed = slipping_branch.branch(s, p.j, p.mu, p.eta, p.kappa).A_y
+    pushed = slipping_branch.branch(s, p).A_y
     exchange = brentq(lambda w: _second_rate(p.replace(omega_0=w)), 0.8 * t.omega_03, 1.2 * t.omega_03, rtol=1e-14)
     along = branch_stability.states(np.linspace(-8.0, 8.0, POINTS), p)[1]
     k = int(np.argmax(along))

@@ -108,7 +108,7 @@ _GAMMA_NR = Bearing(
 def _bound(
     arrow: tuple[Case, Case],
     by: str,
-    bound: Callable[[Measurement], slip_bounds.SlipBound],
+    bound: Callable[[Measurement], slip_bounds.SlipBound | slip_bounds.HeldBound],
     side: int = 0,
     from_rest: bool = False,
 ) -> tuple[Bearing, ...]:

@@ -203,5 +203,5 @@ def slipping(axes: Axes, p: Parameters, quantity: Quantity, name: str, stable: P
 
 def fold_state(p: Parameters, released: bool = False) -> Array:
     """The state of SS at the fold, shape (8,)."""
-    s = slipping_branch.fold(p.j, p.mu, p.eta, p.kappa, released)
+    s = slipping_branch.fold(p, released=released)
     return branch_stability.states(s, p)[0]

@@ -24,14 +24,18 @@ EPS = np.finfo(float).eps
 KAPPAS = [1e-6, 1e-3, 0.07, 1.0, 30.0]
 
 
-def exact_fold(j: float, mu: float, eta: float, kappa: float) -> tuple[sp.Float, sp.Float]:
+def groups(mu: float, eta: float, kappa: float) -> Parameters:
+    return P.replace(mu=mu, eta=eta, c=kappa * np.sqrt(P.g / P.R))
+
+
+def exact_fold(p: Parameters) -> tuple[sp.Float, sp.Float]:
     """alpha and Omega_0 of the fold with 50 digits: the root of d Omega_0/d alpha of (41), differentiated by sympy."""
     a = sp.Symbol("a")
-    J, M, E, K = (sp.Rational(v) for v in (j, mu, eta, kappa))
+    J, M, E, K = (sp.Rational(v) for v in (p.j, p.mu, p.eta, p.kappa))
     den = (1 + J * sp.cos(a) ** 2) * M * E + (J - E) * sp.cos(a)
     Omega_c = sp.sqrt(M) * sp.sqrt((1 + E * sp.cos(a) ** 2) / den)
     Omega_0 = Omega_c - M / K * sp.cos(a) * sp.sin(a) * (J - E) / den
-    guess = -sp.atan(sp.exp(sp.Float(float(sb.fold(j, mu, eta, kappa)), 50)))
+    guess = -sp.atan(sp.exp(sp.Float(float(sb.fold(p)), 50)))
     alpha = sp.nsolve(sp.diff(Omega_0, a), a, guess, prec=50, maxsteps=100)
     return alpha, Omega_0.evalf(50, subs={a: alpha})
 
@@ -47,10 +51,10 @@ CASES = [
 
 @pytest.mark.parametrize(("mu", "eta", "kappa"), CASES)
 def test_fold_to_1e_12(mu: float, eta: float, kappa: float) -> None:
-    alpha, Omega_0 = exact_fold(0.4, mu, eta, kappa)
-    p = P.replace(mu=mu, eta=eta, c=kappa * np.sqrt(P.g / P.R))
+    p = groups(mu, eta, kappa)
+    alpha, Omega_0 = exact_fold(p)
     assert abs(thresholds(p).omega_04 / np.sqrt(p.g / p.R) / float(Omega_0) - 1) <= 1e-12
-    place = -float(sp.atan(sp.exp(sp.Float(float(sb.fold(0.4, mu, eta, p.kappa)), 30))))
+    place = -float(sp.atan(sp.exp(sp.Float(float(sb.fold(p)), 30))))
     assert abs(place / float(alpha) - 1) <= 1e-10
 
 
@@ -61,12 +65,14 @@ BIRTHS = [(mu, kappa) for mu in (0.2, 1.0, 100.0) for kappa in (1e-4, 0.07, 0.2)
 @pytest.mark.parametrize(("mu", "kappa"), BIRTHS)
 def test_fold_is_born_at_eta_cr_in_sr(mu: float, kappa: float) -> None:
     """Just above eta_cr the fold is next to alpha = -pi/2, at omega_02; just below there is none."""
-    eta_cr = float(sb.eta_critical(mu, kappa))
-    assert np.isnan(sb.fold(0.4, mu, eta_cr * (1 - 1e-9), kappa))
+    p = groups(mu, 0.1, kappa)
+    eta_cr = float(sb.eta_critical(mu, p))
+    assert np.isnan(sb.fold(p.replace(eta=eta_cr * (1 - 1e-9))))
     last = np.inf
     for excess in (1e-3, 1e-6, 1e-9):
-        s = float(sb.fold(0.4, mu, eta_cr * (1 + excess), kappa))
-        Omega_04 = float(sb.branch(s, 0.4, mu, eta_cr * (1 + excess), kappa).Omega_0)
+        p = p.replace(eta=eta_cr * (1 + excess))
+        s = float(sb.fold(p))
+        Omega_04 = float(sb.branch(s, p).Omega_0)
         gap = Omega_04 * np.sqrt(eta_cr * (1 + excess)) - 1
         assert -4 * EPS <= gap < last
         last = gap
@@ -127,11 +133,12 @@ def test_slope_is_the_derivative() -> None:
     for mu, eta in ((0.2, 0.2), (0.2, 0.45), (1.0, 0.05)):
         angle, h, kappa = np.linspace(0.2, 1.4, 7), 1e-6, 0.3
         places = [np.log(np.tan(angle + k * h)) for k in (-1, 0, 1)]
-        low, mid, high = (sb.branch(s, 0.4, mu, eta, kappa) for s in places)
+        p = groups(mu, eta, kappa)
+        low, mid, high = (sb.branch(s, p) for s in places)
         numeric = (high.Omega_0 - low.Omega_0) / (2 * h)
         den = (1 + 0.4 * mid.cos**2) * mu * eta + (0.4 - eta) * mid.cos
         factor = mu * abs(0.4 - eta) * mid.sin**2 / (kappa * den**2)
-        exact = factor * sb.slope(places[1], 0.4, mu, eta, kappa)
+        exact = factor * sb.slope(places[1], p)
         np.testing.assert_allclose(numeric, exact, rtol=1e-7, atol=1e-8)
 
 

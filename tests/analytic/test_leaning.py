@@ -29,7 +29,7 @@ def test_modes_in_closed_form() -> None:
     j, mu, c, g, R, r, w, sign, omega_c, slip = sp.symbols("j mu c g R r w s omega_c slip")
 
     class Symbols:
-        m = sp.Integer(1)
+        m, drag = sp.Integer(1), "stokes"
 
     p = Symbols()
     p.j, p.mu, p.eta, p.c, p.g, p.R, p.r = j, mu, sp.Symbol("eta"), c, g, R, r

@@ -10,7 +10,7 @@ import sympy as sp
 
 from analytic import contact_forces, dynamics, slip_bounds, slip_stability, thresholds, vector_field
 from analytic.rigid_body import Forces
-from analytic.slip_bounds import SlipBound
+from analytic.slip_bounds import HeldBound, SlipBound
 from model import Case, InputError, Parameters, State
 
 P = Parameters.named("reference")
@@ -20,7 +20,7 @@ j, mu, eta, c, g, R, r, w, omega_0 = sp.symbols("j mu eta c g R r w omega_0", po
 class Symbols:
     """Stands for `Parameters`: the bounds are plain arithmetic."""
 
-    m = sp.Integer(1)
+    m, drag = sp.Integer(1), "stokes"
     j, mu, eta, c, g, R, r = j, mu, eta, c, g, R, r
 
 
@@ -57,11 +57,17 @@ def test_zeros_as_printed() -> None:
     assert equal(
         slip_bounds.rr_to_ss(p, -1).zero, g / (eta * R) * mu * eta * (eta - 1) / (mu * eta * (1 + j) + j + eta)
     )
-    for side in (1, -1):
-        lag = eta / (j * c) * (1 + j) * (1 + 2 * j) * w**2
-        assert equal(slip_bounds.rr_to_rs(p, w, side).zero, w + side * lag)
-        lag = (1 + 2 * j) * mu / (j * R * c) * (g - j * R * w**2)
-        assert equal(slip_bounds.rr_to_sr(p, w, side).zero, w - side * lag)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_zeros_of_lag_as_printed(side: int) -> None:
+    """(66) with eta, (73)."""
+    for p in random_sets(50):
+        w = p.omega_0
+        lag = p.eta / (p.j * p.c) * (1 + p.j) * (1 + 2 * p.j) * w**2
+        assert slip_bounds.rr_to_rs(p, w, side).zero == pytest.approx(w + side * lag, rel=1e-14, abs=1e-14 * lag)
+        lag = (1 + 2 * p.j) * p.mu / (p.j * p.R * p.c) * (p.g - p.j * p.R * w**2)
+        assert slip_bounds.rr_to_sr(p, w, side).zero == pytest.approx(w - side * lag, rel=1e-14, abs=1e-14 * abs(lag))
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -69,7 +75,7 @@ def test_from_newton_and_euler(side: int) -> None:
     """gamma of every bound is the rate of the slip itself, with the forces of the case it leads to."""
     p: Any = Symbols()
     spin = g / (j * omega_0 * r) - omega_0 * R / r
-    table: list[tuple[SlipBound, Case, Any, Any, int, list[tuple[Any, Any]]]] = [
+    table: list[tuple[SlipBound | HeldBound, Case, Any, Any, int, list[tuple[Any, Any]]]] = [
         (slip_bounds.rr_to_rs(p, w, side), Case.RS, w, 0, 4, [(side, 0)]),
         (slip_bounds.rr_to_rs_stationary(p), Case.RS, omega_0, 0, 4, [(side, 0)]),
         (slip_bounds.rr_to_sr(p, w, side), Case.SR, w, 0, 3, [(side, 0)]),
@@ -80,7 +86,11 @@ def test_from_newton_and_euler(side: int) -> None:
     for bound, outer, omega_c, slip_x, row, directions in table:
         x = [0, 0, omega_c, slip_x, 0, 0, 0, 0]
         rate = dynamics.newton_euler(outer, x, dynamics.FORCES[outer](x, p, omega_0, *directions), p, omega_0)[row]
-        assert equal(bound.offset + bound.slope * omega_0**bound.power, side * rate), outer
+        if isinstance(bound, HeldBound):
+            gamma = bound.side * c * R * (omega_0 - w) / ((1 + j) * r) - bound.hold
+        else:
+            gamma = bound.offset + bound.slope * omega_0**2
+        assert equal(gamma, side * rate), outer
 
 
 # --- against gamma at random sets ------------------------------------------------------------------------------
@@ -108,13 +118,15 @@ def test_bounds_at_random_sets() -> None:
                     )
                     for flow in flows.tolist()
                 ]
-                scale = abs(bound.offset) + np.abs(bound.slope * flows**bound.power)
+                other = bound.slope * flows**2 if isinstance(bound, SlipBound) else bound.slope * (flows - omega_c)
+                scale = np.abs(bound.gamma(flows)) + np.abs(other)
                 assert np.all(np.abs(bound.gamma(flows) - growth) <= 1e-13 * scale)
 
 
 def test_zero_of_a_bound() -> None:
-    assert SlipBound(1, 3.0, -2.0).zero == 1.5
-    assert SlipBound(1, 3.0, 0.0).zero == np.inf
+    assert SlipBound(3.0, -2.0).zero == 1.5
+    assert SlipBound(3.0, 0.0).zero == np.inf
+    assert HeldBound(P.replace(c=0.0), 1.0, 1, 1.0).zero == np.inf
 
 
 def forces_at_onset(p: Parameters, omega_0: np.ndarray, side: int) -> Forces:

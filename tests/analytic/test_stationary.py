@@ -285,7 +285,7 @@ def test_ends_of_the_branch(mu: float, eta: float, c: float) -> None:
 def test_the_branch_is_stable_before_the_fold_and_has_one_unstable_direction_after(mu: float, eta: float) -> None:
     """As far as mu <= 1."""
     p = P.replace(mu=mu, eta=eta)
-    turning = float(fold(p.j, mu, eta, p.kappa))
+    turning = float(fold(p))
     s = np.linspace(-15, 15, 301)
     unstable = np.sum(stability.eigenvalues_at(s, p).real > 1e-9, axis=-1)
     beyond = s > turning if np.isfinite(turning) else np.zeros(s.shape, bool)
@@ -323,15 +323,16 @@ def test_hopf_point_of_figure_12() -> None:
 @pytest.mark.parametrize("mu", [0.05, 0.2, 1.0])
 def test_roots_of_the_branch_to_round_off(mu: float, kappa: float, eta: float) -> None:
     """Every place belongs to its flow, over the whole branch and right up to its ends."""
+    p = P.replace(mu=mu, eta=eta, c=kappa * np.sqrt(P.g / P.R))
     for s in (-25.0, -12.0, -3.0, 0.0, 3.0, 12.0):
-        Omega_0 = float(branch(s, 0.4, mu, eta, kappa).Omega_0)
-        low, high = (float(branch(end, 0.4, mu, eta, kappa).Omega_0) for end in (-80, 80))
+        Omega_0 = float(branch(s, p).Omega_0)
+        low, high = (float(branch(end, p).Omega_0) for end in (-80, 80))
         if min(abs(Omega_0 - low), abs(Omega_0 - high)) < 4 * EPS * Omega_0:
             continue  # the flow can't tell the place from the end
-        places = points_at(Omega_0, 0.4, mu, eta, kappa)
+        places = points_at(p.replace(omega_0=Omega_0 * np.sqrt(P.g / P.R)))
         assert places
         for place in places:
-            assert abs(float(branch(place, 0.4, mu, eta, kappa).Omega_0) - Omega_0) <= 8 * EPS * Omega_0
+            assert abs(float(branch(place, p).Omega_0) - Omega_0) <= 8 * EPS * Omega_0
 
 
 @given(st.floats(1e-14, 1e-3))

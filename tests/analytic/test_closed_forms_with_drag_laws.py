@@ -1,0 +1,382 @@
+"""Stationary solutions, fold, eigenvalues and slip bounds under every law of drag, against brute force.
+
+The law, the branch of SS and the equations of motion are written out here again: nothing of `analytic.drag`,
+`slipping_branch` or `dynamics` is used for what is expected.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.optimize import brentq
+
+from analytic import (
+    Stability,
+    StationarySolution,
+    characteristic_slope,
+    leaning_modes,
+    mean_slope,
+    slip_bounds,
+    slip_stability,
+    slope_jump,
+    slowest_time_constant,
+    solution,
+    stationary_solutions,
+    thresholds,
+    vector_field,
+)
+from analytic import slipping_branch as sb
+from analytic.bifurcation import case_map, critical_drag, double_points, number_of_folds, threshold_curves
+from analytic.branch_stability import eigenvalues_at
+from model import Case, Contact, Parameters, State
+from model.cases import TRAITS
+from model.drag import LAWS, QUADRATIC, SCHILLER_NAUMANN, STOKES
+
+spec = importlib.util.spec_from_file_location("newton_euler", Path(__file__).with_name("newton_euler.py"))
+ne = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(ne)
+
+P = Parameters.named("reference").replace(nu_f=2e-4)
+LIGHT = {STOKES: 1.0, SCHILLER_NAUMANN: 1.0, QUADRATIC: 0.0}
+"""The drag of a vanishing lag over Stokes'."""
+NOT_STOKES = [law for law in LAWS if law != STOKES]
+
+
+def resistance(speed: float, p: Parameters) -> float:
+    """Drag per mass, m s-2, from the drag coefficients of a sphere."""
+    if p.drag == STOKES or speed == 0:
+        return p.c * speed
+    Re = 2 * p.r * speed / p.nu_f
+    wake = 24 / Re * (1 + 0.15 * Re**0.687)
+    C_D = p.C_D if p.drag == QUADRATIC else max(wake, 0.44)
+    return p.c * C_D * Re / 24 * speed
+
+
+def at_angle(angle: float, p: Parameters) -> tuple[float, float]:
+    """omega_c and omega_0 of SS at |alpha| from (38), (39), with the lag whose drag balances friction, (41)."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    den = (1 + p.j * cos**2) * p.mu * p.eta + (p.j - p.eta) * cos
+    omega_c = np.sqrt(p.g / p.R * p.mu * (1 + p.eta * cos**2) / den)
+    needed = p.g * p.mu * (p.j - p.eta) * cos * sin / den
+    top = 1.0
+    while resistance(top, p) < needed:
+        top *= 2
+    lag = brentq(lambda speed: resistance(speed, p) - needed, 0.0, top, xtol=1e-300, rtol=9e-16)
+    return omega_c, omega_c + lag / p.R
+
+
+def random_sets(law: str, count: int) -> list[Parameters]:
+    """With folds for the most; Re along the branch from 1 to 1e4."""
+    rng = np.random.default_rng([count, LAWS.index(law)])
+    sets = []
+    for _ in range(count):
+        j, mu = rng.uniform(0.1, 2 / 3), 10 ** rng.uniform(-1.3, 0.3)
+        kappa, nu_f = 10 ** rng.uniform(-2.5, 0.3), 10 ** rng.uniform(-5.5, -2)
+        eta = j * rng.uniform(0.02, 0.98)
+        c = kappa * np.sqrt(P.g / P.R)
+        sets.append(P.replace(j=j, mu=mu, eta=eta, c=c, nu_f=nu_f, drag=law, C_D=rng.uniform(0.3, 1.0)))
+    return sets
+
+
+def scanned(p: Parameters) -> tuple[float, int]:
+    """The greatest omega_0 of the branch inside its ends, by ever finer scans, and how many extrema the first saw."""
+    angles = np.concatenate([np.geomspace(1e-9, 0.1, 100), np.linspace(0.1, np.pi / 2 - 0.1, 400)[1:]])
+    angles = np.concatenate([angles, np.pi / 2 - np.geomspace(1e-9, 0.1, 200)[::-1][1:]])
+    flows = np.array([at_angle(angle, p)[1] for angle in angles])
+    rises = np.sign(np.diff(flows))
+    turns = int(np.sum(rises[1:] != rises[:-1]))
+    for _ in range(8):
+        top = int(np.clip(np.argmax(flows), 1, len(angles) - 2))
+        angles = np.linspace(angles[top - 1], angles[top + 1], 21)
+        flows = np.array([at_angle(angle, p)[1] for angle in angles])
+    return float(flows.max()), turns
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_fold_against_a_scan(law: str) -> None:
+    """omega_04 to 1e-10, one fold beyond eta_cr and none before; omega_01, omega_02, omega_03 are those of Stokes."""
+    folds = []
+    for p in random_sets(law, 12):
+        t, stokes = thresholds(p), thresholds(p.replace(drag=STOKES))
+        assert (t.omega_01, t.omega_02, t.omega_03) == (stokes.omega_01, stokes.omega_02, stokes.omega_03)
+        assert t.eta_cr == LIGHT[law] * stokes.eta_cr
+        top, turns = scanned(p)
+        assert number_of_folds(p) == (p.eta > t.eta_cr) == turns == np.isfinite(t.omega_04)
+        folds.append(turns)
+        if turns:
+            assert abs(t.omega_04 / top - 1) <= 1e-10
+            assert t.omega_04 > t.omega_02 > t.omega_01
+    assert law == QUADRATIC or 3 <= sum(folds) <= 11
+
+
+@pytest.mark.parametrize("nu_f", [1e-6, 5e-6, 1e-5, 1e-4])
+def test_fold_where_the_drag_bends(nu_f: float) -> None:
+    """With C_D constant beyond Re = 989 the drag grows faster at once: for 1e-6 and 5e-6 the fold is that corner."""
+    p = P.replace(c=0.07, nu_f=nu_f, drag=SCHILLER_NAUMANN)
+    top, turns = scanned(p)
+    assert number_of_folds(p) == turns == 1
+    assert abs(thresholds(p).omega_04 / top - 1) <= 1e-10
+    point = sb.branch(sb.fold(p), p)
+    lag = float(point.Omega_0 - point.Omega_c) * np.sqrt(p.g * p.R)
+    assert (abs(2 * p.r * lag / nu_f - 988.95) < 0.01) == (nu_f < 8e-6)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_fold_is_unique_because_the_drag_grows_ever_faster(law: str) -> None:
+    """The proof in docs/theory.md: along the branch the stiffness of a fold rises, that of the law falls."""
+    for p in random_sets(law, 200):
+        s = np.linspace(-20, 20, 2001)
+        at = sb.branch(s, p)
+        den = (1 + p.j * at.cos**2) * p.mu * p.eta + (p.j - p.eta) * at.cos
+        beyond = p.mu * p.eta * (1 - p.j * at.cos**2) - den * (at.cos / at.sin) ** 2
+        falls = beyond > 0
+        needed = beyond / (1 + 2 * p.mu * p.eta * at.cos - p.eta * at.cos**2) * 2 * at.Omega_c * at.sin
+        assert np.all(np.diff(at.drag[falls]) < 0)
+        assert np.all(np.diff(at.stiffness[falls]) <= 1e-12 * at.stiffness[falls][1:])
+        assert np.all(np.diff(needed[falls]) > -1e-12)
+        assert needed[-1] == pytest.approx(2 * p.mu * np.sqrt(p.eta), rel=1e-6)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_slopes_along_the_branch(law: str) -> None:
+    """d omega_c/d omega_0 and the sign of `slope` against differences."""
+    for p in random_sets(law, 20):
+        for angle in (0.2, 0.8, 1.3, 1.5):
+            h = 1e-5
+            (low_c, low_0), (high_c, high_0) = (at_angle(angle + side * h, p) for side in (-1, 1))
+            s = np.log(np.tan(angle))
+            assert float(sb.characteristic_slope(s, p)) == pytest.approx((high_c - low_c) / (high_0 - low_0), rel=1e-5)
+            assert np.sign(float(sb.slope(s, p))) == np.sign(high_0 - low_0)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_points_of_the_branch(law: str) -> None:
+    """Each solution SS belongs to its flow by the formulas written out here; there are two beyond omega_02."""
+    for p in random_sets(law, 20):
+        t = thresholds(p)
+        flows = {0.5 * (t.omega_01 + t.omega_02): 1, 0.999 * t.omega_01: 0}
+        if np.isfinite(t.omega_04):
+            flows |= {0.5 * (t.omega_02 + t.omega_04): 2, 1.001 * t.omega_04: 0}
+        for omega_0, count in flows.items():
+            those = [s for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.case is Case.SS]
+            assert len(those) == count
+            for s in those:
+                assert at_angle(abs(s.alpha), p) == pytest.approx((s.state.omega_c, omega_0), rel=1e-12)
+
+
+def test_how_slip_sets_in_under_the_quadratic_law() -> None:
+    """alpha grows like (omega_0 - omega_01)^2, the reading like its fourth power; under Stokes, 1 and 2."""
+    for law, power in ((STOKES, 1), (SCHILLER_NAUMANN, 1), (QUADRATIC, 2)):
+        p = P.replace(drag=law)
+        omega_01 = thresholds(p).omega_01
+        leads = np.array([1e-3, 2e-3]) * (10 if law == QUADRATIC else 1e-3)
+        places = [solution(p.replace(omega_0=omega_01 + lead), Case.SS) for lead in leads]
+        growth = np.log2(places[1].alpha / places[0].alpha)
+        assert growth == pytest.approx(power, abs=0.02)
+        rise = np.log2((places[1].state.omega_c - omega_01) / (places[0].state.omega_c - omega_01))
+        assert rise == pytest.approx(2 * power, abs=0.05)
+        assert slope_jump(p) == pytest.approx(-1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("law", NOT_STOKES)
+def test_flowmeter(law: str) -> None:
+    """The characteristic, and its mean slope up to omega_02, against differences."""
+    p = P.replace(drag=law)
+    t = thresholds(p)
+
+    def reading(omega_0: float) -> float:
+        return solution(p.replace(omega_0=omega_0), Case.SS).state.omega_c
+
+    expected = (reading(t.omega_02) - t.omega_01) / (t.omega_02 - t.omega_01)
+    assert mean_slope(p) == pytest.approx(expected, rel=1e-12)
+    omega_0, h = 20.0, 1e-4
+    expected = (reading(omega_0 + h) - reading(omega_0 - h)) / (2 * h)
+    assert characteristic_slope(p.replace(omega_0=omega_0)) == pytest.approx(expected, rel=1e-6)
+
+
+def test_where_the_fold_is_born() -> None:
+    """In SR, where the lag vanishes: with Schiller and Naumann as with Stokes, under the quadratic law at eta = 0."""
+    p = P.replace(drag=SCHILLER_NAUMANN)
+    assert critical_drag(p) == critical_drag(P)
+    assert double_points(p) == double_points(P)
+    eta_cr = thresholds(p).eta_cr
+    near = thresholds(p.replace(eta=eta_cr * (1 + 1e-3)))
+    assert 1 < near.omega_04 / near.omega_02 < 1 + 1e-4
+    p = P.replace(drag=QUADRATIC)
+    assert critical_drag(p) == np.inf
+    assert [point.eta for point in double_points(p)] == [P.j]
+    assert np.all(np.isfinite(threshold_curves(p, 0.2, np.array([1e-6, 1e-3, 0.1]))["omega_04"]))
+
+
+@pytest.mark.parametrize("law", NOT_STOKES)
+def test_curves_and_map_agree_with_single_sets(law: str) -> None:
+    p, eta = P.replace(drag=law), np.array([0.01, 0.05, 0.3, 0.6])
+    curve = threshold_curves(p, p.mu, eta)["omega_04"] * np.sqrt(p.g / p.R)
+    np.testing.assert_allclose(curve, [thresholds(p.replace(eta=e)).omega_04 for e in eta.tolist()], rtol=1e-14)
+    plane = case_map(p, p.mu, eta, np.array([0.999, 1.001]) * curve[2])
+    assert plane[2, 0] != plane[2, 1]
+
+
+# --- stationary solutions and their eigenvalues ----------------------------------------------------------------
+
+
+@cache
+def equations_of_motion(case: Case):
+    """Rates (8,) of a case from Newton and Euler by algebra, at a given c: f(x, c, omega_0, alpha, beta, p)."""
+    unknowns = [*ne.RATE, *ne.FORCE_A, *ne.FORCE_B]
+    (solved,) = sp.solve([e.subs(ne.held(case)) for e in ne.balance() + ne.closure(case)], unknowns, dict=True)
+    symbols = [ne.m, ne.r, ne.R, ne.j, ne.mu, ne.eta, ne.g, ne.c, ne.omega_0, ne.alpha, ne.beta, *ne.STATE]
+    return sp.lambdify(symbols, [solved[rate] for rate in ne.RATE])
+
+
+def field(case: Case, x: np.ndarray, p: Parameters) -> np.ndarray:
+    """Rates of a state on the wall under the drag of the law."""
+    _, v_y, omega_c, w_x, w_y, w_z, *_ = x
+    speed = float(np.hypot(v_y, p.R * (omega_c - p.omega_0)))
+    c = resistance(speed, p) / speed if speed else LIGHT[p.drag] * p.c
+    alpha = np.arctan2(p.r * w_x, v_y + p.r * w_z) if case.A is Contact.S else 0.0
+    beta = np.arctan2(w_y, w_z) if case.B is Contact.S else 0.0
+    rates = equations_of_motion(case)(p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, c, p.omega_0, alpha, beta, *x)
+    return np.array(rates, dtype=float)
+
+
+def by_differences(s: StationarySolution, p: Parameters) -> np.ndarray:
+    """Eigenvalues of the Jacobian of `field` in the active variables but y."""
+    rows = [State._fields.index(name) for name in TRAITS[s.case].active if name != "y"]
+    columns = []
+    for row in rows:
+        step = np.zeros(8)
+        step[row] = 3e-6 * max(1.0, abs(s.x[row]))
+        columns.append((field(s.case, s.x + step, p) - field(s.case, s.x - step, p))[rows] / (2 * step[row]))
+    return np.linalg.eigvals(np.array(columns).T)
+
+
+def nearest(values: np.ndarray, to: np.ndarray) -> np.ndarray:
+    """Of the values those next to others, one each."""
+    order = [int(np.argmin(np.abs(values - value))) for value in to]
+    assert len(set(order)) == len(values) == len(to)
+    return values[order]
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("omega_0", [5.0, 20.0, 31.5, 60.0])
+def test_solutions_are_zeros_of_the_equations(law: str, omega_0: float) -> None:
+    """Of those of the simulators and of those written out here, to 1e-12 of the largest acceleration."""
+    p = P.replace(drag=law, omega_0=omega_0, eta=0.2)
+    scale = (p.g + p.R * omega_0**2) / (p.j * p.r)
+    for s in stationary_solutions(p):
+        sinking = np.array([s.state.v_y, *[0.0] * 7])
+        assert np.abs(vector_field(s.case, s.x, p) - sinking).max() <= 1e-12 * scale, s.case
+        if s.case is not Case.RR:
+            assert np.abs(field(s.case, s.x, p) - sinking).max() <= 1e-12 * scale, s.case
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_sinking_speed(law: str) -> None:
+    """NS: the drag alone balances the weight that the wall doesn't carry."""
+    for omega_0 in (0.5, 20.0, 31.0):
+        p = P.replace(drag=law, omega_0=omega_0)
+        s = solution(p, Case.NS)
+        assert resistance(-s.state.v_y, p) == pytest.approx(p.g - p.eta * p.R * omega_0**2, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("case", "omega_0"), [(Case.NS, 20.0), (Case.NS, 5.0), (Case.SS, 15.0), (Case.SS, 25.0)])
+def test_eigenvalues_by_differences(law: str, case: Case, omega_0: float) -> None:
+    """Where the ball lags behind the fluid or sinks through it: along the lag the drag's slope counts, across it c."""
+    for nu_f in (2e-5, 2e-4, 2e-3):
+        p = P.replace(drag=law, omega_0=omega_0, nu_f=nu_f)
+        s = solution(p, case)
+        expected = by_differences(s, p)
+        values = nearest(s.eigenvalues, expected)
+        np.testing.assert_allclose(values, expected, atol=1e-6 * np.abs(expected).max())
+        # The rates that drag decides are not lost beside stiff slip.
+        least = np.abs(expected).argmin()
+        assert abs(values[least] / expected[least] - 1) <= 1e-5
+
+
+@pytest.mark.parametrize("law", NOT_STOKES)
+@pytest.mark.parametrize("omega_0", [5.0, 25.0, 40.0])
+def test_where_the_fluid_takes_the_ball_along_a_slight_lag_decides(law: str, omega_0: float) -> None:
+    """RR, SR, NR: the eigenvalues of Stokes' drag, or those without drag under the quadratic law, said so."""
+    p = P.replace(drag=law, omega_0=omega_0, eta=0.6)
+    same = p.replace(drag=STOKES, c=LIGHT[law] * p.c)
+    for case in (Case.RR, Case.SR, Case.NR):
+        (s,) = (s for s in stationary_solutions(p) if s.case is case)
+        (stokes,) = (s for s in stationary_solutions(p.replace(drag=STOKES)) if s.case is case)
+        (expected,) = (s for s in stationary_solutions(same) if s.case is case)
+        np.testing.assert_allclose(
+            np.sort_complex(s.eigenvalues), np.sort_complex(expected.eigenvalues), atol=1e-12 * omega_0
+        )
+        assert (s.exists, s.slip_stability, s.family) == (stokes.exists, stokes.slip_stability, stokes.family)
+        exponential = law != QUADRATIC or stokes.stability is not Stability.ASYMPTOTIC
+        assert s.stability is (stokes.stability if exponential else Stability.ALGEBRAIC)
+        assert s.stable == stokes.stable
+        assert s.stability is not Stability.ALGEBRAIC or slowest_time_constant(s) == np.inf
+
+
+@pytest.mark.parametrize("omega_0", [26.0, 40.0, 60.0])
+def test_a_slight_drag_attracts_where_the_quadratic_one_does(omega_0: float) -> None:
+    """SR: whether it attracts doesn't depend on how small c is, so that c(|w|) -> 0 may stand for it."""
+    for eta, expected in ((0.6, {True}), (1.8, {True, False})):
+        p = P.replace(omega_0=omega_0, eta=eta, drag=STOKES)
+        of_sr = [next(s for s in stationary_solutions(p.replace(c=c)) if s.case is Case.SR) for c in (1e-4, 1.0, 9.0)]
+        kinds = {s.stable for s in of_sr}
+        assert len(kinds) == 1
+        assert kinds <= expected
+
+
+@pytest.mark.parametrize("law", NOT_STOKES)
+def test_leaning(law: str) -> None:
+    """The first mode is that of leaning; the other dies out like a slight lag does."""
+    p = P.replace(drag=law, omega_0=40.0, eta=0.6)
+    values, _ = leaning_modes(p)
+    expected, _ = leaning_modes(p.replace(drag=STOKES, c=LIGHT[law] * p.c + 1e-12))
+    np.testing.assert_allclose(values, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_ends_of_the_branch(law: str) -> None:
+    """As for Stokes' law (tests of the stationary solutions), with the c of a vanishing lag."""
+    p = P.replace(drag=law)
+    c, omega_02 = LIGHT[law] * p.c, np.sqrt(p.g / (p.eta * p.R))
+    stiffness = 2 * p.g / p.R * p.mu * (1 + p.eta) / ((1 + p.mu * p.eta) * (1 + 2 * p.j))
+    at_rr = np.roots([1.0, c / (1 + 2 * p.j), stiffness])
+    at_sr = np.array([(2 * p.mu * p.eta * omega_02 - c) / (1 + p.j), 1j * omega_02, -1j * omega_02])
+    for expected, end in ((at_rr, -25.0), (at_sr, 25.0)):
+        values = eigenvalues_at(end, p)
+        for value in expected:
+            assert np.abs(values - value).min() <= 1e-3 * np.abs(expected).max()
+
+
+# --- slip ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_slip_bounds(law: str) -> None:
+    """(66), (73) and (56) against the vector fields; at its zero gamma vanishes with the slope that is given."""
+    for p in random_sets(law, 20):
+        p, rolling = p.replace(omega_0=20.0), np.array(State(omega_c=9.0))
+        for side in (1, -1):
+            for bound, outer in (
+                (slip_bounds.rr_to_rs(p, 9.0, side), Case.RS),
+                (slip_bounds.rr_to_sr(p, 9.0, side), Case.SR),
+            ):
+                unit, h = abs(bound.hold), 1e-5 * abs(bound.zero - 9.0)
+                flows = [bound.zero, bound.zero - h, bound.zero + h, -3.0, 12.0, 40.0]
+                gamma = [
+                    float(slip_stability.gamma(Case.RR, outer, rolling, [float(side)], p.replace(omega_0=flow)))
+                    for flow in flows
+                ]
+                np.testing.assert_allclose(bound.gamma(flows), gamma, rtol=1e-11, atol=1e-11 * unit)
+                assert abs(gamma[0]) <= 1e-12 * unit
+                assert bound.slope == pytest.approx((gamma[2] - gamma[1]) / (2 * h), rel=1e-6)
+        hanging = np.array(State(y=0.01, v_y=0.3, omega_c=18.0, slip_x=-4.0))
+        for beta in (0.3, 2.0, -1.0):
+            growth = slip_stability.gamma(Case.NR, Case.NS, hanging, [np.sin(beta), np.cos(beta)], p)
+            assert float(slip_bounds.gamma_nr(beta, hanging, p)) == pytest.approx(float(growth), rel=1e-11)
