@@ -102,7 +102,10 @@ def simulate_many(
         stretches = time_stepping.Stretches.of(times, fluid, time_stepping.longest_step(p, settings))
         for name in blank:
             blank[name][k, 0] = states[k]
-        omega_0, p_k = marching.Flow(fluid.start, fluid.value, fluid.slope), time_stepping.constants(p, settings)
+        omega_0, p_k = (
+            marching.Flow(fluid.start, fluid.value, fluid.slope, fluid.waves),
+            time_stepping.constants(p, settings),
+        )
         low, high, mean = blank["low"][k], blank["high"][k], blank["mean"][k]
         kept = blank["x"][k], case[k], low, high, mean, landings[k]
         end[k] = marching.follow(time_stepping.ball(states[k], 0.0, p), *stretches, still, omega_0, p_k, *kept)

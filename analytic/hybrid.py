@@ -41,21 +41,12 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     simulator = _Simulator(p, settings, recorder)
     at, case = Moment(0.0, theta_0, x0), None
     for start, end in pairwise(knots):
-        fluid = _piece(flow, start, end)
-        if case is None or flow(start) != flow(np.nextafter(start, -1.0)):
+        fluid = Fluid.of(flow, start)
+        if case is None or flow.line(start) != flow.line(np.nextafter(start, -1.0)):
             before, (case, at, impulse) = case, simulator.settle(at, fluid)
             if (before is not None and before is not case) or impulse is not NOTHING:
                 recorder.events.append(Event(start, case if before is None else before, case, impulse))
         case, at = simulator.advance(case, at, end, fluid)
-
-
-def _piece(flow: Flow, start: float, end: float) -> Fluid:
-    """omega_0 between two knots of the flow, where it is linear, on plain floats."""
-    a, middle = float(flow(start)), (start + end) / 2
-    slope = (float(flow(middle)) - a) / (middle - start)
-    if slope == 0:
-        return lambda t: a
-    return lambda t: a + slope * (t - start)
 
 
 @dataclass
@@ -145,7 +136,7 @@ class _Simulator:
         end = two_point_rolling.end(at, until, p, fluid, self.settings.leave_rolling)
         stop = until if end is None else end
         times = self._samples(at.time, stop)
-        path = two_point_rolling.path(np.append(times, stop), at, until, p, fluid)
+        path = two_point_rolling.path(np.append(times, stop), at, p, fluid)
         self._record(Case.RR, path, np.append(np.full(len(times), True), False), fluid)
         return None if end is None else "RR ends", _moment(path, -1)
 

@@ -19,6 +19,7 @@ class Flow(NamedTuple):
     start: Array
     value: Array
     slope: Array
+    waves: Array
 
 
 @compiled
@@ -107,4 +108,7 @@ def _fluid(flow: Flow, time: float) -> float:
     k = 0
     if len(flow.start) > 1:
         k = max(int(np.searchsorted(flow.start, time, side="right")) - 1, 0)
-    return float(flow.value[k] + flow.slope[k] * max(time - flow.start[k], 0.0))
+    omega_0 = flow.value[k] + flow.slope[k] * max(time - flow.start[k], 0.0)
+    for n in range(len(flow.waves)):
+        omega_0 += flow.waves[n, 0] * math.sin(2 * math.pi * flow.waves[n, 1] * time + flow.waves[n, 2])
+    return float(omega_0)

@@ -5,12 +5,38 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Self
 
-from model import Case, Parameters, State
+import numpy as np
+
+from model import Case, Flow, Parameters, State
 from model.arrays import Array
 
-Fluid = Callable[[float], float]
-"""omega_0 in rad s-1 at a time in s."""
+
+@dataclass(frozen=True)
+class Fluid:
+    """omega_0 in rad s-1 at a time in s, between two knots of a `model.Flow`: a line and waves."""
+
+    start: float
+    value: float
+    slope: float = 0.0
+    waves: tuple[tuple[float, float, float], ...] = ()
+    """Amplitude in rad s-1, angular frequency in rad s-1, phase in rad."""
+
+    def __call__(self, t: float) -> float:
+        omega_0 = self.value + self.slope * (t - self.start)
+        for amplitude, omega, phase in self.waves:
+            omega_0 += amplitude * math.sin(omega * t + phase)
+        return omega_0
+
+    @classmethod
+    def of(cls, flow: Flow, start: float) -> Self:
+        """That of a flow from one of its knots, or from 0, on."""
+        k = int(np.searchsorted(flow.start, start, side="right")) - 1
+        waves = tuple((a, 2 * math.pi * f, phase) for a, f, phase in flow.waves.tolist())
+        if k < 0:
+            return cls(start, float(flow.value[0]), 0.0, waves)
+        return cls(float(flow.start[k]), float(flow.value[k]), float(flow.slope[k]), waves)
 
 
 GAPS = ("A lands", "B lands")

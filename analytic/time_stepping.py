@@ -63,7 +63,7 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     The first sample, before any step, carries the forces and the case of the first step. Raises
     `NotConvergedError`.
     """
-    given, fluid = constants(p, settings), marching.Flow(flow.start, flow.value, flow.slope)
+    given, fluid = constants(p, settings), marching.Flow(flow.start, flow.value, flow.slope, flow.waves)
     stretches = Stretches.of(recorder.times, flow, longest_step(p, settings))
     now, dt = ball(x0, theta_0, p), float(stretches.dt[0])
     first = stepping.step(now, dt, float(flow(dt / 2)), given)

@@ -1,6 +1,6 @@
 """Motion in RR, with Stokes' drag in closed form, and the moment when it ends.
 
-There (23) is linear, omega_c' = -k (omega_c - omega_0) with k = c/(1+2j), and omega_0 is linear in time between the
+There (23) is linear, omega_c' = -k (omega_c - omega_0) with k = c/(1+2j), and omega_0 is a line and waves between the
 breakpoints of the flow; `chart` is for the other laws. What RR leaves open is its forces: where it ends is the choice
 of `Settings.leave_rolling`.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -22,35 +23,46 @@ from model import Case, Parameters
 from model.arrays import Array
 
 _SCAN = 256
-"""Points at which a stretch of RR is looked at for its end: exits that close again in between are missed."""
+"""Points at which a stretch of RR, or each period of the fastest wave in it, is looked at for its end: exits that
+close again in between are missed."""
 MARGINS = {"slip-stability": rolling_forces.slip_margin, "infeasible": rolling_forces.margin}
 """How far RR is from where it is left, >= 0 while it lasts, by `Settings.leave_rolling`."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
-def omega_c(t: npt.ArrayLike, at: Moment, until: float, p: Parameters, omega_0: Fluid) -> Array:
-    """omega_c at times t (n,) of a stretch that starts at a moment, while omega_0 is linear until `until`."""
-    k, tau = p.c / (1 + 2 * p.j), np.asarray(t, dtype=float) - at.time
-    a, b = _line(at.time, until, omega_0)
-    start = at.x.omega_c
+def omega_c(t: npt.ArrayLike, at: Moment, p: Parameters, omega_0: Fluid) -> Array:
+    """omega_c at times t of a stretch that starts at a moment, same shape: the lag behind a line and behind waves."""
+    t = np.asarray(t, dtype=float)
+    k, tau = p.c / (1 + 2 * p.j), t - at.time
+    a, b = omega_0.value + omega_0.slope * (at.time - omega_0.start), omega_0.slope
+    start = at.x.omega_c - float(_swing(at.time, k, omega_0))
     # k tau^2 (1 - tau k/3 + …): the lag behind a ramp, without the cancellation of tau - (1 - exp(-k tau))/k.
-    return np.asarray(start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * flight.second(k * tau))
+    line = start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * flight.second(k * tau)
+    return np.asarray(line + _swing(t, k, omega_0))
 
 
-def path(t: Array, at: Moment, until: float, p: Parameters, omega_0: Fluid) -> Path:
+def _swing(t: npt.ArrayLike, k: float, omega_0: Fluid) -> Array:
+    """What the waves make of omega_c once they have gone on for long: each times k/(k + i omega)."""
+    swing = np.zeros_like(t, dtype=float)
+    for amplitude, omega, phase in omega_0.waves:
+        swing += amplitude * np.imag(k / (k + 1j * omega) * np.exp(1j * (omega * np.asarray(t) + phase)))
+    return swing
+
+
+def path(t: Array, at: Moment, p: Parameters, omega_0: Fluid) -> Path:
     """States at increasing times t (n,) after `at`; azimuth and work of the drag by Gauss' quadrature, exact here."""
-    a, b = _line(at.time, until, omega_0)
     k = p.c / (1 + 2 * p.j)
     span = float(t[-1]) - at.time
-    ends = np.union1d(np.append(t, at.time), np.linspace(at.time, t[-1], 2 + int(k * span)))
+    quickest = max((omega for _, omega, _ in omega_0.waves), default=0.0)
+    ends = np.union1d(np.append(t, at.time), np.linspace(at.time, t[-1], 2 + int((k + quickest) * span)))
     middle, half = (ends[1:] + ends[:-1]) / 2, np.diff(ends) / 2
     nodes = middle[:, None] + half[:, None] * _NODES
-    w = omega_c(nodes, at, until, p, omega_0)
-    power = -p.m * p.c * p.R**2 * w * (w - a - b * (nodes - at.time))
+    w = omega_c(nodes, at, p, omega_0)
+    power = -p.m * p.c * p.R**2 * w * (w - _fluid(nodes, omega_0))
     theta, work = (np.append(0.0, np.cumsum(half * (f @ _WEIGHTS))) for f in (w, power))
     here = np.searchsorted(ends, t)
     x = np.zeros((len(t), 8))
-    x[:, 2] = omega_c(t, at, until, p, omega_0)
+    x[:, 2] = omega_c(t, at, p, omega_0)
     none = np.full_like(t, np.nan)
     return Path(t, at.theta + theta[here], x, none, none, at.work + work[here])
 
@@ -60,17 +72,19 @@ def end(at: Moment, until: float, p: Parameters, omega_0: Fluid, leave_rolling: 
     margin = MARGINS[leave_rolling]
 
     def value(t: float) -> float:
-        return float(margin(omega_c(t, at, until, p, omega_0), p, omega_0(t)))
+        return float(margin(omega_c(t, at, p, omega_0), p, omega_0(t)))
 
-    times = np.linspace(at.time, until, _SCAN)
-    fluid = np.array([omega_0(t) for t in times.tolist()])
-    gone = margin(omega_c(times, at, until, p, omega_0), p, fluid) < 0
-    if not np.any(gone):
-        return None
-    first = int(np.argmax(gone))
-    if first == 0:
-        return at.time
-    return float(brentq(value, times[first - 1], times[first], xtol=4 * math.ulp(until), rtol=4 * math.ulp(1.0)))
+    periods = sum((until - at.time) * omega / (2 * math.pi) for _, omega, _ in omega_0.waves)
+    for start, stop in pairwise(np.linspace(at.time, until, 2 + int(periods))):
+        times = np.linspace(start, stop, _SCAN)
+        gone = margin(omega_c(times, at, p, omega_0), p, _fluid(times, omega_0)) < 0
+        if gone[0]:
+            return float(start)
+        if np.any(gone):
+            first = int(np.argmax(gone))
+            ends = times[first - 1], times[first]
+            return float(brentq(value, *ends, xtol=4 * math.ulp(until), rtol=4 * math.ulp(1.0)))
+    return None
 
 
 def chart(at: Moment, p: Parameters, omega_0: Fluid, leave_rolling: str) -> Chart:
@@ -115,7 +129,7 @@ def onset(at: Moment, p: Parameters, omega_0: float) -> tuple[Case, Moment]:
     return Case.SS, replace(at, alpha=alpha, beta=beta)
 
 
-def _line(start: float, until: float, omega_0: Fluid) -> tuple[float, float]:
-    """omega_0 at the start, and its slope."""
-    a = omega_0(start)
-    return a, (omega_0(until) - a) / (until - start)
+def _fluid(t: Array, omega_0: Fluid) -> Array:
+    """omega_0 at times t, same shape."""
+    waves = [amplitude * np.sin(omega * t + phase) for amplitude, omega, phase in omega_0.waves]
+    return np.asarray(omega_0.value + omega_0.slope * (t - omega_0.start) + sum(waves))

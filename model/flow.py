@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from model.arrays import Array
-from model.errors import InputError
-from model.parameters import NOT_NEGATIVE, POSITIVE, check_number
+from model.errors import InputError, StorageError
+from model.parameters import NOT_NEGATIVE, POSITIVE, check_number, parse_number
 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """A piecewise linear omega_0(t), with jumps where a piece doesn't start where the last one ended.
+    """omega_0(t): a piecewise linear function, with jumps where a piece doesn't start where the last one ended, and
+    sine waves on top of it.
 
     Piece k holds from ``start[k]`` on and is ``value[k] + slope[k] (t - start[k])``; before the first start its
-    value holds. Make one with `steady`, `ramp`, `staircase` or `sampled`.
+    value holds. Make one with `steady`, `ramp`, `staircase`, `sampled`, `sine`, `sines` or `from_csv`.
     """
 
     kind: str
@@ -30,9 +32,18 @@ class Flow:
     """omega_0 at the starts, shape (n,), rad s-1."""
     slope: Array
     """Rate of change in the pieces, shape (n,), rad s-2."""
+    waves: Array = field(default_factory=lambda: np.empty((0, 3)))
+    """Waves amplitude sin(2 pi frequency t + phase) as rows of amplitude in rad s-1, frequency > 0 in Hz and phase in
+    rad, shape (k, 3)."""
 
     def __call__(self, t: npt.ArrayLike) -> Array:
         """omega_0 in rad s-1 at times t in s, same shape."""
+        t = np.asarray(t, dtype=float)
+        amplitude, frequency, phase = self.waves.T
+        return np.asarray(self.line(t) + np.sin(2 * np.pi * frequency * t[..., None] + phase) @ amplitude)
+
+    def line(self, t: npt.ArrayLike) -> Array:
+        """omega_0 in rad s-1 without the waves."""
         t = np.asarray(t, dtype=float)
         k = np.maximum(np.searchsorted(self.start, t, side="right") - 1, 0)
         return np.asarray(self.value[k] + self.slope[k] * np.maximum(t - self.start[k], 0.0))
@@ -45,7 +56,7 @@ class Flow:
     @property
     def is_steady(self) -> bool:
         """Whether omega_0 never changes."""
-        return len(self.start) == 1 and self.slope[0] == 0
+        return len(self.start) == 1 and self.slope[0] == 0 and not np.any(self.waves[:, 0])
 
     @classmethod
     def steady(cls, omega_0: float) -> Self:
@@ -76,6 +87,53 @@ class Flow:
         return cls._pieces(kind, t, value, slope)
 
     @classmethod
+    def sine(cls, mean: float, amplitude: float, frequency: float, phase: float = 0.0) -> Self:
+        """mean + amplitude sin(2 pi frequency t + phase); rad s-1, Hz, rad."""
+        return cls.sines(mean, [(amplitude, frequency, phase)])
+
+    @classmethod
+    def sines(cls, mean: float, waves: Iterable[tuple[float, float, float]]) -> Self:
+        """The sum of a mean and waves (amplitude, frequency, phase) as in `sine`."""
+        flow = cls._pieces("sines", [0.0], [mean], [0.0])
+        rows = [
+            (
+                check_number(f"amplitude of wave {k}", amplitude, "rad s-1"),
+                check_number(f"frequency of wave {k}", frequency, "Hz", POSITIVE),
+                check_number(f"phase of wave {k}", phase, "rad"),
+            )
+            for k, (amplitude, frequency, phase) in enumerate(waves)
+        ]
+        return replace(flow, waves=np.array(rows).reshape(-1, 3))
+
+    @classmethod
+    def from_csv(cls, path: str | Path) -> Self:
+        """A measured flow: lines of time in s and omega_0 in rad s-1, with linear interpolation between them.
+
+        Commas, semicolons or white space separate the two; a first line without numbers is taken as the header, and
+        what follows a # as a comment. Raises `StorageError` for a file that can't be read, `InputError` that names
+        the line where a field is missing or not a finite number, or where times don't increase.
+        """
+        try:
+            lines = Path(path).read_text("utf-8-sig").rstrip().splitlines()
+        except OSError as error:
+            raise StorageError(f"cannot read the flow from {path}: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise InputError(f"{path} is not a text file: {error.reason}") from error
+        rows = [(n, _fields(line)) for n, line in enumerate(lines, 1) if not line.lstrip().startswith("#")]
+        if rows and not any(_is_number(text) for text in rows[0][1]):
+            del rows[0]
+        samples: list[tuple[float, float]] = []
+        for n, texts in rows:
+            try:
+                samples.append(_sample(texts, samples[-1][0] if samples else -np.inf))
+            except InputError as error:
+                raise InputError(f"{path}, line {n}: {error}") from error
+        if not samples:
+            raise InputError(f"{path} has no line with a time and a value of omega_0")
+        times, values = zip(*samples, strict=True)
+        return cls.sampled(times, values, kind="measured")
+
+    @classmethod
     def _pieces(cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]) -> Self:
         cls._check(start, value)
         return cls(kind, *(np.array(list(a), dtype=float) for a in (start, value, slope)))
@@ -92,7 +150,7 @@ class Flow:
 
     def to_mapping(self) -> dict[str, Any]:
         """A JSON-able description, exact."""
-        pieces = {name: getattr(self, name).tolist() for name in ("start", "value", "slope")}
+        pieces = {name: getattr(self, name).tolist() for name in ("start", "value", "slope", "waves")}
         return {"kind": self.kind} | pieces
 
     @classmethod
@@ -100,8 +158,33 @@ class Flow:
         """Inverse of `to_mapping`; raises `InputError` if it isn't one."""
         try:
             flow = cls._pieces(str(values["kind"]), values["start"], values["value"], values["slope"])
+            flow = replace(flow, waves=cls.sines(0.0, values.get("waves", ())).waves)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"not a flow: {error}") from error
         if not flow.start.shape == flow.value.shape == flow.slope.shape or not np.all(np.isfinite(flow.slope)):
             raise InputError("not a flow: start, value and slope must be finite and of one length")
         return flow
+
+
+def _fields(line: str) -> list[str]:
+    """The fields of a line of text, without its comment."""
+    line = line.partition("#")[0].replace(";", ",")
+    return [text.strip(' "') for text in line.split(",")] if "," in line else line.split()
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _sample(fields: Sequence[str], last: float) -> tuple[float, float]:
+    """Time and omega_0 of a line after that of the `last` time."""
+    if len(fields) != 2 or not all(fields):
+        raise InputError(f"{len([f for f in fields if f])} values, but there must be two, time and omega_0")
+    time, omega_0 = parse_number("time", fields[0], "s"), parse_number("omega_0", fields[1], "rad s-1")
+    if time <= last:
+        raise InputError(f"times must increase, but {time:g} s comes after {last:g} s")
+    return time, omega_0

@@ -8,14 +8,12 @@ import os
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from compare.commands.options import given, number, parameters
 from compare.runs import engines
 from compare.runs.engines import Settings
 from compare.runs.tasks import Task
 from compare.runs.workers import Workers, dask
-from model import Flow, InputError, State, StorageError
+from model import Flow, InputError, State
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import Range, check_names, check_number, parse_number
 
@@ -26,7 +24,9 @@ def add_flow(parser: argparse.ArgumentParser) -> None:
     choice = group.add_mutually_exclusive_group()
     choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"))
     choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help="each level held HOLD s")
-    choice.add_argument("--flow", metavar="FILE", help="samples as text: time, omega_0 on each line")
+    wave = "a mean with waves on it, frequencies in Hz"
+    choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
+    choice.add_argument("--flow", type=Path, metavar="FILE", help="measured, as CSV: time, omega_0 on each line")
 
 
 def flow(args: argparse.Namespace) -> Flow | None:
@@ -35,9 +35,14 @@ def flow(args: argparse.Namespace) -> Flow | None:
         return Flow.ramp(*args.ramp)
     if args.staircase:
         return Flow.staircase(args.staircase[1:], args.staircase[0])
-    if args.flow:
-        return _read_flow(Path(args.flow))
-    return None
+    if args.sine:
+        mean, *waves = args.sine
+        if not waves or len(waves) % 2:
+            raise InputError(
+                "--sine needs a mean in rad/s, then for each wave its amplitude in rad/s and frequency in Hz"
+            )
+        return Flow.sines(mean, zip(waves[::2], waves[1::2], [0.0] * (len(waves) // 2), strict=True))
+    return Flow.from_csv(args.flow) if args.flow else None
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:
@@ -99,15 +104,3 @@ def start(args: argparse.Namespace) -> State:
         check_names([name], VARIABLES, "state variable")
         values[name] = parse_number(name, value, units[name])
     return State(**values)
-
-
-def _read_flow(path: Path) -> Flow:
-    try:
-        table = np.loadtxt(path, delimiter="," if "," in path.read_text("utf-8") else None, ndmin=2)
-    except OSError as error:
-        raise StorageError(f"cannot read the flow from {path}: {error.strerror}") from error
-    except ValueError as error:
-        raise InputError(f"{path} is not a table of numbers, time and omega_0 on each line: {error}") from error
-    if table.shape[1] != 2:
-        raise InputError(f"{path} has {table.shape[1]} columns, but a flow has two, time and omega_0")
-    return Flow.sampled(table[:, 0].tolist(), table[:, 1].tolist())

@@ -77,6 +77,9 @@ def table(about: dict[str, Any], most: int = 20) -> Table:
 def _flow(flow: Flow) -> str:
     if flow.is_steady:
         return f"steady, omega_0 = {flow.value[0]:g} rad/s"
+    if len(flow.waves):
+        waves = (f"{amplitude:g} rad/s at {frequency:g} Hz" for amplitude, frequency, _ in flow.waves)
+        return f"{flow.kind}, omega_0 = {flow.value[0]:g} rad/s with waves of {', '.join(waves)}"
     return f"{flow.kind}, omega_0 from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within {flow.start[-1]:g} s"
 
 

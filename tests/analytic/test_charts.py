@@ -112,19 +112,20 @@ def test_fall_ends_on_the_floor(c, y, v_y):
     assert drop == pytest.approx(-y, abs=2e-12 * scale)
 
 
+@pytest.mark.parametrize("waves", [(), ((3.0, 7.0, 0.4), (1.0, 20.0, 0.0))], ids=["ramp", "waves"])
 @pytest.mark.parametrize("c", [0.0, 1e-8, 1.0, 30.0])
-def test_two_point_rolling_solves_its_equation(c):
+def test_two_point_rolling_solves_its_equation(c, waves):
     """Along a ramp: omega_c' = -c (omega_c - omega_0)/(1+2j), azimuth and work by their definitions."""
-    p = P.replace(c=c)
-    at, until = motion.Moment(0.3, 1.1, State(omega_c=5.0)), 4.0
-    t = np.linspace(0.3, until, 50)[1:]
-    path = two_point_rolling.path(t, at, until, p, ramp)
+    p, ramp = P.replace(c=c), motion.Fluid(0.1, 4.0, 3.0, waves)
+    at = motion.Moment(0.3, 1.1, State(omega_c=5.0))
+    t = np.linspace(0.3, 4.0, 50)[1:]
+    path = two_point_rolling.path(t, at, p, ramp)
     k = c / (1 + 2 * p.j)
     for t1, omega_c, theta, work in zip(t, path.x[:, 2], path.theta, path.work, strict=True):
         # Variation of constants, by quadrature.
         fluid = quad(lambda s, t1=t1: math.exp(-k * (t1 - s)) * k * ramp(s), 0.3, t1, epsabs=1e-13, epsrel=1e-13)[0]
         assert omega_c == pytest.approx(5.0 * math.exp(-k * (t1 - 0.3)) + fluid, rel=1e-12)
-        turned = quad(lambda s: float(two_point_rolling.omega_c(s, at, until, p, ramp)), 0.3, t1, epsrel=1e-12)[0]
+        turned = quad(lambda s: float(two_point_rolling.omega_c(s, at, p, ramp)), 0.3, t1, epsrel=1e-12)[0]
         assert theta - 1.1 == pytest.approx(turned, rel=1e-11)
         kinetic = p.m * p.R**2 * (1 + 2 * p.j) * (omega_c**2 - 25.0) / 2
         assert work == pytest.approx(kinetic, abs=1e-13 * p.m * p.R**2 * omega_c**2 + 1e-16)

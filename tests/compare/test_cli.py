@@ -65,14 +65,19 @@ def test_simulate_inspect_and_xarray(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 @pytest.mark.parametrize(
     ("flow", "last"),
-    [(["--ramp", "10", "20", "0.2"], 20), (["--staircase", "0.1", "10", "12", "14"], 14), (["--flow", "flow.txt"], 9)],
+    [
+        (["--ramp", "10", "20", "0.2"], 20),
+        (["--staircase", "0.1", "10", "12", "14"], 14),
+        (["--sine", "10", "2", "2.5", "1", "5"], 8),
+        (["--flow", "flow.csv"], 9),
+    ],
 )
 def test_flows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flow: list[str], last: float) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("flow.txt").write_text("0, 3\n0.1, 9\n")
+    Path("flow.csv").write_text("0, 3\n0.1, 9\n")
     assert cli.main(["simulate", "--time", "0.3", *flow, "-o", "run.h5"]) == 0
     trajectory = storage.load("run.h5")
-    assert trajectory.header.flow(0.3) == last
+    assert trajectory.header.flow(0.3) == pytest.approx(last)
 
 
 def test_sweep_and_collect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -191,7 +196,7 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str], name: str) -> Non
         ("simulate --restitution 0.5", "--restitution is for event and time-stepping, not for mujoco"),
         ("simulate --engine event --restitution 1.5", "restitution = 1.5 1 is out of range"),
         ("simulate --flow absent.txt", "cannot read the flow from absent.txt"),
-        ("simulate --flow broken.toml", "broken.toml is not a table of numbers"),
+        ("simulate --flow broken.toml", "broken.toml has no line with a time and a value"),
         ("simulate --ramp 1 2 0", "duration = 0 s is out of range"),
         ("simulate -o absent/run.h5", "cannot write absent/run.h5: there is no directory absent"),
         ("sweep --vary omega_0=30:10:5", "omega_0 = 30:10 rad s-1 is in the wrong order"),

@@ -138,6 +138,8 @@ def test_a_ball_that_passes_by_the_axis_goes_on() -> None:
         ({"omega_0": 1.0, "c": 1.0}, None, np.sqrt(P.R / P.g), r"sqrt\(R/g\)"),
         ({"omega_0": -25.0, "c": 1.0}, None, 1 / 25, "1/omega_0"),
         ({"omega_0": 1.0, "c": 1.0}, Flow.ramp(1.0, 50.0, 0.05), 1 / 50, "1/omega_0"),
+        ({"omega_0": 1.0, "c": 1.0}, Flow.sine(10.0, 40.0, 1.0), 1 / 50, "1/omega_0"),
+        ({"omega_0": 1.0, "c": 1.0}, Flow.sine(1.0, 1.0, 20.0), 1 / (40 * np.pi), r"1/\(2 pi f\)"),
         ({"omega_0": 1.0, "c": 100.0}, None, 1 / 100, "1/c"),
     ],
 )

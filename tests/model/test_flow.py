@@ -1,24 +1,31 @@
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from model import Flow, InputError
+from model import Flow, InputError, StorageError
 
 FLOWS = [
     Flow.steady(-3.0),
     Flow.ramp(10, 30, 5, t_start=1),
     Flow.staircase([1, 4, 2], hold=2),
     Flow.sampled([0, 1, 4], [5, 6, 0]),
+    Flow.sine(10, 2, 0.5, phase=0.3),
+    Flow.sines(10, [(2, 0.5, 0), (1, 3, 1.5)]),
 ]
 
 
 def test_values() -> None:
-    steady, ramp, stairs, sampled = FLOWS
+    steady, ramp, stairs, sampled, sine, sines = FLOWS
     np.testing.assert_array_equal(steady([0, 1e9]), [-3, -3])
     np.testing.assert_allclose(ramp([0, 1, 3.5, 6, 100]), [10, 10, 20, 30, 30], rtol=1e-15)
     np.testing.assert_array_equal(stairs([0, 1.99, 2, 4, 99]), [1, 1, 4, 2, 2])
     np.testing.assert_allclose(sampled([0, 0.5, 1, 2.5, 4, 9]), [5, 5.5, 6, 3, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(sine([0, 0.5]), [10 + 2 * np.sin(0.3), 10 + 2 * np.cos(0.3)], rtol=1e-15)
+    assert sines(0.25) == pytest.approx(10 + np.sqrt(2) + np.sin(1.5 * np.pi + 1.5), rel=1e-15)
+    np.testing.assert_array_equal(sines.line([0.1, 0.2]), [10, 10])
+    assert sine(np.zeros((2, 3))).shape == (2, 3)
     assert steady.is_steady
     assert not any(flow.is_steady for flow in FLOWS[1:])
     np.testing.assert_array_equal(stairs.breakpoints, [2, 4])
@@ -46,10 +53,67 @@ def test_a_mapping_holds_all_of_it(flow: Flow) -> None:
         (lambda: Flow.sampled([0, 1, 1], [1, 2, 3]), "times must increase, but sample 2 is at 1 s"),
         (lambda: Flow.sampled([0, math.nan], [1, 2]), "time of flow sample 1"),
         (lambda: Flow.sampled([0, 1], [1, "two"]), "omega_0"),
+        (lambda: Flow.sine(math.inf, 1, 1), "omega_0 of flow sample 0"),
+        (lambda: Flow.sine(1, 1, 0), "frequency of wave 0 = 0 Hz is out of range: must be > 0"),
+        (lambda: Flow.sines(1, [(1, 1, 0), (math.nan, 1, 0)]), "amplitude of wave 1 = nan"),
         (lambda: Flow.from_mapping({"kind": "steady"}), "not a flow"),
+        (
+            lambda: Flow.from_mapping({"kind": "x", "start": [0], "value": [1], "slope": [0], "waves": [1]}),
+            "not a flow",
+        ),
         (lambda: Flow.from_mapping({"kind": "x", "start": [0], "value": [1], "slope": [math.nan]}), "not a flow"),
     ],
 )
 def test_bad_flows(make, says: str) -> None:
     with pytest.raises(InputError, match=says):
         make()
+
+
+def test_flow_of_an_older_file() -> None:
+    assert Flow.from_mapping({"kind": "steady", "start": [0], "value": [1], "slope": [0]}).is_steady
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0,5\n1,6\n4,0\n",
+        "t in s; omega_0\n0; 5\n1; 6\n4; 0\n\n",
+        "# measured\n0 5\n1\t6  # late\n4 0",
+        '\ufeff"time","omega_0"\r\n"0","5"\r\n1,6\r\n4,0\r\n',
+    ],
+    ids=["plain", "semicolons", "white space", "spreadsheet"],
+)
+def test_measured(tmp_path: Path, text: str) -> None:
+    (tmp_path / "flow.csv").write_text(text, "utf-8")
+    measured, sampled = Flow.from_csv(tmp_path / "flow.csv").to_mapping(), FLOWS[3].to_mapping()
+    assert measured == sampled | {"kind": "measured"}
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("time,omega_0\n0,5\n1,\n", "line 3: 1 values, but there must be two"),
+        ("0,5\n,6\n", "line 2: 1 values"),
+        ("0,5\n\n2,6\n", "line 2: 0 values"),
+        ("0,5,1\n", "line 1: 3 values"),
+        ("0,5\n2,6\n1,7\n", "line 3: times must increase, but 1 s comes after 2 s"),
+        ("0,5\n0,6\n", "line 2: times must increase"),
+        ("0,5\n10:31,6\n", "line 2: time = '10:31' must be a number in s"),
+        ("0,5\n1,nan\n", "line 2: omega_0 = nan rad s-1 must be finite"),
+        ("0,5\nnan,6\n", "line 2: time = nan s must be finite"),
+        ("time,omega_0\n", "no line with a time"),
+        ("", "no line with a time"),
+    ],
+)
+def test_bad_measurements(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "flow.csv").write_text(text)
+    with pytest.raises(InputError, match=says):
+        Flow.from_csv(tmp_path / "flow.csv")
+
+
+def test_unreadable_measurements(tmp_path: Path) -> None:
+    with pytest.raises(StorageError, match=r"cannot read the flow from .*: No such file"):
+        Flow.from_csv(tmp_path / "flow.csv")
+    (tmp_path / "flow.csv").write_bytes(b"\xff\x00\x01")
+    with pytest.raises(InputError, match="not a text file"):
+        Flow.from_csv(tmp_path / "flow.csv")
