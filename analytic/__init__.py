@@ -6,8 +6,10 @@ from analytic.bifurcation import Thresholds, thresholds
 from analytic.dynamics import contact_forces, vector_field
 from analytic.ensemble import Ensemble, simulate_many
 from analytic.flowmeter import (
+    OperatingLimit,
     characteristic_slope,
     mean_slope,
+    operating_limit,
     operating_range,
     reading_range,
     slope_jump,
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Ensemble",
+    "OperatingLimit",
     "Settings",
     "SlipStability",
     "Stability",
@@ -42,6 +45,7 @@ __all__ = [
     "floor_force",
     "leaning_modes",
     "mean_slope",
+    "operating_limit",
     "operating_range",
     "reading_range",
     "simulate",

@@ -48,19 +48,26 @@ def threshold_curves(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, relea
     equations have solutions.
     """
     mu, eta = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(mu, eta))
-    divisor = mu * eta * (1 + p.j) + p.j - eta
-    real = (divisor > 0) & ((eta <= p.j) | released)
-    Omega_01 = np.where(real, np.sqrt(mu * (1 + eta) / np.where(real, divisor, 1.0)), np.nan)
     fold = slipping_branch.fold(p, mu, eta, released)
     folds = np.isfinite(fold)
     Omega_04 = np.full(mu.shape, np.nan)
     Omega_04[folds] = slipping_branch.branch(fold[folds], p, mu[folds], eta[folds]).Omega_0
+    return curves_without_drag(p.j, mu, eta, released) | {
+        "omega_04": Omega_04,
+        "eta_cr": np.broadcast_to(slipping_branch.eta_critical(mu, p), mu.shape),
+    }
+
+
+def curves_without_drag(j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False) -> dict[str, Array]:
+    """Those of `threshold_curves` in which drag plays no part: omega_01, omega_02 and omega_03."""
+    mu, eta = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(mu, eta))
+    divisor = mu * eta * (1 + j) + j - eta
+    real = (divisor > 0) & ((eta <= j) | released)
+    Omega_01 = np.where(real, np.sqrt(mu * (1 + eta) / np.where(real, divisor, 1.0)), np.nan)
     return {
         "omega_01": np.asarray(Omega_01),
         "omega_02": np.where(eta > 0, 1 / np.sqrt(np.where(eta > 0, eta, 1.0)), np.nan),
-        "omega_03": np.full(mu.shape, 1 / np.sqrt(p.j)),
-        "omega_04": Omega_04,
-        "eta_cr": np.broadcast_to(slipping_branch.eta_critical(mu, p), mu.shape),
+        "omega_03": np.full(mu.shape, 1 / np.sqrt(j)),
     }
 
 

@@ -2,22 +2,54 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from enum import Enum
+
 import numpy as np
 
 from analytic import bifurcation, slipping_branch, stationary
 from model import Case, InputError, Parameters
 
 
-def operating_range(p: Parameters) -> float:
-    """The largest omega_0 in rad s-1 below which rolling at both points (RR) is the ball's only lasting motion.
+class End(Enum):
+    """What ends the operating range."""
 
-    It ends where RR ends in slipping (omega_01, eta < j); for eta >= j at omega_02, the limit from unloading: a flow
-    beyond it may leave the ball on the wall, which drops it with transients and impacts when it falls below again.
+    SLIP = "it begins to slip at both points and lags"
+    """At omega_01, for eta < j."""
+    UNLOADING = "the wall can carry it, and drops it with impacts when the flow falls below this again"
+    """At omega_02, for eta >= j: the black dot of Fig. 13."""
+    SMOOTH = "a contact without friction never makes it roll"
+    NO_DRAG = "without drag nothing makes it go round"
+
+
+@dataclass(frozen=True)
+class OperatingLimit:
+    """Up to which flow the ball can do nothing but roll at both points, and why not beyond."""
+
+    omega_0: float
+    """rad s-1; 0 if there is always another motion that lasts."""
+    end: End
+
+
+def operating_limit(p: Parameters) -> OperatingLimit:
+    """The largest omega_0 below which rolling at both points (RR) is the ball's only lasting motion, and what ends it.
+
+    Section 5.3. For eta < j it ends where RR ends in slipping, omega_01. For eta >= j RR itself goes on to omega_03,
+    where the floor lets go, but it is alone up to omega_02 only: a flow beyond may leave the ball on the wall, which
+    drops it with transients and impacts when the flow falls below omega_02 again (unloading).
     """
     if p.c == 0:
-        return 0.0
-    t = bifurcation.thresholds(p)
-    return t.omega_01 if p.eta < p.j else t.omega_02
+        return OperatingLimit(0.0, End.NO_DRAG)
+    if p.mu == 0 or p.eta == 0:
+        return OperatingLimit(0.0, End.SMOOTH)
+    Omega = bifurcation.curves_without_drag(p.j, p.mu, p.eta)
+    name, end = ("omega_01", End.SLIP) if p.eta < p.j else ("omega_02", End.UNLOADING)
+    return OperatingLimit(float(Omega[name] * np.sqrt(p.g / p.R)), end)
+
+
+def operating_range(p: Parameters) -> float:
+    """The flow of `operating_limit`, rad s-1."""
+    return operating_limit(p).omega_0
 
 
 def reading_range(p: Parameters) -> float:

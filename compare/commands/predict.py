@@ -53,11 +53,14 @@ def reading(p: Parameters, attractors: Sequence[StationarySolution]) -> str:
 
 def described(p: Parameters) -> dict[str, Any]:
     """Everything as plain data; what doesn't exist is nan."""
+    limit = analytic.operating_limit(p)
     return {
         "parameters": dataclasses.asdict(p),
         "groups": {"kappa": p.kappa, "Omega_0": p.Omega_0},
         "thresholds": dataclasses.asdict(analytic.thresholds(p)),
-        "operating_range": analytic.operating_range(p),
+        "operating_range": limit.omega_0,
+        "operating_range_ends": {"by": limit.end.name, "because": limit.end.value},
+        "reading_range": analytic.reading_range(p),
         "reading": reading(p, analytic.stable_solutions(p)),
         "solutions": [_solution(solution) for solution in analytic.stationary_solutions(p)],
     }
@@ -98,10 +101,18 @@ def tables(p: Parameters) -> list[Table | str]:
         shown.add_column(s.case.name, justify="right", style="" if s.exists and s.case in attracting else "dim")
     for label, show in _ROWS.items():
         shown.add_row(label, *map(show, solutions))
-    end = analytic.operating_range(p)
-    reach = f"ω_c = ω₀ holds uniquely up to ω₀ = {end:.8g} rad/s" if math.isfinite(end) else "no limit to ω_c = ω₀"
     groups = f"[dim]κ = c√(R/g) = {p.kappa:.6g}, Ω₀ = ω₀√(R/g) = {p.Omega_0:.6g}"
-    return [head, groups, limits, shown, f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {reading(p, attractors)}; {reach}."]
+    meter = f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {reading(p, attractors)}; {reach(p)}."
+    return [head, groups, limits, shown, meter]
+
+
+def reach(p: Parameters) -> str:
+    """How far the flowmeter can be used, and why not beyond."""
+    limit, reads = analytic.operating_limit(p), analytic.reading_range(p)
+    if limit.omega_0 == 0:
+        return f"it has no operating range: {limit.end.value}"
+    text = f"rolling is its only lasting motion up to ω₀ = {limit.omega_0:.8g} rad/s: there {limit.end.value}"
+    return text + "; ω_c = ω₀ holds in every motion, however fast the flow" * math.isinf(reads)
 
 
 _SYMBOLS = {"omega_01": "ω₀₁", "omega_02": "ω₀₂", "omega_03": "ω₀₃", "omega_04": "ω₀₄", "eta_cr": "η_cr"}

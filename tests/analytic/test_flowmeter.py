@@ -8,6 +8,7 @@ import pytest
 from analytic import (
     characteristic_slope,
     mean_slope,
+    operating_limit,
     operating_range,
     reading_range,
     slope_jump,
@@ -16,6 +17,7 @@ from analytic import (
     thresholds,
     unloading_limit,
 )
+from analytic.flowmeter import End
 from model import Case, InputError, Parameters
 
 P = Parameters.named("reference")
@@ -28,6 +30,27 @@ def test_operating_range_is_where_rolling_is_the_only_attractor(p: Parameters) -
     for omega_0 in np.linspace(0.02, 0.9999, 9) * limit:
         assert {s.case for s in stable_solutions(p.replace(omega_0=float(omega_0)))} == {Case.RR}
     assert {s.case for s in stable_solutions(p.replace(omega_0=limit * 1.0001))} != {Case.RR}
+
+
+@pytest.mark.parametrize("trial", range(12))
+def test_what_ends_the_operating_range(trial: int) -> None:
+    """What else lasts just beyond: slip at both points, or the ride on the wall while the ball still rolls, too."""
+    rng = np.random.default_rng(trial)
+    p = P.replace(mu=rng.uniform(0.05, 1), eta=rng.uniform(0.05, 1), j=rng.uniform(0.2, 0.66))
+    limit = operating_limit(p)
+    below, beyond = (
+        {s.case for s in stable_solutions(p.replace(omega_0=limit.omega_0 * (1 + side * 1e-6)))} for side in (-1, 1)
+    )
+    assert below == {Case.RR}
+    assert beyond == ({Case.SS} if limit.end is End.SLIP else {Case.RR, Case.NR})
+    assert (limit.end is End.SLIP) == (p.eta < p.j)
+
+
+@pytest.mark.parametrize("smooth", [{"mu": 0.0}, {"eta": 0.0}, {"mu": 0.0, "eta": 0.6}])
+def test_smooth_contacts_leave_no_operating_range(smooth: dict[str, float]) -> None:
+    p = P.replace(omega_0=0.1, **smooth)
+    assert operating_limit(p).end is End.SMOOTH
+    assert {s.case for s in stable_solutions(p)} != {Case.RR}
 
 
 @pytest.mark.parametrize("p", [P, ROUGH])
@@ -55,6 +78,7 @@ def test_ranges_at_the_edges() -> None:
     assert operating_range(P.replace(mu=0.0)) == 0
     for ask in (operating_range, reading_range):
         assert ask(P.replace(c=0.0)) == 0
+    assert operating_limit(P.replace(c=0.0)).end is End.NO_DRAG
     assert np.isnan(unloading_limit(P.replace(eta=0.0)))
 
 

@@ -34,6 +34,16 @@ def test_predict_as_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert "the ball slips (SS)" in capsys.readouterr().out
 
 
+def test_predict_says_what_ends_the_operating_range(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, words in (("reference", "slip at both points"), ("high-wall-friction", "the wall can carry it")):
+        assert cli.main(["predict", "--set", name]) == 0
+        assert words in " ".join(capsys.readouterr().out.split())
+    assert cli.main(["predict", "--mu", "0", "--json"]) == 0
+    described = json.loads(capsys.readouterr().out)
+    assert described["operating_range"] == 0
+    assert described["operating_range_ends"]["by"] == "SMOOTH"
+
+
 def test_predict_waits_for_no_heavy_package() -> None:
     """Formulas need numpy only; the engines, scipy and the figures would take most of a second to load."""
     code = "import sys; from compare.commands import cli; cli.main(['predict']); print(*sys.modules, file=sys.stderr)"
