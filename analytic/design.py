@@ -1,0 +1,184 @@
+"""Design of a flowmeter: how its limits depend on what it is made of, its reading with tolerances, the best choice.
+
+Everything rests on `thresholds`, `operating_range` and `stable_solutions`, whatever the law of drag. A meter is given
+as a function `make` that takes values by name and returns `Parameters`: `p.replace`, or `Parameters.from_fluid` with
+some arguments filled in.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic import bifurcation, flowmeter, stationary
+from model import InputError, Parameters, drag
+from model.arrays import Array
+
+Make: TypeAlias = Callable[..., Parameters]
+"""Parameters of a meter from values by name."""
+Interval: TypeAlias = tuple[float, float]
+"""Lowest and highest value."""
+
+THRESHOLDS = ("omega_01", "omega_02", "omega_03", "omega_04")
+_STEP = 1e-3
+"""Of the differences, in the logarithm of a value."""
+_TIE = 1e-3
+"""What the logarithm of the response time counts beside the margin: it decides where the margin doesn't."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """d ln omega_0k / d ln of a value: by how many per cent a threshold changes if the value does by one."""
+
+    value: float
+    """nan where the threshold doesn't exist on both sides, or the value may not be changed to one of them."""
+    error: float
+    """Estimated from differences of two widths."""
+
+
+def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Sensitivity]]:
+    """Sensitivity of each threshold to each of the values `at`.
+
+    By central differences in the logarithm, extrapolated from two widths (Richardson). omega_01 to omega_03 have
+    closed forms (docs/design.md), with which tests compare; the differences serve any law of drag, and the fold.
+    """
+    by_name = {name: _log_derivatives(lambda x, name=name: make(**{**at, name: x}), at[name]) for name in at}  # type: ignore[misc]
+    return {
+        key: {name: Sensitivity(float(value[k]), float(error[k])) for name, (value, error) in by_name.items()}
+        for k, key in enumerate(THRESHOLDS)
+    }
+
+
+def _log_derivatives(make: Callable[[float], Parameters], x: float) -> tuple[Array, Array]:
+    """Derivatives of the logarithms of all thresholds by that of x, and their errors, shape (4,) each."""
+
+    def logarithms(step: float) -> Array:
+        try:
+            t = bifurcation.thresholds(make(x * math.exp(step)))
+        except InputError:  # beyond what the value may be: no derivative there
+            return np.full(len(THRESHOLDS), np.nan)
+        with np.errstate(divide="ignore"):
+            return np.log([getattr(t, key) for key in THRESHOLDS])
+
+    with np.errstate(invalid="ignore"):
+        wide, narrow = ((logarithms(h) - logarithms(-h)) / (2 * h) for h in (_STEP, _STEP / 2))
+        return (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
+
+
+def corners(make: Make, at: Mapping[str, float], tolerances: Mapping[str, float]) -> Iterator[Parameters]:
+    """The meter with every value at one end of its tolerance, which is relative: x (1 - t) or x (1 + t).
+
+    Limits and readings are monotonic in friction and size, but for a ridge of the operating limit at eta = j; so their
+    extremes over all that the tolerances allow are at corners. A test samples between them.
+    """
+    inexact = {name: (at[name] * (1 - t), at[name] * (1 + t)) for name, t in tolerances.items() if t > 0}
+    for values in itertools.product(*inexact.values()):
+        yield make(**{**at, **dict(zip(inexact, values, strict=True))})
+
+
+def threshold_spread(meters: Sequence[Parameters]) -> dict[str, Interval]:
+    """Lowest and highest value of each threshold over some meters, rad s-1; nan if one of them doesn't have it."""
+    each = [dataclasses.asdict(bifurcation.thresholds(p)) for p in meters]
+    return {key: (float(np.min([t[key] for t in each])), float(np.max([t[key] for t in each]))) for key in THRESHOLDS}
+
+
+def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
+    """The lowest and the highest omega_c of all stationary motions that last, at flows omega_0 > 0, rad s-1.
+
+    They differ where the reading depends on the past: the lowest is read while the flow rises slowly from rest, the
+    highest while it falls. nan where none lasts.
+    """
+    flows, alone = np.asarray(omega_0, dtype=float), flowmeter.operating_range(p)
+    low, high = flows.copy(), flows.copy()
+    for k in np.flatnonzero(flows >= alone):
+        orbits = [s.state.omega_c for s in stationary.stable_solutions(p.replace(omega_0=float(flows[k])))]
+        low[k], high[k] = min(orbits, default=np.nan), max(orbits, default=np.nan)
+    return low, high
+
+
+def response_time(p: Parameters) -> float:
+    """Time constant (1 + 2j)/c in s with which a rolling ball follows a small change of the flow (docs/theory.md, 9).
+
+    inf for the quadratic law: such drag vanishes faster than the difference that it is to remove.
+    """
+    return math.inf if p.drag == drag.QUADRATIC or p.c == 0 else (1 + 2 * p.j) / p.c
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A meter chosen within bounds."""
+
+    values: dict[str, float]
+    """What `make` needs to make it."""
+    p: Parameters
+    limits: Interval
+    """The operating limit at the worst and the best corner of the tolerances, rad s-1."""
+    margin: float
+    """The worst limit over the fastest flow that is asked for: covered if >= 1."""
+    response: float
+    """Time constant, s."""
+
+
+def choice(make: Make, values: Mapping[str, float], tolerances: Mapping[str, float], fastest: float) -> Choice:
+    """What is to be said of a meter that shall measure flows up to `fastest`, rad s-1."""
+    p = make(**values)
+    limits = [flowmeter.operating_range(q) for q in (p, *corners(make, values, tolerances))]
+    worst = min(limits)
+    return Choice(dict(values), p, (worst, max(limits)), worst / fastest, response_time(p))
+
+
+def best(
+    make: Make,
+    bounds: Mapping[str, Interval],
+    tolerances: Mapping[str, float],
+    fastest: float,
+    slowest_response: float = math.inf,
+    seed: int = 0,
+) -> Choice:
+    """The meter within the bounds whose operating range exceeds the fastest flow by the largest factor.
+
+    Among all that answer within `slowest_response`, s, the one with the largest margin at the worst corner of the
+    tolerances; among equals the quickest. Differential evolution (scipy), as the margin has a ridge at eta = j; the
+    seed settles the result.
+
+    Raises
+    ------
+    InputError
+        If no meter within the bounds answers so fast; the message says how fast one can.
+    """
+    from scipy.optimize import Bounds, differential_evolution  # here, because `predict` shall not wait for it
+
+    open_names = [name for name, (low, high) in bounds.items() if low < high]
+    ends = np.array([bounds[name] for name in open_names]).reshape(-1, 2)
+    exact = {name: low for name, (low, _) in bounds.items()}
+
+    def at(unit: npt.ArrayLike) -> Choice:
+        chosen = ends[:, 0] + np.asarray(unit) * (ends[:, 1] - ends[:, 0])
+        return choice(make, {**exact, **dict(zip(open_names, chosen.tolist(), strict=True))}, tolerances, fastest)
+
+    def cost(unit: Array) -> float:
+        c = at(unit)
+        delay = math.log(c.response) if math.isfinite(c.response) else 0.0
+        late = c.response > slowest_response
+        return 100 + delay if late else _TIE * delay - c.margin
+
+    if open_names:
+        each = 4 + 12 // len(ends)  # times the number of values: how many meters compete
+        cube = Bounds(np.zeros(len(ends)), np.ones(len(ends)))
+        result = differential_evolution(cost, cube, rng=seed, popsize=each, tol=1e-6, polish=False)
+        chosen = at(result.x)
+    else:
+        chosen = at([])
+    if chosen.response > slowest_response:
+        raise InputError(
+            f"response = {slowest_response:g} s excludes everything: within the bounds the quickest ball has a time "
+            f"constant of {chosen.response:.3g} s"
+        )
+    return chosen

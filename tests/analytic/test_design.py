@@ -1,0 +1,154 @@
+"""Design of a flowmeter, against closed forms, differences of other widths, sampling and brute force."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from functools import partial
+
+import numpy as np
+import pytest
+
+from analytic import bifurcation, design, operating_range, solution, thresholds
+from model import Case, InputError, Parameters
+
+WATER = partial(Parameters.from_fluid, nu_f=1.004e-6, rho_f=998.2, gravity=9.81)
+STEEL = {"r": 0.005, "R": 0.025, "rho_b": 7850.0, "mu": 0.2, "eta": 0.2, "j": 0.4}
+TOLERANCES = {"mu": 0.2, "eta": 0.2, "r": 0.02, "R": 0.01}
+P = Parameters.named("reference")
+
+
+@pytest.mark.parametrize("trial", range(5))
+def test_sensitivities_have_these_closed_forms(trial: int) -> None:
+    """Logarithmic derivatives of (84)-(86), of g = gravity (1 - rho_f/rho_b) and of c ~ nu_f rho_f/(rho_b r^2)."""
+    rng = np.random.default_rng(trial)
+    mu, j, rho_b = rng.uniform(0.05, 1.5), rng.uniform(0.2, 0.6), rng.uniform(1200, 9000)
+    eta = j * rng.uniform(0.1, 0.9)
+    at = STEEL | {"mu": mu, "eta": eta, "j": j, "rho_b": rho_b} | {"nu_f": 1e-6, "rho_f": 1000.0, "gravity": 9.8}
+    by = design.sensitivities(Parameters.from_fluid, at)
+    buoyancy = 1000.0 / (rho_b - 1000.0) / 2
+    common = {"R": -0.5, "gravity": 0.5, "rho_b": buoyancy, "rho_f": -buoyancy, "r": 0, "nu_f": 0}
+    divisor = mu * eta * (1 + j) + j - eta
+    expected = {
+        "omega_01": {
+            "mu": (j - eta) / (2 * divisor),
+            "eta": eta * (1 + j) * (1 - mu) / (2 * (1 + eta) * divisor),
+            "j": -j * (1 + mu * eta) / (2 * divisor),
+        },
+        "omega_02": {"mu": 0, "eta": -0.5, "j": 0},
+        "omega_03": {"mu": 0, "eta": 0, "j": -0.5},
+    }
+    for name, own in expected.items():
+        for key, value in (common | own).items():
+            s = by[name][key]
+            assert s.value == pytest.approx(value, abs=1e-9)
+            assert abs(s.value - value) <= s.error + 1e-9
+
+
+def test_sensitivities_of_the_fold_by_differences_of_other_widths() -> None:
+    """Central differences of omega_04 err by the square of their width."""
+    at = {"mu": 0.2, "eta": 0.2, "j": 0.4, "c": 1.0, "R": 0.05, "g": 9.81}
+    fold = design.sensitivities(P.replace, at)["omega_04"]
+
+    def ln_fold(name: str, factor: float) -> float:
+        return math.log(thresholds(P.replace(**{name: at[name] * factor})).omega_04)
+
+    for name in at:
+        for h in (3e-2, 1e-2):
+            difference = (ln_fold(name, math.exp(h)) - ln_fold(name, math.exp(-h))) / (2 * h)
+            assert fold[name].value == pytest.approx(difference, abs=20 * h**2)
+        assert fold[name].error < 1e-4
+    # All flows scale with sqrt(g/R) and else depend on R, g, c by kappa = c sqrt(R/g) only.
+    assert fold["R"].value == pytest.approx(-0.5 + fold["c"].value / 2, abs=1e-8)
+    assert fold["g"].value == pytest.approx(-fold["R"].value, abs=1e-8)
+
+
+def test_no_sensitivity_where_a_threshold_or_a_value_ends() -> None:
+    by = design.sensitivities(P.replace, {"eta": 0.4})
+    assert math.isnan(by["omega_01"]["eta"].value)
+    assert math.isnan(design.sensitivities(P.replace, {"j": 2 / 3})["omega_03"]["j"].value)
+    assert by["omega_02"]["eta"].value == pytest.approx(-0.5)
+
+
+def test_no_meter_within_tolerances_reads_beyond_the_corners() -> None:
+    p = Parameters.from_fluid(nu_f=1e-4, rho_f=900, **STEEL)  # thick oil: a fold near omega_02
+    make = partial(Parameters.from_fluid, nu_f=1e-4, rho_f=900)
+    at = {name: STEEL[name] for name in ("r", "R", "rho_b", "mu", "eta")}
+    flows = np.linspace(0.5, 1.5, 4) * thresholds(p).omega_02
+    extreme = [design.readings(q, flows) for q in design.corners(make, at, TOLERANCES)]
+    low, high = np.min([r[0] for r in extreme], axis=0), np.max([r[1] for r in extreme], axis=0)
+    spread = design.threshold_spread(list(design.corners(make, at, TOLERANCES)))
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        q = make(**at | {name: at[name] * (1 + t * rng.uniform(-1, 1)) for name, t in TOLERANCES.items()})
+        own = design.readings(q, flows)
+        assert np.all(own[0] >= low * (1 - 1e-12))
+        assert np.all(own[1] <= high * (1 + 1e-12))
+        t = thresholds(q)
+        assert all(lowest <= getattr(t, name) <= highest for name, (lowest, highest) in spread.items())
+
+
+def test_readings_are_those_of_the_branches() -> None:
+    """Below omega_01 one, between omega_02 and omega_04 two: slip while the flow rises, the wall while it falls."""
+    t = thresholds(P)
+    flows = np.array([0.5 * t.omega_01, t.omega_02 * 0.9, t.omega_04 * 0.99, t.omega_04 * 1.1])
+    low, high = design.readings(P, flows)
+    slip = [solution(P.replace(omega_0=float(w)), Case.SS).state.omega_c for w in flows[1:3]]
+    assert low.tolist() == [flows[0], *slip, flows[3]]
+    assert high.tolist() == [flows[0], slip[0], flows[2], flows[3]]
+
+
+@pytest.mark.parametrize("tolerances", [{}, {"mu": 0.2, "eta": 0.2}])
+def test_best_against_brute_force(tolerances: dict[str, float]) -> None:
+    """No point of a grid is better, and the nearest to the optimum is almost as good."""
+    bounds = {"r": (0.003, 0.006), "R": (0.02, 0.03), "rho_b": (2500, 8000), "mu": (0.1, 0.3), "eta": (0.1, 0.6)}
+    best = design.best(WATER, bounds, tolerances, fastest=15.0)
+    grids = [np.linspace(*ends, n) for ends, n in zip(bounds.values(), (2, 2, 2, 3, 41), strict=True)]
+    margins = []
+    for values in itertools.product(*grids):
+        c = design.choice(WATER, dict(zip(bounds, map(float, values), strict=True)), tolerances, 15.0)
+        margins.append(c.margin)
+    step = 0.5 / 40 / 0.4  # of ln eta on the grid, near the optimum; no |d ln omega_0k/d ln eta| reaches 1 here
+    assert max(margins) <= best.margin * (1 + 1e-5)
+    assert max(margins) >= best.margin * (1 - step)
+    assert best.values["r"] == pytest.approx(0.003, rel=1e-2)  # it doesn't change the limit, but the response
+    assert all(low <= best.values[name] <= high for name, (low, high) in bounds.items())
+    assert best == design.best(WATER, bounds, tolerances, fastest=15.0)
+
+
+def test_the_best_wall_is_as_rough_as_the_ball_is_inert() -> None:
+    """For mu < 1 omega_01 rises with eta up to sqrt(g/(jR)) at eta = j, whatever mu; beyond, omega_02 falls."""
+    c = design.best(P.replace, {"eta": (0.1, 0.6)}, {}, 10.0)
+    assert c.values["eta"] == pytest.approx(P.j, rel=1e-4)
+    assert c.limits[0] == pytest.approx(thresholds(P).omega_03, rel=1e-4)
+    assert c.margin == c.limits[0] / 10.0
+    for mu in (0.05, 0.5, 0.95):
+        t = bifurcation.thresholds(P.replace(mu=mu, eta=P.j * (1 - 1e-9)))
+        assert t.omega_01 == pytest.approx(t.omega_03, rel=1e-6)
+
+
+def test_a_response_to_keep() -> None:
+    """The time constant (1 + 2j)/c goes with r^2 rho_b: the response limits the density of a ball of one size."""
+    bounds = {"r": (0.004, 0.004), "R": (0.03, 0.03), "rho_b": (1100, 8000), "mu": (0.2, 0.2), "eta": (0.2, 0.2)}
+    free = design.best(WATER, bounds, {}, 10.0)
+    assert free.values["rho_b"] == pytest.approx(8000, rel=1e-3)
+    wanted = free.response / 2
+    kept = design.best(WATER, bounds, {}, 10.0, wanted)
+    assert kept.response == pytest.approx(wanted, rel=1e-3)
+    assert kept.values["rho_b"] == pytest.approx(4000, rel=1e-3)
+    assert kept.margin < free.margin
+    with pytest.raises(InputError, match=r"response = 1 s excludes everything: .* time constant of 7\.0\d s"):
+        design.best(WATER, bounds, {}, 10.0, 1.0)
+
+
+def test_response_time_is_that_of_rolling() -> None:
+    rolling = solution(P.replace(omega_0=5.0), Case.RR)
+    assert design.response_time(P) == pytest.approx(-1 / rolling.eigenvalues[0].real)
+    quadratic = P.replace(nu_f=1e-6, drag="quadratic")
+    assert design.response_time(quadratic) == math.inf
+
+
+def test_everything_fixed() -> None:
+    c = design.best(WATER, {name: (x, x) for name, x in STEEL.items()}, {"eta": 0.1}, 10.0)
+    assert c.values == STEEL
+    assert c.limits[0] < operating_range(c.p) < c.limits[1]
