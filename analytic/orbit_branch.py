@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from analytic.orbits import Changes, Loop, NoOrbitError, Orbit, close, extent, jacobian
-from model import Contact, InputError, Parameters
+from model import Contact, InputError, Parameters, State
 from model.arrays import Array
 from model.parameters import check_names, check_number
 
@@ -164,7 +164,7 @@ def _renewed(orbit: Orbit, along: Array) -> tuple[Orbit, Array]:
 
     Where the section is another, the parameter alone says which way the branch goes on.
     """
-    if orbit.loop.x[0] > 0:
+    if State.of(orbit.loop.x).y > 0:
         return replace(orbit, loop=replace(orbit.loop, extent=extent(orbit.cycle))), along
     fresh = close(Loop.of(orbit.p, orbit.loop.x, orbit.period))
     if (fresh.loop.case, fresh.loop.fixed) == (orbit.loop.case, orbit.loop.fixed):

@@ -94,7 +94,7 @@ def _branch(m: Measurement) -> Case:
 
 def _reading(m: Measurement) -> float:
     case = _branch(m)
-    return next(float(s.x[2]) for s in lasting(m.parameters) if s.case is case)
+    return next(float(s.state.omega_c) for s in lasting(m.parameters) if s.case is case)
 
 
 def _on_floor(m: Measurement) -> bool:

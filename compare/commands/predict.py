@@ -43,10 +43,10 @@ def reading(p: Parameters, attractors: Sequence[StationarySolution]) -> str:
     cases = [solution.case for solution in attractors]
     if not cases:
         return "no stationary motion attracts the ball"
-    if all(math.isclose(s.x[2], p.omega_0, rel_tol=1e-12, abs_tol=1e-300) for s in attractors):
+    if all(math.isclose(s.state.omega_c, p.omega_0, rel_tol=1e-12, abs_tol=1e-300) for s in attractors):
         return f"the ball goes round with the fluid ({' or '.join(dict.fromkeys(c.name for c in cases))})"
     if len(set(cases) - {Case.SR, Case.NR}) == len(set(cases)) == 1:
-        lag = 1 - attractors[0].x[2] / p.omega_0
+        lag = 1 - attractors[0].state.omega_c / p.omega_0
         return f"the ball slips ({cases[0].name}) and lags {lag:.1%} behind the fluid"
     return f"ambiguous: {', '.join(c.name for c in cases)} all attract, the reading depends on the history"
 
@@ -126,11 +126,11 @@ _MEANING = {
 
 
 _ROWS: dict[str, Callable[[StationarySolution], str]] = {
-    "ω_c (rad/s)": lambda s: f"{s.x[2]:.8g}",
-    "ω̃_x (rad/s)": lambda s: f"{s.x[3]:.8g}",
-    "ω̃_y (rad/s)": lambda s: f"{s.x[4]:.8g}",
-    "ω̃_z (rad/s)": lambda s: f"{s.x[5]:.8g}",
-    "v_y (m/s)": lambda s: f"{s.x[1]:.6g}",
+    "ω_c (rad/s)": lambda s: f"{s.state.omega_c:.8g}",
+    "ω̃_x (rad/s)": lambda s: f"{s.state.slip_x:.8g}",
+    "ω̃_y (rad/s)": lambda s: f"{s.state.slip_y:.8g}",
+    "ω̃_z (rad/s)": lambda s: f"{s.state.slip_z:.8g}",
+    "v_y (m/s)": lambda s: f"{s.state.v_y:.6g}",
     "A_y (N)": lambda s: f"{s.force_A[1]:.6g}",
     "B_x (N)": lambda s: f"{s.force_B[0]:.6g}",
     "forces admissible": lambda s: "yes" if s.exists else "no",

@@ -73,5 +73,5 @@ def draw(curves: tuple[Curve, ...]) -> Figure:
 
 
 def _deviation(m: Measurement) -> float:
-    near = [float(abs(m.value / s.x[2] - 1)) for s in analytic.stable_solutions(m.parameters)]
+    near = [float(abs(m.value / s.state.omega_c - 1)) for s in analytic.stable_solutions(m.parameters)]
     return min(near, default=np.nan)

@@ -91,7 +91,7 @@ def fold_curve(axes: Axes, p: Parameters, fastest: float, arrows: bool = False) 
     style.guides(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in (1, 2, 4)})
     if arrows:
         slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
-        jumps = ((t.omega_04, float(fold_state(p)[2]), t.omega_04), (t.omega_02, t.omega_02, float(slow.x[2])))
+        jumps = ((t.omega_04, float(fold_state(p)[2]), t.omega_04), (t.omega_02, t.omega_02, float(slow.state.omega_c)))
         for x, begin, end in jumps:
             look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
             axes.annotate("", (x, end), (x, begin), arrowprops=look)

@@ -22,7 +22,7 @@ from compare.measure.settling import Start, high, settle
 from compare.measure.watched import ends_of_rolling
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, straight_line
-from model import Case, Parameters, Trajectory
+from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 
 NAME = "bounds"
@@ -150,7 +150,7 @@ def _around(line: Line, points: _Points | None) -> tuple[float, ...]:
     if not 0 < zero < (FAR * max(points.flows)) ** line.power:
         return ()
     _, x = line.at(points.flows[0])
-    start = float(x[2]) if line.power == 1 else 0.0
+    start = State.of(x).omega_c if line.power == 1 else 0.0
     return tuple(start + (zero ** (1 / line.power) - start) * factor for factor in AROUND)
 
 
@@ -176,7 +176,7 @@ def _result(
         yield Missing(NAME, line.set, f"growth of slip from {what}, changes too little with the flow")
         return
     p, x = line.at(line.first[0])
-    conditions = line.push(line.first[0]).conditions | {"by": line.by, "omega_c": float(x[2])}
+    conditions = line.push(line.first[0]).conditions | {"by": line.by, "omega_c": State.of(x).omega_c}
     square = "_square" if line.power == 2 else ""
     for what, value in zip((f"gamma_zero{square}", f"gamma_slope{square}"), (zero, slope), strict=True):
         if what.startswith("gamma_zero") and abs(value.value) > BEYOND * np.abs(q).max():

@@ -22,7 +22,7 @@ from compare.measure.record import Measurement, Missing, Records, measurement, s
 from compare.measure.settling import TAPER, Settled, Start, family, rotation_scale, settle
 from compare.runs.tasks import Task
 from compare.statistics import Measured, tail
-from model import Case, Parameters, Trajectory
+from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 
 PROTOCOL = "edge"
@@ -212,15 +212,12 @@ def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
 
 def _values(edge: Edge) -> dict[str, Measured]:
     """omega_c, the slips and the spin on the wall, each with its uncertainty; those of the slips are alike."""
-    x, roll, sure = edge.crossing, edge.p.R / edge.p.r, _sure(edge)
-    slips = float(max(sure[3:6].max(), roll * sure[2]))
-    spin = float(x[3] + roll * x[2])
+    x, sure, roll = State.of(edge.crossing), State.of(_sure(edge)), edge.p.R / edge.p.r
+    slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
     return {
-        "omega_c": Measured(float(x[2]), slips / roll),
-        "slip_x": Measured(float(x[3]), slips),
-        "slip_y": Measured(float(x[4]), slips),
-        "slip_z": Measured(float(x[5]), slips),
-        "wall_spin": Measured(spin, slips),
+        "omega_c": Measured(x.omega_c, slips / roll),
+        **{name: Measured(getattr(x, name), slips) for name in ("slip_x", "slip_y", "slip_z")},
+        "wall_spin": Measured(x.slip_x + roll * x.omega_c, slips),
     }
 
 

@@ -19,7 +19,7 @@ from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
-from model import Case, Contact, Parameters, Trajectory
+from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, slip_velocities
@@ -122,7 +122,7 @@ def _starts(p: Parameters, count: int, name: str) -> Iterator[tuple[Parameters, 
         for _ in range(count):
             x = random_state(case, p, rng)
             # Two contacts that both roll hold the ball against no more than a slight lag.
-            omega_0 = x[2] * rng.uniform(0.8, 1.2) if case is Case.RR else rng.uniform(0.3, 2.5) / unit
+            omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if case is Case.RR else rng.uniform(0.3, 2.5) / unit
             yield p.replace(omega_0=omega_0), x
 
 
@@ -157,9 +157,7 @@ def constrained(case: Case, x: Array, p: Parameters) -> Array:
     """The state (8,) with what the case holds at zero set to exactly that, of which a contact leaves some 1e-9."""
     held = [name in TRAITS[case].constraints for name in VARIABLES]
     x = np.where(held, 0.0, x)
-    if case is Case.RN:
-        x[5] = -x[7] / p.r
-    return x
+    return State.of(x)._replace(slip_z=-State.of(x).v_h / p.r).stacked() if case is Case.RN else x
 
 
 def _tasks(lab: Lab, p: Parameters, x: Array) -> list[Task]:

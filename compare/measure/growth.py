@@ -21,7 +21,7 @@ from compare.measure.quantities import quantity
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
-from model import Case, Parameters, Trajectory
+from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 
 NAME = "growth"
@@ -187,29 +187,29 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[Push]:
     rng = np.random.default_rng([SEED, *name.encode()])
     slow = 0.4 / time_unit(p) * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
     n = np.array(SIDEWAYS) / np.linalg.norm(SIDEWAYS)
-    x = np.array([0.0, 0.0, slow, 0.0, 0.0, 0.0, 0.0, 0.0])
+    x = State(omega_c=slow).stacked()
     yield Push(name, p.replace(omega_0=slow), Case.RR, Case.SS, x, n, "sideways")
     still = p.replace(omega_0=0.0)
     for side in (1, -1):
         yield Push(name, still, Case.RR, Case.RS, np.zeros(8), np.array([0.0, side, 0.0]), "rest")
-        x = random_state(Case.NR, p, rng)
-        x[1] = -SINKING * p.g / p.c
-        dragged = p.replace(omega_0=x[2] + p.g / (p.c * p.R))
-        yield Push(name, dragged, Case.NR, Case.NS, x, np.array([0.0, 0.8 * side, 0.6]), "dragged")
+        sinking = State.of(random_state(Case.NR, p, rng))._replace(v_y=-SINKING * p.g / p.c)
+        dragged = p.replace(omega_0=sinking.omega_c + p.g / (p.c * p.R))
+        yield Push(name, dragged, Case.NR, Case.NS, sinking.stacked(), np.array([0.0, 0.8 * side, 0.6]), "dragged")
     for (inner, outer), count in PUSHES.items():
         for _ in range(count * more):
-            x = random_state(inner, p, rng)
-            x[2] = _orbit(inner, outer, p, rng) or x[2]
-            slides = {Case.RS: 4, Case.SR: 3}.get(inner)
+            begin = State.of(random_state(inner, p, rng))
+            begin = begin._replace(omega_c=_orbit(inner, outer, p, rng) or begin.omega_c)
+            slides = {Case.RS: 1, Case.SR: 0}.get(inner)
             # A slip that is there already is so fast that a slower one beside it hardly turns it.
             if inner is Case.RS:
-                x[4] = rng.choice([-1, 1]) * rng.uniform(3.0, 5.0) * start_unit(p, x)
+                fast = rng.choice([-1, 1]) * rng.uniform(3.0, 5.0)
+                begin = begin._replace(slip_y=fast * start_unit(p, begin.stacked()))
             if inner is Case.SR:  # the faster the ball spins about its radial axis, the faster slip_z sets in
-                x[3] = -rng.uniform(2.0, 3.0) * p.R / p.r * x[2]
-            n = np.zeros(3)
-            free = [k for k in SLIPS[outer] if k + 3 != slides]
+                begin = begin._replace(slip_x=-rng.uniform(2.0, 3.0) * p.R / p.r * begin.omega_c)
+            n, x = np.zeros(3), begin.stacked()
+            free = [k for k in SLIPS[outer] if k != slides]
             n[free] = rng.choice([-1, 1], len(free)) * rng.uniform(0.4, 1.0, len(free))
-            omega_0 = float(x[2] * rng.uniform(0.6, 1.4))
+            omega_0 = float(begin.omega_c * rng.uniform(0.6, 1.4))
             for side in (1, -1) if len(free) == 1 else (1,):
                 yield Push(name, p.replace(omega_0=omega_0), inner, outer, x, side * n / np.linalg.norm(n))
 
@@ -226,4 +226,4 @@ def _orbit(inner: Case, outer: Case, p: Parameters, rng: np.random.Generator) ->
 
 def start_unit(p: Parameters, x: Array) -> float:
     """The slip that the weight, and at the wall the centrifugal force, makes in the unit of time, rad s-1."""
-    return (p.g + p.R * float(x[2]) ** 2) / 2 / p.r * time_unit(p)
+    return (p.g + p.R * float(State.of(x).omega_c) ** 2) / 2 / p.r * time_unit(p)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from compare.measure.field import constrained
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
-from model import Case, Parameters, Trajectory
+from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 
 NAME = "motions"
@@ -124,7 +124,7 @@ def _plain(run: Trajectory) -> npt.NDArray[np.bool_]:
 def _start(p: Parameters, Omega_0: float, state: tuple[float, ...]) -> tuple[Parameters, Array]:
     unit, speed = time_unit(p), math.sqrt(p.g * p.R)
     units = np.array([p.R, speed, 1 / unit, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
-    x = np.array(state) * units
-    if x[0] == x[1] == 0 and x[3] == 0 and x[6] > 0:
-        x[5] = -x[7] / p.r  # it rolls on the floor
-    return p.replace(omega_0=Omega_0 / unit), x
+    x = State.of(np.array(state) * units)
+    if x.y == x.v_y == x.slip_x == 0 and x.h > 0:  # it rolls on the floor
+        x = x._replace(slip_z=-x.v_h / p.r)
+    return p.replace(omega_0=Omega_0 / unit), x.stacked()

@@ -11,7 +11,7 @@ from compare.measure.lab import Lab, coarse_step
 from compare.measure.settling import Settled, family, high
 from compare.runs.tasks import Task
 from compare.statistics import settled_case, tail
-from model import Case, Contact, Parameters, Trajectory
+from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 
 From = Callable[[Parameters, float], Array]
@@ -45,7 +45,7 @@ def rider(states: Sequence[Settled], height: float) -> From:
     omegas = np.array([state.start.p.omega_0 for state in states])
     spins = [state.values["slip_x"].value for state in states]
     fit = np.polynomial.Polynomial.fit(omegas, spins, len(omegas) - 1)
-    return lambda p, omega: np.array([height, 0.0, omega, float(fit(omega)), 0.0, 0.0])
+    return lambda p, omega: State(y=height, omega_c=omega, slip_x=float(fit(omega))).stacked()
 
 
 def leaning(states: Sequence[Settled]) -> From:
@@ -53,9 +53,8 @@ def leaning(states: Sequence[Settled]) -> From:
     ride = rider(states, 0.0)
 
     def lean(p: Parameters, omega: float) -> Array:
-        x = ride(p, omega)
-        x[3] -= PRESSED * (x[3] + p.R / p.r * omega)
-        return x
+        x = State.of(ride(p, omega))
+        return x._replace(slip_x=x.slip_x - PRESSED * (x.slip_x + p.R / p.r * omega)).stacked()
 
     return lean
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+import model
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.measure.settled import SPIN
@@ -124,13 +125,11 @@ def settled(records: Records, name: str) -> Iterator[State]:
         values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
     for (p, case), value in values.items():
         if case in (Case.RR, Case.SS, Case.NR, Case.NS):
-            x = np.array([value.get(name, 0.0) for name in VARIABLES])
-            x[[0, 6, 7]] = high(p) if case.A.name == "N" else 0.0, 0.0, 0.0
-            yield State(name, p, case, x)
+            on_floor = model.State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
+            x = on_floor._replace(y=high(p)) if case.A is Contact.N else on_floor
+            yield State(name, p, case, x.stacked())
             if case is Case.NR:
-                x = x.copy()
-                x[0] = 0.0
-                yield State(name, p, Case.SR, x)
+                yield State(name, p, Case.SR, on_floor.stacked())
 
 
 def units(state: State) -> Array:
@@ -146,7 +145,7 @@ def _suits(state: State) -> bool:
     Too slowly: a push turns it round, or friction stops it within a few steps. Too fast: it hovers under its load.
     """
     p = state.p
-    loads = p.g, p.R * state.x[2] ** 2
+    loads = p.g, p.R * model.State.of(state.x).omega_c ** 2
     turned = math.sqrt(p.g * p.R) * max(SLOWEST, 2 * PUSH.get(state.case, 0.0))
     return all(
         max(turned, STOPPED * coarse_step(p) * friction * load) < speed

@@ -16,7 +16,7 @@ from compare.measure.lab import Lab, Level, time_unit
 from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import GROUPS, Settled, Start, family, high, scale, settle
 from compare.statistics import Measured
-from model import Parameters
+from model import Parameters, State
 from model.arrays import Array
 
 PROTOCOL = "settled"
@@ -122,8 +122,8 @@ def _key(each: Settled) -> tuple[str, float, int]:
 
 
 def _again(each: Settled) -> Start:
-    x0 = each.mean.copy()
-    x0[0] = max(each.start.x0[0], 0.0)
+    height = max(State.of(each.start.x0).y, 0.0)
+    x0 = State.of(each.mean)._replace(y=height).stacked()
     return Start(each.start.set, each.start.p, each.start.name, x0)
 
 

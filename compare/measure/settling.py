@@ -16,7 +16,7 @@ from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.quantities import quantity
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
-from model import Case, Contact, Parameters, Trajectory
+from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 
 SPAN = 40.0
@@ -158,10 +158,10 @@ def _task(lab: Lab, start: Start, refine: int, span: float) -> Task:
 
 
 def _onward(state: Settled) -> Start:
-    x0 = state.mean.copy()
+    x0 = State.of(state.mean)
     if state.case.A is Contact.N:
-        x0[0] = max(state.start.x0[0], 0.0)
-    return replace(state.start, x0=x0)
+        x0 = x0._replace(y=max(State.of(state.start.x0).y, 0.0))
+    return replace(state.start, x0=x0.stacked())
 
 
 def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:

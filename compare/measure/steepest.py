@@ -16,7 +16,7 @@ from compare.measure.growth import Push
 from compare.measure.lab import Lab, Level
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.statistics import Measured
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.arrays import Array
 
 NAME = "steepest"
@@ -53,7 +53,7 @@ def _fans(name: str, p: Parameters, count: int) -> Iterator[list[Push]]:
     for _ in range(count):
         x = random_state(Case.NR, p, rng)
         pull = rng.choice([-1, 1]) * rng.uniform(*DRAGGED)
-        q = p.replace(omega_0=x[2] + pull * p.g / (p.c * p.R))
+        q = p.replace(omega_0=State.of(x).omega_c + pull * p.g / (p.c * p.R))
         yield [Push(name, q, Case.NR, Case.NS, x, _along(beta)) for beta in _angles()]
 
 

@@ -21,7 +21,7 @@ from compare.measure.record import Condition, Measurement, Missing, Records, mea
 from compare.measure.settling import Settled, Start, family, high, settle
 from compare.runs.tasks import Task
 from compare.statistics import Measured, settled_case
-from model import Case, Parameters, Trajectory
+from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 
 PROTOCOL = "unloading"
@@ -90,15 +90,18 @@ def _limit(records: Records, name: str, quantities: Sequence[str]) -> float | No
 
 def _unloading(lab: Lab, state: Settled, landing: bool) -> Trial:
     p = state.start.p
-    x0 = np.array([HEIGHT * p.R, 0.0, *state.mean[2:4], 0.0, 0.0])
-    return _trial(lab, state, LANDING if landing else UNLOADED, p.replace(omega_0=p.omega_0 * BELOW / ABOVE), x0)
+    mean = State.of(state.mean)
+    x0 = State(y=HEIGHT * p.R, omega_c=mean.omega_c, slip_x=mean.slip_x)
+    return _trial(
+        lab, state, LANDING if landing else UNLOADED, p.replace(omega_0=p.omega_0 * BELOW / ABOVE), x0.stacked()
+    )
 
 
 def _push(lab: Lab, state: Settled, upwards: bool) -> Trial:
-    p, x = state.start.p, state.mean
+    p, x = state.start.p, State.of(state.mean)
     v_y = PUSH * math.sqrt(p.g * p.R) if upwards else 0.0
-    spin = 0.0 if upwards else PUSH * (x[3] + p.R / p.r * x[2])
-    x0 = np.array([0.0, v_y, x[2], x[3] + spin, 0.0, 0.0])
+    spin = 0.0 if upwards else PUSH * (x.slip_x + p.R / p.r * x.omega_c)
+    x0 = State(v_y=v_y, omega_c=x.omega_c, slip_x=x.slip_x + spin).stacked()
     return _trial(lab, state, UPWARDS if upwards else BY_SPIN, p, x0)
 
 

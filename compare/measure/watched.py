@@ -17,7 +17,7 @@ from compare.measure.record import Measurement, Missing, Records, measurement, s
 from compare.measure.settling import Start, family, high, settle
 from compare.runs.tasks import Task
 from compare.statistics import settled_case
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.arrays import Array
 
 NAME = "watched"
@@ -82,12 +82,11 @@ def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tupl
                 continue
             for factor, side in zip(SIDES, ("below", "above"), strict=True):
                 q = p.replace(omega_0=ends[name] * factor)
-                x = np.array([0.0, 0.0, q.omega_0, 0, 0, 0, 0, 0])
+                x = State(omega_c=q.omega_0)
                 if case is Case.NR:  # the spin about the radial axis is the same, whatever the orbit
-                    x[0], x[3] = HIGH * p.R, hanging[name] - p.R / p.r * q.omega_0
-                slights += [
-                    Slight(name, q, case, x, n, side, quantity) for n in directions(case, DIRECTIONS[lab.level])
-                ]
+                    x = x._replace(y=HIGH * p.R, slip_x=hanging[name] - p.R / p.r * q.omega_0)
+                along = directions(case, DIRECTIONS[lab.level])
+                slights += [Slight(name, q, case, x.stacked(), n, side, quantity) for n in along]
     return slights, missing
 
 

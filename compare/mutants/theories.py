@@ -19,7 +19,7 @@ from compare.mutants.exchange import (
     swapped,
     times,
 )
-from model import Case, Parameters
+from model import Case, Parameters, State
 
 
 def _gone(solution: Any) -> None:
@@ -35,7 +35,7 @@ def _without_drag_on_y(right: Function) -> Function:
 
     def function(case: Case, x: Any, f: Any, p: Parameters, omega_0: Any) -> Any:
         rate = right(case, x, f, p, omega_0)
-        return rate._replace(v_y=rate.v_y + p.c * x[1]) if case.A.name == "N" else rate
+        return rate._replace(v_y=rate.v_y + p.c * State(*x).v_y) if case.A.name == "N" else rate
 
     return function
 

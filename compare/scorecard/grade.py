@@ -122,7 +122,7 @@ def _onset(contender: Contender) -> float:
     states = [State(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in ONSET]
     runs = [_settled(contender, state) for state in states]
     slips = [float(run.slip_z.mean()) if run.complete else math.nan for run in runs]
-    if not all(abs(slip / s.solution.x[5] - 1) < 0.5 for slip, s in zip(slips, states, strict=True)):
+    if not all(abs(slip / s.solution.state.slip_z - 1) < 0.5 for slip, s in zip(slips, states, strict=True)):
         return math.nan
     # omega_0 as a function of slip, at no slip.
     return float(np.polynomial.Polynomial.fit(slips, ONSET, 2)(0.0)) - 1
