@@ -67,7 +67,7 @@ def _held(campaign: Campaign, states: Sequence[State], tasks: Sequence[Task]) ->
 
 def _relative_slip(held: Held, state: State) -> float:
     """Error of slip in units of the ball's orbital speed."""
-    return held.slip / abs(state.solution.state.omega_c * state.p.R)
+    return held.slip / (float(abs(state.solution.state.omega_c)) * state.p.R)
 
 
 def reached(campaign: Campaign, states: Sequence[State] = REACHED, steps: Sequence[float] = STEPS) -> Rows:
