@@ -16,7 +16,8 @@ from mjsim import corrections as source
 from mjsim.corrections import Ball, Velocity
 from model.arrays import Array
 
-register_jitable(source.slip)  # corrections calls it
+for called in (source.slip, source.resistance):  # by corrections
+    register_jitable(called)
 _corrections, _followed = numba.njit(cache=True)(source.corrections), numba.njit(cache=True)(source.followed)
 _BALL, _VELOCITY = len(Ball._fields), len(Velocity._fields)
 _ROWS = types.Array(types.float64, 2, "A")

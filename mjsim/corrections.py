@@ -9,11 +9,13 @@ Every quantity is a float for one run and an array with an entry for each run of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from mjsim.contact_settings import ContactSettings
 from model import Parameters
+from model.drag import SCHILLER_NAUMANN, STOKES
 
 Quantity = Any
 """A float, or an array with an entry for each run."""
@@ -29,6 +31,14 @@ class Ball(NamedTuple):
     r: Quantity
     drag: Quantity
     """m c, kg s-1."""
+    Re: Quantity
+    """2 r/nu_f, Reynolds number per speed, s m-1; 0 with Stokes' drag."""
+    creeping: Quantity
+    """Three terms of C_D Re/24: 1, or 0 with quadratic drag;"""
+    wake: Quantity
+    """what Re^0.687 is multiplied by, 0.15 by Schiller and Naumann;"""
+    blunt: Quantity
+    """what Re is multiplied by once that is more, C_D/24."""
     mass_ahead: Quantity
     """m times `ahead`, kg."""
     inertia_ahead: Quantity
@@ -45,9 +55,11 @@ class Ball(NamedTuple):
     @classmethod
     def of(cls, p: Parameters, settings: ContactSettings) -> Ball:
         """The values of one run."""
-        ahead = settings.midpoint
+        ahead, Re = settings.midpoint, 2 * p.r / (p.nu_f or math.inf)
+        laws = {STOKES: (0.0, 1.0, 0.0, 0.0), SCHILLER_NAUMANN: (Re, 1.0, 0.15, 0.44 / 24)}
+        law = laws.get(p.drag, (Re, 0.0, 0.0, p.C_D / 24))
         return cls(
-            p.R, p.r, p.m * p.c, p.m * ahead, p.j * p.m * p.r**2 * ahead,
+            p.R, p.r, p.m * p.c, *law, p.m * ahead, p.j * p.m * p.r**2 * ahead,
             settings.memory_gain(p.m), ahead, settings.friction_lag, settings.servo_gain,
         )  # fmt: skip
 
@@ -68,6 +80,13 @@ def slip(v: Velocity, rho: Quantity, r: Quantity) -> tuple[Quantity, ...]:
     omega_c, v_h, v_y, o_x, o_y, o_z = v
     along, roll = rho * omega_c, r * o_z
     return v_h + roll, along - r * o_x, v_y - roll, along + r * (o_y + omega_c)
+
+
+def resistance(w_z: Quantity, w_h: Quantity, w_y: Quantity, ball: Ball) -> Quantity:
+    """Drag over the speed of a centre that moves with w relative to the fluid, m c C_D Re/24, kg s-1."""
+    Re = ball.Re * (w_z * w_z + w_h * w_h + w_y * w_y) ** 0.5
+    flowing, blunt = ball.creeping + ball.wake * Re**0.687, ball.blunt * Re
+    return ball.drag * (flowing + (blunt - flowing) * (blunt > flowing))
 
 
 def corrections(
@@ -94,9 +113,9 @@ def corrections(
     )  # fmt: skip
 
     # Drag (9) at mid step: -m c (v - v_fluid). Of the last step's change as much again lies `ahead` till then.
-    drag_z = -ball.drag * rho * (v.omega_c + ahead * change.omega_c - omega_0)
-    drag_h = -ball.drag * (v.v_h + ahead * change.v_h)
-    drag_y = -ball.drag * (v.v_y + ahead * change.v_y)
+    lag, w_h, w_y = v.omega_c + ahead * change.omega_c - omega_0, v.v_h + ahead * change.v_h, v.v_y + ahead * change.v_y
+    mc = resistance(rho * lag, w_h, w_y, ball)
+    drag_z, drag_h, drag_y = -mc * rho * lag, -mc * w_h, -mc * w_y
 
     # Inertial forces at mid step. In the co-rotating frame they are 2 m omega_c v_h along the orbit and
     # -m rho omega_c^2 inwards, and I omega_c (-o_z, 0, o_x) on the spin. The engine has them with the velocities of the

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import followed
+from mjsim.corrections import Ball, followed, resistance
 from mjsim.stepping import Stepper
 from model import Parameters
 from model.arrays import Array
@@ -71,7 +71,7 @@ class _Ball:
     def __init__(self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float) -> None:
         self.model = copy.copy(model)  # its margins move
         self.data = mujoco.MjData(self.model)
-        self._p, self._settings, self.theta = p, settings, theta_0
+        self._p, self._settings, self._ball, self.theta = p, settings, Ball.of(p, settings), theta_0
         start = to_world(x, theta_0, p)
         self.data.qpos[:] = [*start.position, 1.0, 0.0, 0.0, 0.0]
         self.data.qvel[:] = [*start.velocity, *start.spin]
@@ -80,10 +80,12 @@ class _Ball:
 
     def step(self, omega_0: float) -> None:
         """Take a step."""
-        data, p, mc, gain = self.data, self._p, self._p.m * self._p.c, self._settings.servo_gain
+        data, p, gain = self.data, self._p, self._settings.servo_gain
         x, y, z, *_ = data.qpos.tolist()
         v_x, v_y, v_z, *_ = data.qvel.tolist()
-        data.qfrc_applied[:3] = -mc * (v_x + omega_0 * y), -mc * (v_y - omega_0 * x), -mc * v_z  # (9)
+        w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
+        mc = resistance(w_x, w_y, v_z, self._ball)
+        data.qfrc_applied[:3] = -mc * w_x, -mc * w_y, -mc * v_z  # (9)
         self._unwrap(math.atan2(y, x))
         if self._turns:
             data.mocap_quat[0] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))

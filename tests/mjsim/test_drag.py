@@ -1,0 +1,83 @@
+"""MuJoCo under each law of drag: the force itself, known motions, and the event-driven simulation beside it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import analytic
+import mjsim
+from analytic import drag
+from mjsim import ContactSettings, limits
+from mjsim.corrections import Ball, resistance
+from model import Case, Flow, InputError
+from model.drag import LAWS
+from tests import drag_laws
+from tests.drag_laws import BY_LAW
+
+SLIPPING = [0, 0, 13.0, -20.0, -5.0, 22.0]
+OTHERS = LAWS[1:]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_force_is_that_of_the_law_and_of_theory(law):
+    p = BY_LAW[law]
+    ball = Ball.of(p, ContactSettings.at(1e-3))
+    w = np.random.default_rng(3).normal(size=(3, 200)) * 10.0 ** np.linspace(-7, 1, 200)
+    speeds = np.linalg.norm(w, axis=0)
+    assert np.ptp(np.log10(2 * p.r * speeds / p.nu_f)) > 7
+    force = resistance(*w, ball)
+    np.testing.assert_allclose(force, p.m * drag_laws.resistance(speeds, p), rtol=1e-13)
+    np.testing.assert_allclose(force, p.m * drag.coefficient(speeds, p), rtol=1e-13)
+    assert [resistance(*one, ball) for one in w.T.tolist()] == pytest.approx(force.tolist(), rel=1e-14)
+
+
+@pytest.mark.parametrize("law", OTHERS)
+@pytest.mark.parametrize("changes", [{}, {"coordinates": "free", "memory": False, "order": 1}])
+def test_a_fall_ends_at_the_terminal_speed(law, changes):
+    p = BY_LAW[law].replace(omega_0=0.0, c=1.0, nu_f=1e-4)
+    settings = ContactSettings.at(1e-3, **changes)
+    run = mjsim.simulate(p, [50.0, 0, 0, 0, 0, 0, p.R / 2, 0], 4.0, settings=settings, sample_interval=0.1)
+    assert set(run.cases) == {Case.NN}
+    speed = -run.v_y[-1]
+    # What is left decays at twice g/v or faster; the round-off of a height of 50 m over a step limits v_y.
+    assert float(drag_laws.resistance(speed, p)) * speed == pytest.approx(p.g, rel=1e-8)
+
+
+@pytest.mark.parametrize("law", OTHERS)
+def test_slipping_converges_with_the_square_of_the_step(law):
+    """Each variable's error against the event-driven simulation is less than a quarter at half the step."""
+    p = BY_LAW[law].replace(mu=0.15, eta=0.15, omega_0=20.0)
+    exact = analytic.simulate(p, SLIPPING, 0.08, rtol=1e-12).x[-1]
+    coarse, fine = (
+        mjsim.simulate(p, SLIPPING, 0.08, settings=ContactSettings.for_problem(p, h), sample_interval=0.02).x[-1]
+        - exact
+        for h in (2e-4, 1e-4)
+    )
+    assert np.all(np.abs(coarse[2:6]) > 1e-7)
+    assert np.all(np.abs(fine[2:6]) < np.abs(coarse[2:6]) / 3.8)
+
+
+@pytest.mark.parametrize("law", OTHERS)
+def test_stationary_slipping_is_the_same_for_all_simulators(law):
+    p = BY_LAW[law].replace(mu=0.15, eta=0.15, omega_0=20.0)
+    runs = [
+        analytic.simulate(p, SLIPPING, 40.0, sample_interval=40.0),
+        analytic.simulate(p, SLIPPING, 40.0, method="time-stepping", sample_interval=40.0),
+        mjsim.simulate(p, SLIPPING, 40.0, settings=ContactSettings.for_problem(p, 5e-4), sample_interval=40.0),
+    ]
+    omega_c = [run.omega_c[-1] for run in runs]
+    assert {run.cases[-1] for run in runs} == {Case.SS}
+    assert np.ptp(omega_c) <= 1e-9 * omega_c[0]
+    assert omega_c[0] < 0.9 * p.omega_0
+
+
+def test_a_step_too_long_for_the_drag_is_refused():
+    p = BY_LAW["quadratic"].replace(omega_0=1.0, c=5.0)
+    stiff = 2 * float(drag_laws.resistance(p.R * p.omega_0, p))
+    with pytest.raises(InputError, match=r"must be <= .* half of 1/\(2 c\(R omega_0\)\)"):
+        limits.check_timestep(ContactSettings.at(0.51 / stiff), p, Flow.steady(1.0), 1.0)
+    limits.check_timestep(ContactSettings.at(0.49 / stiff), p, Flow.steady(1.0), 1.0)
+    assert math.isfinite(stiff)
