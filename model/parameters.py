@@ -118,13 +118,13 @@ class Parameters:
     c: float = _quantity("c", "s-1", "viscous drag coefficient over mass", NOT_NEGATIVE)
     omega_0: float = _quantity("ω₀", "rad s-1", "angular velocity of the fluid", ANY)
     nu_f: float = _quantity(
-        "ν_f", "m2 s-1", "kinematic viscosity of the fluid, 0 if not known", NOT_NEGATIVE, default=0.0
+        "ν_f", "m2 s-1", "kinematic viscosity of the fluid (0: not known)", NOT_NEGATIVE, default=0.0
     )
     C_D: float = _quantity("C_D", "1", "drag coefficient of the quadratic law", POSITIVE, default=0.44)
     density_ratio: float = _quantity(
         "ρ_f/ρ_b",
         "1",
-        "density of the fluid over that of the ball, 0 if not known",
+        "density of the fluid over that of the ball (0: not known; from 1 on it floats)",
         Range(0.0, 1.0, below=True),
         default=0.0,
     )

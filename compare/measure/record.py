@@ -202,6 +202,6 @@ def _rows(columns: Mapping[str, Sequence[Any]]) -> Iterator[Measurement]:
         yield Measurement(
             **{name: columns[name][k] for name in _OWN if name not in ("unit", "runs")},
             runs=tuple(columns["runs"][k].split()),
-            parameters=Parameters(**{name: columns[name][k] for name in _PARAMETERS}),
+            parameters=Parameters(**{name: columns[name][k] for name in _PARAMETERS if name in columns}),
             conditions={name: value for name, value in conditions.items() if value != "" and value == value},
         )

@@ -98,6 +98,7 @@ def _described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
         "engines": sorted({text.decode() for text in columns["engine"]}),
         "cases": {Case(code).name: int(count) for code, count in zip(codes, counts, strict=True) if code >= 0},
         "failures": failures,
+        "drag": sorted({text.decode() for text in columns.get("drag", ())}),
         "varied": _varied(columns),
         "ranges": {name: [float(v.min()), float(v.max())] for name, v in finite.items() if len(v)},
     }
@@ -105,7 +106,8 @@ def _described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
 
 def _varied(columns: Mapping[str, Iterable[Any]]) -> list[str]:
     """Names of the parameters that are not the same in all runs."""
-    return [f.name for f in dataclasses.fields(Parameters) if len(set(columns[f.name])) > 1]
+    names = [f.name for f in dataclasses.fields(Parameters) if f.name in columns]  # older files have no law of drag
+    return [name for name in names if len(set(columns[name])) > 1]
 
 
 def table(about: dict[str, Any]) -> Table:
@@ -113,9 +115,9 @@ def table(about: dict[str, Any]) -> Table:
     rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     rows.add_row("[bold]runs", f"{about['runs']} ({', '.join(about['engines'])}), {len(about['failures'])} failed")
     rows.add_row("[bold]cases", ", ".join(f"{name}: {count}" for name, count in about["cases"].items()))
-    rows.add_row(
-        "[bold]varied", "\n".join(f"{n} {about['ranges'][n][0]:g} … {about['ranges'][n][1]:g}" for n in about["varied"])
-    )
+    varied = (f"{n} {about['ranges'][n][0]:g} … {about['ranges'][n][1]:g}" for n in about["varied"] if n != "drag")
+    rows.add_row("[bold]varied", "\n".join(varied))
+    rows.add_row("[bold]drag", ", ".join(about["drag"]))
     rows.add_row("[bold]omega_c", "{:.9g} … {:.9g} rad s-1".format(*about["ranges"].get("omega_c", [np.nan, np.nan])))
     return rows
 

@@ -14,6 +14,7 @@ from compare.runs import collection
 from compare.runs.campaign import Campaign
 from compare.runs.tasks import Task
 from model import Parameters, StorageError
+from model.files import dataset, reading
 
 P = Parameters.named("reference")
 OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
@@ -47,6 +48,19 @@ def test_varied_parameters_are_coordinates(grid: Path, tmp_path: Path) -> None:
         assert np.isfinite(table).all()
         assert set(data.mu.values) == {P.mu}
     assert collection.describe(tmp_path / "all.h5")["varied"] == ["eta", "omega_0"]
+
+
+def test_the_law_of_drag_is_kept(tmp_path: Path) -> None:
+    sets = [P, P.replace(drag="quadratic", nu_f=1e-6)]
+    with Campaign(tmp_path / "runs", workers=0) as campaign:
+        assert not campaign.complete(Task(engine="event", parameters=p, x0=(0.0,) * 8, t_end=0.1) for p in sets)
+    collection.collect(tmp_path / "runs", tmp_path / "all.h5")
+    about = collection.describe(tmp_path / "all.h5")
+    assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
+    assert collection.table(about).row_count == 5
+    with reading(tmp_path / "all.h5") as file:
+        older = {name: dataset(file, name)[...] for name in file if name != "drag"}
+    assert collection._described(older)["varied"] == ["nu_f"]
 
 
 def test_a_single_run_varies_nothing(runs: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import h5py
@@ -14,6 +15,7 @@ from compare.measure.record import Measurement, Missing, Records
 from model import InputError, Parameters, StorageError
 
 P = Parameters.named("reference")
+BLUNT = P.replace(drag="quadratic", nu_f=1e-6, C_D=0.5, density_ratio=0.125)
 
 
 def measurement(quantity: str = "omega_c", value: float = 11.9, **conditions: record.Condition) -> Measurement:
@@ -42,7 +44,16 @@ RECORDS = Records(
 
 
 def test_a_file_gives_back_what_was_saved(tmp_path: Path) -> None:
-    record.save(RECORDS, tmp_path / "settled.h5", {"level": "QUICK"})
+    other = dataclasses.replace(RECORDS.measurements[0], parameters=BLUNT)
+    records = dataclasses.replace(RECORDS, measurements=(*RECORDS.measurements, other))
+    record.save(records, tmp_path / "settled.h5", {"level": "QUICK"})
+    assert record.load(tmp_path / "settled.h5") == records
+
+
+def test_files_without_the_law_of_drag_are_stokes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as older:
+        older.setattr(record, "_PARAMETERS", ("m", "r", "R", "j", "mu", "eta", "g", "c", "omega_0"))
+        record.save(RECORDS, tmp_path / "settled.h5", {})
     assert record.load(tmp_path / "settled.h5") == RECORDS
 
 

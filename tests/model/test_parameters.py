@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from model import InputError, Parameters, StorageError
+from model.drag import LAWS
 from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, Range, check_number, parse_number
 
 FIELDS = [f.name for f in Parameters.quantities()]
@@ -23,6 +24,10 @@ valid = st.builds(
     g=positive,
     c=st.floats(0, 1e3),
     omega_0=st.floats(-1e6, 1e6),
+    nu_f=st.floats(1e-9, 1e3),
+    C_D=st.floats(1e-3, 1e3),
+    density_ratio=st.floats(0, 0.999),
+    drag=st.sampled_from(LAWS),
 )
 
 
@@ -43,6 +48,32 @@ def test_the_reference_sets_are_those_of_the_study() -> None:
 def test_steel_in_water_has_the_drag_the_paper_names() -> None:
     # After (10): for a steel ball of some millimetres in water c is of the order of 1e-2 1/s.
     assert 1e-2 <= Parameters.named("steel-in-water").c < 1e-1
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_of_drag_beside_a_fluid(tmp_path: Path, law: str) -> None:
+    (tmp_path / "p.toml").write_text(
+        f'r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\ndrag = "{law}"\n[fluid]\nnu_f = 1e-6\nrho_f = 1.0\nrho_b = 4.0'
+    )
+    p = Parameters.load(tmp_path / "p.toml")
+    assert (p.drag, p.nu_f, p.density_ratio, p.C_D) == (law, 1e-6, 0.25, 0.44)
+    p.save(tmp_path / "again.toml")
+    assert Parameters.load(tmp_path / "again.toml") == p
+
+
+def test_a_file_without_a_law_of_drag_is_stokes(reference: Parameters) -> None:
+    names = ("m", "r", "R", "j", "mu", "eta", "g", "c", "omega_0")
+    assert Parameters.from_mapping({name: getattr(reference, name) for name in names}) == reference
+
+
+def test_a_law_needs_the_viscosity_and_a_ball_must_sink(reference: Parameters) -> None:
+    for law in LAWS[1:]:
+        with pytest.raises(InputError, match=f"^drag = '{law}' needs the Reynolds number: nu_f in m2 s-1 "):
+            reference.replace(drag=law)
+    with pytest.raises(InputError, match=r"^drag = 'quadratics' must be one of .* \(did you mean 'quadratic'\?\)$"):
+        reference.replace(drag="quadratics")
+    with pytest.raises(InputError, match=r"^density_ratio = 1\.5 .* floats"):
+        reference.replace(density_ratio=1.5)
 
 
 def test_drag_and_gravity_follow_from_the_fluid() -> None:

@@ -21,7 +21,7 @@ def make(n: int = 50, events: int = 2, failure: str = "") -> Trajectory:
         samples[name] = rng.normal(size=samples[name].shape) if name != "case" else rng.integers(0, 9, n)
     header = Header(
         engine="event",
-        parameters=Parameters.named("reference"),
+        parameters=Parameters.named("steel-in-water").replace(drag="quadratic", C_D=0.5),
         flow=Flow.ramp(10, 20, 3),
         settings={"rtol": 1e-9, "method": "event"},
         mjcf="<mujoco/>",
@@ -67,7 +67,7 @@ def test_xarray_opens_it_with_axes_units_and_cases(tmp_path: Path) -> None:
         assert all({"units", "long_name"} <= set(data[name].attrs) for name in columns(Trajectory))
         names = data.case.flag_meanings.split()
         assert [names[code] for code in data.case.values] == [case.name for case in trajectory.cases]
-        assert json.loads(data.parameters)["R"] == 0.05
+        assert json.loads(data.parameters) == dataclasses.asdict(trajectory.header.parameters)
 
 
 @pytest.mark.parametrize(("n", "events", "failure"), [(50, 2, ""), (0, 0, "diverged"), (1, 0, "")])
