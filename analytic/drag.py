@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import roots
-from model import Parameters
+from model import Parameters, State
 from model.arrays import Array, Real
-from model.drag import SCHILLER_NAUMANN, STOKES
+from model.drag import REYNOLDS, SCHILLER_NAUMANN, STOKES
 
 EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
 """Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
@@ -90,3 +90,14 @@ def speed_of(acceleration: npt.ArrayLike, p: Parameters) -> Array:
 def reynolds(speed: Real, p: Parameters) -> Real:
     """Reynolds number 2 r |w|/nu_f; nan if the viscosity isn't known."""
     return 2 * p.r / p.nu_f * speed if p.nu_f else math.nan * speed
+
+
+def reynolds_of(x: State, p: Parameters) -> float:
+    """Reynolds number of a ball in a state x in the flow p.omega_0; nan if the viscosity isn't known."""
+    return float(reynolds(speed(x.v_h, x.v_y, (p.R - x.h) * (x.omega_c - p.omega_0)), p))
+
+
+def covers(Re: float, law: str) -> bool:
+    """Whether a law is meant for a Reynolds number; no law has anything to say where the ball goes with the fluid."""
+    low, high = REYNOLDS[law]
+    return Re == 0 or low <= Re <= high

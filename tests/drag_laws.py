@@ -9,7 +9,7 @@ from model import Parameters
 from model.arrays import Array
 from model.drag import LAWS
 
-BALL = Parameters.named("steel-in-water")
+BALL = Parameters.named("steel-in-water").replace(drag="stokes")
 BY_LAW = {law: BALL.replace(drag=law, C_D=0.6) for law in LAWS}
 """A ball in water at up to Re = 1e5 by each law."""
 

@@ -13,10 +13,11 @@ from rich.console import Console
 from rich.table import Table
 
 import analytic
-from analytic import StationarySolution
+from analytic import StationarySolution, drag, fluid_inertia
 from compare.commands import options
 from compare.statistics import plain
 from model import Case, Parameters
+from model.drag import REYNOLDS, SCHILLER_NAUMANN
 from model.kinematics import UNITS, VARIABLES
 
 
@@ -62,13 +63,17 @@ def described(p: Parameters) -> dict[str, Any]:
         "operating_range_ends": {"by": limit.end.name, "because": limit.end.value},
         "reading_range": analytic.reading_range(p),
         "reading": reading(p, analytic.stable_solutions(p)),
-        "solutions": [_solution(solution) for solution in analytic.stationary_solutions(p)],
+        "fluid_inertia": fluid_inertia.shifts(p) if p.density_ratio else None,
+        "solutions": [_solution(solution, p) for solution in analytic.stationary_solutions(p)],
     }
 
 
-def _solution(s: StationarySolution) -> dict[str, Any]:
+def _solution(s: StationarySolution, p: Parameters) -> dict[str, Any]:
+    Re = drag.reynolds_of(s.state, p)
     return {
         "case": s.case.name,
+        "Re": Re,
+        "drag_law_covers_Re": drag.covers(Re, p.drag) if p.nu_f else None,
         "x": dict(zip(VARIABLES, map(float, s.x), strict=True)),
         "units": dict(zip(VARIABLES, UNITS, strict=True)),
         "force_A": s.force_A.tolist(),
@@ -89,6 +94,7 @@ def tables(p: Parameters) -> list[Table | str]:
         meta = field.metadata
         unit = "" if meta["unit"] == "1" else meta["unit"]
         head.add_row(meta["symbol"], f"{getattr(p, field.name):.8g} {unit}", f"[dim]{meta['meaning']}")
+    head.add_row("drag", p.drag, "[dim]law of drag")
     thresholds, limits = analytic.thresholds(p), Table("", title="Thresholds", **look)
     limits.add_column("value", justify="right")
     limits.add_column("what happens there")
@@ -101,9 +107,33 @@ def tables(p: Parameters) -> list[Table | str]:
         shown.add_column(s.case.name, justify="right", style="" if s.exists and s.case in attracting else "dim")
     for label, show in _ROWS.items():
         shown.add_row(label, *map(show, solutions))
+    if p.nu_f:
+        shown.add_row("Re", *(f"{drag.reynolds_of(s.state, p):.4g}" for s in solutions))
     groups = f"[dim]κ = c√(R/g) = {p.kappa:.6g}, Ω₀ = ω₀√(R/g) = {p.Omega_0:.6g}"
     meter = f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {reading(p, attractors)}; {reach(p)}."
-    return [head, groups, limits, shown, meter]
+    return [head, groups, limits, shown, meter, *_inertia(p), *_warnings(solutions, p)]
+
+
+def _inertia(p: Parameters) -> list[str]:
+    """What the fluid's inertia would change, if its density is known."""
+    if not p.density_ratio:
+        return []
+    by = fluid_inertia.shifts(p)
+    names = {name: _SYMBOLS.get(name, "the rate at which rolling follows the flow") for name in by}
+    shifts = ", ".join(f"{names[name]} by {100 * shift:+.2g} %" for name, shift in by.items() if math.isfinite(shift))
+    return [f"Left out is the fluid's inertia (added mass, pressure gradient): it would shift {shifts}; not ω₀₃."]
+
+
+def _warnings(solutions: Sequence[StationarySolution], p: Parameters) -> list[str]:
+    """Admissible solutions with a Reynolds number for which the law of drag isn't meant."""
+    numbers = {s.case.name: drag.reynolds_of(s.state, p) for s in solutions if s.exists and p.nu_f}
+    outside = {case: Re for case, Re in numbers.items() if not drag.covers(Re, p.drag)}
+    if not outside:
+        return []
+    (low, high), (_, most) = REYNOLDS[p.drag], REYNOLDS[SCHILLER_NAUMANN]
+    seen = ", ".join(f"{Re:.3g} in {case}" for case, Re in outside.items())
+    hint = f" (--drag {SCHILLER_NAUMANN}: up to {most:g})" if p.drag != SCHILLER_NAUMANN else ""
+    return [f"[yellow]Warning: Re = {seen}, but the law {p.drag!r} is meant for {low:g} to {high:g}{hint}."]
 
 
 def reach(p: Parameters) -> str:

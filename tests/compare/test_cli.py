@@ -59,6 +59,34 @@ def test_predict_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert {s["case"] for s in printed["solutions"]} >= {"RR", "NS"}
 
 
+@pytest.mark.parametrize(("law", "covered"), [("stokes", False), ("schiller-naumann", True)])
+def test_predict_says_where_a_law_of_drag_ends(capsys: pytest.CaptureFixture[str], law: str, covered: bool) -> None:
+    options = ["predict", "--set", "steel-in-water", "--omega-0", "20", "--drag", law]
+    assert cli.main([*options, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    p, solutions = printed["parameters"], {s["case"]: s for s in printed["solutions"]}
+    lag, sinking = (solutions[case]["x"][name] for case, name in (("SS", "omega_c"), ("NS", "v_y")))
+    assert solutions["SS"]["Re"] == pytest.approx(2 * p["r"] * p["R"] * (20.0 - lag) / p["nu_f"], rel=1e-12)
+    assert solutions["NS"]["Re"] == pytest.approx(2 * p["r"] * -sinking / p["nu_f"], rel=1e-12)
+    assert [s["drag_law_covers_Re"] for s in solutions.values()] == [
+        s["Re"] == 0 or covered for s in solutions.values()
+    ]
+    assert {case for case, s in solutions.items() if s["Re"] == 0} == {"RR", "SR", "NR"}
+    assert cli.main(options) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert ("Warning: Re = 518 in SS, " in shown) is not covered
+    assert "the fluid's inertia (added mass, pressure gradient): it would shift ω₀₁ by -3.8 %, ω₀₂ by +7 %" in shown
+
+
+def test_predict_without_a_fluid_knows_no_reynolds_number(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["predict", "--omega-0", "25"]) == 0
+    assert "Re " not in capsys.readouterr().out
+    assert cli.main(["predict", "--omega-0", "25", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["fluid_inertia"] is None
+    assert {(s["Re"], s["drag_law_covers_Re"]) for s in printed["solutions"]} == {(None, None)}
+
+
 def test_simulate_inspect_and_xarray(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = tmp_path / "run.h5"
     argv = ["simulate", "--omega-0", "25", "--start", "omega_c=13.8", "--time", "0.5", "-o", str(run), "--json"]

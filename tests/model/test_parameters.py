@@ -31,9 +31,8 @@ valid = st.builds(
 )
 
 
-@pytest.mark.parametrize("name", ["reference", "high-wall-friction", "steel-in-water", "air"])
+@pytest.mark.parametrize("name", Parameters.names())
 def test_every_named_set_loads(name: str) -> None:
-    assert name in Parameters.names()
     assert Parameters.named(name).m > 0
 
 
