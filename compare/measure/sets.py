@@ -1,6 +1,7 @@
 """The parameter sets that are measured: a few chosen by hand, and a design that fills the space of the five groups.
 
-Floor and wall differ in friction, either way; the wall's is below and above the inertia j; drag is weak and strong.
+Floor and wall differ in friction, either way; the wall's is below and above the inertia j; drag is weak and strong,
+and with two sets of another law than Stokes', at Reynolds numbers of hundreds.
 A protocol chooses omega_0 by itself; the one of a set counts for nothing.
 """
 
@@ -13,6 +14,7 @@ from scipy.stats import qmc
 
 from compare.measure.lab import Level
 from model import Parameters
+from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 
 COUNT = {Level.DEFAULT: 24, Level.FULL: 96}
 SEED = 20161
@@ -25,15 +27,20 @@ _CHOSEN = {
     "rough-wall": {"m": 0.05, "r": 0.015, "R": 0.05, "j": 0.55, "mu": 0.15, "eta": 0.35, "g": 8.0, "c": 1.5},
     "thick-fluid": {"m": 0.03, "r": 0.008, "R": 0.04, "j": 0.45, "mu": 0.25, "eta": 0.1, "g": 9.0, "c": 5.0},
     "heavy-core": {"m": 0.01, "r": 0.02, "R": 0.07, "j": 0.25, "mu": 0.7, "eta": 0.5, "g": 9.5, "c": 2.5},
+    "wake": {"m": 0.02, "r": 0.012, "R": 0.055, "j": 0.45, "mu": 0.6, "eta": 0.25, "g": 9.0, "c": 0.7, "nu_f": 5e-5},
+    "blunt": {"m": 0.03, "r": 0.01, "R": 0.05, "j": 0.4, "mu": 0.5, "eta": 0.2, "g": 8.5, "c": 1.2, "nu_f": 4e-5},
     "rubber-wall": {"m": 0.04, "r": 0.01, "R": 0.055, "j": 0.35, "mu": 0.3, "eta": 0.8, "g": 7.0, "c": 3.0},
 }
+_DRAG = {"wake": SCHILLER_NAUMANN, "blunt": QUADRATIC}
+"""The laws of those that have another than Stokes'."""
 
 
 def sets(level: Level) -> dict[str, Parameters]:
     """The sets of a level by name."""
     named = {name: Parameters.named(name) for name in ("reference", "high-wall-friction")}
-    chosen = {name: Parameters.from_mapping(values | {"omega_0": 1.0}) for name, values in _CHOSEN.items()}
-    return named | chosen | (_design(COUNT[level] - 7) if level > Level.QUICK else {})
+    chosen = {name: Parameters(**values, omega_0=1.0, drag=_DRAG.get(name, STOKES)) for name, values in _CHOSEN.items()}
+    by_hand = named | chosen
+    return by_hand | (_design(COUNT[level] - len(by_hand)) if level > Level.QUICK else {})
 
 
 def _design(count: int) -> dict[str, Parameters]:

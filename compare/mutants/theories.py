@@ -20,6 +20,7 @@ from compare.mutants.exchange import (
     times,
 )
 from model import Case, Parameters, State
+from model.drag import STOKES
 
 
 def _gone(solution: Any) -> None:
@@ -68,6 +69,11 @@ def _fold_everywhere(right: Function) -> Function:
         return curves | {"omega_04": np.where(missing, 1.2 * np.nan_to_num(curves["omega_02"]), curves["omega_04"])}
 
     return function
+
+
+def _by_stokes(p: Parameters) -> Parameters:
+    """The parameters with Stokes' law of drag."""
+    return p.replace(drag=STOKES)
 
 
 _DYNAMICS, _BOUNDS, _STATIONARY = "analytic.dynamics", "analytic.slip_bounds", "analytic.stationary"
@@ -139,6 +145,15 @@ THEORIES: tuple[WrongTheory, ...] = (
     WrongTheory("(73) with 3 % more floor friction", _BOUNDS, "rr_to_sr", given(other(mu=1.03))),
     WrongTheory("(74) with 3 % more inertia", _BOUNDS, "rr_to_sr_stationary", given(other(j=1.03))),
     WrongTheory("(82), (83) with μ and η exchanged", _BOUNDS, "rr_to_ss", given(swapped)),
+    # Laws of drag
+    WrongTheory("SS lags as under Stokes' drag", _STATIONARY, "_ss", given(_by_stokes)),
+    WrongTheory("NS sinks as under Stokes' drag", _STATIONARY, "_ns", given(_by_stokes)),
+    WrongTheory("ω₀₄ as under Stokes' drag", "analytic.bifurcation", "threshold_curves", given(_by_stokes)),
+    WrongTheory("the drag's slope left out of the eigenvalues", "analytic.drag", "of_velocity", answer(np.real)),
+    WrongTheory("Schiller and Naumann's wake 5 % strong", "analytic.drag", "law",
+                answer(lambda law: law._replace(wake=1.05 * law.wake))),
+    WrongTheory("quadratic drag 5 % strong", "analytic.drag", "law",
+                answer(lambda law: law._replace(blunt=1.05 * law.blunt))),
     # The flowmeter, section 5.3
     WrongTheory("operating range up to ω₀₂", "analytic.flowmeter", "operating_range",
                 lambda right: lambda p: _unloading(p)),

@@ -57,6 +57,23 @@ def test_wrong_equations_of_motion_are_wrong_and_not_broken(wrong: WrongTheory) 
         assert numbers() != right
 
 
+@pytest.mark.parametrize("law", ["stokes", "schiller-naumann", "quadratic"])
+def test_faults_in_a_law_of_drag_show_under_that_law_alone(law: str) -> None:
+    p = P.replace(drag=law, nu_f=2e-4, omega_0=20.0)
+
+    def numbers(p: Parameters) -> tuple[object, ...]:
+        solved = [(*s.x.tolist(), *s.eigenvalues.tolist()) for s in analytic.stationary_solutions(p)]
+        return *solved, analytic.thresholds(p).omega_04
+
+    right, seen = numbers(p), set()
+    for wrong in THEORIES[[t.what for t in THEORIES].index("SS lags as under Stokes' drag") :][:6]:
+        with believed(wrong):
+            if numbers(p) != right:
+                seen.add(wrong.what.split()[0])
+    every = {"SS", "NS", "ω₀₄", "the"}
+    assert seen == {"stokes": set(), "schiller-naumann": every | {"Schiller"}, "quadratic": every | {"quadratic"}}[law]
+
+
 def test_a_fault_shows_wherever_the_function_is_known_by_name() -> None:
     doubled = WrongTheory("", "analytic.stationary", "stable_solutions", lambda right: lambda p: 2 * right(p))
     right = analytic.stable_solutions(P)
