@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from compare.measure.record import Measurement
 from compare.runs.engines import ENGINES
 from model import Case, Parameters
+from model.drag import STOKES
 
 COLOURS = {
     Case.RR: "#0072B2",
@@ -48,8 +49,11 @@ def figure(width: float = 5.0, height: float = 3.6) -> Figure:
 
 
 def named(p: Parameters, *names: str) -> str:
-    """The dimensionless parameters as a caption gives them, all but omega_0 if none is named."""
-    return ", ".join(f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names or ("mu", "eta", "j", "kappa"))
+    """The dimensionless parameters as a caption gives them, all but omega_0 if none is named, and the law of drag."""
+    values = [f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names or ("mu", "eta", "j", "kappa")]
+    if p.drag != STOKES:
+        values.append(f"{p.drag} drag with Re = {2 * p.r * math.sqrt(p.g * p.R) / p.nu_f:.3g} at √(gR)")
+    return ", ".join(values)
 
 
 def dimensionless_x(axes: Axes, p: Parameters, label: str = UP_TO_UNITS) -> None:
