@@ -1,0 +1,118 @@
+"""A ball that rolls at both points (RR) in a flow that pulsates: when it slips, and what it then reads on average.
+
+The flow is omega_0 = p.omega_0 + amplitude sin(2 pi frequency t). While the ball rolls, omega_c pulsates about the
+mean of the flow exactly: no error of the mean. The friction that this takes grows with the lag omega_c - omega_0, that
+is with the ball's acceleration (23), and the loads with omega_c^2. docs/theory.md derives what follows from it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from analytic import bifurcation, rolling_forces, slip_bounds, stationary
+from analytic.response import rolling_rate
+from analytic.simulation import simulate
+from model import Case, Flow, InputError, Parameters
+from model.arrays import Array
+
+PHASES = 720
+"""Phases of a period at which slip is looked for, and once more in the cell of the least margin."""
+SETTLED = 16.0
+"""Time in units of the time constant (1+2j)/c after which a pulsation with slip counts as periodic."""
+
+
+def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
+    """omega_c and omega_0 in rad s-1 of RR that has pulsated for long, at phases of the flow in rad, same shape."""
+    k = rolling_rate(p)
+    gain, wave = k / (k + 2j * math.pi * frequency), amplitude * np.exp(1j * np.asarray(phase))
+    return p.omega_0 + np.imag(gain * wave), p.omega_0 + np.imag(wave)
+
+
+def slip_onset(p: Parameters, frequency: float) -> float:
+    """The least amplitude in rad s-1 at which slip begins at some phase of the pulsation, frequency > 0 in Hz.
+
+    By `rolling_forces.slip_margin` along `swing`. 0 where the mean flow alone ends RR, inf without drag.
+    """
+    if p.c == 0:
+        return math.inf
+
+    def slack(amplitude: float) -> float:
+        phases = np.linspace(0.0, 2 * math.pi, PHASES + 1)
+        for _ in range(2):
+            omega_c, omega_0 = swing(p, amplitude, frequency, phases)
+            margins = rolling_forces.slip_margin(omega_c, p, omega_0)
+            k, cell = int(margins.argmin()), phases[1] - phases[0]
+            phases = np.linspace(phases[k] - cell, phases[k] + cell, PHASES + 1)
+        return float(margins.min())
+
+    low, high = 0.0, 1e-3 * math.sqrt(p.g / p.R)
+    if slack(low) <= 0:
+        return 0.0
+    while slack(high) > 0:
+        low, high = high, 1.1 * high
+    return float(brentq(slack, low, high, rtol=1e-12))
+
+
+def slow_onset(p: Parameters) -> float:
+    """The limit of `slip_onset` for low frequencies: up to omega_01 or omega_03, where RR ends, or down to rest (67)."""
+    t = bifurcation.thresholds(p)
+    return max(0.0, min((t.omega_01 if p.eta < p.j else t.omega_03) - abs(p.omega_0), abs(p.omega_0)))
+
+
+def fast_onset(p: Parameters) -> float:
+    """The limit of `slip_onset` for high frequencies, at which omega_c stands still and the lag is that of the flow.
+
+    The least of (66), of (73) if the wall can turn the spin at that lag, and of the lag at which both cones are full.
+    """
+    u, unit = p.R / p.g * p.omega_0**2, p.j * p.c * p.R / ((1 + 2 * p.j) * p.g)
+    k, ju = (1 + p.j) * u, p.j * u
+    wall, floor = (
+        abs(bound(p, p.omega_0, 1).zero - p.omega_0) for bound in (slip_bounds.rr_to_rs, slip_bounds.rr_to_sr)
+    )
+    lags = [wall] if math.hypot(ju, unit * floor) > p.eta * u else [wall, floor]
+    # B_y = s m g with s^2 + z^2 = eta^2 (k - s)^2 and (ju - s)^2 + z^2 = mu^2 (1 - s)^2; z^2 drops out.
+    both = [p.eta**2 - p.mu**2, 2 * (p.mu**2 - p.eta**2 * k - ju), (p.eta * k) ** 2 - p.mu**2 + ju**2]
+    for s in np.roots(both):
+        if np.isreal(s) and 0 <= s.real <= min(ju, p.eta * k / (1 + p.eta)):
+            lags.append(math.sqrt((p.eta * (k - s.real)) ** 2 - s.real**2) / unit)
+    return min(lags)
+
+
+def mean_error(p: Parameters, amplitude: float, frequency: float) -> float:
+    """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic; frequency in Hz.
+
+    0 below `slip_onset`; beyond it, from the event-driven simulation, by the azimuth that the ball runs through.
+    """
+    if amplitude <= slip_onset(p, frequency):
+        return 0.0
+    periods = 2 + math.ceil(SETTLED / rolling_rate(p) * frequency)
+    start = float(swing(p, amplitude, frequency, 0.0)[0])
+    flow = Flow.sine(p.omega_0, amplitude, frequency)
+    run = simulate(p, [0, 0, start, 0, 0, 0], periods / frequency, flow, sample_interval=1 / frequency)
+    return float(run.theta[-1] - run.theta[-2]) * frequency - p.omega_0
+
+
+def slow_mean_error(p: Parameters, amplitude: float) -> float:
+    """The limit of `mean_error` for low frequencies: the mean of the characteristic curve, in RR and SS, over a period.
+
+    Raises `InputError` unless RR ends in SS and the flow stays between rest and the fold.
+    """
+    end = bifurcation.thresholds(p).omega_01
+    top = p.omega_0 + amplitude
+    if amplitude > p.omega_0 or p.omega_0 >= end:
+        raise InputError(
+            f"amplitude = {amplitude:g} rad s-1 about omega_0 = {p.omega_0:g} rad s-1 is out of range: the mean flow must "
+            f"be below omega_01 = {end:g} rad s-1 and the flow must not turn back"
+        )
+    if top <= end:
+        return 0.0
+    first = math.asin((end - p.omega_0) / amplitude)
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    half = math.pi / 2 - first  # the flow is above the end of RR for phases pi/2 ± half
+    flows = p.omega_0 + amplitude * np.cos(half * nodes)
+    lags = [stationary.solution(p.replace(omega_0=w), Case.SS).state.omega_c - w for w in flows.tolist()]
+    return float(half * (weights @ lags) / (2 * math.pi))

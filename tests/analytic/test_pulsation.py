@@ -1,0 +1,81 @@
+"""Slip under pulsation against the event-driven simulator, and its limits in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+
+from analytic import pulsation, simulate
+from analytic.response import rolling_rate
+from model import Case, Flow, Parameters
+
+REFERENCE = Parameters.named("reference")
+SETS = {
+    "slips at both": REFERENCE.replace(omega_0=12.0),
+    "slow": REFERENCE.replace(omega_0=4.0),
+    "slips at the floor": Parameters.named("high-wall-friction").replace(omega_0=20.0),
+}
+
+
+def slips(p: Parameters, amplitude: float, frequency: float) -> bool:
+    """Whether the ball, rolling in the rhythm of the flow, slips within a period."""
+    x0 = [0, 0, float(pulsation.swing(p, amplitude, frequency, 0.0)[0]), 0, 0, 0]
+    run = simulate(p, x0, 1.1 / frequency, Flow.sine(p.omega_0, amplitude, frequency))
+    return any(Case(to) is not Case.RR for to in run.events.to_case)
+
+
+@pytest.mark.parametrize("p", SETS.values(), ids=SETS)
+@pytest.mark.parametrize("pace", [0.3, 2.0, 10.0, 60.0])
+def test_onset(p: Parameters, pace: float) -> None:
+    """Found again by simulations that stop at the end of RR, to a part of ten thousand."""
+    frequency = pace * rolling_rate(p) / (2 * math.pi)
+    onset = pulsation.slip_onset(p, frequency)
+    assert not slips(p, 0.9999 * onset, frequency)
+    assert slips(p, 1.0003 * onset, frequency)  # the simulator looks 256 times a period
+
+
+@pytest.mark.parametrize("p", SETS.values(), ids=SETS)
+def test_limits_of_the_onset(p: Parameters) -> None:
+    k = rolling_rate(p)
+    assert pulsation.slip_onset(p, 1e5 * k) == pytest.approx(pulsation.fast_onset(p), rel=1e-6)
+    slow = [abs(pulsation.slip_onset(p, f * k) / pulsation.slow_onset(p) - 1) for f in (1e-4, 1e-5)]
+    assert slow[1] < 0.5 * slow[0] or slow[1] < 1e-8
+    assert slow[1] < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("changes", "wanted"), [({"c": 0.0}, math.inf), ({"omega_0": 14.0}, 0.0), ({"omega_0": 0.0}, 0.0)]
+)
+def test_no_onset(changes: dict[str, float], wanted: float) -> None:
+    assert pulsation.slip_onset(REFERENCE.replace(**changes), 1.0) == wanted
+
+
+def test_mean_error_of_fast_pulsations() -> None:
+    """None as long as the ball rolls; beyond, as Moreau's time stepping has it, which knows no cases."""
+    p, frequency = SETS["slips at both"], 1.5
+    onset = pulsation.slip_onset(p, frequency)
+    assert pulsation.mean_error(p, 0.99 * onset, frequency) == 0.0
+    expected = pulsation.mean_error(p, 1.5 * onset, frequency)
+    x0, flow = [0, 0, p.omega_0 + expected, 0, 0, 0], Flow.sine(p.omega_0, 1.5 * onset, frequency)
+    run = simulate(p, x0, 20 / frequency, flow, method="time-stepping", step=1e-3, sample_interval=1 / frequency)
+    assert expected < -0.1
+    assert (run.theta[-1] - run.theta[-2]) * frequency - p.omega_0 == pytest.approx(expected, rel=0.01)
+
+
+def test_mean_error_of_slow_pulsations() -> None:
+    p = SETS["slips at both"]
+    limit = pulsation.slow_mean_error(p, 3.0)
+    near, far = (abs(pulsation.mean_error(p, 3.0, f * rolling_rate(p)) - limit) for f in (3e-3, 1e-2))
+    assert near < 0.3 * far
+    assert near < 1e-3 * abs(limit)
+    assert pulsation.slow_mean_error(p, 1.0) == 0.0
+
+
+def test_both_witnesses_of_the_azimuth() -> None:
+    """The mean of omega_c, sampled densely, is what the azimuth says."""
+    p, amplitude, frequency = SETS["slips at both"], 8.0, 0.5
+    x0 = [0, 0, float(pulsation.swing(p, amplitude, frequency, 0.0)[0]), 0, 0, 0]
+    run = simulate(p, x0, 40.0, Flow.sine(p.omega_0, amplitude, frequency), sample_interval=2e-3)
+    last = run.time >= 38.0
+    mean = np.trapezoid(run.omega_c[last], run.time[last]) / 2.0
+    assert mean - p.omega_0 == pytest.approx(pulsation.mean_error(p, amplitude, frequency), rel=1e-4)
