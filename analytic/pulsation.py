@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic import bifurcation, rolling_forces, slip_bounds, stationary
+from analytic import bifurcation, drag, rolling_forces, slip_bounds, stationary
 from analytic.response import rolling_rate
 from analytic.simulation import simulate
 from model import Case, Flow, InputError, Parameters
@@ -58,7 +58,7 @@ def slip_onset(p: Parameters, frequency: float) -> float:
 
 
 def slow_onset(p: Parameters) -> float:
-    """The limit of `slip_onset` for low frequencies: up to omega_01 or omega_03, where RR ends, or down to rest (67)."""
+    """Low-frequency limit of `slip_onset`: the flow rises to omega_01 or omega_03, or falls to rest (67)."""
     t = bifurcation.thresholds(p)
     return max(0.0, min((t.omega_01 if p.eta < p.j else t.omega_03) - abs(p.omega_0), abs(p.omega_0)))
 
@@ -68,17 +68,19 @@ def fast_onset(p: Parameters) -> float:
 
     The least of (66), of (73) if the wall can turn the spin at that lag, and of the lag at which both cones are full.
     """
-    u, unit = p.R / p.g * p.omega_0**2, p.j * p.c * p.R / ((1 + 2 * p.j) * p.g)
+    u, unit = p.R / p.g * p.omega_0**2, p.j / ((1 + 2 * p.j) * p.g)
     k, ju = (1 + p.j) * u, p.j * u
     wall, floor = (
         abs(bound(p, p.omega_0, 1).zero - p.omega_0) for bound in (slip_bounds.rr_to_rs, slip_bounds.rr_to_sr)
     )
-    lags = [wall] if math.hypot(ju, unit * floor) > p.eta * u else [wall, floor]
+    push = drag.coefficient(p.R * floor, p) * p.R * floor
+    lags = [wall] if math.hypot(ju, unit * push) > p.eta * u else [wall, floor]
     # B_y = s m g with s^2 + z^2 = eta^2 (k - s)^2 and (ju - s)^2 + z^2 = mu^2 (1 - s)^2; z^2 drops out.
     both = [p.eta**2 - p.mu**2, 2 * (p.mu**2 - p.eta**2 * k - ju), (p.eta * k) ** 2 - p.mu**2 + ju**2]
     for s in np.roots(both):
         if np.isreal(s) and 0 <= s.real <= min(ju, p.eta * k / (1 + p.eta)):
-            lags.append(math.sqrt((p.eta * (k - s.real)) ** 2 - s.real**2) / unit)
+            push = math.sqrt((p.eta * (k - s.real)) ** 2 - s.real**2) / unit
+            lags.append(float(drag.speed_of(push, p)) / p.R)
     return min(lags)
 
 
@@ -105,8 +107,8 @@ def slow_mean_error(p: Parameters, amplitude: float) -> float:
     top = p.omega_0 + amplitude
     if amplitude > p.omega_0 or p.omega_0 >= end:
         raise InputError(
-            f"amplitude = {amplitude:g} rad s-1 about omega_0 = {p.omega_0:g} rad s-1 is out of range: the mean flow must "
-            f"be below omega_01 = {end:g} rad s-1 and the flow must not turn back"
+            f"amplitude = {amplitude:g} rad s-1 about omega_0 = {p.omega_0:g} rad s-1 is out of range: "
+            f"the mean flow must be below omega_01 = {end:g} rad s-1, and the flow must not turn back"
         )
     if top <= end:
         return 0.0

@@ -14,6 +14,7 @@ from analytic import branch_stability, dynamics, jacobian, slipping_branch, stat
 from model import Case, InputError, Parameters, State
 from model.arrays import Array
 from model.cases import TRAITS
+from model.drag import STOKES
 from model.kinematics import VARIABLES
 
 AIRY_ZERO = 2.338107410459767
@@ -26,7 +27,9 @@ _STEP = 1e-3
 
 
 def rolling_rate(p: Parameters) -> float:
-    """Rate c/(1+2j) in s-1 at which omega_c follows omega_0 in RR (23)."""
+    """Rate c/(1+2j) in s-1 at which omega_c follows omega_0 in RR (23); `InputError` for another law than Stokes'."""
+    if p.drag != STOKES:
+        raise InputError(f"drag = {p.drag!r}: omega_c follows the flow at one rate with Stokes' drag only")
     return p.c / (1 + 2 * p.j)
 
 
@@ -87,7 +90,7 @@ def ramp_coefficient(p: Parameters) -> float:
     2 b q = -2 sqrt(-a b (omega_0 - omega_04)). On a ramp q is a ratio of Airy functions, and runs off at the zero of
     Ai: K = 2.338 (a b)^(-1/3). Raises `InputError` if there is no fold.
     """
-    s = float(slipping_branch.fold(p.j, p.mu, p.eta, p.kappa))
+    s = float(slipping_branch.fold(p))
     if np.isnan(s):
         raise InputError(f"there is no fold at eta = {p.eta:g}: the branch of SS doesn't turn back")
     places = s + _STEP * np.array([-1.0, 0.0, 1.0])
