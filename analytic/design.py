@@ -12,12 +12,15 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from analytic import bifurcation, flowmeter, stationary
+from analytic.bifurcation import Thresholds
+from analytic.flowmeter import OperatingLimit
 from model import InputError, Parameters, drag
 from model.arrays import Array
 
@@ -26,6 +29,8 @@ Make: TypeAlias = Callable[..., Parameters]
 Interval: TypeAlias = tuple[float, float]
 """Lowest and highest value."""
 
+INEXACT = ("mu", "eta", "r", "R")
+"""What may have a tolerance: friction and size."""
 THRESHOLDS = ("omega_01", "omega_02", "omega_03", "omega_04")
 _STEP = 1e-3
 """Of the differences, in the logarithm of a value."""
@@ -97,7 +102,7 @@ def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
     """
     flows, alone = np.asarray(omega_0, dtype=float), flowmeter.operating_range(p)
     low, high = flows.copy(), flows.copy()
-    for k in np.flatnonzero(flows >= alone):
+    for k in np.flatnonzero(flows > alone):
         orbits = [s.state.omega_c for s in stationary.stable_solutions(p.replace(omega_0=float(flows[k])))]
         low[k], high[k] = min(orbits, default=np.nan), max(orbits, default=np.nan)
     return low, high
@@ -113,15 +118,17 @@ def response_time(p: Parameters) -> float:
 
 @dataclass(frozen=True)
 class Choice:
-    """A meter chosen within bounds."""
+    """A meter for flows up to a given one."""
 
     values: dict[str, float]
     """What `make` needs to make it."""
     p: Parameters
-    limits: Interval
-    """The operating limit at the worst and the best corner of the tolerances, rad s-1."""
+    limit: OperatingLimit
+    """As it is meant to be."""
+    worst: OperatingLimit
+    """At the corner of the tolerances where the operating range is the shortest."""
     margin: float
-    """The worst limit over the fastest flow that is asked for: covered if >= 1."""
+    """The worst limit over the fastest flow: covered if >= 1."""
     response: float
     """Time constant, s."""
 
@@ -129,9 +136,10 @@ class Choice:
 def choice(make: Make, values: Mapping[str, float], tolerances: Mapping[str, float], fastest: float) -> Choice:
     """What is to be said of a meter that shall measure flows up to `fastest`, rad s-1."""
     p = make(**values)
-    limits = [flowmeter.operating_range(q) for q in (p, *corners(make, values, tolerances))]
-    worst = min(limits)
-    return Choice(dict(values), p, (worst, max(limits)), worst / fastest, response_time(p))
+    limit = flowmeter.operating_limit(p)
+    others = (flowmeter.operating_limit(q) for q in corners(make, values, tolerances))
+    worst = min((limit, *others), key=lambda each: each.omega_0)
+    return Choice(dict(values), p, limit, worst, worst.omega_0 / fastest, response_time(p))
 
 
 def best(
@@ -172,8 +180,9 @@ def best(
     if open_names:
         each = 4 + 12 // len(ends)  # times the number of values: how many meters compete
         cube = Bounds(np.zeros(len(ends)), np.ones(len(ends)))
-        result = differential_evolution(cost, cube, rng=seed, popsize=each, tol=1e-6, polish=False)
-        chosen = at(result.x)
+        result = differential_evolution(cost, cube, rng=seed, popsize=each, tol=1e-5, polish=False)
+        at_bounds = np.where(np.abs(result.x - 0.5) > 0.499, np.round(result.x), result.x)
+        chosen = at(min(at_bounds, result.x, key=cost))
     else:
         chosen = at([])
     if chosen.response > slowest_response:
@@ -182,3 +191,96 @@ def best(
             f"constant of {chosen.response:.3g} s"
         )
     return chosen
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What a meter is wanted for, and what it may be made of."""
+
+    fluid: Mapping[str, Any]
+    """Arguments of `Parameters.from_fluid`: nu_f, rho_f, gravity, and perhaps drag and C_D."""
+    slowest: float
+    """The range of flows to measure: omega_0, rad s-1."""
+    fastest: float
+    bounds: Mapping[str, Mapping[str, Interval]]
+    """For each material the bounds on r, R, rho_b, mu, eta and j."""
+    tolerances: Mapping[str, float]
+    """Relative, of any of `INEXACT`."""
+    response: float = math.inf
+    """Longest time constant, s."""
+
+    @property
+    def make(self) -> Make:
+        """The meter with this fluid."""
+        return partial(Parameters.from_fluid, **self.fluid)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Characteristic curve: lowest and highest reading at each flow, rad s-1, arrays of one shape."""
+
+    omega_0: Array
+    meant: tuple[Array, Array]
+    """Of the meter as it is meant to be."""
+    band: tuple[Array, Array]
+    """Over all corners of the tolerances."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """The best meter for a request, and what to know of it."""
+
+    request: Request
+    material: str
+    choices: dict[str, Choice]
+    """The best meter of each material that can be used."""
+    refused: dict[str, str]
+    """Why the others can't."""
+    thresholds: Thresholds
+    spread: dict[str, Interval]
+    """Of the thresholds over the corners of the tolerances."""
+    sensitivities: dict[str, dict[str, Sensitivity]]
+    curve: Curve
+
+    @property
+    def choice(self) -> Choice:
+        """The chosen meter."""
+        return self.choices[self.material]
+
+
+def design(request: Request, seed: int = 0) -> Design:
+    """Choose the material and the meter with the largest margin; raises `InputError` if no material can be used."""
+    choices, refused, wanted = {}, {}, (request.tolerances, request.fastest, request.response, seed)
+    for material, bounds in request.bounds.items():
+        try:
+            for ends in zip(*bounds.values(), strict=True):
+                request.make(**dict(zip(bounds, ends, strict=True)))  # does the lightest ball sink?
+            choices[material] = best(request.make, bounds, *wanted)
+        except InputError as reason:
+            refused[material] = str(reason)
+    if not choices:
+        raise InputError("; ".join(f"{material}: {why}" for material, why in refused.items()))
+    material = max(choices, key=lambda name: choices[name].margin)
+    chosen = choices[material]
+    meters = [chosen.p, *corners(request.make, chosen.values, request.tolerances)]
+    at = {name: x for name, x in {**request.fluid, **chosen.values}.items() if name != "drag"}
+    return Design(
+        request=request,
+        material=material,
+        choices=choices,
+        refused=refused,
+        thresholds=bifurcation.thresholds(chosen.p),
+        spread=threshold_spread(meters),
+        sensitivities=sensitivities(request.make, at),
+        curve=characteristic(meters, 1.5 * max(request.fastest, chosen.limit.omega_0)),
+    )
+
+
+def characteristic(meters: Sequence[Parameters], top: float, count: int = 61) -> Curve:
+    """The curve of the first meter up to the flow `top`, rad s-1, with a band over all of them."""
+    t = dataclasses.astuple(bifurcation.thresholds(meters[0]))[: len(THRESHOLDS)]
+    sides = np.outer(t, (1 - 1e-6, 1 + 1e-6)).ravel()  # of the jumps
+    flows = np.union1d(np.linspace(0.0, top, count)[1:], sides[sides < top])
+    each = [readings(p, flows) for p in meters]
+    band = np.fmin.reduce([low for low, _ in each]), np.fmax.reduce([high for _, high in each])
+    return Curve(flows, each[0], band)

@@ -192,7 +192,7 @@ class Parameters:
         names = [f.name for f in dataclasses.fields(cls)]
         if "fluid" not in values:
             check_names(values, [*names, "fluid"], "parameter")
-            _refuse_missing(
+            refuse_missing(
                 values, [f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING], "parameter"
             )
             return cls(**values)
@@ -204,9 +204,9 @@ class Parameters:
             if name in rest:
                 raise InputError(f"{name} follows from the [fluid] table and may not be given beside it")
         check_names(rest, names, "parameter")
-        _refuse_missing(rest, ["r", "R", "mu", "eta"], "parameter")
+        refuse_missing(rest, ["r", "R", "mu", "eta"], "parameter")
         check_names(fluid, ["nu_f", "rho_f", "rho_b", "gravity"], "fluid property")
-        _refuse_missing(fluid, ["nu_f", "rho_f", "rho_b"], "fluid property")
+        refuse_missing(fluid, ["nu_f", "rho_f", "rho_b"], "fluid property")
         return cls.from_fluid(**rest, **fluid)
 
     @classmethod
@@ -226,12 +226,7 @@ class Parameters:
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a TOML file; raises `StorageError` if it can't be read, `InputError` for what it says."""
-        try:
-            values = tomllib.loads(Path(path).read_text("utf-8"))
-        except OSError as error:
-            raise StorageError(f"cannot read parameters from {path}: {error.strerror}") from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise StorageError(f"{path} is not valid TOML: {error}") from error
+        values = read_toml(path)
         try:
             return cls.from_mapping(values)
         except InputError as error:
@@ -245,7 +240,18 @@ class Parameters:
             raise StorageError(f"cannot write parameters to {path}: {error.strerror}") from error
 
 
-def _refuse_missing(given: Mapping[str, Any], needed: list[str], kind: str) -> None:
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """What a TOML file holds; raises `StorageError` if it can't be read."""
+    try:
+        return tomllib.loads(Path(path).read_text("utf-8"))
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise StorageError(f"{path} is not valid TOML: {error}") from error
+
+
+def refuse_missing(given: Mapping[str, Any], needed: list[str], kind: str) -> None:
+    """`InputError` if a needed name is not given."""
     missing = [name for name in needed if name not in given]
     if missing:
         raise InputError(f"missing {kind} {', '.join(repr(name) for name in missing)}")

@@ -38,6 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 _MODULES = {
     "predict": ("predict",),
+    "design": ("design",),
     "simulate": ("simulate",),
     "validate": ("validate", "judge"),
     "sweep": ("sweep", "collect"),

@@ -120,8 +120,9 @@ def test_the_best_wall_is_as_rough_as_the_ball_is_inert() -> None:
     """For mu < 1 omega_01 rises with eta up to sqrt(g/(jR)) at eta = j, whatever mu; beyond, omega_02 falls."""
     c = design.best(P.replace, {"eta": (0.1, 0.6)}, {}, 10.0)
     assert c.values["eta"] == pytest.approx(P.j, rel=1e-4)
-    assert c.limits[0] == pytest.approx(thresholds(P).omega_03, rel=1e-4)
-    assert c.margin == c.limits[0] / 10.0
+    assert c.limit == c.worst
+    assert c.worst.omega_0 == pytest.approx(thresholds(P).omega_03, rel=1e-4)
+    assert c.margin == c.worst.omega_0 / 10.0
     for mu in (0.05, 0.5, 0.95):
         t = bifurcation.thresholds(P.replace(mu=mu, eta=P.j * (1 - 1e-9)))
         assert t.omega_01 == pytest.approx(t.omega_03, rel=1e-6)
@@ -151,4 +152,28 @@ def test_response_time_is_that_of_rolling() -> None:
 def test_everything_fixed() -> None:
     c = design.best(WATER, {name: (x, x) for name, x in STEEL.items()}, {"eta": 0.1}, 10.0)
     assert c.values == STEEL
-    assert c.limits[0] < operating_range(c.p) < c.limits[1]
+    assert c.worst.omega_0 < operating_range(c.p) == c.limit.omega_0
+
+
+def test_materials_are_compared_and_those_that_float_refused() -> None:
+    """On a wall with eta < j the best ball is the densest, in the smallest vessel, for omega_01 ~ sqrt(g/R)."""
+    bounds = {"r": (0.005, 0.005), "R": (0.02, 0.03), "mu": (0.2, 0.2), "eta": (0.1, 0.2)}
+    densities = {"cork": 200.0, "glass": 2500.0, "steel": 7850.0}
+    request = design.Request(
+        fluid={"nu_f": 1e-6, "rho_f": 998.2, "gravity": 9.81},
+        slowest=2.0,
+        fastest=15.0,
+        bounds={name: bounds | {"rho_b": (rho_b, rho_b)} for name, rho_b in densities.items()},
+        tolerances={"eta": 0.1},
+    )
+    made = design.design(request)
+    assert list(made.choices) == ["glass", "steel"]
+    assert made.material == "steel"
+    assert made.choice.values["R"] == pytest.approx(0.02, rel=1e-4)
+    assert "rho_b = 200 kg m-3 is out of range: a ball not denser than the fluid floats" in made.refused["cork"]
+    assert made.choice.worst.omega_0 == pytest.approx(made.spread["omega_01"][0])
+    assert made.spread["omega_01"][0] < made.thresholds.omega_01 < made.spread["omega_01"][1]
+    band, meant = made.curve.band, made.curve.meant
+    assert np.all((band[0] <= meant[0]) & (meant[0] <= meant[1]) & (meant[1] <= band[1]))
+    exact = made.curve.omega_0 < made.choice.worst.omega_0
+    assert band[0][exact].tolist() == band[1][exact].tolist() == made.curve.omega_0[exact].tolist()

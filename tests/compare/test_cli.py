@@ -217,7 +217,7 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str], name: str) -> Non
 @pytest.mark.parametrize(
     ("argv", "says"),
     [
-        ("predict --parameters absent.toml", "cannot read parameters from absent.toml: No such file or directory"),
+        ("predict --parameters absent.toml", "cannot read absent.toml: No such file or directory"),
         ("predict --parameters broken.toml", "broken.toml is not valid TOML"),
         ("predict --parameters unknown.toml", "unknown.toml: unknown parameter 'muu' (did you mean 'mu'?)"),
         ("predict --parameters text.toml", "text.toml: m = 'heavy' must be a number in kg"),

@@ -1,0 +1,186 @@
+"""A designed meter, shown: tables for the terminal, a page, plain data."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from rich.table import Table
+
+from analytic import flowmeter
+from analytic.design import THRESHOLDS, Choice, Design, Sensitivity
+from compare import pages
+
+SYMBOLS = {
+    "omega_01": "ω₀₁",
+    "omega_02": "ω₀₂",
+    "omega_03": "ω₀₃",
+    "omega_04": "ω₀₄",
+    "mu": "μ",
+    "eta": "η",
+    "rho_b": "ρ_b",
+    "rho_f": "ρ_f",
+    "nu_f": "ν_f",
+}
+UNITS = {"r": "m", "R": "m", "rho_b": "kg/m³", "rho_f": "kg/m³", "nu_f": "m²/s", "gravity": "m/s²"}
+_NONE = "–"
+Rows = list[list[str]]
+"""A table: its head, then its body."""
+
+
+def sentences(made: Design) -> list[str]:
+    """What the design comes to."""
+    chosen, request = made.choice, made.request
+    covers = f"{_number(chosen.margin)} times the fastest flow, {request.fastest:g} rad/s"
+    limit = f"at worst ω₀ = {_number(chosen.worst.omega_0)} rad/s, {covers} ({_number(chosen.limit.omega_0)} as meant)"
+    said = [
+        f"Best: {made.material}, {_values(chosen.values)}.",
+        f"Rolling at both points is the ball's only lasting motion up to {limit}: there {chosen.worst.end.value}.",
+    ]
+    if chosen.margin < 1:
+        said.insert(0, f"No meter within the bounds covers the flows up to {request.fastest:g} rad/s.")
+    if math.isinf(flowmeter.reading_range(chosen.p)):
+        said.append("As meant, every motion beyond it reads the flow, too, but for the ball's fall at unloading.")
+    if math.isfinite(chosen.response):
+        said.append(f"It follows small changes of the flow with a time constant of {_number(chosen.response)} s.")
+    if request.slowest > 0:
+        turn, ratio = 2 * math.pi / request.slowest, request.fastest / request.slowest
+        said.append(f"At the slowest flow, 1/{_number(ratio)} of the fastest, a turn takes {_number(turn)} s.")
+    return said
+
+
+def materials(made: Design) -> Rows:
+    """A column for the best meter of each material that can be used, the best of all first."""
+    choices = sorted(made.choices.items(), key=lambda item: -item[1].margin)
+    rows = [["", *(name for name, _ in choices)]]
+    rows += [[_named(name), *(_number(c.values[name]) for _, c in choices)] for name in made.choice.values]
+    rows += [["limit at worst (rad/s)", *(_number(c.worst.omega_0) for _, c in choices)]]
+    rows += [["limit as meant (rad/s)", *(_number(c.limit.omega_0) for _, c in choices)]]
+    rows += [["margin at worst", *(_number(c.margin) for _, c in choices)]]
+    return [*rows, ["time constant (s)", *(_number(c.response) for _, c in choices)]]
+
+
+def thresholds(made: Design) -> Rows:
+    """A row for each threshold: its value, and between which it lies within the tolerances."""
+    rows = [["threshold", "as meant (rad/s)", "lowest", "highest"]]
+    for key in THRESHOLDS:
+        rows.append([SYMBOLS[key], *map(_number, (getattr(made.thresholds, key), *made.spread[key]))])
+    return rows
+
+
+def sensitivities(made: Design) -> Rows:
+    """A row for each value: by how many per cent a threshold, a column each, changes if the value does by one."""
+    rows = [["% per %", *(SYMBOLS[key] for key in THRESHOLDS)]]
+    for name in made.sensitivities[THRESHOLDS[0]]:
+        rows.append([SYMBOLS.get(name, name), *(_sensitivity(made.sensitivities[key][name]) for key in THRESHOLDS)])
+    return rows
+
+
+def tables(made: Design) -> list[Table | str]:
+    """All of it, for the terminal."""
+    titles = {"The best of each material": materials, "Thresholds": thresholds, "Sensitivities": sensitivities}
+    shown = [_table(title, rows(made)) for title, rows in titles.items()]
+    return [*shown, *(f"{name} can't be used: {why}" for name, why in made.refused.items()), *sentences(made)]
+
+
+def described(made: Design) -> dict[str, Any]:
+    """All of it as plain data; what doesn't exist is nan."""
+    curve, request = made.curve, dataclasses.asdict(made.request)
+    return {
+        "request": request,
+        "material": made.material,
+        "meter": _choice(made.choice),
+        "parameters": dataclasses.asdict(made.choice.p),
+        "covers": made.choice.margin >= 1,
+        "reading_range": flowmeter.reading_range(made.choice.p),
+        "unloading_limit": flowmeter.unloading_limit(made.choice.p),
+        "materials": {name: _choice(c) for name, c in made.choices.items()},
+        "refused": made.refused,
+        "thresholds": {
+            key: {"value": getattr(made.thresholds, key), "lowest": low, "highest": high}
+            for key, (low, high) in made.spread.items()
+        },
+        "sensitivities": {
+            key: {name: dataclasses.asdict(s) for name, s in own.items()} for key, own in made.sensitivities.items()
+        },
+        "characteristic": {
+            "omega_0": curve.omega_0.tolist(),
+            "omega_c": {"lowest": curve.meant[0].tolist(), "highest": curve.meant[1].tolist()},
+            "within_tolerances": {"lowest": curve.band[0].tolist(), "highest": curve.band[1].tolist()},
+        },
+    }
+
+
+def page(made: Design) -> str:
+    """All of it as a page that needs nothing but itself."""
+    from compare.figures import meter as figures  # here, because drawing takes a second to load
+    from compare.report import pictures
+
+    drawn = [(pictures.svg(draw(made)), caption) for draw, caption in figures.FIGURES]
+    return pages.render(
+        "compare.report",
+        "meter.html",
+        made=made,
+        sentences=sentences(made),
+        tables=[
+            ("The best of each material", materials(made)),
+            ("Thresholds", thresholds(made)),
+            ("Sensitivities", sensitivities(made)),
+        ],
+        asked=_asked(made),
+        figures=drawn,
+    )
+
+
+def _asked(made: Design) -> dict[str, str]:
+    """The request in words."""
+    r, bounds = made.request, made.request.bounds[made.material]
+    response = f", time constant up to {r.response:g} s" if math.isfinite(r.response) else ""
+    return {
+        "fluid": _values(r.fluid),
+        "flow": f"ω₀ = {r.slowest:g} … {r.fastest:g} rad/s{response}",
+        "bounds": ", ".join(
+            f"{_named(name)} {f'{low:g} … {high:g}' if low < high else f'{low:g}'}"
+            for name, (low, high) in bounds.items()
+        ),
+        "tolerances": ", ".join(f"{SYMBOLS.get(name, name)} ± {100 * t:g} %" for name, t in r.tolerances.items())
+        or "none",
+    }
+
+
+def _choice(c: Choice) -> dict[str, Any]:
+    limits = {
+        name: {"omega_0": each.omega_0, "end": each.end.name} for name, each in (("limit", c.limit), ("worst", c.worst))
+    }
+    return {"values": c.values, **limits, "margin": c.margin, "response": c.response}
+
+
+def _values(values: Mapping[str, Any]) -> str:
+    texts = {
+        name: x if isinstance(x, str) else f"{_number(x)} {UNITS.get(name, '')}".rstrip() for name, x in values.items()
+    }
+    return ", ".join(f"{SYMBOLS.get(name, name)} = {text}" for name, text in texts.items())
+
+
+def _named(name: str) -> str:
+    unit = UNITS.get(name)
+    return SYMBOLS.get(name, name) + (f" ({unit})" if unit else "")
+
+
+def _number(x: float) -> str:
+    return f"{x:.4g}" if math.isfinite(x) else _NONE
+
+
+def _sensitivity(s: Sensitivity) -> str:
+    return f"{s.value:+.3f}".replace("+0.000", "0").replace("-0.000", "0") if math.isfinite(s.value) else _NONE
+
+
+def _table(title: str, rows: Rows) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold")
+    for k, name in enumerate(rows[0]):
+        table.add_column(name, justify="right" if k else "left")
+    for row in rows[1:]:
+        table.add_row(*row)
+    return table

@@ -1,0 +1,114 @@
+"""``dualball design``: its answers as data and as a page, and one clear line for what can't be asked."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+
+from analytic import operating_range, thresholds
+from compare.commands import cli
+from model import Parameters
+
+METER: dict[str, Any] = {
+    "fluid": {"nu_f": 1.004e-6, "rho_f": 998.2},
+    "flow": {"slowest": 3.0, "fastest": 18.0},
+    "bounds": {"r": [0.004, 0.006], "R": 0.02, "mu": [0.1, 0.3], "eta": [0.1, 0.6]},
+    "material": [{"name": "steel", "rho_b": 7850}, {"name": "cork", "rho_b": 200}],
+    "tolerances": {"mu": 0.1, "eta": 0.2},
+}
+
+
+def written(folder: Path, **changes: Any) -> str:
+    """A file of `METER` with other tables; None leaves one out."""
+    asked = {name: value for name, value in {**METER, **changes}.items() if value is not None}
+    path = folder / "meter.toml"
+    path.write_text(tomli_w.dumps(asked), "utf-8")
+    return str(path)
+
+
+def test_design_as_json_and_as_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "meter.html"
+    assert cli.main(["design", written(tmp_path), "-o", str(page), "--json"]) == 0
+    made = json.loads(capsys.readouterr().out)
+    p = Parameters(**made["parameters"])
+    values, worst = made["meter"]["values"], made["meter"]["worst"]
+    assert made["material"] == "steel"
+    assert made["meter"]["limit"]["omega_0"] == operating_range(p)
+    # At the best wall slip, with the smoothest contacts, is as near as unloading, with the roughest.
+    slip = thresholds(p.replace(mu=0.9 * p.mu, eta=0.8 * p.eta)).omega_01
+    unloading = thresholds(p.replace(eta=1.2 * p.eta)).omega_02
+    assert slip == pytest.approx(unloading, rel=1e-3)
+    assert worst["omega_0"] == pytest.approx(min(slip, unloading), rel=1e-12)
+    assert made["meter"]["margin"] == worst["omega_0"] / 18.0
+    assert made["sensitivities"]["omega_02"]["eta"]["value"] == pytest.approx(-0.5)
+    assert made["thresholds"]["omega_03"]["lowest"] == pytest.approx(math.sqrt(p.g / (p.j * p.R)))
+    assert "a ball not denser than the fluid floats" in made["refused"]["cork"]
+    text = page.read_text("utf-8")
+    for shown in (worst["omega_0"], made["meter"]["margin"], values["eta"], thresholds(p).omega_02, 2 * math.pi / 3):
+        assert f"{shown:.4g}" in text
+    assert text.count("<svg") == 3
+    assert "cork can't be used" in text
+
+
+def test_design_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without a material that is good enough: the best there is, and exit code 1."""
+    ball = {"r": 0.005, "R": [0.02, 0.03], "rho_b": [2000, 3000], "mu": 0.2, "eta": 0.2}
+    path = written(tmp_path, bounds=ball, material=None, tolerances=None, flow={"slowest": 0, "fastest": 60})
+    assert cli.main(["design", path]) == 1
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "No meter within the bounds covers the flows up to 60 rad/s. Best: ball, r = 0.005 m, R = 0.02 m" in shown
+    end = operating_range(Parameters.from_fluid(**METER["fluid"], r=0.005, R=0.02, rho_b=3000, mu=0.2, eta=0.2))
+    assert f"at worst ω₀ = {end:.4g} rad/s, {end / 60:.4g} times the fastest flow" in shown
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"fluid": {"nu_f": -1.0, "rho_f": 998.2}}, "fluid.nu_f = -1 m2 s-1 is out of range: must be > 0"),
+        ({"fluid": {"nu_f": 1e-6, "rho_f": -5}}, "fluid.rho_f = -5 kg m-3 is out of range: must be > 0"),
+        ({"fluid": {"rho_f": 998.2}}, "missing entry of [fluid] 'nu_f'"),
+        ({"fluid": {"nu_f": 1e-6, "rho_f": 1e3, "drag": "stoks"}}, "fluid.drag = 'stoks' must be one of"),
+        ({"fluid": {"nu_f": 1e-6, "rho_f": 1e3, "rho": 1}}, "unknown entry of [fluid] 'rho' (did you mean 'rho_f'?)"),
+        ({"fluid": 3}, "fluid = 3 must be a table, [fluid]"),
+        (
+            {"flow": {"slowest": 5, "fastest": 4}},
+            "flow.fastest = 4 rad s-1 is out of range: must be > flow.slowest = 5",
+        ),
+        ({"flow": {"slowest": "x", "fastest": 4}}, "flow.slowest = 'x' must be a number in rad s-1"),
+        ({"flow": METER["flow"] | {"response": 1e-3}}, "response = 0.001 s excludes everything: within the bounds"),
+        ({"bounds": METER["bounds"] | {"eta": [0.3, 0.1]}}, "steel: eta = [0.3, 0.1] 1 excludes everything"),
+        ({"bounds": METER["bounds"] | {"eta": [0.3]}}, "steel: eta = [0.3] must be a number in 1, or the two between"),
+        ({"bounds": METER["bounds"] | {"R": 0}}, "steel: R = 0 m is out of range: must be > 0"),
+        ({"bounds": {"r": 0.01}}, "missing bound of steel: 'R', 'mu', 'eta'"),
+        ({"material": [{"name": "cork", "rho_b": 200}]}, "cork: rho_b = 200 kg m-3 is out of range: a ball not denser"),
+        ({"material": [{"rho_b": 200}]}, "missing property of a material 'name'"),
+        (
+            {"material": [{"name": "a", "rho_b": 2e3}] * 2},
+            "material.name = 'a' must be a text, and no other material's",
+        ),
+        ({"material": {"name": "a"}}, "material must be a list of tables"),
+        ({"tolerances": {"mu": 1.5}}, "tolerances.mu = 1.5 1 is out of range: must be >= 0 and < 1"),
+        ({"tolerances": {"j": 0.1}}, "unknown entry of [tolerances] 'j'; known: mu, eta, r, R"),
+        ({"tables": {}}, "unknown table 'tables'"),
+    ],
+)
+def test_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], changes: dict[str, Any], message: str) -> None:
+    path = written(tmp_path, **changes)
+    assert cli.main(["design", path]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith(f"dualball: error: {path}: ")
+    assert message in captured.err
+
+
+def test_no_file_and_no_place_for_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["design", "absent.toml"]) == 2
+    assert capsys.readouterr().err == "dualball: error: cannot read absent.toml: No such file or directory\n"
+    assert cli.main(["design", written(tmp_path), "-o", str(tmp_path / "absent" / "page.html")]) == 2
+    assert "there is no directory" in capsys.readouterr().err
