@@ -1,7 +1,7 @@
 """Design of a flowmeter: how its limits depend on what it is made of, its reading with tolerances, the best choice.
 
-Everything rests on `thresholds`, `operating_range` and `stable_solutions`, whatever the law of drag. A meter is given
-as a function `make` that takes values by name and returns `Parameters`: `p.replace`, or `Parameters.from_fluid` with
+Everything rests on `thresholds`, `operating_range` and the branch of SS, whatever the law of drag. A meter is given as
+a function `make` that takes values by name and returns `Parameters`: `p.replace`, or `Parameters.from_fluid` with
 some arguments filled in.
 """
 
@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from analytic import bifurcation, flowmeter, stationary
+from analytic import bifurcation, flowmeter, roots, slipping_branch
 from analytic.bifurcation import Thresholds
 from analytic.flowmeter import OperatingLimit
 from model import InputError, Parameters, drag
@@ -95,17 +95,21 @@ def threshold_spread(meters: Sequence[Parameters]) -> dict[str, Interval]:
 
 
 def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
-    """The lowest and the highest omega_c of all stationary motions that last, at flows omega_0 > 0, rad s-1.
+    """The lowest and the highest omega_c of all stationary motions that attract, at flows omega_0 >= 0, rad s-1.
 
-    They differ where the reading depends on the past: the lowest is read while the flow rises slowly from rest, the
-    highest while it falls. nan where none lasts.
+    They differ where the reading depends on the past (Fig. 13): the lowest is read while the flow rises slowly from
+    rest, the highest while it falls. Only SS lags behind the flow, up to its fold; whether it swings there, as it may
+    for mu > 1.7, is left out. nan without drag.
     """
-    flows, alone = np.asarray(omega_0, dtype=float), flowmeter.operating_range(p)
-    low, high = flows.copy(), flows.copy()
-    for k in np.flatnonzero(flows > alone):
-        orbits = [s.state.omega_c for s in stationary.stable_solutions(p.replace(omega_0=float(flows[k])))]
-        low[k], high[k] = min(orbits, default=np.nan), max(orbits, default=np.nan)
-    return low, high
+    flows = np.asarray(omega_0, dtype=float) * (1.0 if p.c else np.nan)
+    if p.mu == 0 or p.eta >= p.j or p.c == 0:
+        return flows, flows
+    t, turn, unit = bifurcation.thresholds(p), slipping_branch.fold(p), np.sqrt(p.g / p.R)
+    end, ends_in_fold = (slipping_branch.END, False) if np.isnan(turn) else (float(turn), True)
+    s = roots.bisected(lambda s: slipping_branch.branch(s, p).Omega_0 * unit - flows, -slipping_branch.END, end)
+    lagging = slipping_branch.branch(s, p).Omega_c * unit
+    slips = (flows > t.omega_01) & ~(flows > (t.omega_04 if ends_in_fold else t.omega_02))
+    return np.where(slips, lagging, flows), np.where(slips & ~(flows > t.omega_02), lagging, flows)
 
 
 def response_time(p: Parameters) -> float:
@@ -181,7 +185,7 @@ def best(
         each = 4 + 12 // len(ends)  # times the number of values: how many meters compete
         cube = Bounds(np.zeros(len(ends)), np.ones(len(ends)))
         result = differential_evolution(cost, cube, rng=seed, popsize=each, tol=1e-5, polish=False)
-        at_bounds = np.where(np.abs(result.x - 0.5) > 0.499, np.round(result.x), result.x)
+        at_bounds = np.where(np.abs(result.x - 0.5) > 0.49, np.round(result.x), result.x)
         chosen = at(min(at_bounds, result.x, key=cost))
     else:
         chosen = at([])
@@ -282,5 +286,5 @@ def characteristic(meters: Sequence[Parameters], top: float, count: int = 61) ->
     sides = np.outer(t, (1 - 1e-6, 1 + 1e-6)).ravel()  # of the jumps
     flows = np.union1d(np.linspace(0.0, top, count)[1:], sides[sides < top])
     each = [readings(p, flows) for p in meters]
-    band = np.fmin.reduce([low for low, _ in each]), np.fmax.reduce([high for _, high in each])
+    band = np.min([low for low, _ in each], axis=0), np.max([high for _, high in each], axis=0)
     return Curve(flows, each[0], band)

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from analytic import bifurcation, design, operating_range, solution, thresholds
+from analytic import bifurcation, design, operating_range, solution, stable_solutions, thresholds
 from model import Case, InputError, Parameters
 
 WATER = partial(Parameters.from_fluid, nu_f=1.004e-6, rho_f=998.2, gravity=9.81)
@@ -88,14 +88,20 @@ def test_no_meter_within_tolerances_reads_beyond_the_corners() -> None:
         assert all(lowest <= getattr(t, name) <= highest for name, (lowest, highest) in spread.items())
 
 
-def test_readings_are_those_of_the_branches() -> None:
-    """Below omega_01 one, between omega_02 and omega_04 two: slip while the flow rises, the wall while it falls."""
-    t = thresholds(P)
-    flows = np.array([0.5 * t.omega_01, t.omega_02 * 0.9, t.omega_04 * 0.99, t.omega_04 * 1.1])
-    low, high = design.readings(P, flows)
-    slip = [solution(P.replace(omega_0=float(w)), Case.SS).state.omega_c for w in flows[1:3]]
-    assert low.tolist() == [flows[0], *slip, flows[3]]
-    assert high.tolist() == [flows[0], slip[0], flows[2], flows[3]]
+@pytest.mark.parametrize("law", ["stokes", "schiller-naumann", "quadratic"])
+@pytest.mark.parametrize("eta", [0.02, 0.2, 0.6])
+def test_readings_are_those_of_the_stable_solutions(law: str, eta: float) -> None:
+    """Between omega_02 and omega_04 two: slip while the flow rises, the wall while it falls."""
+    p = P.replace(eta=eta, drag=law, nu_f=1e-4)
+    t = thresholds(p)
+    marks = np.sort([w for w in (t.omega_01, t.omega_02, t.omega_03, t.omega_04) if np.isfinite(w)])
+    flows = np.array([marks[0] * 0.5, *(marks[1:] + marks[:-1]) / 2, marks[-1] * 1.1])
+    low, high = design.readings(p, flows)
+    for k, omega_0 in enumerate(flows):
+        orbits = [s.state.omega_c for s in stable_solutions(p.replace(omega_0=float(omega_0)))]
+        assert [low[k], high[k]] == pytest.approx([min(orbits), max(orbits)], rel=1e-11)
+    assert np.all(np.isnan(design.readings(P.replace(c=0.0), flows)))
+    assert design.readings(P.replace(mu=0.0), flows)[0].tolist() == flows.tolist()
 
 
 @pytest.mark.parametrize("tolerances", [{}, {"mu": 0.2, "eta": 0.2}])
