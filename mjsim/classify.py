@@ -7,10 +7,11 @@ lasts for `PERSISTENCE` samples: single samples of a contact that hovers or rebo
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 import numpy.typing as npt
 
-from mjsim.contact_settings import ContactSettings
 from model import Case, Contact, Events, Parameters
 from model.arrays import Array
 from model.trajectory import SAMPLE
@@ -25,10 +26,21 @@ _SATURATED, _FREE = 1e-6, 1e-4
 """How far from its Coulomb value friction may be for slipping, and must be for rolling, relative."""
 
 
+class Regularised(Protocol):
+    """What the classifier needs of an engine's settings."""
+
+    @property
+    def memory(self) -> bool:
+        """Whether friction that the engine regularises is corrected for."""
+
+    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
+        """Slip speed, m s-1, up to which friction is less than Coulomb's, for the latter over mass in m s-2."""
+
+
 class Classifier:
     """Classifies one run, block by block; samples too recent to judge wait for the next block."""
 
-    def __init__(self, p: Parameters, settings: ContactSettings) -> None:
+    def __init__(self, p: Parameters, settings: Regularised) -> None:
         self._p, self._settings = p, settings
         self._samples = np.empty(0, SAMPLE)
         self._letters = np.empty((2, 0), dtype=np.intp)

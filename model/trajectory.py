@@ -46,12 +46,16 @@ def _column(
 def current_versions() -> Mapping[str, str]:
     """Versions of the packages that determine a result, and of Python."""
     versions = {"python": platform.python_version()}
-    for name in ("dualball", "mujoco", "numpy", "scipy"):
-        try:
-            versions[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            versions[name] = "not installed"
-    return versions
+    return versions | {name: version(name) for name in ("dualball", "mujoco", "numpy", "scipy")}
+
+
+@functools.cache
+def version(package: str) -> str:
+    """The version of an installed package."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"
 
 
 @functools.cache

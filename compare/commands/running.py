@@ -50,7 +50,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("engine")
     known = f"{', '.join(engines.ENGINES)}; analytic is event"
     group.add_argument("--engine", type=_engine, default=engines.MUJOCO, metavar="NAME", help=known)
-    group.add_argument("--timestep", type=number, metavar="s", help="time step of mujoco and time-stepping")
+    group.add_argument("--timestep", type=number, metavar="s", help="time step; event has none")
     group.add_argument("--rtol", type=number, help="relative tolerance of event")
     group.add_argument("--restitution", type=number, help="coefficient of restitution of event and time-stepping")
 

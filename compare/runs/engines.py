@@ -5,13 +5,15 @@ To add an engine, add a record. It is named in tasks and files by `Engine.name`;
 
 from __future__ import annotations
 
+import importlib.util
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import analytic
 import mjsim
+from compare.engines import drake, loop, pybullet
 from mjsim import ContactSettings
 from mjsim.journal import Journal
 from model import InputError, Parameters, SimulationError, Trajectory
@@ -20,7 +22,7 @@ from model.errors import suggestion
 if TYPE_CHECKING:  # a task names its engine
     from compare.runs.tasks import Task
 
-Settings = ContactSettings | analytic.Settings
+Settings = ContactSettings | analytic.Settings | pybullet.Settings | drake.Settings
 """Numerical settings of any engine."""
 Simulate = Callable[["Task", Callable[[float], None]], Trajectory]
 """One whole run; the function is called with the fraction done, from time to time."""
@@ -49,9 +51,19 @@ class Engine:
     """Packages whose sources determine the results."""
     stands_on: tuple[str, ...]
     """Libraries whose versions do."""
+    needs: str = ""
+    """Library of the extra ``engines`` without which it can't run."""
+    as_it_comes: str = ""
+    """Name of the same engine as a newcomer would use it."""
     mark: str
     """Marker of matplotlib."""
     colour: str
+
+    @property
+    def missing(self) -> str:
+        """Why it can't run here; empty if it can."""
+        absent = self.needs and importlib.util.find_spec(loop.module(self.needs)) is None
+        return loop.how_to_install(self.needs) if absent else ""
 
     def configured(self, given: Mapping[str, float]) -> Settings:
         """`configure`, but an option that belongs to other engines is an `InputError`."""
@@ -116,6 +128,15 @@ def _theory(method: str) -> Simulate:
     return simulate
 
 
+def _adapter(name: str, library: str, scene: Callable[[Any, Parameters, Any], loop.Scene]) -> Simulate:
+    def simulate(task: Task, progress: Callable[[float], None]) -> Trajectory:
+        settings: Any = task.chosen_settings
+        given = task.parameters, task.x0, task.t_end, task.fluid, settings, task.sample_interval, progress
+        return loop.simulate(name, library, scene, *given)
+
+    return simulate
+
+
 def _time_stepping(given: Mapping[str, float]) -> analytic.Settings:
     return analytic.Settings(method="time-stepping", **{_STEP.get(name, name): given[name] for name in given})  # type: ignore[arg-type]
 
@@ -130,6 +151,7 @@ MUJOCO = Engine(
     stream=mujoco,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
+    as_it_comes="mujoco-defaults",
     mark="o",
     colour="#0072B2",
 )
@@ -164,7 +186,53 @@ MOREAU = replace(
     mark="^",
     colour="#009E73",
 )
-ENGINES: dict[str, Engine] = {each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU)}
+PYBULLET = Engine(
+    name="pybullet",
+    settings=pybullet.Settings,
+    options=("timestep",),
+    configure=lambda given: pybullet.Settings(**given),  # type: ignore[arg-type]
+    at=lambda step: pybullet.Settings(timestep=step),
+    simulate=_adapter("pybullet", "pybullet", pybullet.scene),
+    sources=("model", "mjsim", "compare.engines"),
+    stands_on=("numpy", "pybullet"),
+    needs="pybullet",
+    as_it_comes="pybullet-defaults",
+    mark="v",
+    colour="#E69F00",
+)
+PYBULLET_NEWCOMER = replace(
+    PYBULLET,
+    name="pybullet-defaults",
+    configure=lambda given: pybullet.newcomer(given.get("timestep", 1 / 240)),
+    at=pybullet.newcomer,
+    simulate=_adapter("pybullet-defaults", "pybullet", pybullet.scene),
+    mark="1",
+)
+DRAKE = Engine(
+    name="drake",
+    settings=drake.Settings,
+    options=("timestep",),
+    configure=lambda given: drake.Settings(**given),  # type: ignore[arg-type]
+    at=lambda step: drake.Settings(timestep=step),
+    simulate=_adapter("drake", "drake", drake.scene),
+    sources=("model", "mjsim", "compare.engines"),
+    stands_on=("numpy", "drake"),
+    needs="drake",
+    as_it_comes="drake-defaults",
+    mark="D",
+    colour="#56B4E9",
+)
+DRAKE_NEWCOMER = replace(
+    DRAKE,
+    name="drake-defaults",
+    configure=lambda given: drake.newcomer(given.get("timestep", 1e-3)),
+    at=drake.newcomer,
+    simulate=_adapter("drake-defaults", "drake", drake.scene),
+    mark="+",
+)
+ENGINES: dict[str, Engine] = {
+    each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU, PYBULLET, PYBULLET_NEWCOMER, DRAKE, DRAKE_NEWCOMER)
+}
 """Every engine by name."""
 ALIASES = {"analytic": "event"}
 """Other names that the command line takes."""

@@ -22,7 +22,7 @@ import numpy as np
 
 import analytic
 from compare.runs.campaign import BATCH, Campaign
-from compare.runs.engines import MOREAU, NEWCOMER, Settings
+from compare.runs.engines import MOREAU, NEWCOMER
 from compare.runs.tasks import Task, carry_out, failed_path
 from compare.scorecard import settings as ways
 from compare.scorecard import trials
@@ -32,6 +32,8 @@ from mjsim import ContactSettings, Run
 from model import StorageError, Trajectory, storage
 from model.files import write_text
 
+Settings = ContactSettings | analytic.Settings
+"""Of MuJoCo, or of the simulators of theory."""
 FILE = "scores.json"
 STEP = 1e-3
 """Time step of the ladder and the variants, s."""

@@ -24,6 +24,8 @@ from model.files import WholeFile
 ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.slow)])
 """Mutations of one file."""
 P = Parameters.named("reference")
+SIMULATORS = [name for name, engine in ENGINES.items() if not engine.needs]
+"""Engines that need no extra."""
 
 
 def mutated(data: bytes, rng: np.random.Generator) -> bytes:
@@ -55,11 +57,11 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A file of every kind, by what it is."""
     made = tmp_path_factory.mktemp("whole")
-    kept = {name: made / "runs" / f"{name}.h5" for name in ENGINES} | {"collection": made / "all.h5"}
+    kept = {name: made / "runs" / f"{name}.h5" for name in SIMULATORS} | {"collection": made / "all.h5"}
     kept |= {"measurements": made / "measurements" / "settled.h5"}
     (made / "runs").mkdir()
     (made / "measurements").mkdir()
-    for name in ENGINES:
+    for name in SIMULATORS:
         assert cli.main(["simulate", "--engine", name, "--time", "0.05", "-o", str(kept[name]), "--json"]) == 0
     collection.collect(made / "runs", kept["collection"])
     measured = [
@@ -91,7 +93,7 @@ def parts(path: Path) -> list[dict[str, Any]]:
 
 
 READERS: list[tuple[str, Callable[[Path], Any]]] = [
-    *((name, read) for name in ENGINES for read in (whole, parts)),
+    *((name, read) for name in SIMULATORS for read in (whole, parts)),
     ("collection", collection.is_collection),
     ("collection", collection.describe),
     ("measurements", record.load),
@@ -128,7 +130,7 @@ def results_of(measurements: Path) -> Path:
 @pytest.mark.parametrize(
     ("kind", "command"),
     [
-        *((name, "inspect FILE") for name in ENGINES),
+        *((name, "inspect FILE") for name in SIMULATORS),
         ("event", "inspect FILE --plot DIRECTORY/plot.png"),
         ("event", "render FILE -o DIRECTORY/picture.png"),
         ("event", "collect RUNS -o DIRECTORY/all.h5"),

@@ -1,0 +1,186 @@
+"""Drake: a discrete `MultibodyPlant` with point contact, normal forces implicit, friction regularised below a speed.
+
+TAMSI solves the step by Newton's method, with friction mu v/v_s up to the stiction tolerance v_s: a contact that should
+roll creeps at a part of v_s, and a ball sinks in by its load over the stiffness. Both can be made as small as round-off
+lets them. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of their own, and creep.
+
+Traps: friction is the harmonic mean 2 a b/(a + b) of both bodies' coefficients, stiffness k1 k2/(k1 + k2); without
+`SetUseSampledOutputPorts(False)` there is no update to be evaluated by itself; a plane
+has to be a half space, since boxes are less exact, but one among a dozen of other shapes crashes the engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from compare.engines.loop import BreakdownError, Scene, Touch, tangents
+from model import Parameters
+from model.arrays import Array
+from model.parameters import POSITIVE, Range, check_choice, check_number
+
+_APPROXIMATIONS = {"tamsi": "kTamsi", "sap": "kSap", "lagged": "kLagged", "similar": "kSimilar"}
+_SIZE = 100.0
+"""Edge of the cubes of which a vessel of many facets is made, in units of its radius."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """The engine's settings: by default the best known, massless joints, TAMSI, stiff contacts and a low v_s."""
+
+    timestep: float = 1e-3
+    """s"""
+    coordinates: str = "joints"
+    """``joints``, or ``free`` for a free ball."""
+    facets: int = 1
+    """Planes that make up the wall."""
+    approximation: str = "tamsi"
+    """`discrete_contact_approximation`."""
+    stiffness: float | None = 1e11
+    """Of ball, floor and wall, N/m; None for what the engine takes from its `penetration_allowance` of 1 mm."""
+    dissipation: float | None = 100.0
+    """Of each of them, s/m; None for the engine's own. A ball that has landed comes out of its overlap at up to the
+    reciprocal: with less it is thrown back, with more it stays sunk in for long."""
+    stiction: float = 1e-10
+    """`stiction_tolerance` v_s, m s-1."""
+
+    def __post_init__(self) -> None:
+        check_number("timestep", self.timestep, "s", POSITIVE)
+        check_choice("coordinates", self.coordinates, ("joints", "free"))
+        check_number("facets", self.facets, "planes", Range(1, whole=True))
+        check_choice("approximation", self.approximation, tuple(_APPROXIMATIONS))
+        check_number("stiction", self.stiction, "m s-1", POSITIVE)
+
+    @property
+    def memory(self) -> bool:
+        """Nothing corrects for regularised friction."""
+        return False
+
+    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
+        """The stiction tolerance, and for round-off at least 1e-9 m s-1."""
+        return np.full(np.shape(load), max(self.stiction, 1e-9))
+
+
+def newcomer(timestep: float) -> Settings:
+    """The engine's defaults: a free ball in a prism of 64 boxes."""
+    return Settings(
+        timestep=timestep,
+        coordinates="free",
+        facets=64,
+        approximation="lagged",
+        stiffness=None,
+        dissipation=None,
+        stiction=1e-4,
+    )
+
+
+def scene(engine: Any, p: Parameters, settings: Settings) -> Scene:
+    """The ball in a plant of its own."""
+    return _Plant(engine, p, settings)
+
+
+class _Plant(Scene):
+    def __init__(self, engine: Any, p: Parameters, settings: Settings) -> None:
+        self._joints = settings.coordinates == "joints"
+        builder = engine.DiagramBuilder()
+        plant, _ = engine.AddMultibodyPlantSceneGraph(builder, engine.MultibodyPlant(settings.timestep))
+        plant.set_contact_model(engine.ContactModel.kPoint)
+        approximations = engine.DiscreteContactApproximation
+        plant.set_discrete_contact_approximation(getattr(approximations, _APPROXIMATIONS[settings.approximation]))
+        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -p.g])
+        plant.SetUseSampledOutputPorts(False)
+        ball = plant.AddRigidBody("ball", _inertia(engine, p.m, p.j * p.r**2))
+        if self._joints:
+            _hang(engine, plant, ball, p)
+        springs = {"dissipation": settings.dissipation, "point_stiffness": settings.stiffness}
+        springs = {name: value for name, value in springs.items() if value is not None}
+        world, most = plant.world_body(), max(p.mu, p.eta)
+
+        def surface(body: Any, place: Any, shape: Any, name: str, friction: float) -> Any:
+            material, coefficient = engine.ProximityProperties(), engine.CoulombFriction(friction, friction)
+            engine.AddContactMaterial(**springs, friction=coefficient, properties=material)
+            return plant.RegisterCollisionGeometry(body, place, shape, name, material)
+
+        def of_pair(friction: float) -> float:
+            """The coefficient of a surface whose harmonic mean with that of the ball is the pair's."""
+            return most * friction / (2 * most - friction) if friction else 0.0
+
+        def plane(name: str, place: Array, normal: Array, friction: float) -> Any:
+            if settings.facets == 1:
+                pose, shape = engine.HalfSpace.MakePose(normal, place), engine.HalfSpace()
+            else:  # a half space among a dozen of shapes crashes the engine
+                turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
+                pose, shape = engine.RigidTransform(turn, place - size / 2 * normal), engine.Box(size, size, size)
+            return surface(world, pose, shape, name, of_pair(friction))
+
+        size = _SIZE * (p.R + p.r)
+        surface(ball, engine.RigidTransform(), engine.Sphere(p.r), "ball", most)
+        self._floor = plane("floor", np.zeros(3), np.array([0.0, 0.0, 1.0]), p.mu)
+        for number, (place, normal) in enumerate(tangents(p, settings.facets)):
+            plane(f"wall{number}", place, normal, p.eta)
+        plant.Finalize()
+        plant.set_stiction_tolerance(settings.stiction)
+        self._diagram = builder.Build()
+        self._root = self._diagram.CreateDefaultContext()
+        self._plant, self._context = plant, plant.GetMyMutableContextFromRoot(self._root)
+        self._force = plant.get_applied_generalized_force_input_port()
+        self._results = plant.get_contact_results_output_port()
+        self._ball = ball.index()
+        self._state: Array = np.empty(0)
+
+    def start(self, place: Sequence[float], velocity: Sequence[float]) -> None:
+        if self._joints:
+            self._state = np.array([*place, 0.0, 0.0, 0.0, *velocity])
+        else:
+            self._state = np.array([1.0, 0.0, 0.0, 0.0, *place, *velocity[3:], *velocity[:3]])
+
+    def advance(self, force: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+        if self._joints:
+            self._state[0], self._state[3:6], forces = 0.0, 0.0, [*force, 0.0, 0.0, 0.0]
+        else:
+            forces = [0.0, 0.0, 0.0, *force]
+        self._force.FixValue(self._context, forces)
+        self._plant.SetPositionsAndVelocities(self._context, self._state)
+        try:
+            update = self._plant.EvalUniquePeriodicDiscreteUpdate(self._context)
+        except RuntimeError as error:
+            raise BreakdownError(f"could not go on ({' '.join(str(error).split())[:80]})") from error
+        self._state = update.get_vector(0).CopyToVector()
+        numbers = self._state.tolist()
+        if self._joints:
+            return numbers[:3], numbers[6:]
+        return numbers[4:7], [*numbers[10:], *numbers[7:10]]
+
+    def touches(self) -> list[Touch]:
+        results = self._results.Eval(self._context)
+        infos = [results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())]
+        return [self._touch(info) for info in infos]
+
+    def _touch(self, info: Any) -> Touch:
+        force, pair = info.contact_force(), info.point_pair()  # the force acts on the second body
+        force = force if info.bodyB_index() == self._ball else -force
+        return Touch(int(self._floor not in (pair.id_A, pair.id_B)), force, -pair.depth)
+
+    def close(self) -> None:
+        del self._diagram, self._root, self._plant, self._context, self._force, self._results
+
+
+def _inertia(engine: Any, mass: float, per_mass: float) -> Any:
+    unit = engine.UnitInertia(per_mass, per_mass, per_mass)
+    return engine.SpatialInertia(mass, [0.0, 0.0, 0.0], unit, skip_validity_check=True)  # joints have no mass
+
+
+def _hang(engine: Any, plant: Any, ball: Any, p: Parameters) -> None:
+    """Join the ball to the world by an azimuth hinge, an inward and an upward slide, and a ball joint."""
+    hinge, inward, upward = (plant.AddRigidBody(name, _inertia(engine, 0.0, 0.0)) for name in ("hinge", "in", "up"))
+    up, frame = [0.0, 0.0, 1.0], plant.world_body().body_frame()
+    plant.AddJoint(engine.RevoluteJoint("azimuth", frame, hinge.body_frame(), up, 0.0))
+    place = engine.FixedOffsetFrame("place", hinge.body_frame(), engine.RigidTransform([p.R, 0.0, p.r]))
+    start = plant.AddFrame(place)
+    plant.AddJoint(engine.PrismaticJoint("inward", start, inward.body_frame(), [-1.0, 0.0, 0.0], damping=0.0))
+    plant.AddJoint(engine.PrismaticJoint("upward", inward.body_frame(), upward.body_frame(), up, damping=0.0))
+    plant.AddJoint(engine.BallRpyJoint("spin", upward.body_frame(), ball.body_frame(), 0.0))

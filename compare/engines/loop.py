@@ -1,0 +1,285 @@
+"""The loop round an engine: the fluid's drag, samples, cases, and what becomes of a run that breaks down.
+
+An engine shows itself as a `Scene` of a ball, a floor and a wall, in one of two kinds of `Coordinates`:
+
+* `JOINTS`: the ball hangs on an azimuth hinge, an inward and an upward slide, and a ball joint. Before each step the
+  scene turns its azimuth and the ball's orientation back to zero, so that the wall is one fixed plane. A stationary
+  orbit is then a fixed point of the step.
+* `FREE`: a free ball in world axes, in a vessel of fixed walls.
+
+The engine is driven by -m c(|w|) w (9) alone, with the velocity w relative to the fluid at the beginning of each step.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from mjsim import limits, recorder
+from mjsim.classify import Classifier, Regularised
+from model import Flow, Header, InputError, Parameters, State, Trajectory, drag
+from model.arrays import Array
+from model.kinematics import Motion, frame, from_world, slip_speeds, to_world
+from model.parameters import Range, check_number
+from model.trajectory import SAMPLE, current_versions, version
+
+_HUGE = 1e8
+"""A coordinate, velocity or force beyond this, in SI units, has diverged."""
+_Floats = Sequence[float]
+
+
+class Touch(NamedTuple):
+    """What a contact point of the engine carried in the last step."""
+
+    contact: int
+    """0 for the floor (A), 1 for the wall (B)."""
+    force: Array
+    """On the ball, in the axes of the scene, shape (3,), N."""
+    gap: float
+    """m"""
+
+
+class Scene(Protocol):
+    """A ball in an engine. Its axes are the world's; on joints, those in which the azimuth is zero."""
+
+    def start(self, place: _Floats, velocity: _Floats) -> None:
+        """Put the ball somewhere: what the three and six numbers are, its `Coordinates` say."""
+
+    def advance(self, force: _Floats) -> tuple[_Floats, _Floats]:
+        """Take a step under a (generalised) force of three components; return place and velocity after it.
+
+        On joints the azimuth in `place` is that of this step alone. Raises `BreakdownError`.
+        """
+
+    def touches(self) -> list[Touch]:
+        """The contact points of the last step."""
+
+    def close(self) -> None:
+        """Give up what the engine holds."""
+
+
+class BreakdownError(RuntimeError):
+    """The engine can't take the next step."""
+
+
+class Numbers(Regularised, Protocol):
+    """What the loop needs of any engine's settings, a dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def timestep(self) -> float:
+        """s"""
+
+    @property
+    def coordinates(self) -> str:
+        """A name of `COORDINATES`."""
+
+
+N = TypeVar("N", bound=Numbers)
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """What place and velocity of a scene are."""
+
+    start: Callable[[State, Parameters], tuple[Array, Array]]
+    drag: Callable[[_Floats, _Floats, float, Parameters], _Floats]
+    """The force of the fluid at a place, a velocity and an omega_0."""
+    azimuth: Callable[[float, _Floats], float]
+    """The azimuth, not wrapped, from that before the step."""
+    states: Callable[[Array, Array, Parameters], State]
+    """States of places (n, 3) and velocities (n, 6)."""
+    turning: bool
+    """Whether the axes of the scene turn with the ball."""
+
+
+def _coefficient(p: Parameters, speed: float) -> float:
+    """m c(|w|) in kg s-1 by the law of `model.drag`, at a speed |w| in m s-1."""
+    if p.drag == drag.STOKES:
+        return p.m * p.c
+    reynolds = 2 * p.r * speed / p.nu_f
+    if p.drag == drag.QUADRATIC:
+        return p.m * p.c * p.C_D * reynolds / 24
+    return p.m * p.c * max(1 + 0.15 * reynolds**0.687 if reynolds < 1000 else 0.0, 0.44 * reynolds / 24)
+
+
+def _joint_start(x: State, p: Parameters) -> tuple[Array, Array]:
+    qpos, qvel = recorder.joint_state(x, 0.0, p)
+    return qpos[:3], qvel @ _SPIN.T
+
+
+def _joint_drag(place: _Floats, velocity: _Floats, omega_0: float, p: Parameters) -> _Floats:
+    rho, (omega_c, v_h, v_y, *_) = p.R - place[1], velocity
+    along = rho * (omega_c - omega_0)
+    mc = _coefficient(p, math.hypot(v_h, v_y, along))
+    return -mc * rho * along, -mc * v_h, -mc * v_y
+
+
+def _joint_states(place: Array, velocity: Array, p: Parameters) -> State:
+    upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(place), 4))
+    return recorder.state(np.concatenate([place, upright], axis=1), velocity @ _SPIN, p)
+
+
+def _free_start(x: State, p: Parameters) -> tuple[Array, Array]:
+    motion = to_world(x, 0.0, p)
+    return motion.position, np.concatenate([motion.velocity, motion.spin])
+
+
+def _free_drag(place: _Floats, velocity: _Floats, omega_0: float, p: Parameters) -> _Floats:
+    (x, y, _), (v_x, v_y, v_z, *_) = place, velocity
+    w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
+    mc = _coefficient(p, math.hypot(w_x, w_y, v_z))
+    return -mc * w_x, -mc * w_y, -mc * v_z
+
+
+def _free_states(place: Array, velocity: Array, p: Parameters) -> State:
+    return from_world(Motion(place, velocity[:, :3], velocity[:, 3:]), p)[0]
+
+
+_SPIN = np.eye(6)
+_SPIN[3:, 3:] = frame(0.0).T
+"""Turns the spin from the paper's axes to those of the scene."""
+JOINTS = Coordinates(_joint_start, _joint_drag, lambda theta, place: theta + place[0], _joint_states, True)
+"""Place (angle, h, y) in rad and m; velocity (omega_c, v_h, v_y, spin about the scene's axes against the joints)."""
+FREE = Coordinates(
+    _free_start,
+    _free_drag,
+    lambda theta, place: theta + math.remainder(math.atan2(place[1], place[0]) - theta, math.tau),
+    _free_states,
+    False,
+)
+"""Place and velocity with spin in world axes, m, m s-1 and rad s-1."""
+COORDINATES = {"joints": JOINTS, "free": FREE}
+
+
+def simulate(
+    engine: str,
+    library: str,
+    build: Callable[[Any, Parameters, N], Scene],
+    p: Parameters,
+    x0: npt.ArrayLike,
+    t_end: float,
+    flow: Flow,
+    settings: N,
+    sample_interval: float | None,
+    progress: Callable[[float], None],
+) -> Trajectory:
+    """One run of an engine with the scene that `build` makes of its library, and from rest of the azimuth.
+
+    Where it breaks down, the header says why.
+
+    Forces of a sample are those of the step that begins there, gaps of touching contacts the engine's own.
+
+    Raises
+    ------
+    InputError
+        If the library is not installed, an argument out of range, or the time step too large for the problem.
+    """
+    every, count = limits.sampling(t_end, settings.timestep, sample_interval)
+    limits.check_timestep(settings.timestep, p, flow, t_end)
+    x = State.one(x0)
+    check_number("h", x.h, "m", Range(high=p.R, below=True), "to be off the axis it")
+    rows, failure = np.empty((count, _WIDTH)), ""
+    coordinates = COORDINATES[settings.coordinates]
+    with closing(build(_imported(library), p, settings)) as scene:
+        place, velocity = coordinates.start(x, p)
+        scene.start(place.tolist(), velocity.tolist())
+        run = _Run(scene, coordinates, p, place.tolist(), velocity.tolist())
+        done = 0
+        try:
+            while done < count:
+                steps = every if done + 1 < count else 1  # nothing is needed after the forces of the last sample
+                times = (done * every + np.arange(steps) + 0.5) * settings.timestep
+                run.sample(rows[done], flow(times).tolist())
+                if not (np.abs(rows[done]) < _HUGE).all():
+                    raise BreakdownError("diverged")
+                done += 1
+                progress(done / count)
+        except BreakdownError as error:
+            failure = f"{error} by t = {done * every * settings.timestep:g} s"
+    time = np.arange(done, dtype=float) * (every * settings.timestep)
+    given = {"t_end": float(t_end), "sample_interval": every * settings.timestep, "x0": list(x), "theta_0": 0.0}
+    versions = {**current_versions(), library: version(library)}
+    header = Header(engine, p, flow, asdict(settings) | given, failure=failure, versions=versions)
+    classifier = Classifier(p, settings)
+    block = classifier.add(_samples(time, rows[:done], coordinates, p), last=True)
+    return Trajectory.from_blocks(header, [block], classifier.events)
+
+
+def module(library: str) -> str:
+    """The module of an engine's library, which is named as it is installed."""
+    return {"drake": "pydrake"}.get(library, library)
+
+
+def how_to_install(library: str) -> str:
+    """What to say where it isn't."""
+    return f'{library} is not installed: pip install "dualball[engines]"'
+
+
+def _imported(library: str) -> Any:
+    try:
+        return importlib.import_module({"drake": "pydrake.all"}.get(library, library))
+    except ImportError as error:
+        raise InputError(how_to_install(library)) from error
+
+
+_WIDTH = 1 + 3 + 6 + 2 * 5
+"""A row: azimuth, place, velocity, and for each contact whether it touches, force (3,), gap."""
+
+
+@dataclass
+class _Run:
+    scene: Scene
+    coordinates: Coordinates
+    p: Parameters
+    place: _Floats
+    velocity: _Floats
+    theta: float = 0.0
+
+    def sample(self, row: Array, omega_0: list[float]) -> None:
+        """Fill in the present state, take a step for each omega_0, and fill in the contacts of the first."""
+        row[:10], row[10:] = [self.theta, *self.place, *self.velocity], 0.0
+        self._step(omega_0[0])
+        for contact, force, gap in self.scene.touches():
+            of = row[10 + 5 * contact :][:5]
+            of[4] = min(gap, of[4]) if of[0] else gap
+            of[0], of[1:4] = 1.0, of[1:4] + force
+        for fluid in omega_0[1:]:
+            self._step(fluid)
+
+    def _step(self, omega_0: float) -> None:
+        drag_force, azimuth, p = self.coordinates.drag, self.coordinates.azimuth, self.p
+        self.place, self.velocity = self.scene.advance(drag_force(self.place, self.velocity, omega_0, p))
+        if self.coordinates.turning and self.place[1] >= p.R:
+            raise BreakdownError("reached the vessel's axis, where polar coordinates end,")
+        self.theta = azimuth(self.theta, self.place)
+
+
+def _samples(time: Array, rows: Array, coordinates: Coordinates, p: Parameters) -> npt.NDArray[np.void]:
+    """Samples of dtype `SAMPLE`, shape (n,), all but the case."""
+    theta, place, velocity, *contacts = np.split(rows, [1, 4, 10, 15], axis=1)
+    x = coordinates.states(place, velocity, p)
+    axes = frame(np.zeros(len(rows)) if coordinates.turning else theta[:, 0])
+    block = np.zeros(len(time), SAMPLE)
+    block["time"], block["theta"] = time, theta[:, 0]
+    for name, column in x._asdict().items():
+        block[name] = column
+    for name, own, distance, speed in zip("AB", contacts, (x.y, x.h), slip_speeds(x.stacked(), p), strict=True):
+        block[f"force_{name}"] = np.einsum("nab,nb->na", axes, own[:, 1:4])
+        block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], distance)
+        block[f"slip_speed_{name}"] = speed
+    return block
+
+
+def tangents(p: Parameters, facets: int) -> list[tuple[Array, Array]]:
+    """Places and inward normals, each (3,), of planes tangent to the vessel's wall, from azimuth 0 round."""
+    normals = [-np.array([math.cos(a), math.sin(a), 0.0]) for a in math.tau * np.arange(facets) / facets]
+    return [(-(p.R + p.r) * normal, normal) for normal in normals]

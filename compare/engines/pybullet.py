@@ -1,0 +1,214 @@
+"""PyBullet: projected Gauss-Seidel on the velocities of a multibody (Featherstone), contacts rigid within tolerances.
+
+Traps: its margins are absolute lengths and its solver stops at an absolute residual, both made for things the size of
+a man; joints have damping, motors and a velocity limit unless told otherwise; friction and inertia given in one call of
+`changeDynamics` leave friction at 0.5; friction is the product of both bodies' coefficients.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from compare.engines.loop import BreakdownError, Scene, Touch, tangents
+from model import Parameters
+from model.arrays import Array
+from model.parameters import POSITIVE, Range, check_choice, check_number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """The engine's settings: by default the best known, massless joints and contacts solved to round-off."""
+
+    timestep: float = 1e-3
+    """s"""
+    coordinates: str = "joints"
+    """``joints``, or ``free`` for a free ball."""
+    facets: int = 1
+    """Planes that make up the wall."""
+    scale: float = 100.0
+    """Length unit of the engine, in 1/m: its tolerances are absolute lengths."""
+    iterations: int = 200
+    """Most iterations of the contact solver."""
+    residual: float = 1e-24
+    """`solverResidualThreshold`, the change of velocity in an iteration, squared, at which the solver stops."""
+    cone: bool = True
+    """Whether friction obeys Coulomb's cone; a pyramid otherwise."""
+    slop: float = 0.0
+    """`contactSlop`, overlap that is left alone, in the engine's length unit."""
+    breaking: float = 0.2
+    """`contactBreakingThreshold`, distance up to which contacts are prepared for, in the engine's length unit."""
+
+    def __post_init__(self) -> None:
+        check_number("timestep", self.timestep, "s", POSITIVE)
+        check_choice("coordinates", self.coordinates, ("joints", "free"))
+        check_number("facets", self.facets, "planes", Range(1, whole=True))
+        check_number("scale", self.scale, "m-1", POSITIVE)
+
+    @property
+    def memory(self) -> bool:
+        """Friction is not regularised."""
+        return False
+
+    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
+        """The speed to which the solver goes, and for round-off at least 1e-9 m s-1."""
+        return np.full(np.shape(load), max(math.sqrt(self.residual) / self.scale, 1e-9))
+
+
+def newcomer(timestep: float) -> Settings:
+    """The engine's defaults: a free ball in a prism of 64 planes, SI units."""
+    return Settings(
+        timestep=timestep,
+        coordinates="free",
+        facets=64,
+        scale=1.0,
+        iterations=50,
+        residual=1e-7,
+        cone=False,
+        slop=1e-5,
+        breaking=0.02,
+    )
+
+
+def scene(engine: Any, p: Parameters, settings: Settings) -> Scene:
+    """The ball in a physics server of its own."""
+    return (_OnJoints if settings.coordinates == "joints" else _Free)(engine, p, settings)
+
+
+class _Ball(Scene):
+    """Floor, wall, and what is common to both kinds of ball."""
+
+    def __init__(self, engine: Any, p: Parameters, settings: Settings) -> None:
+        self._engine, self._p, self._scale = engine, p, settings.scale
+        self._here = {"physicsClientId": engine.connect(engine.DIRECT)}
+        if self._here["physicsClientId"] < 0:
+            raise BreakdownError("PyBullet has no more servers")
+        engine.setPhysicsEngineParameter(
+            fixedTimeStep=settings.timestep,
+            numSolverIterations=settings.iterations,
+            solverResidualThreshold=settings.residual,
+            enableConeFriction=int(settings.cone),
+            contactSlop=settings.slop,
+            contactBreakingThreshold=settings.breaking,
+            **self._here,
+        )
+        engine.setGravity(0, 0, -p.g * self._scale, **self._here)
+        self._floor = self._plane([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], p.mu)
+        for place, normal in tangents(p, settings.facets):
+            self._plane((place * self._scale).tolist(), normal.tolist(), p.eta)
+        sphere = engine.createCollisionShape(engine.GEOM_SPHERE, radius=p.r * self._scale, **self._here)
+        self._body = self._make(sphere)
+
+    def _plane(self, place: Sequence[float], normal: Sequence[float], friction: float) -> int:
+        shape = self._engine.createCollisionShape(self._engine.GEOM_PLANE, planeNormal=normal, **self._here)
+        body: int = self._engine.createMultiBody(0, shape, basePosition=place, **self._here)
+        self._engine.changeDynamics(body, -1, lateralFriction=friction, restitution=0, **self._here)
+        return body
+
+    def _make(self, sphere: int) -> int:
+        raise NotImplementedError
+
+    def _dress(self, body: int, link: int, mass: float) -> None:
+        """Give a link a mass and take away all damping."""
+        inertia = self._p.j * mass * (self._p.r * self._scale) ** 2
+        free = {"linearDamping": 0, "angularDamping": 0, "jointDamping": 0, "maxJointVelocity": 1e9}
+        self._engine.changeDynamics(body, link, localInertiaDiagonal=[inertia] * 3, **free, **self._here)
+        self._engine.changeDynamics(body, link, lateralFriction=1, restitution=0, **self._here)
+
+    def touches(self) -> list[Touch]:
+        """The contact points of the last step that carried something."""
+        return [
+            Touch(
+                int(point[2] != self._floor),
+                (point[9] * np.array(point[7]) + point[10] * np.array(point[11]) + point[12] * np.array(point[13]))
+                / self._scale,
+                point[8] / self._scale,
+            )
+            for point in self._engine.getContactPoints(self._body, **self._here)
+            if point[9] > 0
+        ]
+
+    def close(self) -> None:
+        """Stop the server."""
+        self._engine.disconnect(**self._here)
+
+
+class _OnJoints(_Ball):
+    """The ball on massless joints."""
+
+    def _make(self, sphere: int) -> int:
+        engine, count = self._engine, 4
+        body: int = engine.createMultiBody(
+            baseMass=0,
+            basePosition=[0, 0, self._p.r * self._scale],
+            linkMasses=[0, 0, 0, self._p.m],
+            linkCollisionShapeIndices=[-1, -1, -1, sphere],
+            linkVisualShapeIndices=[-1] * count,
+            linkPositions=[[0, 0, 0], [self._p.R * self._scale, 0, 0], [0, 0, 0], [0, 0, 0]],
+            linkOrientations=[_UPRIGHT] * count,
+            linkInertialFramePositions=[[0, 0, 0]] * count,
+            linkInertialFrameOrientations=[_UPRIGHT] * count,
+            linkParentIndices=range(count),
+            linkJointTypes=[engine.JOINT_REVOLUTE, *[engine.JOINT_PRISMATIC] * 2, engine.JOINT_SPHERICAL],
+            linkJointAxis=[[0, 0, 1], [-1, 0, 0], [0, 0, 1], [0, 0, 1]],
+            **self._here,
+        )
+        for link, mass in enumerate((0, 0, 0, self._p.m)):
+            self._dress(body, link, mass)
+        for joint in range(3):
+            engine.setJointMotorControl2(body, joint, engine.VELOCITY_CONTROL, force=0, **self._here)
+        still = {"targetPosition": _UPRIGHT, "positionGain": 0, "velocityGain": 0, "force": [0, 0, 0]}
+        engine.setJointMotorControlMultiDof(body, 3, engine.POSITION_CONTROL, **still, **self._here)
+        return body
+
+    def start(self, place: Sequence[float], velocity: Sequence[float]) -> None:
+        _, *gaps = place
+        for joint, gap, rate in zip((1, 2), gaps, velocity[1:3], strict=True):
+            self._engine.resetJointState(self._body, joint, gap * self._scale, rate * self._scale, **self._here)
+        self._turn_back(velocity[0], velocity[3:])
+
+    def _turn_back(self, rate: float, spin: Sequence[float]) -> None:
+        self._engine.resetJointState(self._body, 0, 0.0, rate, **self._here)
+        self._engine.resetJointStateMultiDof(self._body, 3, _UPRIGHT, spin, **self._here)
+
+    def advance(self, force: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+        engine, body, scale = self._engine, self._body, self._scale
+        forces = [force[0] * scale * scale, force[1] * scale, force[2] * scale]
+        engine.setJointMotorControlArray(body, (0, 1, 2), engine.TORQUE_CONTROL, forces=forces, **self._here)
+        engine.stepSimulation(**self._here)
+        states = engine.getJointStatesMultiDof(body, (0, 1, 2, 3), **self._here)
+        ((angle,), (rate,), *_), ((h,), (v_h,), *_), ((y,), (v_y,), *_), (_, spin, *_) = states
+        self._turn_back(rate, spin)
+        return (angle, h / scale, y / scale), (rate, v_h / scale, v_y / scale, *spin)
+
+
+class _Free(_Ball):
+    """A free ball."""
+
+    def _make(self, sphere: int) -> int:
+        body: int = self._engine.createMultiBody(self._p.m, sphere, **self._here)
+        self._dress(body, -1, self._p.m)
+        return body
+
+    def start(self, place: Sequence[float], velocity: Sequence[float]) -> None:
+        centre, linear = ([value * self._scale for value in part] for part in (place, velocity[:3]))
+        self._engine.resetBasePositionAndOrientation(self._body, centre, _UPRIGHT, **self._here)
+        self._engine.resetBaseVelocity(self._body, linear, velocity[3:], **self._here)
+        self._place = centre
+
+    def advance(self, force: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+        engine, body, scale = self._engine, self._body, self._scale
+        pull = [each * scale for each in force]
+        engine.applyExternalForce(body, -1, pull, self._place, engine.WORLD_FRAME, **self._here)
+        engine.stepSimulation(**self._here)
+        self._place, _ = engine.getBasePositionAndOrientation(body, **self._here)
+        linear, spin = engine.getBaseVelocity(body, **self._here)
+        return [each / scale for each in self._place], [*(each / scale for each in linear), *spin]
+
+
+_UPRIGHT = (0.0, 0.0, 0.0, 1.0)

@@ -1,0 +1,148 @@
+"""Engines of the extra ``engines``: the same task in, the same trajectory out."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import analytic
+from compare.commands import cli
+from compare.runs.engines import ENGINES
+from compare.runs.tasks import Task, carry_out
+from compare.scorecard.accuracy import MOTIONS
+from compare.scorecard.trials import STATES
+from model import InputError, Parameters
+from model.kinematics import Motion as World
+from model.kinematics import from_world, to_world
+
+REFERENCE = Parameters.named("reference")
+
+
+def engines(*names):
+    """Parameters of a test; those that aren't installed are skipped, and say so."""
+    marks = {name: pytest.mark.skipif(bool(ENGINES[name].missing), reason=ENGINES[name].missing) for name in names}
+    return pytest.mark.parametrize("name", [pytest.param(name, marks=mark) for name, mark in marks.items()])
+
+
+BEST, ALL = ("pybullet", "drake"), ("pybullet", "drake", "pybullet-defaults", "drake-defaults")
+
+
+def run(name, p, x0, t_end, step, interval=None):
+    settings = ENGINES[name].at(step)
+    task = Task(engine=name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval or step)
+    (trajectory,) = carry_out([task])
+    return trajectory
+
+
+@engines(*BEST)
+@pytest.mark.parametrize("state", STATES[:3], ids=lambda state: state.name)
+def test_stationary_states_are_those_of_theory(name, state):
+    """PyBullet's to round-off; a ball of Drake sinks in by its load over the stiffness, and creeps at up to v_s."""
+    settings, p, x = ENGINES[name].at(4e-3), state.p, state.solution.x
+    tolerance = 1e-12
+    if name == "drake":
+        load = max(state.solution.force_A[1], state.solution.force_B[0])
+        tolerance += 2 * load / settings.stiffness / p.r + settings.stiction / (x[2] * p.R)
+    start = x * [1, 1, 0.98, 0.98, 0.98, 0.98, 1, 1]
+    ended = run(name, p, start, state.forgets, 4e-3, interval=1.0)
+    # What is left of the start after `forgets` is round-off, which the settled ball goes on making.
+    rest = 0.02 * math.exp(-float(ended.time[-1]) / state.forgets * -math.log(np.finfo(float).eps))
+    assert ended.complete
+    assert abs(ended.omega_c[-1] / x[2] - 1) < tolerance + 1e4 * rest
+    assert ended.cases[-1] is state.case
+    assert ended.force_A[-1, 1] + ended.force_B[-1, 1] == pytest.approx(p.m * p.g, rel=1e-6)
+
+
+@engines(*BEST)
+def test_a_ball_lands_slips_and_sticks_when_it_should(name):
+    step, (x0, *_) = 1e-3, MOTIONS.values()
+    truth = analytic.simulate(REFERENCE, x0, 0.3)
+    seen = run(name, REFERENCE, x0, 0.3, step)
+    assert seen.events.to_case.tolist() == truth.events.to_case.tolist()
+    assert abs(seen.events.time[0] - truth.events.time[0]) < 2 * step
+
+
+@engines(*ALL)
+@pytest.mark.parametrize("law", ["stokes", "schiller-naumann", "quadratic"])
+def test_free_flight_obeys_newton_and_the_law_of_drag(name, law):
+    p = REFERENCE.replace(drag=law, nu_f=1e-5, omega_0=12.0, c=0.3)
+    x0 = (0.02, 0.3, 4.0, 1.0, -2.0, 3.0, 0.02, -0.1)
+    lasts, step = 0.05, 1e-4
+    begin = to_world(x0, 0.0, p)
+
+    def motion(_, now):
+        w = now[3:] - p.omega_0 * np.array([-now[1], now[0], 0.0])
+        reynolds = 2 * p.r * np.linalg.norm(w) / p.nu_f
+        stokes, newton = 1.0, reynolds / 24
+        factor = {"stokes": stokes, "quadratic": p.C_D * newton}.get(law)
+        if factor is None:
+            factor = max(1 + 0.15 * reynolds**0.687, 0.44 * newton) if reynolds < 990 else 0.44 * newton
+        return np.concatenate([now[3:], -p.c * factor * w - [0.0, 0.0, p.g]])
+
+    ended = solve_ivp(motion, (0, lasts), np.concatenate([begin.position, begin.velocity]), rtol=1e-9, atol=1e-12)
+    truth, theta = from_world(World(ended.y[:3, -1], ended.y[3:, -1], begin.spin), p)
+    seen = run(name, p, x0, lasts, step)
+    assert seen.time[-1] == pytest.approx(lasts)
+    assert {case.name for case in seen.cases} == {"NN"}
+    # The step is of first order: a speed lacks up to what a step of the largest acceleration gives.
+    speed = np.abs(np.diff(ended.y[3:], axis=1) / np.diff(ended.t)).max() * step
+    assert seen.theta[-1] == pytest.approx(float(theta), abs=lasts * speed / p.R)
+    assert seen.y[-1] == pytest.approx(truth.y, abs=lasts * speed)
+    assert seen.h[-1] == pytest.approx(truth.h, abs=lasts * speed)
+    assert seen.v_y[-1] == pytest.approx(truth.v_y, abs=2 * speed)
+    assert seen.omega_c[-1] == pytest.approx(truth.omega_c, abs=2 * speed / (p.R - truth.h))
+    turned = np.linalg.norm(begin.spin) * lasts * speed / p.R  # the spin keeps its direction in space
+    for slip in ("slip_x", "slip_y", "slip_z"):
+        assert getattr(seen, slip)[-1] == pytest.approx(getattr(truth, slip), abs=2 * speed / p.r + turned)
+
+
+@engines("pybullet-defaults", "drake-defaults")
+def test_a_newcomer_goes_round_and_round(name):
+    seen = run(name, REFERENCE.replace(omega_0=12.0), (0, 0, 11.0, 0, 0, 0), 2.0, 2e-3, interval=0.02)
+    assert seen.complete
+    assert np.all(np.diff(seen.theta) > 0)  # the azimuth isn't wrapped
+    assert seen.theta[-1] == pytest.approx(np.trapezoid(seen.omega_c, seen.time), rel=0.02)
+
+
+@engines(*BEST)
+def test_polar_coordinates_end_at_the_axis(name):
+    seen = run(name, REFERENCE, (0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.03, 3.0), 0.05, 1e-3)
+    assert "axis" in seen.header.failure
+    assert not seen.complete
+    assert 0 < len(seen.time) < 20
+
+
+@engines("drake")
+def test_a_step_that_cannot_be_solved_is_the_run_s_failure(name):
+    settings = ENGINES[name].settings(timestep=1e-3, stiffness=1e12, stiction=1e-12, dissipation=10.0)
+    _, x0 = MOTIONS.values()
+    (seen,) = carry_out([Task(engine=name, parameters=REFERENCE, x0=x0, t_end=0.1, settings=settings)])
+    assert "converge" in seen.header.failure
+
+
+@pytest.mark.parametrize(("name", "package"), [("pybullet", "pybullet"), ("drake-defaults", "drake")])
+def test_what_is_not_installed_names_the_extra(name, package, monkeypatch, capsys):
+    for module in ("pybullet", "pydrake", "pydrake.all"):
+        monkeypatch.setitem(sys.modules, module, None)
+    assert cli.main(["simulate", "--engine", name, "--time", "0.05"]) == 2
+    error = capsys.readouterr().err
+    assert error == f'dualball: error: {package} is not installed: pip install "dualball[engines]"\n'
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_settings_out_of_range_are_refused(name):
+    settings = ENGINES[name].settings
+    with pytest.raises(InputError, match="timestep = -1 s"):
+        settings(timestep=-1.0)
+    with pytest.raises(InputError, match="coordinates = 'polar'"):
+        settings(coordinates="polar")
+
+
+@engines(*ALL)
+def test_a_step_too_long_for_the_problem_is_refused(name):
+    with pytest.raises(InputError, match="half of sqrt"):
+        run(name, REFERENCE, (0,) * 6, 1.0, 0.1)
