@@ -82,7 +82,7 @@ class Run:
         theta_0 = check_number("theta_0", theta_0, "rad")
         states = [State.one(x0) for x0 in x0s]
         for x, p, flow in zip(states, parameters, flows, strict=True):
-            limits.check_timestep(settings, p, flow, t_end)
+            limits.check_timestep(settings.timestep, p, flow, t_end)
             limits.check_start(x, p, settings)
         scenes = [p.replace(omega_0=0.0) for p in parameters]  # the fluid is no part of a scene
         built = {p: scene.build(p, settings) for p in dict.fromkeys(scenes)}

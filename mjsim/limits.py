@@ -34,7 +34,7 @@ def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> 
             )
 
 
-def check_timestep(settings: ContactSettings, p: Parameters, flow: Flow, t_end: float) -> None:
+def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float) -> None:
     """Refuse a step beyond half the shortest time of the problem.
 
     A contact of the engine needs a time constant of two steps. Within it an acceleration a may not move the ball by the
@@ -44,7 +44,6 @@ def check_timestep(settings: ContactSettings, p: Parameters, flow: Flow, t_end: 
     on the speed w, c w changes by up to 2 c(w) with w, taken where the ball lags by all of the fluid's speed. A wave of
     the flow is met at least twice a radian, 2 h <= 1/(2 pi f).
     """
-    timestep = settings.timestep
     times = np.append(flow.breakpoints[flow.breakpoints < t_end], [0.0, t_end])
     # Just before and after the jumps: between them omega_0 is linear.
     fastest = float(np.abs(flow.line(np.append(times, np.nextafter(times, -np.inf)))).max())
@@ -52,7 +51,7 @@ def check_timestep(settings: ContactSettings, p: Parameters, flow: Flow, t_end: 
     scales = {"sqrt(R/g)": math.sqrt(p.R / p.g) if p.g else math.inf}
     name, drag = "1/c", p.c
     if p.drag != STOKES:
-        name, drag = "1/(2 c(R omega_0))", 2 * resistance(p.R * fastest, 0.0, 0.0, Ball.of(p, settings)) / p.m
+        name, drag = "1/(2 c(R omega_0))", 2 * resistance(p.R * fastest, 0.0, 0.0, Ball.of(p, ContactSettings())) / p.m
     scales |= {"1/omega_0": 1 / fastest if fastest else math.inf, name: 1 / drag if drag else math.inf}
     if len(flow.waves):
         scales["1/(2 pi f)"] = 1 / (2 * math.pi * float(flow.waves[:, 1].max()))

@@ -55,7 +55,7 @@ def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSetting
     """The simulation, with what only serves contact out of sight."""
     if settings.coordinates != "polar":
         raise InputError("the viewer shows coordinates = 'polar' only")
-    limits.check_timestep(settings, p, flow, float(flow.start[-1]))
+    limits.check_timestep(settings.timestep, p, flow, float(flow.start[-1]))
     limits.check_start(x0, p, settings)
     model, _ = scene.build(p, settings)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
