@@ -151,3 +151,15 @@ def _logarithms(matrix: Array) -> npt.NDArray[np.complex128]:
     """Logarithms of the eigenvalues of a matrix; of one that is 0, a decay to round-off."""
     values = np.linalg.eigvals(matrix).astype(complex)
     return np.asarray(np.log(np.where(values == 0, np.finfo(float).eps, values)))
+
+
+def peaks(values: Array) -> tuple[npt.NDArray[np.intp], Array]:
+    """Local maxima of samples (n,): their indices, and how much later, in samples, the parabolas have their tops."""
+    k = 1 + np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:]))
+    before, at, after = values[k - 1], values[k], values[k + 1]
+    return k, (before - after) / (2 * (before - 2 * at + after))
+
+
+def top(values: Array, k: npt.NDArray[np.intp], late: Array) -> Array:
+    """The heights of the parabolas that `peaks` puts through samples (n,)."""
+    return np.asarray(values[k] + late * (values[k + 1] - values[k - 1]) / 4)

@@ -17,7 +17,6 @@ from model import Parameters, Trajectory
 from model.kinematics import VARIABLES
 
 SECTION = "Beyond the paper"
-PROTOCOL = "recurrent"
 LASTS = 60.0
 """How long theory simulates a motion that settles, in units of 1/c: the slowest part decays in 2 (1 + 2 j)/c."""
 
@@ -35,8 +34,8 @@ def _of(m: Measurement) -> Orbit:
     return _orbit(m.parameters, tuple(float(m.conditions[n]) for n in VARIABLES), float(m.conditions["period"]))
 
 
-def _bearing(quantity: str, predict: Callable[[Orbit], float]) -> Bearing:
-    return Bearing(protocol=PROTOCOL, quantity=quantity, predict=lambda m: predict(_of(m)), by="analytic.orbits.refine")
+def _bearing(quantity: str, predict: Callable[[Orbit], float], protocol: str = "recurrent") -> Bearing:
+    return Bearing(protocol=protocol, quantity=quantity, predict=lambda m: predict(_of(m)), by="analytic.orbits.refine")
 
 
 @remembered
@@ -85,6 +84,18 @@ CLAIMS = (
         bearings=(_bearing("orbit_multiplier", lambda orbit: float(np.abs(orbit.multipliers).max())),),
     ),
     Claim(
+        id="swing",
+        level=Level.DEFAULT,
+        section=SECTION,
+        source="Section 5.3, last paragraph",
+        statement="Between the Hopf points of SS the ball swings for ever and slips all the time (very rough floor).",
+        bearings=(
+            _bearing("swing_period", lambda orbit: orbit.period, "swing"),
+            _bearing("swing_omega_c", lambda orbit: orbit.turn / orbit.period, "swing"),
+            _bearing("swing_size", lambda orbit: float(np.ptp(orbit.cycle.omega_c)), "swing"),
+        ),
+    ),
+    Claim(
         id="hopping-birth",
         level=Level.DEFAULT,
         section=SECTION,
@@ -92,7 +103,7 @@ CLAIMS = (
         statement="Hopping begins with hops of no height at ω₀₂, where the wall begins to carry the ball.",
         bearings=(
             Bearing(
-                protocol=PROTOCOL,
+                protocol="recurrent",
                 quantity="orbit_birth",
                 predict=lambda m: analytic.thresholds(m.parameters).omega_02,
                 by="analytic.thresholds: omega_02",

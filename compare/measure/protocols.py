@@ -21,10 +21,12 @@ from compare.measure import (
     settled,
     slope,
     steepest,
+    swing,
     thresholds,
     unloading,
     watched,
 )
+from compare.measure.lab import Level
 from compare.measure.programme import Protocol
 
 PROTOCOLS: tuple[Protocol, ...] = (
@@ -47,6 +49,7 @@ PROTOCOLS: tuple[Protocol, ...] = (
     Protocol("motions", motions.measure),
     Protocol("impacts", impacts.measure),
     Protocol("recurrent", recurrent.measure),
+    Protocol("swing", swing.measure, level=Level.DEFAULT),
     Protocol("choice", choice.measure),
     Protocol("slope", slope.measure, ("settled", "thresholds")),
 )

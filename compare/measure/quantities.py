@@ -116,6 +116,9 @@ _ALL = (
     Quantity("orbit_height", "height of the hops", "m", 2e-1),
     Quantity("orbit_multiplier", "largest |Floquet multiplier|", "1", 0.25),
     Quantity("orbit_birth", "ω₀ where hopping begins", "rad s-1", 2e-2),
+    Quantity("swing_period", "period of the swing", "s", 1e-3),
+    Quantity("swing_omega_c", "mean ω_c of a swing", "rad s-1", 1e-5),
+    Quantity("swing_size", "swing of ω_c", "rad s-1", 2e-2),
     Quantity("lift", "height of a lifted ball", "m", 5e-2),
 )
 QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}

@@ -18,7 +18,7 @@ from compare.measure.field import constrained
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.runs.tasks import Task
-from compare.statistics import Measured
+from compare.statistics import Measured, peaks, top
 from model import Case, Flow, Parameters, Trajectory
 from model.arrays import Array
 
@@ -110,16 +110,14 @@ def _task(lab: Lab, p: Parameters, refined: int) -> Task:
 def tops(run: Trajectory, start: float, end: float) -> Hops:
     """The tops of the hops between two times; a ball that stays within a tenth of the highest has none."""
     t, y = run.time, run.y
-    inside = (t[1:-1] > start) & (t[1:-1] < end)
-    high = y[1:-1] > y[1:-1][inside].max(initial=0.0) / 2
-    k = 1 + np.flatnonzero(inside & high & (y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:]))
-    k = k[y[k] > 0]
-    bend, slope = y[k + 1] - 2 * y[k] + y[k - 1], (y[k + 1] - y[k - 1]) / 2
-    shift, interval = -slope / bend, float(t[1] - t[0])
-    x = run.x
-    states = x[k] + shift[:, None] * (x[k + 1] - x[k - 1]) / 2
-    states[:, 0], states[:, 1] = y[k] + slope * shift / 2, 0.0
-    return Hops(t[k] + shift * interval, states[:, 0], run.theta[k] + shift * interval * run.omega_c[k], states)
+    k, late = peaks(y)
+    inside = (t[k] > start) & (t[k] < end)
+    high = inside & (y[k] > y[k][inside].max(initial=0.0) / 2)
+    k, late = k[high], late[high]
+    x, by = run.x, late * (t[1] - t[0])
+    states = x[k] + late[:, None] * (x[k + 1] - x[k - 1]) / 2
+    states[:, 0], states[:, 1] = top(y, k, late), 0.0
+    return Hops(t[k] + by, states[:, 0], run.theta[k] + by * run.omega_c[k], states)
 
 
 def shrinking(states: Array, p: Parameters) -> float:
