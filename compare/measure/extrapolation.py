@@ -14,6 +14,8 @@ POINTS = 5
 """Least number of states from which a place is extrapolated."""
 LEAST_GAIN = 0.2
 """By how much one more point improves a polynomial at best, whatever the points before it seem to say."""
+SLOWEST_GAIN = 0.9
+"""And at worst, where one improvement after the other goes the same way."""
 
 
 def vanishing(where: Array, order: Sequence[Measured]) -> Measured:
@@ -54,14 +56,18 @@ def _converged(estimate: Callable[[Array, int], float], order: Sequence[Measured
     """The estimate from all points, the nearest first, with the noise of each carried over.
 
     How far it is from the limit: what the farthest point changed, times what such changes shrink by from one point to
-    the next, which is the larger of the last two ratios, at least `LEAST_GAIN` and at most 1.
+    the next, which is the larger of the last two ratios, at least `LEAST_GAIN` and at most 1; or the sum of all that
+    would follow, with a ratio of at most `SLOWEST_GAIN`, where the last two changes went the same way.
     """
     values, noise = (np.array([getattr(m, name) for m in order]) for name in ("value", "uncertainty"))
     count = len(values)
     row = np.array([estimate(values, n) for n in range(count - 3, count + 1)])
     changes = np.abs(np.diff(row))
     ratios = np.divide(changes[1:], changes[:-1], out=np.ones(2), where=changes[:-1] > 0)
-    rest = float(changes[-1] * np.clip(ratios.max(), LEAST_GAIN, 1.0))
+    gain = float(np.clip(ratios.max(), LEAST_GAIN, 1.0))
+    if (row[-1] - row[-2]) * (row[-2] - row[-3]) > 0:
+        gain = min(gain, SLOWEST_GAIN) / (1 - min(gain, SLOWEST_GAIN))
+    rest = float(changes[-1]) * gain
     carried = [estimate(values + shift, count) - row[-1] for shift in np.diag(noise)]
     rounding = np.finfo(float).eps * abs(row[-1]) * 2**count
     return Measured(float(row[-1]), math.hypot(rest, rounding, *carried))

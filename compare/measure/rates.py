@@ -30,6 +30,7 @@ from compare.statistics import Measured, exponents, matched, propagator
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
+from model.drag import STOKES
 from model.kinematics import VARIABLES, slip_speeds
 
 PROTOCOL = "rates"
@@ -43,6 +44,9 @@ PUSH = {Case.RS: 0.3, Case.SR: 0.1}
 """Size of a push, in the `units`, in the two cases in which it is extrapolated to none from this and half of it."""
 SMALL = 2e-4
 """Size of a push in all other cases; the run with the coarser step has half of it, and shows that it doesn't matter."""
+SLIGHT = 2e-6
+"""The same where the law of drag isn't Stokes': the drag of a lag that the push makes is then in proportion to it only
+as far as its Reynolds number is nothing beside 1."""
 SLOWEST = 0.04
 """Least slip speed of a state over sqrt(g R): a push is to be small beside it."""
 ORDER = {Case.RS: 2, Case.SR: 1}
@@ -157,9 +161,14 @@ def _suits(state: State) -> bool:
     )
 
 
+def _size(state: State) -> float:
+    """Size of a push."""
+    return PUSH.get(state.case, SMALL if state.p.drag == STOKES else SLIGHT)
+
+
 def _sizes(state: State) -> tuple[float, ...]:
     """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
-    size = PUSH.get(state.case, SMALL)
+    size = _size(state)
     return (size / 2, size, size / 2) if state.case in PUSH else (size / 2, size)
 
 
@@ -234,10 +243,10 @@ def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Expon
     correction = (plain - matched(exponents_of(coarse, coarse), plain)) / 3
     half = np.abs(values - matched(exponents_of(large, small, 0.5), values))
     bent = np.abs(values - plain)
-    size = PUSH.get(state.case, SMALL) ** ORDER.get(state.case, 2)
+    size = _size(state) ** ORDER.get(state.case, 2)
     bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size, 1.0)
     stepped = np.abs(values) * (np.abs(values).max() * step) ** 2 / 12
-    solved = SOLVED / (PUSH.get(state.case, SMALL) * interval)
+    solved = SOLVED / (_size(state) * interval)
     uncertainty = np.sqrt(np.abs(correction) ** 2 + half**2 + bent**2 + stepped**2 + solved**2)
     # Relative errors of one propagator have the same causes; that of one exponent may vanish by chance.
     alike = np.abs(values) * uncertainty.max() / np.abs(values).max()

@@ -14,10 +14,11 @@ import numpy as np
 
 from compare.measure.lab import Lab, Level, time_unit
 from compare.measure.record import Measurement, Missing, Records, measurement
-from compare.measure.settling import GROUPS, Settled, Start, family, high, scale, settle
+from compare.measure.settling import GROUPS, Settled, Start, duration, family, high, scale, settle
 from compare.statistics import Measured
 from model import Parameters, State
 from model.arrays import Array
+from model.drag import QUADRATIC
 
 PROTOCOL = "settled"
 QUICK = (0.43, 0.62, 0.9, 1.13, 1.4, 1.7, 2.05, 2.5, 3.1, 4.2)
@@ -48,6 +49,8 @@ SPIN = 1.0
 """Spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r."""
 SHARP = {Level.QUICK: 1.0, Level.DEFAULT: 0.1, Level.FULL: 0.1}
 """How much less than it may a state is to drift, if it can be had."""
+LIVELY = 10.0
+"""How many times within a round the fluid would stop a free ball in a state whose values count."""
 REFINED = 20.0
 """Length of a round with half the step, in units of 1/c: it goes out from a settled state."""
 
@@ -60,7 +63,13 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     good = [state for state in ended if not state.failure]
     for state in good:
         yield _record(lab, state, "case", state.case)
-    alike = [list(same) for _, same in groupby(sorted(good, key=_key), key=_key)]
+    slack = {id(state) for state in good if _stopping_rate(state) * duration(state.start.p) < LIVELY}
+    for state in good:
+        if id(state) in slack:
+            what = f"{state.case.name} at omega_0 = {state.start.p.omega_0:.4g} rad/s"
+            yield Missing(PROTOCOL, state.start.set, f"{what}: a slight lag is one for ever under the quadratic law")
+    sure = [state for state in good if id(state) not in slack]
+    alike = [list(same) for _, same in groupby(sorted(sure, key=_key), key=_key)]
     refined = settle(lab, [_again(same[0]) for same in alike], refine=2, span=REFINED, sharp=SHARP[lab.level])
     yield from unsettled(PROTOCOL, refined)
     for same, fine in zip(alike, refined, strict=True):
@@ -115,6 +124,15 @@ def combined(fine: Settled, coarse: Sequence[Settled]) -> dict[str, Measured]:
             own = fine.values[q]
             values[q] = Measured(own.value, math.hypot(own.uncertainty, change * scale(q, p)))
     return values
+
+
+def _stopping_rate(each: Settled) -> float:
+    """At what rate the fluid would stop a free ball, s-1: c, but in proportion to the lag under the quadratic law."""
+    p, (_, v_y, omega_c, *_) = each.start.p, each.mean.tolist()
+    if p.drag != QUADRATIC:
+        return p.c
+    Re = 2 * p.r / p.nu_f * math.hypot(v_y, p.R * (omega_c - p.omega_0))
+    return p.c * p.C_D / 24 * Re
 
 
 def _key(each: Settled) -> tuple[str, float, int]:

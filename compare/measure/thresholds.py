@@ -3,8 +3,9 @@
 * Bisected, by the engine's own contacts: the largest flow at which a rolling ball stays without slip, or on the floor;
   the least at which the wall holds a ball that rides it; the flow up to which a lifted ball, pressed lightly on the
   floor, goes back to rolling on both; the largest flow at which a slipping ball settles.
-* Extrapolated from settled states on one side: the flow at which their slip, their sinking or the force of the floor
-  would vanish, or at which omega_0 along the branch has its maximum.
+* Extrapolated from settled states on one side: the flow at which their lag behind the fluid, their sinking or the force
+  of the floor would vanish, or at which omega_0 along the branch has its maximum. It is a smooth function of the lag,
+  whatever the law of drag; of the slip it needn't be.
 """
 
 from __future__ import annotations
@@ -55,8 +56,14 @@ def extrapolated(
     if len(states) < POINTS:
         return None
     omegas = np.array([state.start.p.omega_0 for state in states])
-    place = to(omegas, [state.values[quantity] for state in states])
+    place = to(omegas, [_lag(state) if quantity == "lag" else state.values[quantity] for state in states])
     return place if math.isfinite(place.uncertainty) else None
+
+
+def _lag(state: Settled) -> Measured:
+    """omega_0 - omega_c, rad s-1."""
+    orbit = state.values["omega_c"]
+    return Measured(state.start.p.omega_0 - orbit.value, orbit.uncertainty)
 
 
 def _reaches_wall(lab: Lab, name: str, brackets: onset.Brackets, states: onset.States) -> bool:
@@ -95,7 +102,7 @@ class Rows:
         else:
             yield self._missing("rolling on both ends by slipping before the ball is lifted: there is no omega_03")
             yield self._bisected("omega_01", end, "from below", "onset of slip")
-            yield from self._extrapolated("omega_01", "slipping", "slip_z", "from above", "slip of settled slipping")
+            yield from self._extrapolated("omega_01", "slipping", "lag", "from above", "lag of settled slipping")
 
     def riding(self) -> Iterator[Measurement | Missing]:
         """The least flow that holds a ball on the wall: omega_02, from both sides."""
