@@ -16,13 +16,13 @@ from scipy.optimize import brentq
 from analytic import bifurcation, drag, rolling_forces, slip_bounds, stationary
 from analytic.response import rolling_rate
 from analytic.simulation import simulate
-from model import Case, Flow, InputError, Parameters
+from model import Case, Flow, InputError, Parameters, SimulationError, State
 from model.arrays import Array
 
 PHASES = 720
 """Phases of a period at which slip is looked for, and once more in the cell of the least margin."""
-SETTLED = 16.0
-"""Time in units of the time constant (1+2j)/c after which a pulsation with slip counts as periodic."""
+PERIODS, ROUNDS, SETTLED = 3, 50, 1e-9
+"""Length of the runs of `mean_error`, the most of them, and the relative change of the mean at which it is settled."""
 
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
@@ -87,15 +87,22 @@ def fast_onset(p: Parameters) -> float:
 def mean_error(p: Parameters, amplitude: float, frequency: float) -> float:
     """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic; frequency in Hz.
 
-    0 below `slip_onset`; beyond it, from the event-driven simulation, by the azimuth that the ball runs through.
+    0 below `slip_onset`; beyond it, from the event-driven simulation, by the azimuth that the ball runs through. Each
+    run starts from where the one before points to (Aitken). Raises `SimulationError` if no period is as the one before.
     """
     if amplitude <= slip_onset(p, frequency):
         return 0.0
-    periods = 2 + math.ceil(SETTLED / rolling_rate(p) * frequency)
-    start = float(swing(p, amplitude, frequency, 0.0)[0])
-    flow = Flow.sine(p.omega_0, amplitude, frequency)
-    run = simulate(p, [0, 0, start, 0, 0, 0], periods / frequency, flow, sample_interval=1 / frequency)
-    return float(run.theta[-1] - run.theta[-2]) * frequency - p.omega_0
+    x, flow = State(omega_c=float(swing(p, amplitude, frequency, 0.0)[0])), Flow.sine(p.omega_0, amplitude, frequency)
+    for _ in range(ROUNDS):
+        run = simulate(p, x, PERIODS / frequency, flow, sample_interval=1 / frequency)
+        before, last = (float(turn) * frequency for turn in np.diff(run.theta)[-2:])
+        if abs(last - before) <= SETTLED * abs(p.omega_0):
+            return last - p.omega_0
+        first, second = (float(step) for step in np.diff(run.omega_c)[-2:])
+        ahead = second**2 / (first - second) if abs(second) < abs(first) else 0.0
+        x = State(*run.x[-1].tolist())
+        x = x._replace(omega_c=x.omega_c + ahead)
+    raise SimulationError(f"a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz doesn't become periodic", run)
 
 
 def slow_mean_error(p: Parameters, amplitude: float) -> float:

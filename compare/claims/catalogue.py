@@ -14,6 +14,7 @@ from compare.claims import (
     stability,
     stationary,
     unloading,
+    unsteady,
 )
 from compare.claims.claim import Claim
 
@@ -29,5 +30,6 @@ CLAIMS: tuple[Claim, ...] = (
     *equations.CLAIMS,
     *formal.CLAIMS,
     *attractors.CLAIMS,
+    *unsteady.CLAIMS,
 )
 """Every claim there is."""

@@ -16,6 +16,7 @@ from compare.measure import (
     motions,
     newcomer,
     plane,
+    pulsation,
     rates,
     recurrent,
     settled,
@@ -24,6 +25,7 @@ from compare.measure import (
     swing,
     thresholds,
     unloading,
+    unsteady,
     watched,
 )
 from compare.measure.lab import Level
@@ -51,6 +53,8 @@ PROTOCOLS: tuple[Protocol, ...] = (
     Protocol("recurrent", recurrent.measure),
     Protocol("swing", swing.measure, level=Level.DEFAULT),
     Protocol("choice", choice.measure),
+    Protocol("pulsation", pulsation.measure, ("thresholds",)),
+    Protocol("unsteady", unsteady.measure, ("thresholds",)),
     Protocol("slope", slope.measure, ("settled", "thresholds")),
 )
 """Every protocol there is; each goes out only from those before it."""

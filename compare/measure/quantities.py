@@ -15,6 +15,9 @@ however well the numbers agree. The ceilings follow from what each protocol can 
 * a landing is known to a time step, some 1e-4 of the period of a hop; its slow multipliers make ten times as much of
   it, the height, which is the square of a speed, twice that, and three standard uncertainties are to be resolved where
   the hops are low; a multiplier comes from the ten hops in which a disturbance is neither too large nor lost in that;
+* what a pulsation or a jump does is compared at two time steps, to a part in a thousand of itself; the onset of slip is
+  bracketed to that, and slip begins within a time step, a few hundredths of a period, near a maximum; the mean reading
+  and the flow beyond a fold at which a ramp loses the floor are small differences of flows;
 * rates and growths come from short records of the motion and carry the error of a time step, a few tenths of a percent.
 """
 
@@ -120,6 +123,14 @@ _ALL = (
     Quantity("swing_omega_c", "mean ω_c of a swing", "rad s-1", 1e-5),
     Quantity("swing_size", "swing of ω_c", "rad s-1", 2e-2),
     Quantity("lift", "height of a lifted ball", "m", 5e-2),
+    Quantity("gain", "ω_c over ω₀", "1", 5e-3),
+    Quantity("phase_lag", "phase lag", "rad", 5e-3),
+    Quantity("slip_amplitude", "amplitude at which slip begins", "rad s-1", 1e-2),
+    Quantity("mean_error", "mean of ω_c − ω₀", "rad s-1", 2e-2),
+    Quantity("jump_delay", "delay of a jump", "s", 1e-2),
+    Quantity("jump_peak", "time of the peak after a jump", "s", 1e-2),
+    Quantity("jump_height", "height of the peak after a jump", "1", 1e-2),
+    Quantity("loss_flow", "ω₀ at which a ramp loses the floor", "rad s-1", 2e-2),
 )
 QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}
 """Every quantity by name."""

@@ -76,6 +76,16 @@ def _by_stokes(p: Parameters) -> Parameters:
     return p.replace(drag=STOKES)
 
 
+def _without_lag(right: Function) -> Function:
+    """A pulsating ball whose acceleration takes no friction: the fluid goes round as the ball does."""
+
+    def function(*given: Any) -> Any:
+        omega_c, _ = right(*given)
+        return omega_c, omega_c
+
+    return function
+
+
 _DYNAMICS, _BOUNDS, _STATIONARY = "analytic.dynamics", "analytic.slip_bounds", "analytic.stationary"
 THEORIES: tuple[WrongTheory, ...] = (
     # Forces and equations of motion, (20)-(29)
@@ -166,6 +176,15 @@ THEORIES: tuple[WrongTheory, ...] = (
     WrongTheory("rolling goes on while forces allow it", "analytic.simulation", "simulate",
                 lambda right: lambda *given, **named: right(*given, **named | {"leave_rolling": "infeasible"})),
     WrongTheory("hops with 10 % more floor friction", "analytic.orbits", "refine", given(other(mu=1.1))),
+    # Unsteady flow
+    WrongTheory("a rolling ball follows the flow at the rate c", "analytic.response", "rolling_rate",
+                lambda right: lambda p: p.c),
+    WrongTheory("response to a pulsation 2 % large", "analytic.response", "transfer", scaled(1.02)),
+    WrongTheory("pulsation takes no friction", "analytic.pulsation", "swing", _without_lag),
+    WrongTheory("mean reading of a pulsation with 2 % more floor friction", "analytic.pulsation", "mean_error",
+                given(other(mu=1.02))),
+    WrongTheory("ringing after a jump in a fluid with 5 % more drag", "analytic.response", "step_response",
+                given(other(c=1.05))),
 )  # fmt: skip
 
 

@@ -20,7 +20,9 @@ SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {
     "time": "t",
 }
 """How named conditions are written, where that isn't their name."""
-_UNITS = {"h": "m", "v_h": "m s-1"} | {name: each.unit for name, each in QUANTITIES.items()}
+_UNITS = {"h": "m", "v_h": "m s-1", "f": "Hz", "amplitude": "rad s-1", "rate": "rad s-2"} | {
+    name: each.unit for name, each in QUANTITIES.items()
+}
 MARKS = {
     Outcome.CONFIRMED: ("pass", "✓"),
     Outcome.REFUTED: ("fail", "✗"),

@@ -1,0 +1,149 @@
+"""Claims about flows that change: pulsation of a rolling ball, jumps, ramps past the fold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import analytic
+from analytic import pulsation, response
+from compare.claims.claim import Bearing, Claim
+from compare.claims.judge import remembered
+from compare.measure.record import Measurement
+from model import Case, Contact, Flow, InputError, Parameters
+from model.kinematics import VARIABLES
+
+SECTION = "Unsteady flow"
+PULSATION, UNSTEADY = "pulsation", "unsteady"
+FAR = 3.0
+"""Where theory's ramp ends beyond the fold, over the overshoot of a slow one."""
+
+
+def _ratio(m: Measurement) -> complex:
+    return complex(response.transfer(m.parameters, Case.RR, float(m.conditions["f"])))
+
+
+@remembered
+def _slip_onset(p: Parameters, frequency: float) -> float:
+    return pulsation.slip_onset(p, frequency)
+
+
+@remembered
+def _mean_error(p: Parameters, amplitude: float, frequency: float) -> float:
+    return pulsation.mean_error(p, amplitude, frequency)
+
+
+@remembered
+def _peak(p: Parameters) -> tuple[float, float]:
+    """Time and height of the peak after a jump in SS; LookupError if theory has no such state."""
+    try:
+        return response.peak(p, Case.SS)
+    except InputError as error:
+        raise LookupError(str(error)) from error
+
+
+@remembered
+def _loss(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
+    """The flow at which a ramp loses the floor by theory; LookupError if it doesn't."""
+    beyond = analytic.thresholds(p).omega_04 + FAR * response.ramp_coefficient(p) * rate ** (2 / 3)
+    t_end = (beyond - p.omega_0) / rate
+    run = analytic.simulate(p, x0, t_end, Flow.ramp(p.omega_0, beyond, t_end))
+    for time, to in zip(run.events.time, run.events.to_case, strict=True):
+        if Case(to).A is Contact.N:
+            return p.omega_0 + rate * float(time)
+    raise LookupError("in theory the ramp doesn't take the ball off the floor")
+
+
+def _lost(m: Measurement) -> float:
+    return _loss(m.parameters, float(m.conditions["rate"]), tuple(float(m.conditions[name]) for name in VARIABLES[:6]))
+
+
+def _at_frequency(quantity: str, predict: Callable[[Measurement], float], by: str) -> Bearing:
+    return Bearing(protocol=PULSATION, quantity=quantity, predict=predict, by=by)
+
+
+CLAIMS = (
+    Claim(
+        id="pulsation-lag",
+        section=SECTION,
+        source="(23)",
+        statement=(
+            "Rolling at both points the ball follows the flow, pulsating or after a jump, as a lag of first order with "
+            "the time constant (1 + 2j)/c."
+        ),
+        bearings=(
+            _at_frequency("gain", lambda m: abs(_ratio(m)), "analytic.response.transfer"),
+            _at_frequency("phase_lag", lambda m: -math.atan2(_ratio(m).imag, _ratio(m).real), "the same"),
+            Bearing(
+                protocol=UNSTEADY,
+                quantity="jump_delay",
+                predict=lambda m: 1 / response.rolling_rate(m.parameters),
+                by="analytic.response.rolling_rate",
+            ),
+        ),
+    ),
+    Claim(
+        id="pulsation-slip",
+        section=SECTION,
+        source="(23), (66), (67), (73), (82)",
+        statement=(
+            "In a pulsating flow a rolling ball begins to slip where the friction that its acceleration takes, or the "
+            "load at its fastest, is more than floor and wall can hold."
+        ),
+        bearings=(
+            _at_frequency(
+                "slip_amplitude",
+                lambda m: _slip_onset(m.parameters, float(m.conditions["f"])),
+                "analytic.pulsation.slip_onset",
+            ),
+        ),
+    ),
+    Claim(
+        id="pulsation-mean",
+        section=SECTION,
+        source="(23), (26), Definitions 1-3",
+        statement="A pulsation that makes the ball slip makes its mean reading low.",
+        bearings=(
+            _at_frequency(
+                "mean_error",
+                lambda m: _mean_error(m.parameters, float(m.conditions["amplitude"]), float(m.conditions["f"])),
+                "analytic.pulsation.mean_error",
+            ),
+        ),
+    ),
+    Claim(
+        id="jump-slipping",
+        section=SECTION,
+        source="(26), (38)-(42)",
+        statement="After a jump of the flow a ball that slips at both points overshoots its new reading and rings.",
+        bearings=(
+            Bearing(
+                protocol=UNSTEADY,
+                quantity="jump_peak",
+                predict=lambda m: _peak(m.parameters)[0],
+                by="analytic.response.peak",
+            ),
+            Bearing(
+                protocol=UNSTEADY,
+                quantity="jump_height",
+                predict=lambda m: _peak(m.parameters)[1],
+                by="analytic.response.peak",
+            ),
+        ),
+    ),
+    Claim(
+        id="ramp-fold",
+        section=SECTION,
+        source="(26), (88)",
+        statement="A flow that rises steadily takes the slipping ball past the fold before it is lost.",
+        bearings=(
+            Bearing(
+                protocol=UNSTEADY,
+                quantity="loss_flow",
+                predict=_lost,
+                size=lambda m: abs(_lost(m) - analytic.thresholds(m.parameters).omega_04),
+                by="analytic.simulate",
+            ),
+        ),
+    ),
+)

@@ -1,0 +1,211 @@
+"""A rolling ball in a pulsating flow: how it follows, at which amplitude it slips, what it then reads on average.
+
+The mean flow is a part of the one at which rolling on both ends. A small pulsation shows the engine's own rhythm, from
+which every other run starts, so that it need not settle. Slip is what the engine's contacts show: both slip.
+Frequencies are powers of two, so that sets of about the same drag share batches.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compare.measure.brackets import Bracket, Care, Search, narrow
+from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
+from compare.runs.tasks import Task
+from compare.statistics import Measured
+from model import Case, Contact, Flow, Parameters, Trajectory
+from model.arrays import Array
+from model.drag import STOKES
+
+PROTOCOL = "pulsation"
+MEAN = 0.85
+"""Mean flow over the one at which rolling on both ends."""
+SMALL = 0.01
+"""Amplitude of the pulsation that shows the rhythm, over the mean flow."""
+SLOWEST = 0.5
+"""The lowest angular frequency, about, in units of c."""
+OCTAVES = {Level.QUICK: (3, 6), Level.DEFAULT: (0, 1, 3, 4, 6, 7), Level.FULL: (0, 1, 2, 3, 4, 5, 6, 7)}
+"""Where the frequencies are above it: two decades."""
+STEPS = {Level.QUICK: 512, Level.DEFAULT: 1024, Level.FULL: 2048}
+"""Least number of time steps in a period."""
+PERIODS, ROUNDS = 3, 4
+"""Length of the runs, and how many there are, each from where the one before points to, the last with half the step."""
+WIDTH = {Level.QUICK: 2e-3, Level.DEFAULT: 1e-3, Level.FULL: 5e-4}
+"""Relative width to which the onset of slip is bracketed."""
+REACH = 1.1
+"""Largest amplitude that is tried: it would take the ball beyond its end of rolling by so much."""
+LOOKED = 1.5
+"""Length of the runs of a bracket in periods, of which the first sixth doesn't count."""
+ALONE = 1e-4
+"""Slip speed over sqrt(g R), just below the onset at both points, at which one of them slips alone."""
+SAMPLES, LASTS = 256, 3
+"""Samples in a period there, and how many of them slip must last to be seen."""
+BEYOND = 1.5
+"""Amplitude at which the mean reading is measured, over the one at which slip begins."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rhythm:
+    """How a rolling ball follows a small pulsation."""
+
+    set: str
+    p: Parameters
+    """With the mean flow."""
+    end: float
+    """Flow at which rolling on both ends, rad s-1."""
+    frequency: float
+    ratio: complex
+    """omega_c over omega_0."""
+    uncertainty: float
+    """Of its parts."""
+    tasks: tuple[Task, ...]
+
+    @property
+    def reach(self) -> float:
+        """The largest amplitude that is tried, rad s-1."""
+        return REACH * (self.end - self.p.omega_0) / abs(self.ratio)
+
+    def start(self, amplitude: float) -> Array:
+        """The state of a ball that follows a pulsation, as it begins."""
+        x = np.zeros(8)
+        x[2] = self.p.omega_0 + amplitude * self.ratio.imag
+        return x
+
+    def task(
+        self, lab: Lab, amplitude: float, x: Array, periods: float, largest: float, refine: int, samples: int = 64
+    ) -> Task:
+        """A run from a state, with a power of two of steps in a period; no amplitude is above the `largest`."""
+        fastest = 4 * (self.p.omega_0 + largest) / self.frequency
+        steps = 2 ** math.ceil(math.log2(max(STEPS[lab.level], 1 / (self.frequency * coarse_step(self.p)), fastest)))
+        step, flow = 1 / (self.frequency * steps * refine), Flow.sine(self.p.omega_0, amplitude, self.frequency)
+        return lab.task(self.p, x, periods / self.frequency, step, flow=flow, samples=round(samples * periods))
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
+    rhythms = []
+    for name, p in sets.items():
+        ends = [m.value for m in records.select("thresholds", "omega_01", lambda m, name=name: m.set == name)]  # type: ignore[misc]
+        if p.drag != STOKES:
+            yield Missing(PROTOCOL, name, "with this law of drag a large pulsation isn't a small one magnified")
+        elif not ends:
+            yield Missing(PROTOCOL, name, "no flow was measured at which rolling on both ends by slipping")
+        else:
+            base = 2.0 ** round(math.log2(SLOWEST * p.c / (2 * math.pi)))
+            q = p.replace(omega_0=MEAN * ends[0])
+            rhythms += [Rhythm(name, q, ends[0], base * 2.0**n, 1.0, math.inf, ()) for n in OCTAVES[lab.level]]
+    rhythms = _rhythms(lab, rhythms)
+    for rhythm in rhythms:
+        yield from _followed(lab, rhythm)
+    brackets = narrow(lab, [_search(lab, rhythm) for rhythm in rhythms])
+    slipping = []
+    for rhythm, bracket in zip(rhythms, brackets, strict=True):
+        at, place = f"a pulsation at {rhythm.frequency:g} Hz", bracket.place
+        # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
+        unseen = (math.pi * LASTS / SAMPLES) ** 2 / 2 * place.value
+        onset = Measured(place.value, math.hypot(place.uncertainty, unseen))
+        low, high = bracket.runs
+        if low is None or high is None:
+            yield Missing(PROTOCOL, rhythm.set, f"in {at} there is slip at no amplitude, or at all")
+        elif _fastest(low) > ALONE:
+            yield Missing(PROTOCOL, rhythm.set, f"in {at} one contact slips before both do, too little to tell when")
+        elif not sure_enough("slip_amplitude", onset, onset.value):
+            yield Missing(PROTOCOL, rhythm.set, f"slip in {at} begins at no definite amplitude")
+        else:
+            yield _record(lab, rhythm, "slip_amplitude", onset, bracket.tasks)
+            slipping.append((rhythm, BEYOND * onset.value))
+    yield from _mean_errors(lab, slipping)
+
+
+def _rhythms(lab: Lab, rhythms: Sequence[Rhythm]) -> list[Rhythm]:
+    """Runs in a small pulsation, each from where the one before points to."""
+    found = list(rhythms)
+    for n in range(ROUNDS):
+        refine = 2 if n == ROUNDS - 1 else 1
+        tasks = [_small(lab, each, refine) for each in found]
+        for k, (task, run) in enumerate(zip(tasks, lab.run(tasks), strict=True)):
+            ratio = _ratio(run, found[k].frequency, SMALL * found[k].p.omega_0)
+            moved = abs(ratio - found[k].ratio)
+            found[k] = replace(found[k], ratio=ratio, uncertainty=moved, tasks=(*found[k].tasks[-1:], task))
+    return found
+
+
+def _small(lab: Lab, rhythm: Rhythm, refine: int) -> Task:
+    amplitude = SMALL * rhythm.p.omega_0
+    return rhythm.task(lab, amplitude, rhythm.start(amplitude), PERIODS, amplitude, refine)
+
+
+def _ratio(run: Trajectory, frequency: float, amplitude: float) -> complex:
+    """omega_c over omega_0 in the second half of a run; a cubic takes up what has not yet died out."""
+    late = run.time >= run.time[-1] / 2
+    phase, t = 2 * math.pi * frequency * run.time[late], run.time[late] / run.time[-1]
+    terms = np.stack([np.sin(phase), np.cos(phase), *(t**n for n in range(4))], axis=-1)
+    (sine, cosine, *_), *_ = np.linalg.lstsq(terms, run.omega_c[late])
+    return complex(sine, cosine) / amplitude
+
+
+def _followed(lab: Lab, rhythm: Rhythm) -> Iterator[Measurement]:
+    gain, lag = abs(rhythm.ratio), -math.atan2(rhythm.ratio.imag, rhythm.ratio.real)
+    yield _record(lab, rhythm, "gain", Measured(gain, rhythm.uncertainty), rhythm.tasks)
+    yield _record(lab, rhythm, "phase_lag", Measured(lag, rhythm.uncertainty / gain), rhythm.tasks)
+
+
+def _search(lab: Lab, rhythm: Rhythm) -> Search:
+    def task(amplitude: float, bracket: Bracket, care: Care) -> Task:
+        start, largest = rhythm.start(amplitude), rhythm.reach
+        return rhythm.task(lab, amplitude, start, LOOKED * care.time, largest, 2 * care.refine, SAMPLES)
+
+    # Where slip begins is not known yet: the least amplitude at which it may is taken for a rough width.
+    return Search(Bracket(0.0, rhythm.reach), task, rolls_on, WIDTH[lab.level] * rhythm.reach / 2)
+
+
+def rolls_on(run: Trajectory) -> bool:
+    """Whether the ball neither slips at both points nor leaves the floor, but for the beginning of the run."""
+    cases = {Case(int(case)) for case in run.case[run.time > run.time[-1] / 6]}
+    return not any(case is Case.SS or case.A is Contact.N for case in cases)
+
+
+def _fastest(run: Trajectory) -> float:
+    """Largest slip speed but for the beginning of a run, over sqrt(g R)."""
+    p, late = run.header.parameters, run.time > run.time[-1] / 6
+    return float(np.maximum(run.slip_speed_A, run.slip_speed_B)[late].max() / math.sqrt(p.g * p.R))
+
+
+def _mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator[Measurement | Missing]:
+    """Means over the last period, with both steps, once each period is as the one before."""
+    states = [rhythm.start(amplitude) for rhythm, amplitude in slipping]
+    means: list[list[float]] = [[] for _ in slipping]
+    for n in range(ROUNDS):
+        refine = 2 if n == ROUNDS - 1 else 1
+        tasks = [r.task(lab, a, x, PERIODS, a, refine) for (r, a), x in zip(slipping, states, strict=True)]
+        for k, run in enumerate(lab.run(tasks)):
+            period = (len(run.time) - 1) // PERIODS
+            turns = np.diff(run.theta[::period]) * slipping[k][0].frequency
+            means[k] += [float(turns[-2]), float(turns[-1])]
+            x = run.x[-1].copy()
+            x[2] = _limit(run.omega_c[period::period])
+            states[k] = x
+    for (rhythm, amplitude), task, (*_, before, usual, last, fine) in zip(slipping, tasks, means, strict=True):
+        error = Measured(fine - rhythm.p.omega_0, abs(fine - usual) + abs(fine - last) + abs(usual - before))
+        if sure_enough("mean_error", error, abs(error.value)):
+            yield _record(lab, rhythm, "mean_error", error, [task], amplitude=amplitude)
+        else:
+            yield Missing(PROTOCOL, rhythm.set, f"the mean reading at {rhythm.frequency:g} Hz doesn't settle")
+
+
+def _limit(values: Array) -> float:
+    """Where the last three values of a row point to, that of a geometric approach; the last one if they diverge."""
+    first, second = values[-2] - values[-3], values[-1] - values[-2]
+    return float(values[-1] + (second**2 / (first - second) if abs(second) < abs(first) else 0.0))
+
+
+def _record(
+    lab: Lab, rhythm: Rhythm, quantity: str, value: Measured, tasks: Sequence[Task], **conditions: float
+) -> Measurement:
+    at = {"f": rhythm.frequency} | conditions
+    return measurement(lab, PROTOCOL, rhythm.set, rhythm.p, quantity, value, tasks, **at)

@@ -1,0 +1,89 @@
+"""Unsteady flow: both protocols on one set, the claims, and wrong theories that they notice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import analytic
+from compare.claims import unsteady as claims
+from compare.claims.claim import Outcome
+from compare.claims.judge import judge
+from compare.measure import pulsation, unsteady
+from compare.measure.lab import Lab, Level
+from compare.measure.record import Measurement, Records
+from compare.measure.sets import sets
+from compare.mutants.exchange import believed
+from compare.mutants.theories import THEORIES
+from compare.runs.campaign import Campaign
+from compare.runs.engines import MUJOCO
+from model import Case, Parameters
+
+NAME = "rough-wall"
+P = sets(Level.QUICK)[NAME]
+UNSTEADY = [wrong for wrong in THEORIES if wrong.module in ("analytic.response", "analytic.pulsation")]
+
+
+def thresholds(name: str, p: Parameters) -> Records:
+    """What the protocol of that name would have measured, by theory."""
+    values = {q: getattr(analytic.thresholds(p), q) for q in ("omega_01", "omega_02", "omega_04")}
+    common = {"protocol": "thresholds", "uncertainty": 0.0, "engine": "mujoco", "set": name, "parameters": p}
+    return Records(tuple(Measurement(quantity=q, value=v, **common) for q, v in values.items() if np.isfinite(v)))
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory: pytest.TempPathFactory) -> Records:
+    with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
+        lab, known = Lab(campaign, MUJOCO, Level.QUICK), thresholds(NAME, P)
+        rows = [row for protocol in (pulsation, unsteady) for row in protocol.measure(lab, {NAME: P}, known)]
+    return Records.of(rows)
+
+
+def test_everything_is_measured(records: Records) -> None:
+    assert not records.missing
+    for quantity in ("gain", "phase_lag", "slip_amplitude", "mean_error"):
+        assert len(list(records.select("pulsation", quantity))) == len(pulsation.OCTAVES[Level.QUICK])
+    assert {m.quantity for m in records.select("unsteady")} == {"jump_delay", "jump_peak", "jump_height", "loss_flow"}
+
+
+def test_theory_and_engine_agree(records: Records) -> None:
+    assert {v.claim.id: v.outcome for v in judge(claims.CLAIMS, records)} == dict.fromkeys(
+        ("pulsation-lag", "pulsation-slip", "pulsation-mean", "jump-slipping", "ramp-fold"), Outcome.CONFIRMED
+    )
+
+
+@pytest.mark.parametrize("wrong", UNSTEADY, ids=lambda wrong: wrong.what)
+def test_wrong_theories_are_noticed(records: Records, wrong) -> None:
+    with believed(wrong):
+        assert Outcome.REFUTED in {v.outcome for v in judge(claims.CLAIMS, records)}
+
+
+def test_sets_without_slip_or_with_another_law_say_why(tmp_path) -> None:
+    wall = Parameters.named("high-wall-friction")
+    other = P.replace(nu_f=1e-5, drag="schiller-naumann")
+    with Campaign(tmp_path, workers=0) as campaign:
+        lab = Lab(campaign, MUJOCO, Level.QUICK)
+        rows = [*pulsation.measure(lab, {"wall": wall, "other": other}, thresholds("other", P))]
+        rows += unsteady.measure(lab, {"wall": wall}, Records())
+    assert [row.reason for row in rows] == [
+        "no flow was measured at which rolling on both ends by slipping",
+        "with this law of drag a large pulsation isn't a small one magnified",
+        "no flows were measured between which the ball slips at both points",
+    ]
+
+
+def test_a_row_points_to_its_limit() -> None:
+    assert pulsation._limit(5 + 0.3 ** np.arange(3)) == pytest.approx(5.0, rel=1e-12)
+    assert pulsation._limit(np.array([0.0, 1.0, 3.0])) == 3.0
+
+
+def test_rolling_on_is_judged_after_the_beginning(records: Records) -> None:
+    class Run:
+        time = np.linspace(0.0, 1.5, 16)
+        case = np.full(16, Case.RR)
+
+    assert pulsation.rolls_on(Run)
+    for case, at, rolls in ((Case.SS, 1, True), (Case.SS, 9, False), (Case.NR, 9, False), (Case.RS, 9, True)):
+        Run.case = np.full(16, Case.RR)
+        Run.case[at] = case
+        assert pulsation.rolls_on(Run) is rolls
