@@ -10,13 +10,14 @@ from analytic import pulsation, response
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered
 from compare.measure.record import Measurement
-from model import Case, Contact, Flow, InputError, Parameters
+from compare.measure.unsteady import caught_up
+from model import Case, Flow, InputError, Parameters
 from model.kinematics import VARIABLES
 
 SECTION = "Unsteady flow"
 PULSATION, UNSTEADY = "pulsation", "unsteady"
-FAR = 3.0
-"""Where theory's ramp ends beyond the fold, over the overshoot of a slow one."""
+FAR, SAMPLES = 3.0, 20_000
+"""Where theory's ramp ends beyond the fold, over the overshoot of a slow one; samples of it."""
 
 
 def _ratio(m: Measurement) -> complex:
@@ -43,19 +44,22 @@ def _peak(p: Parameters) -> tuple[float, float]:
 
 
 @remembered
-def _loss(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
-    """The flow at which a ramp loses the floor by theory; LookupError if it doesn't."""
+def _ramp_end(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
+    """The flow at which a ramp ends slipping at both points by theory; LookupError if it doesn't."""
     beyond = analytic.thresholds(p).omega_04 + FAR * response.ramp_coefficient(p) * rate ** (2 / 3)
     t_end = (beyond - p.omega_0) / rate
-    run = analytic.simulate(p, x0, t_end, Flow.ramp(p.omega_0, beyond, t_end))
-    for time, to in zip(run.events.time, run.events.to_case, strict=True):
-        if Case(to).A is Contact.N:
-            return p.omega_0 + rate * float(time)
-    raise LookupError("in theory the ramp doesn't take the ball off the floor")
+    end = caught_up(
+        analytic.simulate(p, x0, t_end, Flow.ramp(p.omega_0, beyond, t_end), sample_interval=t_end / SAMPLES)
+    )
+    if math.isnan(end):
+        raise LookupError("in theory the ramp doesn't end slipping")
+    return end
 
 
-def _lost(m: Measurement) -> float:
-    return _loss(m.parameters, float(m.conditions["rate"]), tuple(float(m.conditions[name]) for name in VARIABLES[:6]))
+def _left(m: Measurement) -> float:
+    return _ramp_end(
+        m.parameters, float(m.conditions["rate"]), tuple(float(m.conditions[name]) for name in VARIABLES[:6])
+    )
 
 
 def _at_frequency(quantity: str, predict: Callable[[Measurement], float], by: str) -> Bearing:
@@ -135,13 +139,13 @@ CLAIMS = (
         id="ramp-fold",
         section=SECTION,
         source="(26), (88)",
-        statement="A flow that rises steadily takes the slipping ball past the fold before it is lost.",
+        statement="A flow that rises steadily keeps the ball slipping beyond the fold, before it catches up.",
         bearings=(
             Bearing(
                 protocol=UNSTEADY,
-                quantity="loss_flow",
-                predict=_lost,
-                size=lambda m: abs(_lost(m) - analytic.thresholds(m.parameters).omega_04),
+                quantity="ramp_end",
+                predict=_left,
+                size=lambda m: abs(_left(m) - analytic.thresholds(m.parameters).omega_04),
                 by="analytic.simulate",
             ),
         ),

@@ -41,7 +41,7 @@ REACH = 1.1
 """Largest amplitude that is tried: it would take the ball beyond its end of rolling by so much."""
 LOOKED = 1.5
 """Length of the runs of a bracket in periods, of which the first sixth doesn't count."""
-ALONE = 1e-4
+ALONE = 2e-4
 """Slip speed over sqrt(g R), just below the onset at both points, at which one of them slips alone."""
 SAMPLES, LASTS = 256, 3
 """Samples in a period there, and how many of them slip must last to be seen."""
@@ -126,7 +126,7 @@ def _rhythms(lab: Lab, rhythms: Sequence[Rhythm]) -> list[Rhythm]:
     """Runs in a small pulsation, each from where the one before points to."""
     found = list(rhythms)
     for n in range(ROUNDS):
-        refine = 2 if n == ROUNDS - 1 else 1
+        refine = 4 if n == ROUNDS - 1 else 2
         tasks = [_small(lab, each, refine) for each in found]
         for k, (task, run) in enumerate(zip(tasks, lab.run(tasks), strict=True)):
             ratio = _ratio(run, found[k].frequency, SMALL * found[k].p.omega_0)

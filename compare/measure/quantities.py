@@ -17,7 +17,7 @@ however well the numbers agree. The ceilings follow from what each protocol can 
   the hops are low; a multiplier comes from the ten hops in which a disturbance is neither too large nor lost in that;
 * what a pulsation or a jump does is compared at two time steps, to a part in a thousand of itself; the onset of slip is
   bracketed to that, and slip begins within a time step, a few hundredths of a period, near a maximum; the mean reading
-  and the flow beyond a fold at which a ramp loses the floor are small differences of flows;
+  and the flow by which a ramp passes a fold are small differences of flows;
 * rates and growths come from short records of the motion and carry the error of a time step, a few tenths of a percent.
 """
 
@@ -130,7 +130,7 @@ _ALL = (
     Quantity("jump_delay", "delay of a jump", "s", 1e-2),
     Quantity("jump_peak", "time of the peak after a jump", "s", 1e-2),
     Quantity("jump_height", "height of the peak after a jump", "1", 1e-2),
-    Quantity("loss_flow", "ω₀ at which a ramp loses the floor", "rad s-1", 2e-2),
+    Quantity("ramp_end", "ω₀ at which a ramp has halved the lag", "rad s-1", 2e-2),
 )
 QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}
 """Every quantity by name."""

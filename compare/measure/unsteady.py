@@ -1,8 +1,8 @@
 """A ball in a flow that changes once: small jumps up and down, and a ramp that passes the end of settled slipping.
 
 Half the difference of two runs, after a jump up and one down, is free of what goes with the square of the jump. A ramp
-starts from settled slipping well below the end of it, and ends well above; that the ball is lost is what the floor's
-contact shows: it carries no more. Every number is measured with two time steps.
+starts from settled slipping well below the end of it, and ends well above; the ball has left slipping once it lags by
+half as much as at first. Every number is measured with two time steps.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from compare.measure.record import Measurement, Missing, Records, measurement, s
 from compare.measure.settling import Settled, Start, settle
 from compare.runs.tasks import Task
 from compare.statistics import Measured
-from model import Case, Contact, Flow, Parameters, Trajectory
+from model import Case, Flow, Parameters, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
@@ -73,7 +73,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             trials += [_ramp(lab, state, begins, ends, rate) for rate in RATES[lab.level]]
     lab.complete([task for trial in trials for pair in trial.tasks for task in pair])
     for trial in trials:
-        yield from (_lost if trial.rate else _jumped)(lab, trial)
+        yield from (_left if trial.rate else _jumped)(lab, trial)
 
 
 def _flow(records: Records, name: str, quantity: str) -> float | None:
@@ -136,18 +136,22 @@ def _answer(up: Trajectory, down: Trajectory) -> dict[str, float]:
     return peak | {"jump_delay": float(np.trapezoid(1 - y, t))}
 
 
-def _lost(lab: Lab, trial: Trial) -> Iterator[Measurement | Missing]:
-    """The flow at which the floor carries no more; a sample may be late."""
-    flows = []
-    for (task,) in trial.tasks:
-        (run,) = lab.run([task])
-        lost = np.flatnonzero([Case(int(case)).A is Contact.N for case in run.case])
-        flows.append(float(run.header.flow(run.time[lost[0]])) if len(lost) else np.nan)
-    coarse, fine = flows
-    late = trial.rate * trial.tasks[-1][0].t_end / SAMPLES["ramp"]
-    value = Measured(fine, abs(fine - coarse) + late)
+def _left(lab: Lab, trial: Trial) -> Iterator[Measurement | Missing]:
+    """The flow at which the ball has caught up."""
+    coarse, fine = (caught_up(lab.run([task])[0]) for (task,) in trial.tasks)
+    value = Measured(fine, abs(fine - coarse))
     if np.isfinite(fine):
         at = {"rate": trial.rate} | state_of(trial.x0[:6])
-        yield measurement(lab, PROTOCOL, trial.set, trial.p, "loss_flow", value, trial.tasks[-1], **at)
+        yield measurement(lab, PROTOCOL, trial.set, trial.p, "ramp_end", value, trial.tasks[-1], **at)
     else:
-        yield Missing(PROTOCOL, trial.set, f"a ramp of {trial.rate:.3g} rad/s^2 doesn't take the ball off the floor")
+        yield Missing(PROTOCOL, trial.set, f"a ramp of {trial.rate:.3g} rad/s^2 doesn't end slipping at both points")
+
+
+def caught_up(run: Trajectory) -> float:
+    """The flow in rad s-1 at which the lag has fallen to half of what it was at first; nan if it never does."""
+    lag = run.header.flow(run.time) - run.omega_c
+    below = np.flatnonzero(lag < lag[0] / 2)
+    if not len(below):
+        return np.nan
+    near = slice(below[0], below[0] - 2, -1)
+    return float(run.header.flow(np.interp(lag[0] / 2, lag[near], run.time[near])))

@@ -65,9 +65,9 @@ def test_mean_error_of_fast_pulsations() -> None:
 def test_mean_error_of_slow_pulsations() -> None:
     p = SETS["slips at both"]
     limit = pulsation.slow_mean_error(p, 3.0)
-    near, far = (abs(pulsation.mean_error(p, 3.0, f * rolling_rate(p)) - limit) for f in (3e-3, 1e-2))
+    near, far = (abs(pulsation.mean_error(p, 3.0, f * rolling_rate(p)) - limit) for f in (1e-2, 4e-2))
     assert near < 0.3 * far
-    assert near < 1e-3 * abs(limit)
+    assert near < 1e-2 * abs(limit)
     assert pulsation.slow_mean_error(p, 1.0) == 0.0
 
 

@@ -43,7 +43,7 @@ def test_everything_is_measured(records: Records) -> None:
     assert not records.missing
     for quantity in ("gain", "phase_lag", "slip_amplitude", "mean_error"):
         assert len(list(records.select("pulsation", quantity))) == len(pulsation.OCTAVES[Level.QUICK])
-    assert {m.quantity for m in records.select("unsteady")} == {"jump_delay", "jump_peak", "jump_height", "loss_flow"}
+    assert {m.quantity for m in records.select("unsteady")} == {"jump_delay", "jump_peak", "jump_height", "ramp_end"}
 
 
 def test_theory_and_engine_agree(records: Records) -> None:
