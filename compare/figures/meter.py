@@ -70,7 +70,7 @@ def sensitivities(made: Design) -> Figure:
     axes.set_xticks(range(len(names)), [_LABELS.get(name, f"${name}$") for name in names])
     axes.set_ylabel("% of the threshold per %")
     axes.grid(axis="y", alpha=0.25)
-    style.legend(axes, loc="best")
+    figure.legend(loc="outside upper center", ncols=len(there), fontsize=8.5, frameon=False)
     return figure
 
 
