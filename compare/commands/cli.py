@@ -46,6 +46,7 @@ _MODULES = {
     "search": ("search", "basins"),
     "look": ("report", "figures", "inspect", "render", "view"),
     "grade": ("grade",),
+    "league": ("league",),
     "benchmark": ("benchmark",),
 }
 """The commands in each module of this package: `predict` doesn't wait for the engines and figures of the others."""

@@ -48,11 +48,16 @@ def flow(args: argparse.Namespace) -> Flow | None:
 def add_engine(parser: argparse.ArgumentParser) -> None:
     """Options that choose an engine and its accuracy."""
     group = parser.add_argument_group("engine")
-    known = f"{', '.join(engines.ENGINES)}; analytic is event"
-    group.add_argument("--engine", type=_engine, default=engines.MUJOCO, metavar="NAME", help=known)
+    add_engine_name(group)
     group.add_argument("--timestep", type=number, metavar="s", help="time step; event has none")
     group.add_argument("--rtol", type=number, help="relative tolerance of event")
     group.add_argument("--restitution", type=number, help="coefficient of restitution of event and time-stepping")
+
+
+def add_engine_name(parser: argparse._ActionsContainer) -> None:
+    """The option that chooses an engine."""
+    known = f"{', '.join(engines.ENGINES)}; analytic is event"
+    parser.add_argument("--engine", type=_engine, default=engines.MUJOCO, metavar="NAME", help=known)
 
 
 def _engine(name: str) -> engines.Engine:

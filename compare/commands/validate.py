@@ -27,6 +27,7 @@ def add(commands: options.Commands) -> None:
     own = command.add_mutually_exclusive_group()
     own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
     own.add_argument("--parameters", type=Path, metavar="FILE", help="your own set, a TOML file, instead of many")
+    running.add_engine_name(command)
     command.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR")
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     running.add_workers(command)
@@ -59,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
             console.print(tables.line(verdict), soft_wrap=True)
 
     with progress.shown(quiet=args.quiet or args.json) as show:
-        wanted = {"level": args.level, "claims": args.claim, "sets": chosen, "limit": args.limit}
+        wanted = {"level": args.level, "claims": args.claim, "sets": chosen, "limit": args.limit, "engine": args.engine}
         verdicts = validation.validate(
             args.output, **wanted, workers=running.workers(args), progress=show, announce=announce
         )

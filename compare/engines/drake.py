@@ -11,6 +11,7 @@ has to be a half space, since boxes are less exact, but one among a dozen of oth
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -80,6 +81,7 @@ def newcomer(timestep: float) -> Settings:
 
 def scene(engine: Any, p: Parameters, settings: Settings) -> Scene:
     """The ball in a plant of its own."""
+    logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
     return _Plant(engine, p, settings)
 
 

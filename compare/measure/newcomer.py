@@ -26,7 +26,10 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     if SET not in sets:
         yield Missing(PROTOCOL, next(iter(sets), ""), f"the engine's own settings are measured on {SET} only")
         return
-    plain, p = replace(lab, engine=engines.NEWCOMER), sets[SET]
+    if not lab.engine.as_it_comes:
+        yield Missing(PROTOCOL, SET, f"{lab.engine.name} has no settings of its own to be compared with")
+        return
+    plain, p = replace(lab, engine=engines.engine(lab.engine.as_it_comes)), sets[SET]
     begins = [Start(SET, p.replace(omega_0=Omega_0 / time_unit(p)), "rest", state()) for Omega_0 in flows(lab.level)]
     tasks = [plain.task(start.p, start.x0, LASTS / p.c, STEP, samples=SAMPLES) for start in begins]
     failed = {failure.task.key: failure.reason for failure in plain.complete(tasks)}

@@ -121,7 +121,11 @@ def _onset(contender: Contender) -> float:
     omega_01 = analytic.thresholds(SMOOTH).omega_01
     states = [State(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in ONSET]
     runs = [_settled(contender, state) for state in states]
-    slips = [float(run.slip_z.mean()) if run.complete else math.nan for run in runs]
+    return onset([float(run.slip_z.mean()) if run.complete else math.nan for run in runs], states)
+
+
+def onset(slips: Sequence[float], states: Sequence[State]) -> float:
+    """Relative error of omega_01 from settled slip_z in states at `ONSET`; nan if it isn't near theirs."""
     if not all(abs(slip / s.solution.state.slip_z - 1) < 0.5 for slip, s in zip(slips, states, strict=True)):
         return math.nan
     # omega_0 as a function of slip, at no slip.
@@ -154,7 +158,7 @@ SCENARIOS: dict[Case, tuple[Parameters, tuple[float, ...]]] = {
 
 
 @functools.cache
-def _phase(case: Case) -> tuple[float, float]:
+def phase(case: Case) -> tuple[float, float]:
     """Times (s) between which the event-driven simulation of a scenario is in its case, 1 s at most."""
     truth = analytic.simulate(*SCENARIOS[case], 1.0, sample_interval=1e-3)
     inside = truth.case == case
@@ -167,14 +171,19 @@ def _cases(contender: Contender) -> dict[str, float]:
     """By case: share of the samples of its scenario that are in it."""
     shares = {}
     for case, (p, x0) in SCENARIOS.items():
-        begin, end = _phase(case)
-        interval = max(contender.loop.timestep, (end - begin) / 200)
-        run = contender.run(p, x0, end, interval)
-        # The first steps press the ball into a soft contact, and the end may come early: a tenth is left out each.
-        margin = 0.1 * (end - begin)
-        judged = (run.time >= begin + margin) & (run.time < end - margin)
-        shares[case.name] = float(_in_case(run, case)[judged].mean()) if run.complete and judged.any() else 0.0
+        begin, end = phase(case)
+        run = contender.run(p, x0, end, max(contender.loop.timestep, (end - begin) / 200))
+        shares[case.name] = share(run, case)
     return shares
+
+
+def share(run: Trajectory, case: Case) -> float:
+    """Share of the samples of a run of a scenario that are in its case, where the event-driven simulation is in it."""
+    begin, end = phase(case)
+    # The first steps press the ball into a soft contact, and the end may come early: a tenth is left out each.
+    margin = 0.1 * (end - begin)
+    judged = (run.time >= begin + margin) & (run.time < end - margin)
+    return float(_in_case(run, case)[judged].mean()) if run.complete and judged.any() else 0.0
 
 
 def _in_case(run: Trajectory, case: Case) -> npt.NDArray[np.bool_]:

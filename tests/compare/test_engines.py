@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 
@@ -13,7 +14,9 @@ import analytic
 from compare.commands import cli
 from compare.runs.engines import ENGINES
 from compare.runs.tasks import Task, carry_out
+from compare.scorecard import league, standings
 from compare.scorecard.accuracy import MOTIONS
+from compare.scorecard.league import CASES, COST, Entry
 from compare.scorecard.trials import STATES
 from model import InputError, Parameters
 from model.kinematics import Motion as World
@@ -146,3 +149,48 @@ def test_settings_out_of_range_are_refused(name):
 def test_a_step_too_long_for_the_problem_is_refused(name):
     with pytest.raises(InputError, match="half of sqrt"):
         run(name, REFERENCE, (0,) * 6, 1.0, 0.1)
+
+
+def test_the_league_of_theory_alone(tmp_path, capsys):
+    command = ["league", "--quick", "--engine", "event", "-o", str(tmp_path), "--workers", "0", "--quiet"]
+    assert cli.main([*command, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    (entry,) = league.from_mapping(data)
+    assert entry.step is None
+    assert entry.scores[CASES] == 9
+    assert entry.scores[COST] > 0
+    assert all(error < 1e-8 for name, error in entry.scores.items() if name not in (CASES, COST))
+    assert data["contestants"][0]["versions"]["scipy"]
+    page = (tmp_path / "league.html").read_text("utf-8")
+    assert "data:image/svg+xml;base64," in page
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "league").iterdir()}
+    assert cli.main(command) == 0  # nothing is measured twice
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "league").iterdir()} == before
+    assert "RR at 12" in capsys.readouterr().out
+
+
+def test_the_league_leaves_out_what_is_missing_and_says_so(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert [bool(each.engine.missing) for each in league.contestants(["event", "drake"])] == [False, True]
+    data = league.to_mapping(league.contestants(["drake"]), [])
+    assert data["contestants"][0]["missing"] == 'drake is not installed: pip install "dualball[engines]"'
+    assert cli.main(["league", "--engine", "drake", "-o", str(tmp_path)]) == 2
+    assert "nothing to compare: drake is not installed" in capsys.readouterr().err
+    assert cli.main(["league", "--engine", "drak", "-o", str(tmp_path)]) == 2
+    assert "did you mean 'drake'?" in capsys.readouterr().err
+
+
+def test_a_run_that_breaks_down_is_in_the_table_as_such():
+    entry = Entry("drake", 1e-3, {"RR at 12": math.nan, CASES: 3.0}, {"RR at 12": "diverged"})
+    head, row = standings.rows([entry])
+    shown = {"engine": "drake", "step": "1 ms", "RR at 12": "failed", CASES: "3", COST: ""}
+    assert dict(zip(head, row, strict=True)) == shown
+
+
+@engines(*BEST)
+def test_the_wall_holds_above_its_threshold_and_not_below(name):
+    """Within 3 %; the protocol itself asks for less."""
+    (discipline,) = [each for each in league.DISCIPLINES if each.name == league.WALL]
+    (contestant,) = league.contestants([name])
+    tasks = [contestant.task(2e-3, *each) for each in discipline.runs]
+    assert discipline.score([run for task in tasks for run in carry_out([task])]) <= 0.03

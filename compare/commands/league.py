@@ -1,0 +1,69 @@
+"""``dualball league``: all engines that are installed, on the same tasks, against theory."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+from compare.commands import options, running
+from compare.runs import progress
+from compare.runs.campaign import Campaign
+from compare.runs.engines import ENGINES
+from model import InputError
+from model.files import make_directory, write_text
+from model.parameters import check_names
+
+JSON, PAGE, RUNS = "league.json", "league.html", "league"
+
+
+def add(commands: options.Commands) -> None:
+    """Declare the command."""
+    command = options.command(
+        commands, "league", run, "all engines that are installed on the same tasks, against theory"
+    )
+    command.add_argument("--quick", action="store_true", help="one time step and fewer tasks: within a minute")
+    command.add_argument(
+        "--engine", action="append", metavar="NAME", help=f"only this one (repeatable): {', '.join(ENGINES)}"
+    )
+    command.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR")
+    running.add_workers(command)
+    command.add_argument("--quiet", action="store_true", help="no progress")
+    command.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure what isn't there yet, show the table, write JSON and page."""
+    from compare.report import league as page  # here, because drawing takes a second to load
+    from compare.scorecard import league, standings
+
+    check_names(args.engine or (), list(ENGINES), "engine")
+    those = league.contestants(args.engine)
+    missing = {each.name: each.engine.missing for each in those if each.engine.missing}
+    if len(missing) == len(those):
+        raise InputError(f"there is nothing to compare: {'; '.join(missing.values())}")
+    for name, why in missing.items():
+        print(f"dualball: {name} is left out: {why}", file=sys.stderr)
+    make_directory(args.output)
+    steps = league.QUICK if args.quick else league.STEPS
+    with (
+        progress.shown(quiet=args.quiet or args.json) as show,
+        Campaign(args.output / RUNS, running.workers(args), limit=args.limit) as campaign,
+    ):
+        campaign.report = lambda now: show("league", now.done, now.total, now.failed)
+        entries = league.measure(
+            campaign, those, steps, args.quick, lambda what, done, total: show(what, done, total, 0)
+        )
+    data = league.to_mapping(those, entries)
+    write_text(args.output / JSON, json.dumps(data, indent=1))
+    write_text(args.output / PAGE, page.html(data))
+    if args.json:
+        print(json.dumps(data, indent=1))
+    else:
+        console = Console()
+        console.print(*standings.tables(entries), standings.CAPTION)
+        console.print(f"page: {args.output / PAGE}", soft_wrap=True)
+    return 0

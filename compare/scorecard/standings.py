@@ -1,0 +1,77 @@
+"""The league as text: rows for the terminal, the page and the documentation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from compare.scorecard.accuracy import number
+from compare.scorecard.league import CASES, COST, DISCIPLINES, MARGINS, WALL, Entry
+
+Rows = list[list[str]]
+
+
+def rows(entries: Sequence[Entry]) -> Rows:
+    """A head, and a row for each entry; only disciplines that some entry has."""
+    asked = [each.name for each in DISCIPLINES if any(each.name in entry.scores for entry in entries)]
+    table = [["engine", "step", *asked, COST]]
+    for entry in entries:
+        step = "its own" if entry.step is None else f"{1e3 * entry.step:g} ms"
+        cells = [cell(name, entry.scores.get(name)) for name in (*asked, COST)]
+        table.append([entry.name, step, *cells])
+    return table
+
+
+def cell(discipline: str, score: float | None) -> str:
+    """A score as a person reads it."""
+    if score is None:
+        return ""
+    if math.isnan(score):
+        return "failed"
+    if discipline == CASES:
+        return f"{score:.0f}"
+    if discipline == COST:
+        return f"{score:.2g}"
+    if discipline == WALL:
+        return f"> {MARGINS[-1]:g}" if math.isinf(score) else f"≤ {score:g}"
+    return number(score)
+
+
+def tables(entries: Sequence[Entry]) -> Iterator[Table]:
+    """The league for the terminal: for each time step a column an engine, those that choose their own in all."""
+    steps: list[float | None] = [step for step in dict.fromkeys(entry.step for entry in entries) if step]
+    for step in steps or [None]:
+        own = [entry for entry in entries if entry.step in (step, None)]
+        title = "League" if step is None else f"League, step {1e3 * step:g} ms"
+        shown = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left", title_style="bold", padding=0)
+        shown.add_column("")
+        for entry in own:
+            shown.add_column(entry.name.replace("-", "- "), justify="right")
+        head, *body = rows(own)
+        for name, *cells in list(zip(head, *body, strict=True))[2:]:
+            shown.add_row(name, *(Text(cell, no_wrap=True) for cell in cells))
+        yield shown
+
+
+def settings(data: dict[str, Any]) -> Rows:
+    """What each contestant was set to, of `league.to_mapping`: a name, versions, and settings or why it is missing."""
+    table = [["engine", "versions", "settings"]]
+    for each in data["contestants"]:
+        versions = ", ".join(f"{name} {version}" for name, version in each["versions"].items())
+        given = ", ".join(f"{name} {value}" for name, value in each.get("settings", {}).items() if name != "timestep")
+        table.append([each["name"], versions, each["missing"] or given])
+    return table
+
+
+CAPTION = (
+    "Relative errors of ω_c: in stationary states (case and ω₀ in rad/s) from rest, once the start is forgotten; as "
+    "root mean square in motions. ω₀₁: relative error of the flow at which rolling ends; ω₀₂: how near to the flow at "
+    "which the wall begins to carry the ball the engine is right on both sides. Cost: processor time over simulated "
+    "time."
+)
+"""What the columns are."""
