@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,6 +16,7 @@ from analytic.settings import Settings
 from analytic.simulation import sample_times, start_state
 from model import Flow, InputError, Parameters
 from model.arrays import Array
+from model.kinematics import VARIABLES
 from model.parameters import POSITIVE, Range, check_number
 
 
@@ -118,3 +120,19 @@ def simulate_many(
             if progress:
                 progress(done / count)
     return Ensemble(times, case=case, landings=landings, end=end, failure=tuple(failure), **blank)
+
+
+def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
+    """States (count, 8): at the wall, half of them on the floor, half up to R above it with speeds up to sqrt(g R).
+
+    omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all evenly spread.
+    """
+    check_number("starts", count, "runs", Range(1, whole=True))
+    rng = np.random.default_rng(seed)
+    size = 2 * abs(p.omega_0) * np.array([1.0, *[p.R / p.r] * 3])
+    x = np.zeros((count, len(VARIABLES)))
+    x[:, 2:6] = rng.uniform(-size, size, (count, 4))
+    flying = rng.random(count) < 0.5
+    x[:, 0] = np.where(flying, rng.uniform(0, p.R, count), 0.0)
+    x[:, 1] = np.where(flying, rng.uniform(-1, 1, count) * math.sqrt(p.g * p.R), 0.0)
+    return x

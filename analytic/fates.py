@@ -17,6 +17,7 @@ import numpy.typing as npt
 from scipy.stats import binomtest
 
 from analytic import orbits
+from analytic.ensemble import random_starts
 from analytic.motion import natural_units
 from analytic.orbits import NoOrbitError, Orbit, extent, scale
 from analytic.simulation import simulate
@@ -25,7 +26,7 @@ from model import InputError, Parameters, SimulationError, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, full_state
-from model.parameters import POSITIVE, Range, check_number
+from model.parameters import POSITIVE, check_number
 
 WINDOW, SAMPLES = 100.0, 4000
 """Length of a window in units of sqrt(R/g), and samples in it."""
@@ -127,7 +128,7 @@ def attractors(
 
     Parameters
     ----------
-    starts : number of random starts (`random_starts`), or states of shape (n, 6 or 8)
+    starts : number of random starts (`ensemble.random_starts`), or states of shape (n, 6 or 8)
     lasting : how long a run is followed at most, s; `LASTING`/c if None
     run : the simulator that carries out the runs
 
@@ -154,22 +155,6 @@ def attractors(
             groups.append([fate])
     groups.sort(key=len, reverse=True)
     return [Attractor(group[0], len(group), len(states)) for group in groups]
-
-
-def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
-    """States (count, 8): at the wall, half of them on the floor, half up to R above it with speeds up to sqrt(g R).
-
-    omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all evenly spread.
-    """
-    check_number("starts", count, "runs", Range(1, whole=True))
-    rng = np.random.default_rng(seed)
-    size = 2 * abs(p.omega_0) * np.array([1.0, *[p.R / p.r] * 3])
-    x = np.zeros((count, len(VARIABLES)))
-    x[:, 2:6] = rng.uniform(-size, size, (count, 4))
-    flying = rng.random(count) < 0.5
-    x[:, 0] = np.where(flying, rng.uniform(0, p.R, count), 0.0)
-    x[:, 1] = np.where(flying, rng.uniform(-1, 1, count) * math.sqrt(p.g * p.R), 0.0)
-    return x
 
 
 def settle(

@@ -55,41 +55,6 @@ def _arrow(inner: Case, outer: Case) -> Claim:
     )
 
 
-def _lift(m: Measurement, lift: Callable[..., float]) -> float:
-    inner, outer = Case[str(m.conditions["inner"])], Case[str(m.conditions["outer"])]
-    return lift(inner, outer, np.array(state(m)), m.parameters)
-
-
-def _lifting(inner: Case, outer: Case) -> Claim:
-    def along(m: Measurement) -> bool:
-        return m.conditions["inner"] == inner.name
-
-    never = inner is Case.RS
-    return Claim(
-        id=f"lift-{inner.name}-{outer.name}",
-        section="Slipping",
-        source="Fig. 6, dotted",
-        statement=f"Out of {inner.name} the ball {'never ' * never}lifts off the floor{'' if never else ' once'}"
-        f"{', whatever its orbit' if never else f' the wall alone, in {outer.name}, would drive it up'}.",
-        bearings=(
-            Bearing(
-                protocol="lift",
-                quantity="lifts",
-                predict=lambda m: float(_lift(m, slip_stability.lift_acceleration) > 0),
-                when=along,
-                by="slip_stability.lift_acceleration",
-            ),
-            Bearing(
-                protocol="lift",
-                quantity="lift_onset",
-                predict=lambda m: _lift(m, slip_stability.lift_onset),
-                when=along,
-                by="slip_stability.lift_onset",
-            ),
-        ),
-    )
-
-
 def _gamma_nr(m: Measurement) -> float:
     beta = math.atan2(float(m.conditions["n_y"]), float(m.conditions["n_z"]))
     return float(slip_bounds.gamma_nr(beta, np.array(state(m)), m.parameters))
@@ -197,7 +162,6 @@ def _watched(inner: Case, end: str, beyond: Case) -> Bearing:
 
 CLAIMS = (
     *(_arrow(inner, outer) for inner, outer in slip_stability.SLIP_ARROWS),
-    *(_lifting(inner, outer) for inner, outer in slip_stability.LIFT_ARROWS),
     _claim(
         "eq-58",
         "(58)",

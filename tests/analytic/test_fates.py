@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analytic import attractors, fates, orbits, stable_solutions
+from analytic import attractors, ensemble, fates, orbits, stable_solutions
 from analytic.fates import Kind
 from model import InputError, Parameters
 
@@ -30,7 +30,7 @@ def test_three_attractors_at_once() -> None:
 
 def test_random_starts_are_reproducible_and_inside() -> None:
     """The same seed gives the same starts; all of them can be simulated."""
-    first, again, other = (fates.random_starts(HOPPING, 50, seed) for seed in (1, 1, 2))
+    first, again, other = (ensemble.random_starts(HOPPING, 50, seed) for seed in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
     assert np.all((first[:, 0] >= 0) & (first[:, 0] <= HOPPING.R))
