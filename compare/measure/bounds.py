@@ -3,6 +3,7 @@
 A ball that goes round at a held omega_c is given more and more flow; or the flow takes it along at its own omega_0,
 rolling at both points or hanging on the wall alone, as its settled states do. Two flows show about where gamma passes
 through zero, and two more are taken around it. gamma is drawn over omega_0, or its square where the orbit goes with it.
+Where another law of drag than Stokes' bends the line, a cubic is laid through the four.
 """
 
 from __future__ import annotations
@@ -21,13 +22,16 @@ from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import Start, high, settle
 from compare.measure.watched import ends_of_rolling
 from compare.runs.tasks import Task
-from compare.statistics import COVERAGE, straight_line
+from compare.statistics import COVERAGE, Measured, straight_line
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
+from model.drag import STOKES
 
 NAME = "bounds"
 AROUND = (0.7, 1.3)
 """Where the second two flows are, over the zero that the first two show."""
+AROUND_BENT = (0.8, 1.1)
+"""The same on a line that the law of drag bends: apart from the first two, too."""
 MEDIUM = (1.0, 0.5)
 """Sizes of slip of a ball that hangs on a smooth wall, and so goes round fast, in units as those of `LARGE`."""
 COARSE = quantity("gamma_slope").resolves / COVERAGE
@@ -61,6 +65,11 @@ class Line:
     def power(self) -> int:
         """Of omega_0, over which gamma is drawn."""
         return 1 if self.by == "held" else 2
+
+    @property
+    def bent(self) -> bool:
+        """Whether gamma isn't a straight line over omega_0 because drag isn't over the lag."""
+        return self.by == "held" and self.at(self.first[0])[0].drag != STOKES
 
     def push(self, omega_0: float) -> Push:
         """The state at a flow, and the slip."""
@@ -151,7 +160,8 @@ def _around(line: Line, points: _Points | None) -> tuple[float, ...]:
         return ()
     _, x = line.at(points.flows[0])
     start = State.of(x).omega_c if line.power == 1 else 0.0
-    return tuple(start + (zero ** (1 / line.power) - start) * factor for factor in AROUND)
+    around = AROUND_BENT if line.bent else AROUND
+    return tuple(start + (zero ** (1 / line.power) - start) * factor for factor in around)
 
 
 def _result(
@@ -168,10 +178,13 @@ def _result(
     one, other = points.shifts
     shifts = one + (other - one) * (q - q[0]) / (q[1] - q[0])
     gamma = np.array(gammas) + shifts
-    # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none of it.
-    _, slope = straight_line(q, gamma, points.noise)
-    zero, _ = straight_line(q, gamma, points.noise * math.sqrt(len(q)))
-    if slope.uncertainty > COARSE * abs(slope.value):
+    if line.bent:
+        zero, slope = _curve(q, gamma, points.noise)
+    else:
+        # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none.
+        _, slope = straight_line(q, gamma, points.noise)
+        zero, _ = straight_line(q, gamma, points.noise * math.sqrt(len(q)))
+    if not slope.uncertainty <= COARSE * abs(slope.value):
         what = f"{line.inner.name} to {line.outer.name}, {line.by}"
         yield Missing(NAME, line.set, f"growth of slip from {what}, changes too little with the flow")
         return
@@ -182,6 +195,25 @@ def _result(
         if what.startswith("gamma_zero") and abs(value.value) > BEYOND * np.abs(q).max():
             continue
         yield measurement(lab, NAME, line.set, p, what, value, tasks, **conditions)
+
+
+def _curve(q: Array, gamma: Array, noise: float) -> tuple[Measured, Measured]:
+    """Zero of a curve through points (n,), and its slope there; uncertain by a third of what the last degree changes.
+
+    nan without a single zero between the points.
+    """
+
+    def at_zero(values: Array, degree: int) -> Array:
+        fit = np.polynomial.Polynomial.fit(q, values, degree)
+        zeros = [root.real for root in fit.roots() if abs(root.imag) < 1e-9 and q.min() < root.real < q.max()]
+        return np.array([zeros[0], fit.deriv()(zeros[0])] if len(zeros) == 1 else [math.nan, math.nan])
+
+    degree = len(q) - 1
+    best = at_zero(gamma, degree)
+    shifted = [at_zero(gamma + shift, degree) - best for shift in noise * np.eye(len(q))]
+    spread = np.linalg.norm([(best - at_zero(gamma, degree - 1)) / 3, *shifted], axis=0)
+    zero, slope = (Measured(*pair) for pair in zip(best.tolist(), spread.tolist(), strict=True))
+    return zero, slope
 
 
 def _lines(name: str, p: Parameters) -> Iterator[Line]:
