@@ -123,16 +123,18 @@ def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> flo
 def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:
     """Stability with respect to slipping of the stationary solution of a case at omega_c, p.omega_0 if None.
 
-    RR: (67), (74), and (82), which can be met only for eta < j because A_y < 0 otherwise. SR and NR: (61). RS: the
-    friction j m R omega_c^2 that its floor must supply. These are the signs of the work done on a slight slip, over all
-    directions along which the contacts stay closed; on a threshold, to round-off, it is neutral.
+    RR: (67), and (82) if eta < j, else (74): beyond omega_03 slip at A alone would need A_y < 0, and so would slip at
+    both if eta > j, so that for eta < j, mu > 1 rolling goes on from omega_03 to omega_01 (`rolling_forces.slip_margin`).
+    SR and NR: (61). RS: the friction j m R omega_c^2 that its floor must supply. These are the signs of the work done
+    on a slight slip, over all directions along which the contacts stay closed; on a threshold, to round-off, it is
+    neutral.
     """
     Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
     match case:
         case Case.RR:
-            kinds = {_sign(0.0, p.eta * Omega2), _sign(p.mu * p.j * Omega2, p.mu)}
-            if p.eta < p.j:
-                kinds.add(_sign(Omega2 * (p.mu * p.eta * (1 + p.j) + p.j - p.eta), p.mu * (1 + p.eta)))
+            divisor = p.mu * p.eta * (1 + p.j) + p.j - p.eta
+            slip = (Omega2 * divisor, p.mu * (1 + p.eta)) if p.eta < p.j else (p.mu * p.j * Omega2, p.mu)
+            kinds = {_sign(0.0, p.eta * Omega2), _sign(*slip)}
         case Case.SR | Case.NR:
             smooth_floor = case is Case.SR and p.mu == 0  # the floor then carries the weight, the wall nothing
             kinds = {_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}

@@ -36,7 +36,7 @@ def test_operating_range_is_where_rolling_is_the_only_attractor(p: Parameters) -
 def test_what_ends_the_operating_range(trial: int) -> None:
     """What else lasts just beyond: slip at both points, or the ride on the wall while the ball still rolls, too."""
     rng = np.random.default_rng(trial)
-    p = P.replace(mu=rng.uniform(0.05, 1), eta=rng.uniform(0.05, 1), j=rng.uniform(0.2, 0.66))
+    p = P.replace(mu=rng.uniform(0.05, 2), eta=rng.uniform(0.05, 1), j=rng.uniform(0.2, 0.66))
     limit = operating_limit(p)
     below, beyond = (
         {s.case for s in stable_solutions(p.replace(omega_0=limit.omega_0 * (1 + side * 1e-6)))} for side in (-1, 1)
