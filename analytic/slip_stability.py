@@ -124,7 +124,7 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
     """Stability with respect to slipping of the stationary solution of a case at omega_c, p.omega_0 if None.
 
     RR: (67), and (82) if eta < j, else (74): beyond omega_03 slip at A alone would need A_y < 0, and so would slip at
-    both if eta > j, so that for eta < j, mu > 1 rolling goes on from omega_03 to omega_01 (`rolling_forces.slip_margin`).
+    both if eta > j, so that for eta < j, mu > 1 rolling goes on beyond omega_03, to omega_01 (`slip_margin`).
     SR and NR: (61). RS: the friction j m R omega_c^2 that its floor must supply. These are the signs of the work done
     on a slight slip, over all directions along which the contacts stay closed; on a threshold, to round-off, it is
     neutral.
