@@ -10,7 +10,9 @@ import analytic
 from analytic import orbits
 from analytic.orbits import NoOrbitError, Orbit
 from compare.claims.claim import Bearing, Claim
+from compare.claims.equations import state
 from compare.claims.judge import remembered
+from compare.measure.calm import hops
 from compare.measure.lab import Level
 from compare.measure.record import Measurement
 from model import Parameters, Trajectory
@@ -36,6 +38,11 @@ def _of(m: Measurement) -> Orbit:
 
 def _bearing(quantity: str, predict: Callable[[Orbit], float], protocol: str = "recurrent") -> Bearing:
     return Bearing(protocol=protocol, quantity=quantity, predict=lambda m: predict(_of(m)), by="analytic.orbits.refine")
+
+
+@remembered
+def _followed(p: Parameters, x: tuple[float, ...], duration: float) -> Trajectory:
+    return analytic.simulate(p, x, duration, sample_interval=duration / 2000)
 
 
 @remembered
@@ -93,6 +100,21 @@ CLAIMS = (
             _bearing("swing_period", lambda orbit: orbit.period, "swing"),
             _bearing("swing_omega_c", lambda orbit: orbit.turn / orbit.period, "swing"),
             _bearing("swing_size", lambda orbit: float(np.ptp(orbit.cycle.omega_c)), "swing"),
+        ),
+    ),
+    Claim(
+        id="calm",
+        level=Level.DEFAULT,
+        section=SECTION,
+        source="Section 5.3, last paragraph",
+        statement="In strong drag, κ > 2, no ball was found that hops on.",
+        bearings=(
+            Bearing(
+                protocol="calm",
+                quantity="hops",
+                predict=lambda m: hops(_followed(m.parameters, state(m), float(m.conditions["duration"]))),
+                by="analytic.simulate",
+            ),
         ),
     ),
     Claim(

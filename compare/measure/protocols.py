@@ -5,6 +5,7 @@ from __future__ import annotations
 from compare.measure import (
     birth,
     bounds,
+    calm,
     choice,
     edge,
     field,
@@ -52,6 +53,7 @@ PROTOCOLS: tuple[Protocol, ...] = (
     Protocol("impacts", impacts.measure),
     Protocol("recurrent", recurrent.measure),
     Protocol("swing", swing.measure, level=Level.DEFAULT),
+    Protocol("calm", calm.measure, level=Level.DEFAULT),
     Protocol("choice", choice.measure),
     Protocol("pulsation", pulsation.measure, ("thresholds",)),
     Protocol("unsteady", unsteady.measure, ("thresholds",)),

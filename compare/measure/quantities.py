@@ -119,6 +119,7 @@ _ALL = (
     Quantity("orbit_height", "height of the hops", "m", 2e-1),
     Quantity("orbit_multiplier", "largest |Floquet multiplier|", "1", 0.25),
     Quantity("orbit_birth", "ω₀ where hopping begins", "rad s-1", 2e-2),
+    Quantity("hops", "hops on", "1", 0.0),
     Quantity("swing_period", "period of the swing", "s", 1e-3),
     Quantity("swing_omega_c", "mean ω_c of a swing", "rad s-1", 1e-5),
     Quantity("swing_size", "swing of ω_c", "rad s-1", 2e-2),
