@@ -48,7 +48,8 @@ other: their error is between first order, for the direction of friction, and se
 DEGREES = (5, 3)
 """Of the polynomials through a window; the lower one shows what the degree changes."""
 TURN = 0.5
-"""Largest change of a slip in a window over the slip itself: where it is about to vanish, friction turns too fast."""
+"""Largest change of a slip in a window over the slip itself, and of what friction alone would make of it: where it is
+about to vanish, or is held at a trace, friction turns too fast."""
 COMPONENTS = ("Ax", "Ay", "Az", "Bx", "By", "Bz")
 
 
@@ -186,8 +187,8 @@ def _sight(run: Trajectory, centre: int, refined: int, degree: int) -> Sighting 
     """What happens in a window, None if the case changes in or near it or a slip turns."""
     near, half = (HALF + APART) * refined, HALF * refined
     window = slice(centre - half, centre + half + 1)
-    case, p = Case(int(run.case[centre])), run.header.parameters
-    if np.ptp(run.case[centre - near : centre + near + 1]) or _turns(case, run.x[window], p):
+    case = Case(int(run.case[centre]))
+    if np.ptp(run.case[centre - near : centre + near + 1]) or _turns(case, run, window):
         return None
     time, at = run.time[window], float(run.time[centre])
     x, rates = polynomial(time, run.x[window], degree, at)
@@ -197,10 +198,15 @@ def _sight(run: Trajectory, centre: int, refined: int, degree: int) -> Sighting 
     return Sighting(case, x, rates, force)
 
 
-def _turns(case: Case, x: Array, p: Parameters) -> bool:
-    """Whether the velocity of a contact that slips changes by more than `TURN` of it in the states x (samples, 8)."""
-    slips = [v for v, contact in zip(slip_velocities(x, p), (case.A, case.B), strict=True) if contact is Contact.S]
-    return any(np.linalg.norm(v[-1] - v[0]) > TURN * np.linalg.norm(v, axis=1).min() for v in slips)
+def _turns(case: Case, run: Trajectory, window: slice) -> bool:
+    """Whether the velocity of a contact that slips changes by more than `TURN` of it, or would by friction alone."""
+    p, time = run.header.parameters, float(np.ptp(run.time[window]))
+    loads = p.mu * run.force_A[window, 1].max(), p.eta * run.force_B[window, 0].max()
+    for v, contact, load in zip(slip_velocities(run.x[window], p), (case.A, case.B), loads, strict=True):
+        change = max(float(np.linalg.norm(v[-1] - v[0])), load * (1 + p.j) / (p.j * p.m) * time)
+        if contact is Contact.S and change > TURN * np.linalg.norm(v, axis=1).min():
+            return True
+    return False
 
 
 def _values(best: Sighting, fine: Sighting, lower: Sighting, p: Parameters) -> Iterator[tuple[str, Measured]]:

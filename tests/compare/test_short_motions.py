@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -185,7 +186,19 @@ def test_landings_do_not_rebound(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> N
     assert outcomes(cases.CLAIMS, measured)["impacts"].outcome is Outcome.REFUTED
 
 
-def test_figure_12_is_algebra() -> None:
-    (verdict,) = judge(formal.CLAIMS, Records())
-    assert verdict.outcome is Outcome.CONFIRMED
-    assert {check.measurement.engine for check in verdict.checks} == {"theory"}
+def test_formal_claims_are_algebra() -> None:
+    for verdict in judge(formal.CLAIMS, Records()):
+        assert verdict.outcome is Outcome.CONFIRMED
+        assert {check.measurement.engine for check in verdict.checks} == {"theory"}
+
+
+@pytest.mark.parametrize(("share", "turns"), [(1.1, True), (0.9, False)])
+def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share: float, turns: bool) -> None:
+    """It doesn't change, yet a 1e-4 of it turns its friction so far that the rates are others."""
+    p, time = Parameters.named("reference"), np.linspace(0.0, 1e-3, 5)
+    # A sphere's contact point feels friction f as an acceleration f/m (1 + 1/j).
+    friction = p.m * field.TURN / (time[-1] * (1 + 1 / p.j)) * share
+    x = np.tile([0, 0, 1.0, 0, 1.0 / p.r, 0, 0, 0], (5, 1))
+    forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / p.eta)}
+    run = SimpleNamespace(header=SimpleNamespace(parameters=p), time=time, x=x, **forces)
+    assert field._turns(Case.NS, run, slice(0, 5)) is turns
