@@ -55,9 +55,10 @@ def turning(where: Array, order: Sequence[Measured]) -> Measured:
 def _converged(estimate: Callable[[Array, int], float], order: Sequence[Measured]) -> Measured:
     """The estimate from all points, the nearest first, with the noise of each carried over.
 
-    How far it is from the limit: what the farthest point changed, times what such changes shrink by from one point to
-    the next, which is the larger of the last two ratios, at least `LEAST_GAIN` and at most 1; or the sum of all that
-    would follow, with a ratio of at most `SLOWEST_GAIN`, where the last two changes went the same way.
+    How far it is from the limit: what the farthest point but one changed, shrunk twice by what such changes shrink by
+    from one point to the next, the larger of the last two ratios, at least `LEAST_GAIN` and at most 1. The last change
+    itself may be small by chance. Where the last two went the same way it is the sum of all that would follow, with a
+    ratio of at most `SLOWEST_GAIN`.
     """
     values, noise = (np.array([getattr(m, name) for m in order]) for name in ("value", "uncertainty"))
     count = len(values)
@@ -65,9 +66,9 @@ def _converged(estimate: Callable[[Array, int], float], order: Sequence[Measured
     changes = np.abs(np.diff(row))
     ratios = np.divide(changes[1:], changes[:-1], out=np.ones(2), where=changes[:-1] > 0)
     gain = float(np.clip(ratios.max(), LEAST_GAIN, 1.0))
+    rest = float(changes[-2]) * gain**2
     if (row[-1] - row[-2]) * (row[-2] - row[-3]) > 0:
-        gain = min(gain, SLOWEST_GAIN) / (1 - min(gain, SLOWEST_GAIN))
-    rest = float(changes[-1]) * gain
+        rest /= 1 - min(gain, SLOWEST_GAIN)
     carried = [estimate(values + shift, count) - row[-1] for shift in np.diag(noise)]
     rounding = np.finfo(float).eps * abs(row[-1]) * 2**count
     return Measured(float(row[-1]), math.hypot(rest, rounding, *carried))

@@ -76,6 +76,16 @@ def test_extrapolated_zero_is_as_sure_as_it_says(noise):
     assert bracket.uncertainty < 1e-4
 
 
+@pytest.mark.parametrize("power", [2.0, 2.5, 2.687])
+def test_extrapolated_zero_of_what_is_no_power_series_is_as_sure_as_it_says(power):
+    """As omega_0 is none of the lag where drag isn't linear."""
+    for part in (0.02, 0.1, 0.5):
+        order = onset.NEAR / onset.NEAR[-1]
+        where = 1.0 + 0.05 * (order + part * order**power + 0.1 * order**3)
+        place = vanishing(where, [Measured(float(value), 1e-12) for value in order])
+        assert abs(place.value - 1.0) < 3 * place.uncertainty
+
+
 def test_extrapolated_maximum_is_as_sure_as_it_says():
     slip = 1 + np.sqrt(onset.TURNS)  # its maximum is at slip = 1, with a cubic part
     where = 3 - (slip - 1) ** 2 * (1 + 0.5 * (slip - 1) + 0.2 * (slip - 1) ** 2)

@@ -12,6 +12,7 @@ from compare.measure import hysteresis, newcomer, plane, settled, settling, slop
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records
+from compare.measure.sets import sets
 from compare.runs import engines
 from compare.runs.campaign import Campaign
 from model import Case, Parameters
@@ -89,6 +90,15 @@ class TestSettled:
         assert not measured.measurements
         assert all(isinstance(each, Missing) and "still drifts" in each.reason for each in measured.missing)
         assert len(measured.missing) == 4
+
+    def test_what_quadratic_drag_does_not_settle_has_no_values(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+        """A ball that goes round with the fluid keeps a slight lag; one that slips or sinks settles."""
+        monkeypatch.setattr(settled, "QUICK", (0.6, 2.0))
+        blunt = sets(Level.QUICK)["blunt"]
+        measured = Records.of(settled.measure(lab, {"blunt": blunt}, Records()))
+        cases = {m.conditions["case"] for m in measured.measurements if m.quantity == "omega_c"}
+        assert cases == {"SS", "NS"}
+        assert any("a slight lag is one for ever" in each.reason for each in measured.missing)
 
     def test_states_of_different_steps_share_what_separates_them(self, records: Records) -> None:
         # Half of the step is measured from the mean of the whole: the difference is part of the uncertainty.

@@ -113,6 +113,15 @@ def test_growth_passes_through_zero_where_it_should(lab: Lab, monkeypatch: pytes
     assert outcomes(slipping.CLAIMS, measured)["eq-66"].outcome is Outcome.REFUTED
 
 
+@pytest.mark.parametrize("power", [1.3, 1.687, 2.0])
+def test_a_bent_line_has_its_zero_and_slope(power: float) -> None:
+    q = np.array([0.0, 1.1, 1.5, 2.0])
+    zero, slope = bounds._curve(q, q**power - 1.7, 1e-6)
+    assert abs(zero.value - 1.7 ** (1 / power)) < 3 * zero.uncertainty < 0.03
+    assert abs(slope.value - power * zero.value ** (power - 1)) < 3 * slope.uncertainty < 0.06
+    assert np.isnan([m.value for m in bounds._curve(q, q + 1, 1e-6)]).all()
+
+
 def _end(quantity: str, name: str = "reference") -> Measurement:
     """A flow at which rolling ends, as if it had been measured before."""
     p = sets(Level.QUICK)[name]
