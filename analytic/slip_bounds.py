@@ -63,7 +63,7 @@ class HeldBound:
     @property
     def slope(self) -> float:
         """d gamma/d omega_0 at the zero, s-1."""
-        lag = self.p.R * abs(self.zero - self.omega_c)
+        lag = self.p.R * abs(self.zero - self.omega_c) if self.p.c else 0.0
         return self.side * float(drag.slope(lag, self.p)) * self.p.R / ((1 + self.p.j) * self.p.r)
 
     def gamma(self, omega_0: npt.ArrayLike) -> Array:

@@ -354,6 +354,17 @@ def test_ends_of_the_branch(law: str) -> None:
             assert np.abs(values - value).min() <= 1e-3 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_without_drag_all_laws_are_one(law: str) -> None:
+    p = P.replace(drag=law, c=0.0, omega_0=35.0)
+    solutions, expected = stationary_solutions(p), stationary_solutions(p.replace(drag=STOKES))
+    assert [(s.case, s.stability, s.family) for s in solutions] == [(s.case, s.stability, s.family) for s in expected]
+    np.testing.assert_array_equal([s.eigenvalues for s in solutions[:1]], [s.eigenvalues for s in expected[:1]])
+    assert np.isnan(thresholds(p).omega_04)
+    bound = slip_bounds.rr_to_rs(p, 10.0, 1)
+    assert (bound.zero, bound.slope) == (np.inf, 0.0)
+
+
 # --- slip ------------------------------------------------------------------------------------------------------
 
 
