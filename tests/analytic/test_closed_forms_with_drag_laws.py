@@ -129,7 +129,7 @@ def test_fold_where_the_drag_bends(nu_f: float) -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_the_fold_is_unique_because_the_drag_grows_ever_faster(law: str) -> None:
     """The proof in docs/theory.md: along the branch the stiffness of a fold rises, that of the law falls."""
-    for p in random_sets(law, 200):
+    for p in random_sets(law, 60):
         s = np.linspace(-20, 20, 2001)
         at = sb.branch(s, p)
         den = (1 + p.j * at.cos**2) * p.mu * p.eta + (p.j - p.eta) * at.cos
@@ -145,7 +145,7 @@ def test_the_fold_is_unique_because_the_drag_grows_ever_faster(law: str) -> None
 @pytest.mark.parametrize("law", LAWS)
 def test_slopes_along_the_branch(law: str) -> None:
     """d omega_c/d omega_0 and the sign of `slope` against differences."""
-    for p in random_sets(law, 20):
+    for p in random_sets(law, 8):
         for angle in (0.2, 0.8, 1.3, 1.5):
             h = 1e-5
             (low_c, low_0), (high_c, high_0) = (at_angle(angle + side * h, p) for side in (-1, 1))
@@ -157,7 +157,7 @@ def test_slopes_along_the_branch(law: str) -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_points_of_the_branch(law: str) -> None:
     """Each solution SS belongs to its flow by the formulas written out here; there are two beyond omega_02."""
-    for p in random_sets(law, 20):
+    for p in random_sets(law, 8):
         t = thresholds(p)
         flows = {0.5 * (t.omega_01 + t.omega_02): 1, 0.999 * t.omega_01: 0}
         if np.isfinite(t.omega_04):
@@ -371,7 +371,7 @@ def test_without_drag_all_laws_are_one(law: str) -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_slip_bounds(law: str) -> None:
     """(66), (73) and (56) against the vector fields; at its zero gamma vanishes with the slope that is given."""
-    for p in random_sets(law, 20):
+    for p in random_sets(law, 8):
         p, rolling = p.replace(omega_0=20.0), np.array(State(omega_c=9.0))
         for side in (1, -1):
             for bound, outer in (
