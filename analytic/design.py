@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from analytic import bifurcation, flowmeter, roots, slipping_branch
+from analytic import bifurcation, flowmeter, fluid_inertia, roots, slipping_branch
 from analytic.bifurcation import Thresholds
 from analytic.flowmeter import OperatingLimit
 from model import InputError, Parameters, drag
@@ -245,6 +245,8 @@ class Design:
     """Of the thresholds over the corners of the tolerances."""
     sensitivities: dict[str, dict[str, Sensitivity]]
     curve: Curve
+    with_inertia: float
+    """The worst limit, rad s-1, if the fluid had inertia, which the model leaves out: see `fluid_inertia`."""
 
     @property
     def choice(self) -> Choice:
@@ -277,7 +279,13 @@ def design(request: Request, seed: int = 0) -> Design:
         spread=threshold_spread(meters),
         sensitivities=sensitivities(request.make, at),
         curve=characteristic(meters, 1.5 * max(request.fastest, chosen.limit.omega_0)),
+        with_inertia=min(map(_limit_with_inertia, meters)),
     )
+
+
+def _limit_with_inertia(p: Parameters) -> float:
+    t = fluid_inertia.thresholds(p)
+    return t["omega_02"] if math.isnan(t["omega_01"]) else t["omega_01"]
 
 
 def characteristic(meters: Sequence[Parameters], top: float, count: int = 61) -> Curve:

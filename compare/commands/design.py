@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(plain(meter.described(made)), indent=1))
     else:
-        Console().print(*meter.tables(made), sep="\n")
+        Console(markup=False).print(*meter.tables(made), sep="\n")
     return 0 if made.choice.margin >= 1 else 1
 
 
@@ -72,6 +72,8 @@ def request(asked: Mapping[str, Any]) -> Request:
     numbers = {name: value for name, value in fluid.items() if name not in law}
     if "drag" in law:
         parameters.check_choice("fluid.drag", law["drag"], drag.LAWS)
+    if law.get("drag") == drag.QUADRATIC and "response" in flow:
+        raise InputError("flow.response can't be asked for with the quadratic law: it has no time constant")
     return Request(
         fluid={"gravity": _USUAL["gravity"]} | _numbers("fluid", numbers, _FLUID) | law,
         **flow,

@@ -7,10 +7,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from rich.table import Table
 
-from analytic import flowmeter
+from analytic import drag, flowmeter
 from analytic.design import THRESHOLDS, Choice, Design, Sensitivity
+from analytic.flowmeter import End
 from compare import pages
 
 SYMBOLS = {
@@ -33,22 +35,43 @@ Rows = list[list[str]]
 def sentences(made: Design) -> list[str]:
     """What the design comes to."""
     chosen, request = made.choice, made.request
-    covers = f"{_number(chosen.margin)} times the fastest flow, {request.fastest:g} rad/s"
-    limit = f"at worst ω₀ = {_number(chosen.worst.omega_0)} rad/s, {covers} ({_number(chosen.limit.omega_0)} as meant)"
-    said = [
-        f"Best: {made.material}, {_values(chosen.values)}.",
-        f"Rolling at both points is the ball's only lasting motion up to {limit}: there {chosen.worst.end.value}.",
-    ]
+    said = [f"Best: {made.material}, {_values(chosen.values)}.", _limit(made)]
     if chosen.margin < 1:
         said.insert(0, f"No meter within the bounds covers the flows up to {request.fastest:g} rad/s.")
-    if math.isinf(flowmeter.reading_range(chosen.p)):
+    if chosen.limit.end is End.UNLOADING:
         said.append("As meant, every motion beyond it reads the flow, too, but for the ball's fall at unloading.")
+    if chosen.margin:
+        said.append(
+            "The inertia of the fluid, which the model leaves out, would make the limit at worst about "
+            f"{_number(made.with_inertia)} rad/s."
+        )
     if math.isfinite(chosen.response):
         said.append(f"It follows small changes of the flow with a time constant of {_number(chosen.response)} s.")
     if request.slowest > 0:
         turn, ratio = 2 * math.pi / request.slowest, request.fastest / request.slowest
         said.append(f"At the slowest flow, 1/{_number(ratio)} of the fastest, a turn takes {_number(turn)} s.")
-    return said
+    return [*said, *_warning(made)]
+
+
+def _limit(made: Design) -> str:
+    chosen, fastest = made.choice, made.request.fastest
+    if not chosen.margin:
+        return f"It has no operating range: {chosen.worst.end.value}."
+    covers = f"{_number(chosen.margin)} times the fastest flow, {fastest:g} rad/s"
+    limit = f"at worst ω₀ = {_number(chosen.worst.omega_0)} rad/s, {covers} ({_number(chosen.limit.omega_0)} as meant)"
+    return f"Rolling at both points is the ball's only lasting motion up to {limit}: there {chosen.worst.end.value}."
+
+
+def _warning(made: Design) -> list[str]:
+    """Whether the law of drag isn't meant for the slips of the characteristic curve."""
+    p, curve = made.choice.p, made.curve
+    Re = float(np.max(drag.reynolds(p.R * (curve.omega_0 - curve.band[0]), p)))
+    if drag.covers(Re, p.drag):
+        return []
+    return [
+        f"Warning: beyond the limit the ball may lag with Re up to {Re:.3g}, for which the law {p.drag!r} isn't meant. "
+        "The limit doesn't depend on drag, what is read beyond it does."
+    ]
 
 
 def materials(made: Design) -> Rows:
@@ -94,6 +117,7 @@ def described(made: Design) -> dict[str, Any]:
         "meter": _choice(made.choice),
         "parameters": dataclasses.asdict(made.choice.p),
         "covers": made.choice.margin >= 1,
+        "worst_limit_with_inertia": made.with_inertia,
         "reading_range": flowmeter.reading_range(made.choice.p),
         "unloading_limit": flowmeter.unloading_limit(made.choice.p),
         "materials": {name: _choice(c) for name, c in made.choices.items()},

@@ -179,6 +179,9 @@ def test_materials_are_compared_and_those_that_float_refused() -> None:
     assert "rho_b = 200 kg m-3 is out of range: a ball not denser than the fluid floats" in made.refused["cork"]
     assert made.choice.worst.omega_0 == pytest.approx(made.spread["omega_01"][0])
     assert made.spread["omega_01"][0] < made.thresholds.omega_01 < made.spread["omega_01"][1]
+    # The fluid's inertia, for which (1 - s) m, j/(1 - s), g/(1 - s) take the place of m, j, g.
+    p, rest = made.choice.p.replace(eta=0.9 * made.choice.p.eta), 1 - 998.2 / 7850
+    assert made.with_inertia == pytest.approx(operating_range(p.replace(j=p.j / rest, g=p.g / rest)))
     band, meant = made.curve.band, made.curve.meant
     assert np.all((band[0] <= meant[0]) & (meant[0] <= meant[1]) & (meant[1] <= band[1]))
     exact = made.curve.omega_0 < made.choice.worst.omega_0

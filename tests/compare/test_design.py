@@ -66,6 +66,19 @@ def test_design_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert f"at worst ω₀ = {end:.4g} rad/s, {end / 60:.4g} times the fastest flow" in shown
 
 
+def test_design_warns_and_says_when_there_is_no_range(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Stokes' law is meant for Re < 1, a ball that slips in water has thousands; a smooth floor drives nothing."""
+    ball = {"r": 0.005, "R": 0.02, "rho_b": 7850, "mu": 0.2, "eta": 0.2}
+    flow = {"slowest": 3, "fastest": 10}
+    assert cli.main(["design", written(tmp_path, bounds=ball, flow=flow, material=[{"name": "[red]"}])]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "Best: [red], r = 0.005 m" in shown
+    assert "Warning: beyond the limit the ball may lag with Re up to" in shown
+    assert cli.main(["design", written(tmp_path, bounds=ball | {"mu": 0}, material=None)]) == 1
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "It has no operating range: a contact without friction never makes it roll." in shown
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -81,6 +94,10 @@ def test_design_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
         ),
         ({"flow": {"slowest": "x", "fastest": 4}}, "flow.slowest = 'x' must be a number in rad s-1"),
         ({"flow": METER["flow"] | {"response": 1e-3}}, "response = 0.001 s excludes everything: within the bounds"),
+        (
+            {"fluid": METER["fluid"] | {"drag": "quadratic"}, "flow": METER["flow"] | {"response": 9}},
+            "flow.response can't",
+        ),
         ({"bounds": METER["bounds"] | {"eta": [0.3, 0.1]}}, "steel: eta = [0.3, 0.1] 1 excludes everything"),
         ({"bounds": METER["bounds"] | {"eta": [0.3]}}, "steel: eta = [0.3] must be a number in 1, or the two between"),
         ({"bounds": METER["bounds"] | {"R": 0}}, "steel: R = 0 m is out of range: must be > 0"),
