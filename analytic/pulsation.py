@@ -22,7 +22,7 @@ from model.arrays import Array
 PHASES = 720
 """Phases of a period at which slip is looked for, and once more in the cell of the least margin."""
 PERIODS, ROUNDS, SETTLED = 3, 50, 1e-9
-"""Length of the runs of `mean_error`, the most of them, and the relative change of the mean at which it is settled."""
+"""Length of the runs of `mean_error`, the most of them, and when the mean is settled."""
 
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
@@ -84,11 +84,12 @@ def fast_onset(p: Parameters) -> float:
     return min(lags)
 
 
-def mean_error(p: Parameters, amplitude: float, frequency: float) -> float:
+def mean_error(p: Parameters, amplitude: float, frequency: float, settled: float = SETTLED) -> float:
     """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic; frequency in Hz.
 
     0 below `slip_onset`; beyond it, from the event-driven simulation, by the azimuth that the ball runs through. Each
-    run starts from where the one before points to (Aitken). Raises `SimulationError` if no period is as the one before.
+    run starts from where the one before points to (Aitken), until the mean changes by less than `settled`, relative to
+    the flow. Raises `SimulationError` if it never does.
     """
     if amplitude <= slip_onset(p, frequency):
         return 0.0
@@ -96,7 +97,7 @@ def mean_error(p: Parameters, amplitude: float, frequency: float) -> float:
     for _ in range(ROUNDS):
         run = simulate(p, x, PERIODS / frequency, flow, sample_interval=1 / frequency)
         before, last = (float(turn) * frequency for turn in np.diff(run.theta)[-2:])
-        if abs(last - before) <= SETTLED * abs(p.omega_0):
+        if abs(last - before) <= settled * abs(p.omega_0):
             return last - p.omega_0
         first, second = (float(step) for step in np.diff(run.omega_c)[-2:])
         ahead = second**2 / (first - second) if abs(second) < abs(first) else 0.0

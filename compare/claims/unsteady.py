@@ -44,7 +44,7 @@ def _peak(p: Parameters) -> tuple[float, float]:
 
 
 @remembered
-def _ramp_end(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
+def ramp_end(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
     """The flow at which a ramp ends slipping at both points by theory; LookupError if it doesn't."""
     beyond = analytic.thresholds(p).omega_04 + FAR * response.ramp_coefficient(p) * rate ** (2 / 3)
     t_end = (beyond - p.omega_0) / rate
@@ -57,7 +57,7 @@ def _ramp_end(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
 
 
 def _left(m: Measurement) -> float:
-    return _ramp_end(
+    return ramp_end(
         m.parameters, float(m.conditions["rate"]), tuple(float(m.conditions[name]) for name in VARIABLES[:6])
     )
 

@@ -20,6 +20,7 @@ from compare.figures import (
     settings,
     slipping,
     unloading,
+    unsteady,
 )
 from compare.figures.drawing import Drawing
 
@@ -75,6 +76,20 @@ FIGURES: dict[str, Drawing] = {
     "fig-13-left": _of_paper(flow_curve, "fig-13-left", "Fig. 13, left: hysteresis, η < j"),
     "fig-13-right": _of_paper(flow_curve, "fig-13-right", "Fig. 13, right: η > j"),
     "unloading": _of(unloading, "Section 5.3: the fall at unloading", "", "fig-13-right"),
+    "pulsation": Drawing(
+        title="Unsteady flow: pulsation",
+        select=partial(unsteady.select, figure="pulsation"),
+        draw=unsteady.draw_pulsation,
+        caption=unsteady.caption_pulsation,
+        claims=("pulsation-lag", "pulsation-slip", "pulsation-mean"),
+    ),
+    "unsteady": Drawing(
+        title="Unsteady flow: jumps and ramps",
+        select=partial(unsteady.select, figure="unsteady"),
+        draw=unsteady.draw_unsteady,
+        caption=unsteady.caption_unsteady,
+        claims=("jump-slipping", "ramp-fold"),
+    ),
     "hopping-orbit": Drawing(
         title="Beyond the paper: a ball that hops for ever",
         select=periodic.select,

@@ -33,10 +33,10 @@ OCTAVES = {Level.QUICK: (3, 6), Level.DEFAULT: (0, 1, 3, 4, 6, 7), Level.FULL: (
 """Where the frequencies are above it: two decades."""
 STEPS = {Level.QUICK: 512, Level.DEFAULT: 1024, Level.FULL: 2048}
 """Least number of time steps in a period."""
-PERIODS, ROUNDS = 3, 4
+PERIODS, ROUNDS = 3, 5
 """Length of the runs, and how many there are, each from where the one before points to, the last with half the step."""
-WIDTH = {Level.QUICK: 2e-3, Level.DEFAULT: 1e-3, Level.FULL: 5e-4}
-"""Relative width to which the onset of slip is bracketed."""
+WIDTH = {Level.QUICK: 1e-3, Level.DEFAULT: 2.5e-4, Level.FULL: 1.2e-4}
+"""Relative width to which the onset of slip is bracketed; if half the step moves it, it counts eight times as much."""
 REACH = 1.1
 """Largest amplitude that is tried: it would take the ball beyond its end of rolling by so much."""
 LOOKED = 1.5

@@ -1,0 +1,186 @@
+"""Unsteady flow: how the ball follows a pulsation and when it slips, jumps of the flow, ramps past the fold."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import analytic
+from analytic import bifurcation, pulsation, response
+from compare.claims.unsteady import ramp_end
+from compare.figures import style
+from compare.figures.bifurcation_diagrams import slipping
+from compare.figures.drawing import Material, Motion
+from compare.measure.record import Measurement
+from compare.measure.unsteady import JUMP
+from compare.runs.engines import ENGINES
+from model import Case, Flow, Parameters
+
+SET = "reference"
+REFERENCE = Parameters.named(SET)
+DECADES = (0.04, 16.0)
+"""Frequencies shown, Hz."""
+FLOWS = (18.0, 25.0, 35.0)
+"""Flows about which the jumps of a slipping ball are shown, rad s-1."""
+RATES = (0.03, 0.3, 1.0)
+"""Rates of the ramps shown, rad s-2."""
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """What was measured on the set that is shown, and the runs after a jump of a ball that slips, up and down."""
+
+    rows: tuple[Measurement, ...] = ()
+    runs: tuple[Motion, ...] = ()
+
+    def of(self, quantity: str) -> list[Measurement]:
+        """Those of one quantity."""
+        return [m for m in self.rows if m.quantity == quantity]
+
+    @property
+    def mean(self) -> Parameters:
+        """The set, with the mean flow of the pulsations."""
+        own = self.of("gain")
+        return own[0].parameters if own else REFERENCE
+
+
+def select(material: Material, figure: str) -> Measurements:
+    """The measurements of a protocol; for the jumps their runs, too."""
+    own = tuple(m for m in material.records.measurements if m.protocol == figure and m.set == SET)
+    jumped = [m for m in own if m.quantity == "jump_height"]
+    return Measurements(own, tuple(material.motions(jumped[0])) if jumped else ())
+
+
+@cache
+def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
+    """Frequencies, amplitudes at which slip begins, mean errors at half as much again."""
+    f = np.geomspace(*DECADES, 32).tolist()
+    onsets = [pulsation.slip_onset(p, each) for each in f]
+    return f, onsets, [pulsation.mean_error(p, 1.5 * a, each, 1e-4) for each, a in zip(f, onsets, strict=True)]
+
+
+def caption_pulsation(of: Measurements) -> str:
+    """Of gain, phase, onset of slip and mean error."""
+    p = of.mean
+    text = (
+        f"A ball in a flow that pulsates about ω₀ = {p.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, where it "
+        f"rolls at both points (RR) and, dashed, where it slips at both (SS, about {FLOWS[1]:g} rad/s). Right: the "
+        "amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast pulsations; "
+        f"and the error of its mean reading when the amplitude is half as much again. {style.named(p)}."
+    )
+    return text + (" Marks: measured, three standard uncertainties smaller than the marks." if of.rows else "")
+
+
+def draw_pulsation(of: Measurements) -> Figure:
+    """Gain, phase, onset, mean error over frequency."""
+    p = of.mean
+    figure = style.figure(9.0, 5.6)
+    (gain, onset), (phase, error) = figure.subplots(2, 2, sharex=True)
+    f = np.geomspace(*DECADES, 400)
+    for q, case, line in ((p, Case.RR, "-"), (REFERENCE.replace(omega_0=FLOWS[1]), Case.SS, "--")):
+        ratio = response.transfer(q, case, f)
+        gain.loglog(f, np.abs(ratio), color=style.COLOURS[case], ls=line, lw=2)
+        phase.plot(f, -np.degrees(np.unwrap(np.angle(ratio))), color=style.COLOURS[case], ls=line, lw=2)
+        style.name(gain, f[60], abs(ratio[60]), case.name, (0, -8), style.COLOURS[case])
+    frequencies, onsets, errors = _theory(p)
+    onset.loglog(frequencies, onsets, color=style.COLOURS[Case.RR], lw=2)
+    onset.margins(y=0.12)
+    for limit, text, at, shift in (
+        (pulsation.slow_onset(p), "slow", 1.0, 3),
+        (pulsation.fast_onset(p), "fast", 0.1, -3),
+    ):
+        onset.axhline(limit, **style.GUIDE)
+        style.name(onset, at, limit, text, (0, shift))
+    error.plot(frequencies, errors, color=style.COLOURS[Case.SS], lw=2)
+    _marks(gain, of.of("gain"))
+    _marks(phase, of.of("phase_lag"), 180 / math.pi)
+    _marks(onset, of.of("slip_amplitude"))
+    _marks(error, of.of("mean_error"))
+    gain.set_ylabel("gain $|\\omega_c/\\omega_0|$")
+    phase.set(ylabel="phase lag (°)", xlabel="frequency (Hz)")
+    onset.set_ylabel("amplitude at which\nslip begins (rad/s)")
+    error.set(ylabel="mean of $\\omega_c - \\omega_0$ (rad/s)", xlabel="frequency (Hz)")
+    error.axhline(0, **style.GUIDE)
+    style.legend(gain, loc="lower left")
+    return figure
+
+
+def _marks(axes: Axes, rows: list[Measurement], unit: float = 1.0) -> None:
+    for engine in dict.fromkeys(m.engine for m in rows):
+        own, given = [m for m in rows if m.engine == engine], ENGINES[engine]
+        at, values = [float(m.conditions["f"]) for m in own], [unit * m.value for m in own]
+        axes.plot(at, values, given.mark, color=given.colour, mfc="white", ms=6, label=engine, zorder=5)
+
+
+def caption_unsteady(of: Measurements) -> str:
+    """Of jumps and ramps."""
+    measured = f" Dots: MuJoCo, half the difference of two jumps by {JUMP:.1%}, up and down." if of.runs else ""
+    marks = " Marks: measured." if of.of("ramp_end") else ""
+    return (
+        "Left: ω_c after a small jump of the flow, over its change in the end; a ball that rolls creeps to its new "
+        f"reading, one that slips at both points rings.{measured} Middle: ramps past the fold, faster ones catch up "
+        "with the flow later. Right: by how much a ramp passes ω₀₄ until the ball lags by half as much as at first, "
+        f"dashed the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).{marks} {style.named(REFERENCE)}."
+    )
+
+
+def draw_unsteady(of: Measurements) -> Figure:
+    """Step responses, ramps, overshoot over rate."""
+    figure = style.figure(10.0, 3.6)
+    jump, ramp, law = figure.subplots(1, 3)
+    t, shades = np.linspace(0.0, 4.0, 800), (0.4, 0.7, 1.0)
+    rolling = response.step_response(REFERENCE, Case.RR, t)
+    jump.plot(t, rolling, color=style.COLOURS[Case.RR], lw=2, label="RR")
+    measured = of.of("jump_height")
+    flows = [*FLOWS[1:], measured[0].parameters.omega_0 if measured else FLOWS[0]]
+    for omega_0, shade in zip(sorted(flows), shades, strict=True):
+        p = REFERENCE.replace(omega_0=omega_0)
+        y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
+        jump.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {omega_0:.3g} rad/s")
+    if len(of.runs) == 2:
+        up, down = (motion.load() for motion in of.runs)
+        y, shown = (up.omega_c - down.omega_c) / (up.omega_c - down.omega_c)[-1], up.time <= t[-1]
+        jump.plot(up.time[shown][::5], y[shown][::5], "k.", ms=3.5, label="MuJoCo")
+    jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$, 1 in the end")
+    style.legend(jump)
+    _ramps(ramp)
+    _law(law, of.of("ramp_end"))
+    return figure
+
+
+def _ramps(axes: Axes) -> None:
+    end = bifurcation.thresholds(REFERENCE).omega_04
+    slipping(axes, REFERENCE, lambda spin, omega_c: omega_c, "SS", (0.5, (0, 0)), (0.2, (-4, 6)))
+    style.name(axes, end + 5.5, end + 5.5, "NR", (-5, 5), style.COLOURS[Case.NR])
+    for rate, shade in zip(RATES, (1.0, 0.65, 0.4), strict=True):
+        p = REFERENCE.replace(omega_0=end - 8)
+        x, span = analytic.solution(p, Case.SS).x, 15.0
+        flow = Flow.ramp(end - 8, end - 8 + span, span / rate)
+        run = analytic.simulate(p, x, span / rate, flow, sample_interval=span / rate / 2000)
+        axes.plot(flow(run.time), run.omega_c, color="black", alpha=shade, lw=1.5, label=f"{rate:g} rad/s²")
+    axes.axline((end, end), slope=1, color=style.COLOURS[Case.NR], lw=1.5)
+    axes.set(xlim=(end - 6, end + 7), ylim=(15, 55), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    style.guides(axes, {"omega_04": end})
+    style.legend(axes, loc="upper left")
+
+
+def _law(axes: Axes, rows: list[Measurement]) -> None:
+    end, K = bifurcation.thresholds(REFERENCE).omega_04, response.ramp_coefficient(REFERENCE)
+    rates = np.geomspace(0.02, 1.0, 7)
+    p = rows[0].parameters if rows else REFERENCE.replace(omega_0=34.9)
+    x = tuple(analytic.solution(p, Case.SS).x[:6].tolist())
+    axes.loglog(rates, K * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
+    passed = [ramp_end(p, rate, x) - end for rate in rates.tolist()]
+    axes.loglog(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
+    for m in rows:
+        given = ENGINES[m.engine]
+        look: dict[str, Any] = {"color": given.colour, "mfc": "white", "ms": 6, "zorder": 5, "label": m.engine}
+        axes.plot([float(m.conditions["rate"])], [m.value - end], given.mark, **look)
+    axes.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)")
+    style.legend(axes, loc="upper left")
