@@ -24,11 +24,11 @@ from model import Case, Flow, Parameters
 
 SET = "reference"
 REFERENCE = Parameters.named(SET)
-DECADES = (0.04, 16.0)
+DECADES = (0.04, 12.0)
 """Frequencies shown, Hz."""
 FLOWS = (18.0, 25.0, 35.0)
 """Flows about which the jumps of a slipping ball are shown, rad s-1."""
-RATES = (0.03, 0.3, 1.0)
+RATES = (0.05, 0.3, 1.0)
 """Rates of the ramps shown, rad s-2."""
 
 
@@ -60,7 +60,7 @@ def select(material: Material, figure: str) -> Measurements:
 @cache
 def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
     """Frequencies, amplitudes at which slip begins, mean errors at half as much again."""
-    f = np.geomspace(*DECADES, 32).tolist()
+    f = np.geomspace(*DECADES, 22).tolist()
     onsets = [pulsation.slip_onset(p, each) for each in f]
     return f, onsets, [pulsation.mean_error(p, 1.5 * a, each, 1e-4) for each, a in zip(f, onsets, strict=True)]
 
@@ -172,7 +172,7 @@ def _ramps(axes: Axes) -> None:
 
 def _law(axes: Axes, rows: list[Measurement]) -> None:
     end, K = bifurcation.thresholds(REFERENCE).omega_04, response.ramp_coefficient(REFERENCE)
-    rates = np.geomspace(0.02, 1.0, 7)
+    rates = np.geomspace(0.05, 1.0, 5)
     p = rows[0].parameters if rows else REFERENCE.replace(omega_0=34.9)
     x = tuple(analytic.solution(p, Case.SS).x[:6].tolist())
     axes.loglog(rates, K * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")

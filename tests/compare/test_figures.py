@@ -27,7 +27,9 @@ DEPENDS = {
         ["characteristic", *(f"fig-{k}" for k in (4, 5, 9, 10, 11, 12)), "fig-13-left", "fig-13-right", "unloading"],
         ("μ", "η", "j", "κ"),
     ),
-    **dict.fromkeys(["ladder", "basins", "hopping-orbit", "hopping-branch"], ("μ", "η", "j", "κ")),
+    **dict.fromkeys(
+        ["ladder", "basins", "hopping-orbit", "hopping-branch", "pulsation", "unsteady"], ("μ", "η", "j", "κ")
+    ),
     "frontier": ("μ", "η", "j", "κ"),
     "fig-7": ("μ", "j", "κ"),
     "fig-8": ("j", "κ"),
