@@ -4,7 +4,9 @@
 # make test-all   the slow tests, too
 # make docs       build the documentation, run its notebooks: docs/_build/html/index.html
 # make wheel      build sdist and wheel, and try the wheel in an empty environment
-# make check      what CI runs: lint, types, import contracts, a quick validation judged by wrong theories, tests, docs, wheel
+# make check      what CI runs: lint, types, import contracts, a quick validation judged by wrong theories, a small league,
+#                 tests, docs, wheel
+# make league     physics engines on the same tasks, those of PyBullet and Drake that have a wheel for this Python
 # make lock       resolve the dependencies anew (needs uv)
 
 PYTHON ?= python3
@@ -12,7 +14,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 RESULTS ?= results
 
-.PHONY: validate mutants verdicts test test-all docs wheel check lint lock clean
+.PHONY: validate mutants verdicts league test test-all docs wheel check lint lock clean
 
 validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
@@ -43,7 +45,10 @@ docs: $(VENV)/installed-dev
 wheel: $(VENV)/installed-dev
 	.ci/wheel $(VENV)
 
-check: lint verdicts test docs wheel
+check: lint verdicts league test docs wheel
+
+league: $(VENV)/installed-engines
+	$(BIN)/dualball league --quick --quiet -o $(RESULTS)
 
 $(VENV)/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "dualball needs Python 3.11 or newer; name one with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
@@ -54,6 +59,13 @@ $(VENV)/installed: requirements.lock pyproject.toml
 
 $(VENV)/installed-dev: requirements-dev.lock $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+	@touch $@
+
+$(VENV)/installed-engines: $(VENV)/installed
+	@for engine in drake pybullet; do \
+	    $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary :all: $$engine || \
+	        echo "the league goes on without $$engine, which has no wheel for this Python"; \
+	done
 	@touch $@
 
 lock:

@@ -74,7 +74,7 @@ class Header:
     """Where a trajectory comes from: enough to run it again."""
 
     engine: str
-    """``event``, ``time-stepping`` or ``mujoco``."""
+    """Its name: ``event``, ``time-stepping``, ``mujoco``, ..."""
     parameters: Parameters
     flow: Flow
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -84,7 +84,7 @@ class Header:
     failure: str = ""
     """Why the run stopped early; empty for a run that reached its end."""
     versions: Mapping[str, str] = field(default_factory=lambda: dict(current_versions()))
-    """Versions of dualball, mujoco, numpy and Python."""
+    """Versions of dualball, the engine, numpy and Python."""
     commit: str = field(default_factory=current_commit)
     """The commit of the program, if it ran from a checkout."""
     created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))

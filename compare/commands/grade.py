@@ -6,14 +6,18 @@ import argparse
 import dataclasses
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
 
-from compare.commands import options
-from compare.runs import progress
+from compare.commands import options, running
+from compare.runs import engines, progress
+from compare.runs.engines import Engine
 from compare.scorecard import native
+from compare.scorecard.contenders import NEWCOMER, OURS, PLAIN, Contender, Other
 from compare.scorecard.native import Native
+from mjsim import ContactSettings
 from model import InputError
 from model.files import check_writable, write_text
 
@@ -21,9 +25,13 @@ from model.files import check_writable, write_text
 def add(commands: options.Commands) -> None:
     """Declare the command."""
     command = options.command(
-        commands, "grade", run, "a score card for MuJoCo contact settings: yours, dualball's, MuJoCo's own"
+        commands,
+        "grade",
+        run,
+        "a score card for MuJoCo contact settings: yours, dualball's, MuJoCo's own; or for another engine",
     )
     add_settings(command)
+    running.add_engine_name(command)
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write")
     command.add_argument("--json", action="store_true", help="print JSON")
 
@@ -34,13 +42,10 @@ def run(args: argparse.Namespace) -> int:
 
     if args.output:
         check_writable(args.output)
-    yours = settings(args)
-    if yours.note:
-        print(f"dualball: {yours.note}", file=sys.stderr)
+    yours, others, described = _graded(args)
     with progress.shown(quiet=args.json) as show:
-        columns = grade.grade(yours, progress=lambda name, done, total: show(f"grade {name}", done, total, 0))
+        columns = grade.grade(yours, others, lambda name, done, total: show(f"grade {name}", done, total, 0))
     if args.output:
-        described = f"{describe(args)} {yours.note}".rstrip()
         write_text(args.output, card.html(columns, described))
     if args.json:
         print(json.dumps([column.to_mapping() for column in columns], indent=1))
@@ -50,6 +55,27 @@ def run(args: argparse.Namespace) -> int:
     for item in columns[0].advice:
         console.print(f"• {item}", markup=False, highlight=False)
     return 0
+
+
+def _graded(args: argparse.Namespace) -> tuple[Native | None, Sequence[Contender | Other], str]:
+    """MuJoCo's settings that the options name, whom they are compared with, and what they are in words."""
+    engine: Engine = args.engine
+    if engine is engines.MUJOCO:
+        yours = settings(args)
+        if yours.note:
+            print(f"dualball: {yours.note}", file=sys.stderr)
+        return yours, (OURS, PLAIN, NEWCOMER), f"{describe(args)} {yours.note}".rstrip()
+    if engine.missing:
+        raise InputError(engine.missing)
+    if "timestep" not in engine.options:
+        raise InputError(f"{engine.name} has no time step, and no settings to grade")
+    given = options.given(args, ("timestep",))
+    if args.file or len(options.given(args, (*_NATIVE, *_CONTACT))) > len(given):
+        raise InputError(f"a file and contact settings are MuJoCo's; of {engine.name} only --timestep can be given")
+    names = dict.fromkeys(name for name in (engine.name, engine.as_it_comes) if name)
+    step = given.get("timestep", ContactSettings.timestep)
+    others = [Other(engines.engine(name), step) for name in names]
+    return None, (*others, OURS), f"{engine.name} in its best known settings and as it comes, step {1e3 * step:g} ms."
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:

@@ -1,12 +1,13 @@
 """Drake: a discrete `MultibodyPlant` with point contact, normal forces implicit, friction regularised below a speed.
 
 TAMSI solves the step by Newton's method, with friction mu v/v_s up to the stiction tolerance v_s: a contact that should
-roll creeps at a part of v_s, and a ball sinks in by its load over the stiffness. Both can be made as small as round-off
-lets them. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of their own, and creep.
+roll creeps at a part of v_s, and a ball sinks in by its load over the stiffness. Both can be made small, as far as
+Newton's method converges. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of their
+own, and creep.
 
 Traps: friction is the harmonic mean 2 a b/(a + b) of both bodies' coefficients, stiffness k1 k2/(k1 + k2); without
-`SetUseSampledOutputPorts(False)` there is no update to be evaluated by itself; a plane
-has to be a half space, since boxes are less exact, but one among a dozen of other shapes crashes the engine.
+`SetUseSampledOutputPorts(False)` there is no update to be evaluated by itself; a plane has to be a half space, since
+boxes are less exact, but one among a dozen of other shapes crashes the engine.
 """
 
 from __future__ import annotations
@@ -41,13 +42,14 @@ class Settings:
     """Planes that make up the wall."""
     approximation: str = "tamsi"
     """`discrete_contact_approximation`."""
-    stiffness: float | None = 1e11
+    stiffness: float | None = 1e10
     """Of ball, floor and wall, N/m; None for what the engine takes from its `penetration_allowance` of 1 mm."""
     dissipation: float | None = 100.0
     """Of each of them, s/m; None for the engine's own. A ball that has landed comes out of its overlap at up to the
     reciprocal: with less it is thrown back, with more it stays sunk in for long."""
-    stiction: float = 1e-10
-    """`stiction_tolerance` v_s, m s-1."""
+    stiction: float = 1e-8
+    """`stiction_tolerance` v_s, m s-1. With a hundredth of it TAMSI fails when a ball that rolls on both contacts lifts
+    off the floor, and so it does at the first step with a ten times larger v_s and stiffness."""
 
     def __post_init__(self) -> None:
         check_number("timestep", self.timestep, "s", POSITIVE)

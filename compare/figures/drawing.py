@@ -52,8 +52,6 @@ class Material:
     """Scores under settings that each have one thing more than the one before."""
     frontier: tuple[Score, ...] = ()
     """Scores of methods over their cost."""
-    elsewhere: tuple[Score, ...] = ()
-    """Those of engines that are not part of this program."""
 
     @cached_property
     def by_claim(self) -> Mapping[str, Verdict]:

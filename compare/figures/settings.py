@@ -24,11 +24,10 @@ _OF_STATES = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """Scores, and those of engines that are not part of this program."""
+    """The scores of a figure."""
 
     figure: str
     scores: tuple[Score, ...]
-    elsewhere: tuple[Score, ...] = ()
 
 
 def select(material: Material, figure: str) -> Comparison:
@@ -36,7 +35,7 @@ def select(material: Material, figure: str) -> Comparison:
     scores = material.ladder if figure == "ladder" else material.frontier
     if not scores:
         raise GapError(f"{'the ladder of settings' if figure == 'ladder' else 'error against cost'} was not measured")
-    return Comparison(figure, scores, material.elsewhere if figure == "frontier" else ())
+    return Comparison(figure, scores)
 
 
 def caption(of: Comparison) -> str:
@@ -47,11 +46,10 @@ def caption(of: Comparison) -> str:
             "have one thing more than those above them, from what a newcomer writes to those of this study (ours). "
             "What is below 1e-16 is drawn there; a run that diverged has no mark."
         )
-    text = (
+    return (
         f"Relative error of ω_c over the processor time that a simulated second takes, in {_OF_STATES} and in a "
         "transient. Marks of one kind: one method at several time steps, joined. What is below 1e-16 is drawn there."
     )
-    return text + (" Grey: other engines, measured once, elsewhere." if of.elsewhere else "")
 
 
 def draw(of: Comparison) -> Figure:
@@ -82,10 +80,10 @@ def _frontier(of: Comparison) -> Figure:
     rows = -(-len(quantities) // COLUMNS)
     figure = style.figure(11, 0.8 + 3.1 * rows)
     panels = figure.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
-    looks = _looks(of.scores, of.elsewhere)
+    looks = _looks(of.scores)
     for axes, quantity in zip(panels, quantities, strict=False):
         for method, look in looks.items():
-            own = [s for s in (*of.scores, *of.elsewhere) if (s.method, s.quantity) == (method, quantity)]
+            own = [s for s in of.scores if (s.method, s.quantity) == (method, quantity)]
             own.sort(key=lambda score: score.cost)
             axes.plot([s.cost for s in own], [max(s.error, _LEAST) for s in own], label=method, ms=5, lw=1, **look)
         axes.set(xscale="log", yscale="log")
@@ -104,11 +102,7 @@ def _frontier(of: Comparison) -> Figure:
     return figure
 
 
-def _looks(scores: Sequence[Score], elsewhere: Sequence[Score]) -> dict[str, dict[str, str]]:
-    """Mark and colour of each method; those elsewhere are hollow and grey."""
-    own = list(dict.fromkeys(score.method for score in scores))
-    others = list(dict.fromkeys(score.method for score in elsewhere))
-    looks = {name: {"marker": _MARKS[k % 8], "color": _COLOURS[k % 8], "mfc": "white"} for k, name in enumerate(own)}
-    return looks | {
-        name: {"marker": "s^Dv"[k % 4], "color": "0.5", "mfc": "white", "ls": "none"} for k, name in enumerate(others)
-    }
+def _looks(scores: Sequence[Score]) -> dict[str, dict[str, str]]:
+    """Mark and colour of each method."""
+    names = list(dict.fromkeys(score.method for score in scores))
+    return {name: {"marker": _MARKS[k % 8], "color": _COLOURS[k % 8], "mfc": "white"} for k, name in enumerate(names)}

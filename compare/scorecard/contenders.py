@@ -1,21 +1,24 @@
-"""Settings under test, and how they run: in the study's scene and loop, one simulation at a time."""
+"""Settings under test, and how they run: MuJoCo's in the study's scene and loop, other engines' in their own."""
 
 from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from compare.runs.engines import Engine
+from compare.runs.tasks import Task, carry_out
 from compare.scorecard.native import Native
 from compare.scorecard.trials import KICKED, SLIPPING
 from mjsim import ContactSettings, recorder, scene
 from mjsim.engine import start
 from mjsim.stepping import Stepper
 from model import Events, Flow, Header, Parameters, Trajectory
+from model.trajectory import columns
 
 _HUGE = 1e8
 """A coordinate, speed or force beyond this, in SI units, has diverged."""
@@ -30,6 +33,11 @@ class Contender:
     """Settings of the loop round the engine."""
     native: Native | None = None
     """Settings of the engine where they are not those of `loop`."""
+
+    @property
+    def timestep(self) -> float:
+        """s"""
+        return self.loop.timestep
 
     def start(self, p: Parameters, x0: npt.ArrayLike) -> Stepper:
         """A simulation from a state."""
@@ -54,6 +62,55 @@ class Contender:
         header = Header("mujoco", p, Flow.steady(p.omega_0), self.loop.to_mapping(), failure=failure)
         return Trajectory.from_blocks(header, [block], Events())
 
+    def clock(self, steps: int) -> Callable[[], float]:
+        """A function that goes on by so many steps and returns the processor time in s."""
+        stepper, omega_0 = self.start(SLIPPING.p, KICKED), np.full((steps, 1), SLIPPING.p.omega_0)
+
+        def spend() -> float:
+            begin = time.process_time()
+            stepper.advance(omega_0)
+            return time.process_time() - begin
+
+        return spend
+
+
+@dataclass(frozen=True)
+class Other:
+    """Another engine, in settings that a time step in s leads to."""
+
+    engine: Engine
+    timestep: float
+
+    @property
+    def name(self) -> str:
+        """The engine's."""
+        return self.engine.name
+
+    def task(self, p: Parameters, x0: npt.ArrayLike, t_end: float, interval: float) -> Task:
+        """A run of the engine."""
+        settings = self.engine.configure({"timestep": self.timestep})
+        return Task(engine=self.name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval)
+
+    def run(self, p: Parameters, x0: npt.ArrayLike, t_end: float, interval: float, skip: float = 0.0) -> Trajectory:
+        """As `Contender.run`; of what follows `skip`, fifty samples."""
+        (run,) = carry_out([self.task(p, x0, t_end, max(interval, (t_end - skip) / 50) if skip else interval)])
+        kept = run.time >= skip
+        return replace(run, **{name: getattr(run, name)[kept] for name in columns(Trajectory)})
+
+    def clock(self, steps: int) -> Callable[[], float]:
+        """As `Contender.clock`, always from the start, without what it takes to begin."""
+        times = [count * steps * self.timestep for count in (1, 2)]
+
+        def spend() -> float:
+            spent = []
+            for t_end in times:
+                begin = time.process_time()
+                carry_out([self.task(SLIPPING.p, KICKED, t_end, t_end)])
+                spent.append(time.process_time() - begin)
+            return spent[1] - spent[0]
+
+        return spend
+
 
 OURS = Contender("dualball", ContactSettings())
 PLAIN = Contender("MuJoCo", Native().loop(), Native())
@@ -61,15 +118,12 @@ NEWCOMER = Contender("newcomer", Native().loop(coordinates="free", wall="prism")
 """What a newcomer might write: MuJoCo's defaults, a free ball, and a wall of flat facets."""
 
 
-def costs(contenders: Sequence[Contender], steps: int = 1500, repeats: int = 5) -> list[float]:
+def costs(contenders: Sequence[Contender | Other], steps: int = 1500, repeats: int = 5) -> list[float]:
     """Medians of time per step over that of our defaults, measured in turn."""
-    steppers = [contender.start(SLIPPING.p, KICKED) for contender in (OURS, *contenders)]
-    omega_0 = np.full((steps, 1), SLIPPING.p.omega_0)
-    times: list[list[float]] = [[] for _ in steppers]
+    clocks = [contender.clock(steps) for contender in (OURS, *contenders)]
+    times: list[list[float]] = [[] for _ in clocks]
     for _ in range(repeats):
-        for stepper, spent in zip(steppers, times, strict=True):
-            begin = time.process_time()
-            stepper.advance(omega_0)
-            spent.append(time.process_time() - begin)
+        for clock, spent in zip(clocks, times, strict=True):
+            spent.append(clock())
     ours, *others = (statistics.median(spent) for spent in times)
     return [1.0 if of is OURS else other / ours for of, other in zip(contenders, others, strict=True)]

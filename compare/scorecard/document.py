@@ -1,4 +1,4 @@
-"""Write the measured tables of the settings page: ``python -m compare.scorecard.document docs/mujoco-settings.md``.
+"""Write the measured tables of a page: ``python -m compare.scorecard.document docs/mujoco-settings.md`` or engines.md.
 
 Each table stands between two lines ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. Runs are kept in a results
 directory and not computed again.
@@ -11,14 +11,16 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from compare.runs import progress
 from compare.runs.campaign import Campaign
-from compare.scorecard import accuracy, confirmation, scores, trials
+from compare.scorecard import accuracy, confirmation, league, scores, standings, trials
 from compare.scorecard.accuracy import Rows, number
-from compare.scorecard.scores import ELSEWHERE, Score
+from compare.scorecard.scores import Score
 from model import InputError
 from model.files import write_text
+from model.parameters import check_choice, check_names
 
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 """Time steps of error against cost, s."""
@@ -60,7 +62,7 @@ def _errors(scored: Sequence[Score]) -> Rows:
 def _frontier(campaign: Campaign) -> Rows:
     """Error and cost, by method and step."""
     rows = [["method", "h", *QUANTITIES, "time per simulated time"]]
-    for (method, step), row in by_method([*scores.frontier(campaign, STEPS), *ELSEWHERE]).items():
+    for (method, step), row in by_method(scores.frontier(campaign, STEPS)).items():
         errors = {score.quantity: number(score.error) for score in row}
         shown = f"{1e3 * step:g} ms" if step else "as it needs"
         rows.append([method, shown, *(errors.get(each, "") for each in QUANTITIES), f"{row[0].cost:.2g}"])
@@ -80,18 +82,36 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
 """The tables by name."""
 
 
+def _league(campaign: Campaign) -> dict[str, Any]:
+    those = league.contestants()
+    if missing := [each.engine.missing for each in those if each.engine.missing]:
+        raise InputError(f"the page is about all engines: {missing[0]}")
+    return league.to_mapping(those, league.measure(campaign, those))
+
+
+LEAGUE: dict[str, Callable[[Campaign], Rows]] = {
+    "league": lambda campaign: standings.rows(league.from_mapping(_league(campaign))),
+    "league-settings": lambda campaign: standings.settings(_league(campaign)),
+}
+PAGES = {"mujoco-settings.md": ("settings", TABLES), "engines.md": ("league", LEAGUE)}
+"""Directory of the runs, and tables of each page."""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure and write all tables of a page, or those named."""
-    parser = argparse.ArgumentParser(description="Write the measured tables of docs/mujoco-settings.md.")
-    parser.add_argument("page", type=Path, metavar="FILE")
-    parser.add_argument("--only", action="append", choices=list(TABLES), metavar="NAME")
+    parser = argparse.ArgumentParser(description="Write the measured tables of a page of the documentation.")
+    parser.add_argument("page", type=Path, metavar="FILE", help=f"a page called {' or '.join(PAGES)}")
+    parser.add_argument("--only", action="append", metavar="NAME", help="only this table (may be repeated)")
     parser.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR", help="where runs are kept")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (0: none)")
     args = parser.parse_args(argv)
-    with progress.shown() as show, Campaign(args.output / "settings", args.workers) as campaign:
-        for name in args.only or TABLES:
+    check_choice("page", args.page.name, list(PAGES))
+    runs, tables = PAGES[args.page.name]
+    check_names(args.only or (), list(tables), "table")
+    with progress.shown() as show, Campaign(args.output / runs, args.workers) as campaign:
+        for name in args.only or tables:
             campaign.report = lambda now, what=name: show(what, now.done, now.total, now.failed)  # type: ignore[misc]
-            write(args.page, name, TABLES[name](campaign))
+            write(args.page, name, tables[name](campaign))
     return 0
 
 

@@ -20,7 +20,7 @@ import analytic
 from compare.runs.tasks import carry_out
 from compare.scorecard import trials
 from compare.scorecard.advice import advice
-from compare.scorecard.contenders import NEWCOMER, OURS, PLAIN, Contender, costs
+from compare.scorecard.contenders import NEWCOMER, OURS, PLAIN, Contender, Other, costs
 from compare.scorecard.native import Native
 from compare.scorecard.trials import AT_REST, KICKED, ROLLING, ROUGH, SLIPPING, SMOOTH, STATES, Held, State
 from compare.statistics import plain
@@ -81,7 +81,7 @@ class Column:
 
 def grade(
     yours: Native | None,
-    others: Sequence[Contender] = (OURS, PLAIN, NEWCOMER),
+    others: Sequence[Contender | Other] = (OURS, PLAIN, NEWCOMER),
     progress: Callable[[str, int, int], None] = lambda name, done, total: None,
 ) -> list[Column]:
     """Columns of the score card: the given settings first, with advice, then the others.
@@ -101,22 +101,22 @@ def grade(
     return columns
 
 
-def _column(contender: Contender, cost: float) -> Column:
-    h, states = contender.loop.timestep, tuple(_held(contender, state) for state in STATES)
+def _column(contender: Contender | Other, cost: float) -> Column:
+    h, states = contender.timestep, tuple(_held(contender, state) for state in STATES)
     return Column(contender.name, h, _cases(contender), states, _onset(contender), _transient(contender), cost)
 
 
-def _held(contender: Contender, state: State) -> Held:
+def _held(contender: Contender | Other, state: State) -> Held:
     return trials.held(_settled(contender, state), state, state.forgets)
 
 
-def _settled(contender: Contender, state: State) -> Trajectory:
+def _settled(contender: Contender | Other, state: State) -> Trajectory:
     """The state from rest, sampled in every step once the start is forgotten."""
-    forgotten, step = state.forgets, contender.loop.timestep
+    forgotten, step = state.forgets, contender.timestep
     return contender.run(state.p, AT_REST, forgotten + WINDOW, step, skip=forgotten)
 
 
-def _onset(contender: Contender) -> float:
+def _onset(contender: Contender | Other) -> float:
     """Relative error of omega_01, from slip_z above it, extrapolated to zero along a parabola."""
     omega_01 = analytic.thresholds(SMOOTH).omega_01
     states = [State(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in ONSET]
@@ -132,8 +132,8 @@ def onset(slips: Sequence[float], states: Sequence[State]) -> float:
     return float(np.polynomial.Polynomial.fit(slips, ONSET, 2)(0.0)) - 1
 
 
-def _transient(contender: Contender) -> float:
-    run = contender.run(SLIPPING.p, KICKED, trials.PASSES, max(0.01, contender.loop.timestep))
+def _transient(contender: Contender | Other) -> float:
+    run = contender.run(SLIPPING.p, KICKED, trials.PASSES, max(0.01, contender.timestep))
     return trials.deviation(run.time, run.x, _exact())[0] if run.complete else math.nan
 
 
@@ -167,12 +167,12 @@ def phase(case: Case) -> tuple[float, float]:
     return float(truth.time[first]), float(truth.time[last - 1])
 
 
-def _cases(contender: Contender) -> dict[str, float]:
+def _cases(contender: Contender | Other) -> dict[str, float]:
     """By case: share of the samples of its scenario that are in it."""
     shares = {}
     for case, (p, x0) in SCENARIOS.items():
         begin, end = phase(case)
-        run = contender.run(p, x0, end, max(contender.loop.timestep, (end - begin) / 200))
+        run = contender.run(p, x0, end, max(contender.timestep, (end - begin) / 200))
         shares[case.name] = share(run, case)
     return shares
 

@@ -166,25 +166,6 @@ def _time_spent(task: Task) -> float:
     return (time.process_time() - begin) / count
 
 
-def _elsewhere(method: str, seconds: float, *errors: float) -> list[Score]:
-    """Scores at the steps that were taken, at so many seconds a step; nobody counted open contacts."""
-    quantities = [*(state.name for state in STATES[:3]), trials.TRANSIENT]
-    steps = [5e-4, 5e-4, 5e-4, 1e-4]
-    return [
-        Score(method, step, quantity, error, math.nan, seconds / step)
-        for quantity, step, error in zip(quantities, steps, errors, strict=True)
-    ]
-
-
-ELSEWHERE = [
-    *_elsewhere("Siconos, Moreau-Jean", 20e-6, 7e-14, 5e-7, 9e-15, 4e-6),
-    *_elsewhere("PyBullet", 17e-6, 7e-14, 4e-6, 8e-7, 1.4e-5),
-    *_elsewhere("Drake, TAMSI", 23e-6, 5e-6, 6e-6, 5e-6, 4.8e-5),
-]
-"""Other engines in co-rotating coordinates, from 2 % off the states: measured once, on another machine, not part of
-this program."""
-
-
 def write(campaign: Campaign, directory: Path) -> None:
     """Measure ladder and error against cost for figures, and keep them beside the results, unless they are there."""
     if not (directory / FILE).exists():
@@ -200,7 +181,6 @@ def read(directory: Path) -> dict[str, tuple[Score, ...]]:
         return {}
     try:
         rows = json.loads(path.read_text("utf-8"))
-        kept = {name: tuple(Score.from_mapping(values) for values in rows[name]) for name in ("ladder", "frontier")}
+        return {name: tuple(Score.from_mapping(values) for values in rows[name]) for name in ("ladder", "frontier")}
     except (ValueError, KeyError, TypeError) as error:
         raise StorageError(f"{path} is damaged: remove it, and it is measured again") from error
-    return {**kept, "elsewhere": tuple(ELSEWHERE)}

@@ -13,7 +13,7 @@ from compare.scorecard import accuracy, document
 from compare.scorecard.accuracy import REACHED
 from model import InputError
 
-PAGE = Path(__file__).parents[2] / "docs" / "mujoco-settings.md"
+DOCS = Path(__file__).parents[2] / "docs"
 ROWS = [["a", "b"], ["1", "2"], ["3", "4"]]
 
 
@@ -30,12 +30,13 @@ def test_a_table_is_put_in_its_place(tmp_path: Path) -> None:
         document.write(page, "z", ROWS)
 
 
-def test_the_page_has_a_place_for_every_table(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    page.write_text(PAGE.read_text("utf-8"), "utf-8")
-    for name in document.TABLES:
-        document.write(page, name, ROWS)
-    assert page.read_text("utf-8").count(document.markdown(ROWS)) == len(document.TABLES)
+@pytest.mark.parametrize("name", document.PAGES)
+def test_the_page_has_a_place_for_every_table(name: str, tmp_path: Path) -> None:
+    page, (_, tables) = tmp_path / name, document.PAGES[name]
+    page.write_text((DOCS / name).read_text("utf-8"), "utf-8")
+    for table in tables:
+        document.write(page, table, ROWS)
+    assert page.read_text("utf-8").count(document.markdown(ROWS)) == len(tables)
 
 
 def test_the_transient_converges_and_is_extrapolated(tmp_path: Path) -> None:

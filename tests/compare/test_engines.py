@@ -16,8 +16,9 @@ from compare.runs.engines import ENGINES
 from compare.runs.tasks import Task, carry_out
 from compare.scorecard import league, standings
 from compare.scorecard.accuracy import MOTIONS
+from compare.scorecard.contenders import Other
 from compare.scorecard.league import CASES, COST, Entry
-from compare.scorecard.trials import STATES
+from compare.scorecard.trials import ROLLING, STATES
 from model import InputError, Parameters
 from model.kinematics import Motion as World
 from model.kinematics import from_world, to_world
@@ -44,12 +45,18 @@ def run(name, p, x0, t_end, step, interval=None):
 @engines(*BEST)
 @pytest.mark.parametrize("state", STATES[:3], ids=lambda state: state.name)
 def test_stationary_states_are_those_of_theory(name, state):
-    """PyBullet's to round-off; a ball of Drake sinks in by its load over the stiffness, and creeps at up to v_s."""
+    """PyBullet's to round-off; a ball of Drake sinks in by its load over the stiffness, and creeps at up to v_s.
+
+    Sinking in shortens its lever. Friction works against creep, as drag does: m c R^2 omega_c d omega_c.
+    """
     settings, p, x = ENGINES[name].at(4e-3), state.p, state.solution.x
     tolerance = 1e-12
     if name == "drake":
         load = max(state.solution.force_A[1], state.solution.force_B[0])
-        tolerance += 2 * load / settings.stiffness / p.r + settings.stiction / (x[2] * p.R)
+        friction = p.mu * state.solution.force_A[1] + p.eta * state.solution.force_B[0]
+        tolerance += 2 * load / settings.stiffness / p.r + friction * settings.stiction / (
+            p.m * p.c * (p.R * x[2]) ** 2
+        )
     start = x * [1, 1, 0.98, 0.98, 0.98, 0.98, 1, 1]
     ended = run(name, p, start, state.forgets, 4e-3, interval=1.0)
     # What is left of the start after `forgets` is round-off, which the settled ball goes on making.
@@ -194,3 +201,26 @@ def test_the_wall_holds_above_its_threshold_and_not_below(name):
     (contestant,) = league.contestants([name])
     tasks = [contestant.task(2e-3, *each) for each in discipline.runs]
     assert discipline.score([run for task in tasks for run in carry_out([task])]) <= 0.03
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--engine", "event"], "event has no time step"),
+        (["--engine", "time-stepping", "--solimp", "0.9"], "of time-stepping only --timestep can be given"),
+        (["--engine", "pybullet"], "pybullet is not installed"),
+    ],
+)
+def test_only_settings_can_be_graded(options, says, monkeypatch, capsys):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert cli.main(["grade", *options]) == 2
+    assert says in capsys.readouterr().err
+
+
+@engines(*BEST)
+def test_an_engine_under_grading_runs_on_from_where_it_is_judged(name):
+    contender = Other(ENGINES[name], 4e-3)
+    seen = contender.run(ROLLING.p, ROLLING.solution.x, 1.0, 4e-3, skip=0.5)
+    assert 0.5 <= seen.time[0] < 0.52
+    assert 30 < len(seen.time) == len(seen.force_A) < 70
+    assert contender.clock(500)() > 0
