@@ -19,9 +19,9 @@ from model.trajectory import SAMPLE
 PERSISTENCE = 3
 """Samples a contact must stay in a state for it to count."""
 
-_LETTERS = (Contact.R, Contact.S, Contact.N)
+_CONTACTS = (Contact.R, Contact.S, Contact.N)
 _R, _S, _N, _AS_BEFORE, _UNKNOWN = range(5)
-_CODES = np.array([[Case.of(A, B) for B in _LETTERS] for A in _LETTERS], dtype=np.int8)
+_CODES = np.array([[Case.of(A, B) for B in _CONTACTS] for A in _CONTACTS], dtype=np.int8)
 _SATURATED, _FREE = 1e-6, 1e-4
 """How far from its Coulomb value friction may be for slipping, and must be for rolling, relative."""
 
@@ -43,10 +43,10 @@ class Classifier:
     def __init__(self, p: Parameters, settings: Regularised) -> None:
         self._p, self._settings = p, settings
         self._samples = np.empty(0, SAMPLE)
-        self._letters = np.empty((2, 0), dtype=np.intp)
-        """Samples that wait, and the letters of A and B that they show by themselves."""
+        self._waiting = np.empty((2, 0), dtype=np.intp)
+        """Samples that wait, and how A and B look in each of them by itself."""
         self._shown, self._states = np.array([_R, _R]), np.array([_UNKNOWN, _UNKNOWN])
-        """The newest letters shown, and those of the newest sample that is decided."""
+        """How they look in the newest sample, and what they are in the newest one that is decided."""
         self._changes: list[tuple[float, int, int]] = []
 
     def add(self, block: npt.NDArray[np.void], last: bool) -> npt.NDArray[np.void]:
@@ -54,28 +54,28 @@ class Classifier:
 
         With `last` all are, since no more will come.
         """
-        letters = np.concatenate([self._letters, self._shown_by(block)], axis=1)
+        contacts = np.concatenate([self._waiting, self._shown_by(block)], axis=1)
         samples = np.concatenate([self._samples, block])
-        A, B = (_lasting(own, int(state), last) for own, state in zip(letters, self._states, strict=True))
+        A, B = (_lasting(own, int(state), last) for own, state in zip(contacts, self._states, strict=True))
         count = min(len(A), len(B))
         if count:
             samples["case"][:count] = _CODES[A[:count], B[:count]]
             self._note_changes(samples[:count])
             self._states = np.array([A[count - 1], B[count - 1]])
-        self._samples, self._letters = samples[count:], letters[:, count:]
+        self._samples, self._waiting = samples[count:], contacts[:, count:]
         return samples[:count]
 
     def _shown_by(self, block: npt.NDArray[np.void]) -> npt.NDArray[np.intp]:
-        """The letters (2, n) that samples show by themselves; between the bands that of the sample before."""
+        """How A and B look in samples by themselves, (2, n); between the bands as in the sample before."""
         A, B = block["force_A"], block["force_B"]
         normal = np.stack([A[:, 1], B[:, 0]])
         friction = np.stack([np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])])
-        letters = self._judge(normal, friction, np.stack([block["slip_speed_A"], block["slip_speed_B"]]))
-        letters = np.concatenate([self._shown[:, None], letters], axis=1)
-        known = np.maximum.accumulate(np.where(letters == _AS_BEFORE, 0, np.arange(letters.shape[1])), axis=1)
-        letters = np.take_along_axis(letters, known, axis=1)
-        self._shown = letters[:, -1]
-        return letters[:, 1:]
+        contacts = self._judge(normal, friction, np.stack([block["slip_speed_A"], block["slip_speed_B"]]))
+        contacts = np.concatenate([self._shown[:, None], contacts], axis=1)
+        known = np.maximum.accumulate(np.where(contacts == _AS_BEFORE, 0, np.arange(contacts.shape[1])), axis=1)
+        contacts = np.take_along_axis(contacts, known, axis=1)
+        self._shown = contacts[:, -1]
+        return contacts[:, 1:]
 
     def _judge(self, normal: Array, friction: Array, speed: Array) -> npt.NDArray[np.intp]:
         """What each sample by itself says of the contacts; all arrays of shape (2, n), in the order A, B."""
@@ -91,8 +91,8 @@ class Classifier:
         held = ((normal > 0) & ~saturated)[::-1] & (speed < 3 * speed[::-1])
         slips = saturated & (speed > 3 * band) & ~held
         rolls = (friction < (1 - _FREE) * limit) | (speed < band) | held
-        letters: npt.NDArray[np.intp] = np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
-        return letters
+        contacts: npt.NDArray[np.intp] = np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
+        return contacts
 
     def _note_changes(self, done: npt.NDArray[np.void]) -> None:
         case = done["case"].astype(int)
@@ -110,19 +110,19 @@ class Classifier:
         return Events(time=time, **codes, impulse_A=none, impulse_B=none)
 
 
-def _lasting(letters: npt.NDArray[np.intp], state: int, last: bool) -> npt.NDArray[np.intp]:
+def _lasting(contacts: npt.NDArray[np.intp], state: int, last: bool) -> npt.NDArray[np.intp]:
     """Letters where those that don't last are replaced by what was before, or by what comes first in an unknown state.
 
-    All of them if they are the `last`, else up to where more letters may change the answer.
+    All of them if they are the `last`, else up to where more contacts may change the answer.
     """
-    if len(letters) == 0:
-        return letters
-    starts = np.flatnonzero(np.diff(letters, prepend=-1))
-    lengths, values = np.diff(starts, append=len(letters)), letters[starts]
+    if len(contacts) == 0:
+        return contacts
+    starts = np.flatnonzero(np.diff(contacts, prepend=-1))
+    lengths, values = np.diff(starts, append=len(contacts)), contacts[starts]
     lasts = (lengths >= PERSISTENCE) | (values == state)
     if state == _UNKNOWN:
         if not (lasts.any() or last):
-            return letters[:0]
+            return contacts[:0]
         state = int(values[np.argmax(lasts)])  # the first that lasts, or the first of all
     latest = np.maximum.accumulate(np.where(lasts, np.arange(len(values)), -1))
     decided = np.repeat(np.where(latest < 0, state, values[latest]), lengths)

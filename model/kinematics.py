@@ -138,12 +138,6 @@ def slip_speeds(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
     return np.hypot(A_x, A_z), np.hypot(B_y, B_z)
 
 
-def slip_directions(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
-    """Slip directions alpha, beta (8), each (...), rad: alpha = atan2(w_x, w_z), beta = atan2(w_y, w_z)."""
-    (A_x, _, A_z), (_, B_y, B_z) = (np.moveaxis(v, -1, 0) for v in slip_velocities(x, p))
-    return np.arctan2(-A_z, A_x), np.arctan2(B_z, -B_y)
-
-
 def to_world(x: npt.ArrayLike, theta: npt.ArrayLike, p: Parameters) -> Motion:
     """Motion in the world frame of states x (..., 6 or 8) at azimuths theta (...)."""
     state, theta = State.of(x), np.asarray(theta, dtype=float)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from compare.figures.drawing import GapError, Material
 from compare.figures.registry import FIGURES
 from model.errors import InputError, StorageError
-from model.files import write_text
+from model.files import make_directory, write_text
 
 FORMATS = ("svg", "pdf", "png")
 CAPTIONS = "captions.txt"
@@ -24,10 +24,7 @@ def write(output: Path, material: Material, formats: tuple[str, ...] = ("svg",))
     for suffix in formats:
         if suffix not in FORMATS:
             raise InputError(f"no figure can be written as {suffix!r}; there are {', '.join(FORMATS)}")
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(f"cannot write {output}: {error.strerror}") from error
+    make_directory(output)
     captions = []
     for name, drawing in FIGURES.items():
         try:

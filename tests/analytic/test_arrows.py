@@ -8,7 +8,7 @@ import pytest
 from analytic import contact_forces, slip_bounds, slip_stability, thresholds
 from analytic.arrows import Arrow, stability_along
 from model import Case, Parameters
-from model.kinematics import slip_directions
+from tests.directions import slip_directions
 
 P = Parameters.named("reference")
 FLOWS = [0.0, 5.0, 12.0, 20.0, 35.0, -8.0]

@@ -13,7 +13,8 @@ from analytic.rigid_body import energy, velocities
 from model import Case, Contact, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS
-from model.kinematics import VARIABLES, slip_directions, slip_velocities
+from model.kinematics import VARIABLES, slip_velocities
+from tests.directions import slip_directions
 from tests.drag_laws import resistance
 
 P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)

@@ -24,7 +24,8 @@ from analytic.jacobian import jacobian
 from analytic.slipping_branch import branch, fold, points_at
 from model import Case, InputError, Parameters, State
 from model.cases import TRAITS
-from model.kinematics import VARIABLES, slip_directions, slip_speeds
+from model.kinematics import VARIABLES, slip_speeds
+from tests.directions import slip_directions
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps

@@ -13,11 +13,11 @@ from model.kinematics import (
     from_world,
     full_state,
     rotated,
-    slip_directions,
     slip_speeds,
     slip_velocities,
     to_world,
 )
+from tests.directions import slip_directions
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps
