@@ -30,7 +30,7 @@ from compare.statistics import Measured, exponents, matched, propagator
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
-from model.drag import STOKES
+from model.drag import QUADRATIC, STOKES
 from model.kinematics import VARIABLES, slip_speeds
 
 PROTOCOL = "rates"
@@ -113,6 +113,9 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> list[State]
     still = np.array([0.0, 0.0, 0.0, 0.0, SPIN / unit * p.R / p.r, 0.0, 0.0, 0.0])
     kept = [State(name, p.replace(omega_0=0.0), Case.RS, still)]
     states = [state for state in settled(records, name) if _suits(state)]
+    if p.drag == QUADRATIC:  # it settles no ball that goes round with the fluid; but one that begins so goes on so
+        slow = 0.5 / unit
+        states.append(State(name, p.replace(omega_0=slow), Case.RR, model.State(omega_c=slow).stacked()))
     for case, most in STATES.items():
         alike = sorted((s for s in states if s.case is case), key=lambda s: s.p.omega_0)
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
