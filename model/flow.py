@@ -183,7 +183,7 @@ def _is_number(text: str) -> bool:
 def _sample(fields: Sequence[str], last: float) -> tuple[float, float]:
     """Time and omega_0 of a line after that of the `last` time."""
     if len(fields) != 2 or not all(fields):
-        raise InputError(f"{len([f for f in fields if f])} values, but there must be two, time and omega_0")
+        raise InputError(f"needs two values, time and omega_0, but has {len([f for f in fields if f])}")
     time, omega_0 = parse_number("time", fields[0], "s"), parse_number("omega_0", fields[1], "rad s-1")
     if time <= last:
         raise InputError(f"times must increase, but {time:g} s comes after {last:g} s")
