@@ -98,3 +98,15 @@ def test_what_there_is_not() -> None:
         response.ramp_coefficient(P.replace(eta=0.02))
     with pytest.raises(InputError, match="case SS has no stable"):
         response.transfer(P, Case.SS, 1.0)
+
+
+def test_rolling_reads_the_mean_of_a_sine_with_any_law_of_drag_but_not_of_every_wave() -> None:
+    """Half a period later a sine is mirrored, and so is the motion; a wave with its second harmonic isn't."""
+    p = P.replace(nu_f=1e-5, drag="schiller-naumann")
+    errors = []
+    for waves in ([(1.2, 0.5, 0.0)], [(1.2, 0.5, 0.0), (0.6, 1.0, 0.0)]):
+        run = analytic.simulate(p, [0, 0, 12.0, 0, 0, 0], 40.0, Flow.sines(12.0, waves), sample_interval=2.0)
+        assert set(run.cases) == {Case.RR}
+        errors.append((run.theta[-1] - run.theta[-2]) / 2.0 - 12.0)
+    assert abs(errors[0]) < 1e-6
+    assert abs(errors[1]) > 1e-3
