@@ -4,7 +4,8 @@ An engine shows itself as a `Scene` of a ball, a floor and a wall, in one of two
 
 * `JOINTS`: the ball hangs on an azimuth hinge, an inward and an upward slide, and a ball joint. Before each step the
   scene turns its azimuth and the ball's orientation back to zero, so that the wall is one fixed plane. A stationary
-  orbit is then a fixed point of the step.
+  orbit is then a fixed point of the step. Engines that take gyroscopic moments at the beginning of the step spin a
+  ball up by omega_c^2 h/2 a second where nothing rubs against its spin.
 * `FREE`: a free ball in world axes, in a vessel of fixed walls.
 
 The engine is driven by -m c(|w|) w (9) alone, with the velocity w relative to the fluid at the beginning of each step.
