@@ -69,7 +69,7 @@ class Engine:
         """`configure`, but an option that belongs to other engines is an `InputError`."""
         for name in given:
             if name not in self.options:
-                others = " and ".join(each.name for each in ENGINES.values() if name in each.options)
+                others = ", ".join(each.name for each in ENGINES.values() if name in each.options)
                 raise InputError(f"--{name} is for {others}, not for {self.name}")
         return self.configure(given)
 

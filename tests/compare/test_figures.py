@@ -88,7 +88,7 @@ def material() -> Material:
         verdict("prop-1", (check(states[0], 10.0), check(states[1], 10.0))),
     )
     scores = tuple(Score(name, "RR at 12", error, 0.1) for name, error in (("a", 0.0), ("b", math.nan), ("c", 1e-3)))
-    return Material(verdicts, Records((*states, *plane)), Path("nowhere"), scores, scores, scores[:1])
+    return Material(verdicts, Records((*states, *plane)), Path("nowhere"), scores, scores)
 
 
 @pytest.fixture
