@@ -24,6 +24,8 @@ from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
 from model.drag import STOKES
 
+_ROUND_OFF = 1e-12
+"""Part of the flow by which it may differ before and after a knot without a jump."""
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
 
@@ -42,7 +44,8 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     at, case = Moment(0.0, theta_0, x0), None
     for start, end in pairwise(knots):
         fluid = Fluid.of(flow, start)
-        if case is None or flow.line(start) != flow.line(np.nextafter(start, -1.0)):
+        step = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
+        if case is None or step > _ROUND_OFF * np.abs(flow.value).max():
             before, (case, at, impulse) = case, simulator.settle(at, fluid)
             if (before is not None and before is not case) or impulse is not NOTHING:
                 recorder.events.append(Event(start, case if before is None else before, case, impulse))

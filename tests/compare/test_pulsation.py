@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import analytic
+import mjsim
 from compare.claims import unsteady as claims
 from compare.claims.claim import Outcome
 from compare.claims.judge import judge
@@ -17,7 +18,7 @@ from compare.mutants.exchange import believed
 from compare.mutants.theories import THEORIES
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MUJOCO
-from model import Case, Parameters
+from model import Case, Flow, Parameters
 
 NAME = "rough-wall"
 P = sets(Level.QUICK)[NAME]
@@ -87,3 +88,16 @@ def test_rolling_on_is_judged_after_the_beginning(records: Records) -> None:
         Run.case = np.full(16, Case.RR)
         Run.case[at] = case
         assert pulsation.rolls_on(Run) is rolls
+
+
+def test_a_measured_flow_by_both_witnesses(tmp_path) -> None:
+    """Noise and a swell that makes the ball slip, a hundred samples a second."""
+    p, t = Parameters.named("reference").replace(c=4.0), np.arange(0.0, 3.0, 0.01)
+    omega_0 = 12.0 + 4.0 * np.sin(2 * np.pi * t / 3.0) + 0.3 * np.random.default_rng(1).standard_normal(len(t))
+    np.savetxt(
+        tmp_path / "flow.csv", np.stack([t, omega_0], axis=-1), delimiter=",", header="time,omega_0", comments=""
+    )
+    flow = Flow.from_csv(tmp_path / "flow.csv")
+    theory, run = (simulate(p, [0, 0, 12.0, 0, 0, 0], 3.0, flow) for simulate in (analytic.simulate, mjsim.simulate))
+    assert {Case.RR, Case.SS} <= set(theory.cases) & set(run.cases)
+    np.testing.assert_allclose(run.omega_c, theory.omega_c, rtol=1e-3)
