@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from compare.figures import style
 from compare.runs.engines import ENGINES
-from compare.scorecard.league import CASES, COST, CREEP, DISCIPLINES, WALL, Entry
+from compare.scorecard.league import CASES, COST, CREEP, DISCIPLINES, ROLLING_ENDS, WALL, Entry
 
 COLUMNS = 3
 _LEAST = 1e-16
@@ -18,7 +18,7 @@ _LEAST = 1e-16
 
 def draw(entries: Sequence[Entry]) -> Figure:
     """A panel for each error; marks of an engine at several time steps are joined."""
-    left_out = {CREEP, WALL, CASES}
+    left_out = {CREEP, ROLLING_ENDS, WALL, CASES}
     shown = [d.name for d in DISCIPLINES if d.name not in left_out and any(d.name in e.scores for e in entries)]
     lines = -(-len(shown) // COLUMNS)
     figure = style.figure(11, 0.9 + 3.0 * lines)

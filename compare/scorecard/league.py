@@ -40,7 +40,7 @@ RIDES = 4.0
 """For how long, s: at the least margin it takes a ball 2.3 s to slide down by R."""
 REPEATS = 3
 """Cost is the median of as many timings."""
-CREEP, WALL, CASES, COST = "creep (m/s)", "ω₀₂", "cases (of 9)", "cost"
+CREEP, ROLLING_ENDS, WALL, CASES, COST = "creep (m/s)", "ω₀₁", "ω₀₂", "cases (of 9)", "cost"
 Runs = Sequence[Trajectory]
 
 
@@ -75,7 +75,7 @@ class Discipline:
     runs: tuple[tuple[State, Sequence[float], float, float], ...]
     """Problem, start, duration and interval of the samples in s of each run."""
     score: Callable[[Runs], float]
-    """Made of whole runs, one for each of `runs`."""
+    """Made of whole runs, one for each of `runs`; nan for what doesn't show."""
     quick: bool = False
     """Whether the small league has it."""
 
@@ -88,7 +88,7 @@ class Entry:
     step: float | None
     """s; None for one that chooses its own."""
     scores: dict[str, float] = field(default_factory=dict)
-    """By discipline; nan where it broke down."""
+    """By discipline; nan where it broke down, and for what doesn't show."""
     failures: dict[str, str] = field(default_factory=dict)
     """By discipline, why."""
 
@@ -218,18 +218,19 @@ def _motion(name: str, state: State, x0: Sequence[float], lasts: float) -> Disci
 
 
 def _end_of_rolling() -> Discipline:
-    """Relative error of omega_01, where slip measured above it would begin."""
+    """Relative error of omega_01, where slip measured above it would begin by the same extrapolation as theory's."""
     omega_01 = analytic.thresholds(SMOOTH).omega_01
     states = [State(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in grade.ONSET]
 
     def score(runs: Runs) -> float:
-        return abs(grade.onset([float(run.slip_z[-100:].mean()) for run in runs], states))
+        extrapolated = grade.onset([float(run.slip_z[-100:].mean()) for run in runs], states)
+        return abs(extrapolated - grade.onset([float(state.solution.x[5]) for state in states], states))
 
-    return Discipline("ω₀₁", tuple((s, AT_REST, math.ceil(s.forgets), s.forgets / 1000) for s in states), score)
+    return Discipline(ROLLING_ENDS, tuple((s, AT_REST, math.ceil(s.forgets), s.forgets / 1000) for s in states), score)
 
 
 def _wall_holds() -> Discipline:
-    """The least margin from which on the wall holds a ball above omega_02 and lets it slide down below."""
+    """The least margin from which on the wall holds a ball above omega_02 and lets it slide down below; nan if none."""
     omega_02 = analytic.thresholds(ROUGH).omega_02
     runs = []
     for margin in MARGINS:
@@ -242,7 +243,7 @@ def _wall_holds() -> Discipline:
     def score(runs: Runs) -> float:
         holds = [bool(run.y[-1] > 0.9 * ROUGH.R) for run in runs]
         wrong = [margin for margin, up, down in zip(MARGINS, holds[::2], holds[1::2], strict=True) if not up or down]
-        return next((margin for margin in MARGINS if not wrong or margin > wrong[-1]), math.inf)
+        return next((margin for margin in MARGINS if not wrong or margin > wrong[-1]), math.nan)
 
     return Discipline(WALL, tuple(runs), score)
 

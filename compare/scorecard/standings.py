@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from compare.scorecard.accuracy import number
-from compare.scorecard.league import CASES, COST, DISCIPLINES, MARGINS, WALL, Entry
+from compare.scorecard.league import CASES, COST, DISCIPLINES, WALL, Entry
 
 Rows = list[list[str]]
 
@@ -22,7 +22,7 @@ def rows(entries: Sequence[Entry]) -> Rows:
     table = [["engine", "step", *asked, COST]]
     for entry in entries:
         step = "its own" if entry.step is None else f"{1e3 * entry.step:g} ms"
-        cells = [cell(name, entry.scores.get(name)) for name in (*asked, COST)]
+        cells = ["failed" if name in entry.failures else cell(name, entry.scores.get(name)) for name in (*asked, COST)]
         table.append([entry.name, step, *cells])
     return table
 
@@ -32,13 +32,13 @@ def cell(discipline: str, score: float | None) -> str:
     if score is None:
         return ""
     if math.isnan(score):
-        return "failed"
+        return "not seen"
     if discipline == CASES:
         return f"{score:.0f}"
     if discipline == COST:
         return f"{score:.2g}"
     if discipline == WALL:
-        return f"> {MARGINS[-1]:g}" if math.isinf(score) else f"≤ {score:g}"
+        return f"≤ {score:g}"
     return number(score)
 
 

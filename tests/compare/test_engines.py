@@ -12,6 +12,10 @@ from scipy.integrate import solve_ivp
 
 import analytic
 from compare.commands import cli
+from compare.measure import newcomer
+from compare.measure.lab import Lab, Level
+from compare.measure.record import Records
+from compare.runs.campaign import Campaign
 from compare.runs.engines import ENGINES
 from compare.runs.tasks import Task, carry_out
 from compare.scorecard import league, standings
@@ -224,3 +228,19 @@ def test_an_engine_under_grading_runs_on_from_where_it_is_judged(name):
     assert 0.5 <= seen.time[0] < 0.52
     assert 30 < len(seen.time) == len(seen.force_A) < 70
     assert contender.clock(500)() > 0
+
+
+def test_an_engine_without_defaults_of_its_own_says_so(tmp_path):
+    with Campaign(tmp_path, workers=0) as campaign:
+        lab = Lab(campaign, ENGINES["event"], Level.QUICK)
+        (missing,) = newcomer.measure(lab, {"reference": REFERENCE}, Records())
+    assert missing.reason == "event has no settings of its own to be compared with"
+
+
+def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr("compare.validation.validate", lambda output, **given: asked.append(given["engine"].name) or [])
+    assert cli.main(["validate", "--engine", "drake", "--workers", "0", "--json"]) == 0
+    assert cli.main(["validate", "--workers", "0", "--json"]) == 0
+    assert asked == ["drake", "mujoco"]
+    assert json.loads(capsys.readouterr().out.splitlines()[0]) == []
