@@ -126,6 +126,7 @@ def _number(material: Material, check: Check) -> dict[str, Any]:
         "omega_0": f"{m.parameters.omega_0:.6g}",
         "conditions": wording.conditions(m.conditions),
         "engine": m.engine,
+        "protocol": m.protocol,
         "symbol": wording.SYMBOLS[m.quantity],
         "unit": wording.unit(m.unit),
         "relation": "" if check.relation == "=" else check.relation,
