@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from model import Parameters, State
 from model.arrays import Array, Real
-from model.drag import REYNOLDS, SCHILLER_NAUMANN, STOKES
+from model.drag import QUADRATIC, REYNOLDS, SCHILLER_NAUMANN, STOKES
 
 EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
 """Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
@@ -35,13 +35,14 @@ class Law(NamedTuple):
 
 
 def law(p: Parameters) -> Law:
-    """The law of a parameter set."""
-    if p.drag == STOKES:
-        return Law(p.c, 0.0, 0.0)
-    per_speed = 2 * p.r / p.nu_f
-    if p.drag == SCHILLER_NAUMANN:
-        return Law(p.c, WAKE * p.c * per_speed**EXPONENT, BLUNT / 24 * p.c * per_speed)
-    return Law(0.0, 0.0, p.C_D / 24 * p.c * per_speed)
+    """The law of a parameter set. Raises KeyError for a law of `model.drag` that has no formula here."""
+    per_speed = 2 * p.r / (p.nu_f or math.inf)
+    laws = {
+        STOKES: Law(p.c, 0.0, 0.0),
+        SCHILLER_NAUMANN: Law(p.c, WAKE * p.c * per_speed**EXPONENT, BLUNT / 24 * p.c * per_speed),
+        QUADRATIC: Law(0.0, 0.0, p.C_D / 24 * p.c * per_speed),
+    }
+    return laws[p.drag]
 
 
 def rate(speed: Real, law: Law) -> Real:

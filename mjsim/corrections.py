@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from mjsim.contact_settings import ContactSettings
 from model import Parameters
-from model.drag import SCHILLER_NAUMANN, STOKES
+from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 
 Quantity = Any
 """A float, or an array with an entry for each run."""
@@ -54,12 +54,15 @@ class Ball(NamedTuple):
 
     @classmethod
     def of(cls, p: Parameters, settings: ContactSettings) -> Ball:
-        """The values of one run."""
+        """The values of one run. Raises KeyError for a law of `model.drag` that has no formula here."""
         ahead, Re = settings.midpoint, 2 * p.r / (p.nu_f or math.inf)
-        laws = {STOKES: (0.0, 1.0, 0.0, 0.0), SCHILLER_NAUMANN: (Re, 1.0, 0.15, 0.44 / 24)}
-        law = laws.get(p.drag, (Re, 0.0, 0.0, p.C_D / 24))
+        laws = {
+            STOKES: (0.0, 1.0, 0.0, 0.0),
+            SCHILLER_NAUMANN: (Re, 1.0, 0.15, 0.44 / 24),
+            QUADRATIC: (Re, 0.0, 0.0, p.C_D / 24),
+        }
         return cls(
-            p.R, p.r, p.m * p.c, *law, p.m * ahead, p.j * p.m * p.r**2 * ahead,
+            p.R, p.r, p.m * p.c, *laws[p.drag], p.m * ahead, p.j * p.m * p.r**2 * ahead,
             settings.memory_gain(p.m), ahead, settings.friction_lag, settings.servo_gain,
         )  # fmt: skip
 

@@ -25,8 +25,9 @@ import numpy.typing as npt
 
 from mjsim import limits, recorder
 from mjsim.classify import Classifier, Regularised
-from model import Flow, Header, InputError, Parameters, State, Trajectory, drag
+from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
+from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 from model.kinematics import Motion, frame, from_world, slip_speeds, to_world
 from model.parameters import Range, check_number
 from model.trajectory import SAMPLE, current_versions, version
@@ -103,13 +104,14 @@ class Coordinates:
 
 
 def _coefficient(p: Parameters, speed: float) -> float:
-    """m c(|w|) in kg s-1 by the law of `model.drag`, at a speed |w| in m s-1."""
-    if p.drag == drag.STOKES:
-        return p.m * p.c
-    reynolds = 2 * p.r * speed / p.nu_f
-    if p.drag == drag.QUADRATIC:
-        return p.m * p.c * p.C_D * reynolds / 24
-    return p.m * p.c * max(1 + 0.15 * reynolds**0.687 if reynolds < 1000 else 0.0, 0.44 * reynolds / 24)
+    """m c(|w|) in kg s-1, at a speed |w| in m s-1. Raises KeyError for a law of `model.drag` without a formula here."""
+    Re = 2 * p.r * speed / (p.nu_f or math.inf)
+    factor: dict[str, float] = {
+        STOKES: 1.0,
+        SCHILLER_NAUMANN: max(1 + 0.15 * Re**0.687, 0.44 * Re / 24),
+        QUADRATIC: p.C_D * Re / 24,
+    }
+    return p.m * p.c * factor[p.drag]
 
 
 def _joint_start(x: State, p: Parameters) -> tuple[Array, Array]:

@@ -50,6 +50,12 @@ def test_stokes_is_what_it_was():
     assert math.isnan(drag.reynolds(0.3, Parameters.named("reference")))
 
 
+def test_a_law_without_a_formula_is_not_taken_for_another(monkeypatch):
+    monkeypatch.setattr("model.drag.LAWS", (*LAWS, "oseen"))
+    with pytest.raises(KeyError, match="oseen"):
+        drag.coefficient(0.3, BALL.replace(drag="oseen"))
+
+
 @pytest.mark.parametrize("zero", [0.0, np.array([0.0])])
 def test_the_speed_relative_to_the_fluid_has_three_components(zero):
     assert drag.speed(zero + 2.0, zero + 3.0, zero + 6.0) == 7.0

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 import analytic
 from compare.commands import cli
+from compare.engines import loop
 from compare.measure import newcomer
 from compare.measure.lab import Lab, Level
 from compare.measure.record import Records
@@ -24,6 +25,7 @@ from compare.scorecard.contenders import Other
 from compare.scorecard.league import CASES, COST, Entry
 from compare.scorecard.trials import ROLLING, STATES
 from model import InputError, Parameters
+from model.drag import LAWS
 from model.kinematics import Motion as World
 from model.kinematics import from_world, to_world
 
@@ -81,7 +83,7 @@ def test_a_ball_lands_slips_and_sticks_when_it_should(name):
 
 
 @engines(*ALL)
-@pytest.mark.parametrize("law", ["stokes", "schiller-naumann", "quadratic"])
+@pytest.mark.parametrize("law", LAWS)
 def test_free_flight_obeys_newton_and_the_law_of_drag(name, law):
     p = REFERENCE.replace(drag=law, nu_f=1e-5, omega_0=12.0, c=0.3)
     x0 = (0.02, 0.3, 4.0, 1.0, -2.0, 3.0, 0.02, -0.1)
@@ -112,6 +114,13 @@ def test_free_flight_obeys_newton_and_the_law_of_drag(name, law):
     turned = np.linalg.norm(begin.spin) * lasts * speed / p.R  # the spin keeps its direction in space
     for slip in ("slip_x", "slip_y", "slip_z"):
         assert getattr(seen, slip)[-1] == pytest.approx(getattr(truth, slip), abs=2 * speed / p.r + turned)
+
+
+@pytest.mark.parametrize("name", loop.COORDINATES)
+def test_a_law_without_a_formula_is_not_taken_for_another(name, monkeypatch):
+    monkeypatch.setattr("model.drag.LAWS", (*LAWS, "oseen"))
+    with pytest.raises(KeyError, match="oseen"):
+        loop.COORDINATES[name].drag([0.0] * 3, [1.0] * 6, 0.0, REFERENCE.replace(drag="oseen", nu_f=1e-5))
 
 
 @engines("pybullet-defaults", "drake-defaults")

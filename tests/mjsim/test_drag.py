@@ -34,6 +34,12 @@ def test_the_force_is_that_of_the_law_and_of_theory(law):
     assert [resistance(*one, ball) for one in w.T.tolist()] == pytest.approx(force.tolist(), rel=1e-14)
 
 
+def test_a_law_without_a_formula_is_not_taken_for_another(monkeypatch):
+    monkeypatch.setattr("model.drag.LAWS", (*LAWS, "oseen"))
+    with pytest.raises(KeyError, match="oseen"):
+        Ball.of(drag_laws.BALL.replace(drag="oseen"), ContactSettings())
+
+
 @pytest.mark.parametrize("law", OTHERS)
 @pytest.mark.parametrize("changes", [{}, {"coordinates": "free", "memory": False, "order": 1}])
 def test_a_fall_ends_at_the_terminal_speed(law, changes):
