@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic import bifurcation, drag, rolling_forces, slip_bounds, stationary
+from analytic import bifurcation, drag, slip_bounds, stationary
 from analytic.response import rolling_rate
 from analytic.simulation import simulate
+from analytic.two_point_rolling import MARGINS
 from model import Case, Flow, InputError, Parameters, SimulationError, State
 from model.arrays import Array
 
@@ -32,11 +33,13 @@ def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLik
     return p.omega_0 + np.imag(gain * wave), p.omega_0 + np.imag(wave)
 
 
-def slip_onset(p: Parameters, frequency: float) -> float:
+def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stability") -> float:
     """The least amplitude in rad s-1 at which slip begins at some phase of the pulsation, frequency > 0 in Hz.
 
-    By `rolling_forces.slip_margin` along `swing`. 0 where the mean flow alone ends RR, inf without drag.
+    By the margin of `Settings.leave_rolling` along `swing`. On rough floors and at high frequencies RR is "infeasible"
+    at a larger amplitude only. 0 where the mean flow alone ends RR, inf without drag.
     """
+    margin = MARGINS[leave_rolling]
     if p.c == 0:
         return math.inf
 
@@ -44,7 +47,7 @@ def slip_onset(p: Parameters, frequency: float) -> float:
         phases = np.linspace(0.0, 2 * math.pi, PHASES + 1)
         for _ in range(2):
             omega_c, omega_0 = swing(p, amplitude, frequency, phases)
-            margins = rolling_forces.slip_margin(omega_c, p, omega_0)
+            margins = margin(omega_c, p, omega_0)
             k, cell = int(margins.argmin()), phases[1] - phases[0]
             phases = np.linspace(phases[k] - cell, phases[k] + cell, PHASES + 1)
         return float(margins.min())

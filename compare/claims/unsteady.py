@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import analytic
 from analytic import pulsation, response
-from compare.claims.claim import Bearing, Claim
+from compare.claims.claim import Bearing, Claim, Relation
 from compare.claims.judge import remembered
 from compare.measure.record import Measurement
 from compare.measure.unsteady import caught_up
@@ -25,8 +25,8 @@ def _ratio(m: Measurement) -> complex:
 
 
 @remembered
-def _slip_onset(p: Parameters, frequency: float) -> float:
-    return pulsation.slip_onset(p, frequency)
+def _slip_onset(p: Parameters, frequency: float, leave_rolling: str) -> float:
+    return pulsation.slip_onset(p, frequency, leave_rolling)
 
 
 @remembered
@@ -92,14 +92,18 @@ CLAIMS = (
         source="(23), (66), (67), (73), (82)",
         statement=(
             "In a pulsating flow a rolling ball begins to slip where the friction that its acceleration takes, or the "
-            "load at its fastest, is more than floor and wall can hold."
+            "load at its fastest, is more than floor and wall can hold: not before slip lasts, and not after no forces "
+            "allow rolling, nearly always the same."
         ),
-        bearings=(
-            _at_frequency(
-                "slip_amplitude",
-                lambda m: _slip_onset(m.parameters, float(m.conditions["f"])),
-                "analytic.pulsation.slip_onset",
-            ),
+        bearings=tuple(
+            Bearing(
+                protocol=PULSATION,
+                quantity="slip_amplitude",
+                predict=lambda m, rule=rule: _slip_onset(m.parameters, float(m.conditions["f"]), rule),  # type: ignore[misc]
+                relation=relation,
+                by=f"analytic.pulsation.slip_onset, {rule}",
+            )
+            for rule, relation in (("slip-stability", Relation.AT_LEAST), ("infeasible", Relation.AT_MOST))
         ),
     ),
     Claim(

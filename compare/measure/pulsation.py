@@ -43,8 +43,8 @@ LOOKED = 1.5
 """Length of the runs of a bracket in periods, of which the first sixth doesn't count."""
 ALONE = 2e-4
 """Slip speed over sqrt(g R), just below the onset at both points, at which one of them slips alone."""
-SAMPLES, LASTS = 256, 3
-"""Samples in a period there, and how many of them slip must last to be seen."""
+SAMPLES, LASTS = 256, 5
+"""Samples in a period there, and how many of them slip must last to count: friction may be full for a moment before."""
 BEYOND = 1.5
 """Amplitude at which the mean reading is measured, over the one at which slip begins."""
 
@@ -76,13 +76,19 @@ class Rhythm:
         x[2] = self.p.omega_0 + amplitude * self.ratio.imag
         return x
 
+    def steps(self, lab: Lab, largest: float) -> int:
+        """Usual number of time steps in a period, a power of two, for amplitudes up to the `largest`."""
+        fastest = 4 * (self.p.omega_0 + largest) / self.frequency
+        return int(
+            2 ** math.ceil(math.log2(max(STEPS[lab.level], 1 / (self.frequency * coarse_step(self.p)), fastest)))
+        )
+
     def task(
         self, lab: Lab, amplitude: float, x: Array, periods: float, largest: float, refine: int, samples: int = 64
     ) -> Task:
-        """A run from a state, with a power of two of steps in a period; no amplitude is above the `largest`."""
-        fastest = 4 * (self.p.omega_0 + largest) / self.frequency
-        steps = 2 ** math.ceil(math.log2(max(STEPS[lab.level], 1 / (self.frequency * coarse_step(self.p)), fastest)))
-        step, flow = 1 / (self.frequency * steps * refine), Flow.sine(self.p.omega_0, amplitude, self.frequency)
+        """A run from a state; no amplitude that it is compared with is above the `largest`."""
+        step = 1 / (self.frequency * self.steps(lab, largest) * refine)
+        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency)
         return lab.task(self.p, x, periods / self.frequency, step, flow=flow, samples=round(samples * periods))
 
 
@@ -165,9 +171,9 @@ def _search(lab: Lab, rhythm: Rhythm) -> Search:
 
 
 def rolls_on(run: Trajectory) -> bool:
-    """Whether the ball neither slips at both points nor leaves the floor, but for the beginning of the run."""
-    cases = {Case(int(case)) for case in run.case[run.time > run.time[-1] / 6]}
-    return not any(case is Case.SS or case.A is Contact.N for case in cases)
+    """Whether the ball nowhere slips at both points or leaves the floor for `LASTS`, but for the beginning of a run."""
+    gone = np.isin(run.case[run.time > run.time[-1] / 6], [Case.SS, *(case for case in Case if case.A is Contact.N)])
+    return bool(np.convolve(gone, np.ones(LASTS)).max() < LASTS)
 
 
 def _fastest(run: Trajectory) -> float:
@@ -191,7 +197,10 @@ def _mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator
             x[2] = _limit(run.omega_c[period::period])
             states[k] = x
     for (rhythm, amplitude), task, (*_, before, usual, last, fine) in zip(slipping, tasks, means, strict=True):
-        error = Measured(fine - rhythm.p.omega_0, abs(fine - usual) + abs(fine - last) + abs(usual - before))
+        value = fine - rhythm.p.omega_0
+        drift = abs(fine - usual) + abs(fine - last) + abs(usual - before)
+        # Slip begins and ends within a step: that much of a period, and of what it takes off the mean, is open.
+        error = Measured(value, drift + abs(value) / (2 * rhythm.steps(lab, amplitude)))
         if sure_enough("mean_error", error, abs(error.value)):
             yield _record(lab, rhythm, "mean_error", error, [task], amplitude=amplitude)
         else:

@@ -34,6 +34,14 @@ def test_onset(p: Parameters, pace: float) -> None:
     assert slips(p, 1.0003 * onset, frequency)  # the simulator looks 256 times a period
 
 
+def test_forces_may_allow_more_on_a_rough_floor() -> None:
+    """Between (73) and the cone of the floor, see docs/theory.md, section 7; elsewhere both ends of RR are one."""
+    p = SETS["slips at both"]
+    assert pulsation.slip_onset(p, 1.0, "infeasible") == pytest.approx(pulsation.slip_onset(p, 1.0), rel=1e-9)
+    rough = p.replace(mu=0.92, eta=0.4, j=0.66)
+    assert pulsation.slip_onset(rough, 100.0, "infeasible") > 1.05 * pulsation.slip_onset(rough, 100.0)
+
+
 @pytest.mark.parametrize("p", SETS.values(), ids=SETS)
 def test_limits_of_the_onset(p: Parameters) -> None:
     k = rolling_rate(p)

@@ -84,9 +84,15 @@ def test_rolling_on_is_judged_after_the_beginning(records: Records) -> None:
         case = np.full(16, Case.RR)
 
     assert pulsation.rolls_on(Run)
-    for case, at, rolls in ((Case.SS, 1, True), (Case.SS, 9, False), (Case.NR, 9, False), (Case.RS, 9, True)):
+    for case, at, rolls in (
+        (Case.SS, 0, True),
+        (Case.SS, 14, True),
+        (Case.SS, 9, False),
+        (Case.NR, 9, False),
+        (Case.RS, 9, True),
+    ):
         Run.case = np.full(16, Case.RR)
-        Run.case[at] = case
+        Run.case[at : at + pulsation.LASTS] = case
         assert pulsation.rolls_on(Run) is rolls
 
 
