@@ -45,6 +45,8 @@ ALONE = 2e-4
 """Slip speed over sqrt(g R), just below the onset at both points, at which one of them slips alone."""
 SAMPLES, LASTS = 256, 5
 """Samples in a period there, and how many of them slip must last to count: friction may be full for a moment before."""
+SURE = 0.9
+"""Part of what is measured that stands for what will be predicted, where it is asked whether it is sure enough."""
 BEYOND = 1.5
 """Amplitude at which the mean reading is measured, over the one at which slip begins."""
 
@@ -120,7 +122,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield Missing(PROTOCOL, rhythm.set, f"in {at} there is slip at no amplitude, or at all")
         elif _fastest(low) > ALONE:
             yield Missing(PROTOCOL, rhythm.set, f"in {at} one contact slips before both do, too little to tell when")
-        elif not sure_enough("slip_amplitude", onset, onset.value):
+        elif not sure_enough("slip_amplitude", onset, SURE * onset.value):
             yield Missing(PROTOCOL, rhythm.set, f"slip in {at} begins at no definite amplitude")
         else:
             yield _record(lab, rhythm, "slip_amplitude", onset, bracket.tasks)
@@ -201,7 +203,7 @@ def _mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator
         drift = abs(fine - usual) + abs(fine - last) + abs(usual - before)
         # Slip begins and ends within a step: that much of a period, and of what it takes off the mean, is open.
         error = Measured(value, drift + abs(value) / (2 * rhythm.steps(lab, amplitude)))
-        if sure_enough("mean_error", error, abs(error.value)):
+        if sure_enough("mean_error", error, SURE * abs(error.value)):
             yield _record(lab, rhythm, "mean_error", error, [task], amplitude=amplitude)
         else:
             yield Missing(PROTOCOL, rhythm.set, f"the mean reading at {rhythm.frequency:g} Hz doesn't settle")
