@@ -43,10 +43,14 @@ class Backend:
     data: Any
     """The `mujoco.MjData` of one simulation; None for a batch."""
     array: Callable[[str], Array]
-    """A field of the data or the model, as a view of shape (n, runs)."""
-    step: Callable[[], Any]
-    forward: Callable[[npt.NDArray[np.intp] | None], Any]
-    """`mj_forward` for the given runs, or all."""
+    """A field of the data or the model, as a view of shape (n, runs). In a batch it costs to have one of the model."""
+    set_timestep: Callable[[Array], Any]
+    """Give each run a time step, shape (runs,), s."""
+    step_all: Callable[[], Any]
+    """`mj_step` for all runs."""
+    step: Callable[[npt.NDArray[np.intp]], Any]
+    forward: Callable[[npt.NDArray[np.intp]], Any]
+    """`mj_step` and `mj_forward` for the given runs."""
 
 
 def single(model: Any) -> Backend:
@@ -55,7 +59,9 @@ def single(model: Any) -> Backend:
     return Backend(
         data,
         lambda name: np.asarray(getattr(data if hasattr(data, name) else model, name)).reshape(-1, 1),
+        lambda steps: setattr(model.opt, "timestep", steps.item()),
         functools.partial(mujoco.mj_step, model, data),
+        lambda runs: mujoco.mj_step(model, data),
         lambda runs: mujoco.mj_forward(model, data),
     )
 
@@ -74,7 +80,10 @@ def batch(models: Sequence[Any]) -> Backend:
         values = values[:, 0] if name == "mocap_quat" else values  # there is one mocap body
         return values.reshape(len(models), -1).T
 
-    return Backend(None, array, made.step, made.forward)
+    def set_timestep(steps: Array) -> None:
+        made.expand("opt.timestep")[:] = steps
+
+    return Backend(None, array, set_timestep, made.step, made.step, made.forward)
 
 
 @functools.cache

@@ -16,24 +16,32 @@ from mjsim import corrections as source
 from mjsim.corrections import Ball, Velocity
 from model.arrays import Array
 
-for called in (source.slip, source.resistance):  # by corrections
-    register_jitable(called)
-_corrections, _followed = numba.njit(cache=True)(source.corrections), numba.njit(cache=True)(source.followed)
+for each in (source.slip, source.resistance, source.lands, source.hovering):  # the others call them
+    register_jitable(each)
+_corrections, _eventful, _followed = (
+    numba.njit(cache=True)(each) for each in (source.corrections, source.eventful, source.followed)
+)
 _BALL, _VELOCITY = len(Ball._fields), len(Velocity._fields)
 _ROWS = types.Array(types.float64, 2, "A")
 _GIVEN = types.Array(types.float64, 2, "A", readonly=True)
 
 
-@numba.njit(types.boolean(types.boolean, types.float64[::1], *[_GIVEN] * 5, *[_ROWS] * 6), cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(types.boolean(types.boolean, types.boolean, types.float64[::1], *[_GIVEN] * 4, *[_ROWS] * 8), cache=True)  # type: ignore[untyped-decorator]
 def drive(
-    watched: bool, omega_0: Array, balls: Array, last: Array, qvel: Array, contact: Array, normals: Array,
-    qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
+    watched: bool, whole: bool, omega_0: Array, balls: Array, qvel: Array, contact: Array, normals: Array,
+    last: Array, before: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
 ) -> bool:  # fmt: skip
-    """As `mjsim.stepping.Polar._drive`, for arrays (n, runs)."""
+    """As `mjsim.balls.Balls._drive`, for arrays (n, runs)."""
     runs = qpos.shape[1]
     if not watched:
         for k in range(runs):
-            if normals[0, k] * normals[1, k] == 0:
+            if normals[0, k] * normals[1, k] == 0 and _eventful(
+                (qpos[0, k], qpos[1, k], qpos[2, k]),
+                Velocity(*to_fixed_tuple(qvel[:, k], _VELOCITY)),
+                Velocity(*to_fixed_tuple(last[:, k], _VELOCITY)),
+                (normals[0, k], normals[1, k]),
+                Ball(*to_fixed_tuple(balls[:, k], _BALL)),
+            ):
                 return False
     for k in range(runs):
         ball = Ball(*to_fixed_tuple(balls[:, k], _BALL))
@@ -44,7 +52,11 @@ def drive(
         qpos[3, k], qpos[4:7, k] = 1.0, 0.0
         forces, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]) = _corrections(
             Velocity(*to_fixed_tuple(qvel[:, k], _VELOCITY)), Velocity(*to_fixed_tuple(last[:, k], _VELOCITY)),
-            ball.R - qpos[1, k], omega_0[k], to_fixed_tuple(contact[:, k], 6), to_fixed_tuple(normals[:, k], 2), ball,
+            Velocity(*to_fixed_tuple(before[:, k], _VELOCITY)), ball.R - qpos[1, k], omega_0[k],
+            to_fixed_tuple(contact[:, k], 6), to_fixed_tuple(normals[:, k], 2), ball,
         )  # fmt: skip
-        applied[0, k], applied[1, k], applied[2, k], applied[3, k], _, applied[5, k] = forces
+        applied[0, k], applied[1, k], applied[2, k], applied[3, k], applied[4, k], applied[5, k] = forces
+        if whole:
+            for i in range(_VELOCITY):
+                before[i, k], last[i, k] = qvel[i, k] - last[i, k], qvel[i, k]
     return True

@@ -37,6 +37,8 @@ CHOICES = {
     "coordinates": ("polar", "free"),
     "wall": ("tangent", "prism"),
 }
+_FALL = 0.01
+"""Way in a step from which on it is an impact, in units of the gap that counts as touching."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +55,7 @@ class ContactSettings:
 
     timestep: float = 1e-3
     """Time step, s."""
-    solref: tuple[float, float] = (2e-3, 1.0)
+    solref: tuple[float, float] = (2e-3, 0.5)
     """Time constant (s) and damping ratio of the normal rows."""
     solreffriction: float = 2.0
     """Time constant tc_f of the friction rows, s."""
@@ -127,6 +129,15 @@ class ContactSettings:
         """
         limits = [self.solref[0] / 2, self.solreffriction * self.solimp / 2]
         return min(limits + ([self.servo] if self.servo else []))
+
+    @property
+    def spring(self) -> tuple[float, float]:
+        """`solref` as stiffness and damping, negative as the engine wants them, s-2 and s-1.
+
+        Of times it would cut the square of d times a time constant off at 1e-15 s2.
+        """
+        time, ratio = self.solref
+        return -1 / (time * ratio) ** 2, -2 / time
 
     @property
     def b_f(self) -> float:
@@ -212,6 +223,13 @@ class ContactSettings:
     def touching(self, g: float) -> float:
         """Gap (m) within which a ball at the start counts as touching: twice the depth to which gravity presses it."""
         return 2 * self.margin(g)
+
+    def slowest_fall(self, g: float) -> float:
+        """Speed (m s-1) from which on a ball comes down with an impact; below, the contacts stop it softly.
+
+        It takes it a hundredth of the gap that counts as touching in a step. Without servo there are no impacts.
+        """
+        return _FALL * self.touching(g) / self.timestep if self.servo else math.inf
 
     def to_mapping(self) -> dict[str, Any]:
         """All values, JSON-able."""

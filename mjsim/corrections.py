@@ -39,31 +39,43 @@ class Ball(NamedTuple):
     """what Re^0.687 is multiplied by, 0.15 by Schiller and Naumann;"""
     blunt: Quantity
     """what Re is multiplied by once that is more, C_D/24."""
-    mass_ahead: Quantity
-    """m times `ahead`, kg."""
-    inertia_ahead: Quantity
-    """j m r^2 times `ahead`, kg m2."""
-    memory: Quantity
-    """R_t/b_f, surface velocity per friction force, m s-1 N-1."""
+    mass: Quantity
+    inertia: Quantity
+    """j m r^2, kg m2."""
     ahead: Quantity
     """Where in a step forces are taken, in steps after its beginning: 1/2, or 0 where the engine's order is kept."""
-    lag: Quantity
-    """How many steps after that friction takes its direction by itself."""
     gain: Quantity
     """Share of a gap that the servo takes off a margin in a step; 0 without servo."""
+    fall: Quantity
+    """Speed from which on a ball that comes down lands, m s-1; inf where landings are left to the contacts."""
+    step: Quantity
+    """The time step, s."""
+    memory_A: Quantity
+    memory_B: Quantity
+    """R_t/b_f of the contacts, surface velocity per friction force, m s-1 N-1."""
+    lag_A: Quantity
+    lag_B: Quantity
+    """How many steps after the middle of a step friction takes its direction by itself."""
+    hover_A: Quantity
+    hover_B: Quantity
+    """Load (m s-2) per slip speed below which a contact hovers, s-1."""
+    weight: Quantity
+    """g, m s-2; inf where there is none."""
 
     @classmethod
     def of(cls, p: Parameters, settings: ContactSettings) -> Ball:
         """The values of one run. Raises KeyError for a law of `model.drag` that has no formula here."""
-        ahead, Re = settings.midpoint, 2 * p.r / (p.nu_f or math.inf)
+        Re = 2 * p.r / (p.nu_f or math.inf)
         laws = {
             STOKES: (0.0, 1.0, 0.0, 0.0),
             SCHILLER_NAUMANN: (Re, 1.0, 0.15, 0.44 / 24),
             QUADRATIC: (Re, 0.0, 0.0, p.C_D / 24),
         }
+        memory, lag, hover = settings.memory_gain(p.m), settings.friction_lag, settings.b_f / settings.softness
         return cls(
-            p.R, p.r, p.m * p.c, *laws[p.drag], p.m * ahead, p.j * p.m * p.r**2 * ahead,
-            settings.memory_gain(p.m), ahead, settings.friction_lag, settings.servo_gain,
+            p.R, p.r, p.m * p.c, *laws[p.drag], p.m, p.j * p.m * p.r**2, settings.midpoint, settings.servo_gain,
+            settings.slowest_fall(p.g), settings.timestep, memory, memory, lag, lag,
+            p.mu * hover, p.eta * hover, p.g or math.inf,
         )  # fmt: skip
 
 
@@ -93,10 +105,10 @@ def resistance(w_z: Quantity, w_h: Quantity, w_y: Quantity, ball: Ball) -> Quant
 
 
 def corrections(
-    v: Velocity, last: Velocity, rho: Quantity, omega_0: Quantity,
+    v: Velocity, last: Velocity, before: Velocity, rho: Quantity, omega_0: Quantity,
     contact: Sequence[Quantity], normals: Sequence[Quantity], ball: Ball,
 ) -> tuple[tuple[Quantity, ...], tuple[Quantity, ...]]:  # fmt: skip
-    """What drives a step that begins with the velocities v, a step after `last`.
+    """What drives a step that begins with the velocities v, a step after `last`, which changed by `before` till then.
 
     Positions are half a step ahead, so that rho is already that at mid step.
 
@@ -122,31 +134,64 @@ def corrections(
 
     # Inertial forces at mid step. In the co-rotating frame they are 2 m omega_c v_h along the orbit and
     # -m rho omega_c^2 inwards, and I omega_c (-o_z, 0, o_x) on the spin. The engine has them with the velocities of the
-    # beginning of the step; what they grow by till its middle is added.
-    inertial_z = 2 * ball.mass_ahead * (v.omega_c * v.v_h - last.omega_c * last.v_h)
-    inertial_h = -ball.mass_ahead * rho * (v.omega_c * v.omega_c - last.omega_c * last.omega_c)
-    moment_x = -ball.inertia_ahead * (v.omega_c * v.o_z - last.omega_c * last.o_z)
-    moment_z = ball.inertia_ahead * (v.omega_c * v.o_x - last.omega_c * last.o_x)
+    # beginning of the step; what they grow by till its middle is added: the parabola through the last three velocities.
+    omega_c = v.omega_c + ahead * (1.75 * change.omega_c - 0.75 * before.omega_c)
+    v_h = v.v_h + ahead * (1.75 * change.v_h - 0.75 * before.v_h)
+    o_x = v.o_x + ahead * (1.75 * change.o_x - 0.75 * before.o_x)
+    o_z = v.o_z + ahead * (1.75 * change.o_z - 0.75 * before.o_z)
+    inertial_z = 2 * ball.mass * (omega_c * v_h - v.omega_c * v.v_h)
+    inertial_h = -ball.mass * rho * (omega_c * omega_c - v.omega_c * v.omega_c)
+    moment_x = -ball.inertia * (omega_c * o_z - v.omega_c * v.o_z)
+    moment_z = ball.inertia * (omega_c * o_x - v.omega_c * v.o_x)
 
     # Direction of sliding friction at mid step. The engine opposes friction to the slip that there would be 1/b_f after
     # the beginning of the step. A surface that moves by what slip changes from the middle till then takes the
     # difference out; only where a contact truly slides, since a slip that ends must end.
     v_Ax, v_Az, v_By, v_Bz = slip(v, rho, ball.r)
     A_x, A_z, B_y, B_z = slip(change, rho, ball.r)
-    lag_A = ball.lag * (_SLIDES * (A_x * A_x + A_z * A_z) < v_Ax * v_Ax + v_Az * v_Az)
-    lag_B = ball.lag * (_SLIDES * (B_y * B_y + B_z * B_z) < v_By * v_By + v_Bz * v_Bz)
+    lag_A = ball.lag_A * (_SLIDES * (A_x * A_x + A_z * A_z) < v_Ax * v_Ax + v_Az * v_Az)
+    lag_B = ball.lag_B * (_SLIDES * (B_y * B_y + B_z * B_z) < v_By * v_By + v_Bz * v_Bz)
 
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
     # that speed for the last step's friction f leaves only the change of f to creep. The friction forces follow from
     # contact = (., A_x + B_x, A_y + B_y, -r A_z, r B_z, .).
-    memory, (_, inward, upward, about_x, about_y, _), (A_normal, B_normal) = ball.memory, contact, normals
-    floor_z = lag_A * A_z - memory / ball.r * about_x
-    floor_x = lag_A * A_x + memory * (inward - B_normal)
-    wall_y = lag_B * B_y + memory * (upward - A_normal)
-    wall_z = lag_B * B_z + memory / ball.r * about_y
+    (_, inward, upward, about_x, about_y, _), (A_normal, B_normal) = contact, normals
+    floor_z = lag_A * A_z - ball.memory_A / ball.r * about_x
+    floor_x = lag_A * A_x + ball.memory_A * (inward - B_normal)
+    wall_y = lag_B * B_y + ball.memory_B * (upward - A_normal)
+    wall_z = lag_B * B_z + ball.memory_B / ball.r * about_y
 
     forces = rho * (drag_z + inertial_z), drag_h + inertial_h, drag_y, moment_x, 0.0, moment_z
     return forces, (floor_z, floor_x, wall_y, wall_z)
+
+
+def eventful(
+    place: Sequence[Quantity], v: Velocity, last: Velocity, normals: Sequence[Quantity], ball: Ball
+) -> Quantity:
+    """Whether a ball that lacks a contact lands in the coming step, or reaches the vessel's axis."""
+    (_, h, y), (A_normal, B_normal) = place, normals
+    hover_A, hover_B = hovering(v, ball.R - h, ball)
+    return (
+        (A_normal == 0) & lands(y, v.v_y, last.v_y, hover_A, ball)
+        | (B_normal == 0) & (lands(h, v.v_h, last.v_h, hover_B, ball) | (ball.R - h <= ball.step * v.v_h))
+    )  # fmt: skip
+
+
+def hovering(v: Velocity, rho: Quantity, ball: Ball) -> tuple[Quantity, Quantity]:
+    """Loads, m s-2, below which slipping contacts hover with the damping of the settings."""
+    A_x, A_z, B_y, B_z = slip(v, rho, ball.r)
+    return ball.hover_A * (A_x * A_x + A_z * A_z) ** 0.5, ball.hover_B * (B_y * B_y + B_z * B_z) ** 0.5
+
+
+def lands(gap: Quantity, speed: Quantity, last: Quantity, hover: Quantity, ball: Ball) -> Quantity:
+    """Whether a gap, known `ahead` of its speed, closes by the end of a step with the acceleration of the last one.
+
+    A contact that would hover under half of the weight may open and close all the time: that is no landing.
+    """
+    change = speed - last
+    gap = gap - ball.step * ball.ahead * (speed + ball.ahead / 2 * change)  # at the beginning
+    end, closing = gap + ball.step * (speed + change / 2), speed * speed - 2 * change * gap / ball.step
+    return (end < 0) & (speed + change < 0) & (closing > ball.fall**2) & (2 * hover < ball.weight)
 
 
 def followed(margin: Quantity, gap: Quantity, gain: Quantity) -> Quantity:

@@ -120,7 +120,7 @@ class Run:
         # Nothing is needed of the steps after the last sample.
         omega_0 = self._omega_0(done * self._interval, (self._count - 1) * self._interval + 1)
         while done < self._count and not all(header.failure for header in self.headers):
-            raw = np.empty((min(size, self._count - done), len(self.headers), recorder.SENSORS + recorder.NSENSOR))
+            raw = np.empty((min(size, self._count - done), len(self.headers), recorder.COLUMNS))
             for row in raw:
                 self._stepper.advance(itertools.islice(omega_0, self._interval), row)
             if self._journal:
@@ -153,7 +153,7 @@ class Run:
             kept = sound[runs]
             times = np.broadcast_to(time, kept.shape)[kept]
             rows = raw.transpose(1, 0, 2)[runs][kept]
-            block = recorder.samples(times, rows, self._parameters[runs[0]], self._settings.lead)
+            block = recorder.samples(times, rows, self._parameters[runs[0]])
             for i, part in zip(runs, np.split(block, kept.sum(axis=1).cumsum()[:-1]), strict=True):
                 if not self.headers[i].failure and len(part) < len(time):
                     failure = self._reason(i, float(time[len(part)]), part)

@@ -48,7 +48,7 @@ class Free(Stepper):
                     row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = ball.joint_coordinates()
                 ball.step(omega)
                 if row is not None:
-                    row[k, recorder.SENSORS :] = ball.data.sensordata
+                    row[k, recorder.SENSORS :] = *ball.data.sensordata, 0.0
                 self.margins[:, k] = ball.model.pair_margin[:2]
             row = None
 

@@ -13,7 +13,8 @@ from model.trajectory import SAMPLE
 NQ, NV, NSENSOR = 7, 6, 28
 """Sizes of the scene: (azimuth, inward, upward, quaternion), their velocities, two contact sensors."""
 SENSORS = NQ + NV
-"""Where the sensors begin in a raw sample."""
+"""Where the sensors begin in a raw sample, which ends with the time by which all but velocities are ahead of them."""
+COLUMNS = SENSORS + NSENSOR + 1
 _COUNT, _FORCE, _DIST, _NORMAL, _TANGENT, _SLIP = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11), slice(12, 14)
 
 
@@ -40,12 +41,9 @@ def state(qpos: Array, qvel: Array, p: Parameters) -> State:
     return State(y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h)
 
 
-def samples(time: Array, raw: Array, p: Parameters, lead: float) -> npt.NDArray[np.void]:
-    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), raw (n, 41).
-
-    Positions and sensors belong to a moment `lead` seconds after that of the velocities.
-    """
-    qpos, qvel, sensors = np.split(raw, [NQ, SENSORS], axis=1)
+def samples(time: Array, raw: Array, p: Parameters) -> npt.NDArray[np.void]:
+    """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), raw (n, `COLUMNS`)."""
+    qpos, qvel, sensors, lead = np.split(raw, [NQ, SENSORS, COLUMNS - 1], axis=1)
     axes = frame(qpos[:, 0])
     qpos = np.concatenate([qpos[:, :3] - lead * qvel[:, :3], qpos[:, 3:]], axis=1)
     block = np.zeros(len(time), SAMPLE)

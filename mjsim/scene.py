@@ -132,7 +132,7 @@ def _set_pair(pair: Any, friction: float, settings: ContactSettings) -> None:
     # The engine raises friction coefficients to 1e-5; no friction at all takes a contact of one row.
     pair.condim = 3 if friction > 0 else 1
     pair.friction = (friction, friction, 0.0, 0.0, 0.0)
-    pair.solref = settings.solref
+    pair.solref = settings.spring
     pair.solreffriction = (settings.solreffriction, 1.0)
     pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
     pair.margin = 0.0

@@ -2,8 +2,8 @@
 
 It starts near its hop; then the flow is lowered in held steps. At each of them the tops of the hops say period, height
 and orbit; how the heights settle after a step says by what factor a disturbance shrinks from hop to hop; and the flow
-at which the height would be zero is extrapolated. Every number is measured with two time steps: as long as a landing is
-located to a time step only, the difference is the error of the finer one.
+at which the height would be zero is extrapolated. Every number is measured with two time steps: an engine
+may locate a landing to a time step only, and the difference is then the error of the finer one.
 """
 
 from __future__ import annotations

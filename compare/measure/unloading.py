@@ -3,7 +3,8 @@
 A ball rides the wall a little above the floor while the flow is suddenly less than what holds it there: when does it
 begin to slip, when does it land, how fast, with what impulse? And a ball that the wall carries beside the floor is
 pushed, upwards or by a little more spin: does it stay off the floor, and how high? Every number is measured with two
-time steps; motions with landings follow the step to first order, so that the difference is the error of the finer one.
+time steps: an engine may follow motions with landings to first order only, and the difference is then the error of the
+finer one.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import numpy as np
 import mjsim
 from compare.runs.engines import ENGINES, MUJOCO, Engine, mujoco
 from compare.runs.tasks import Task
-from mjsim import ContactSettings, scene, stepping
+from mjsim import ContactSettings, contact_settings, scene
 from model import Parameters
 
 LEAST = 1e-5
@@ -54,7 +54,7 @@ def _wrong(
 
 def _no_impacts() -> AbstractContextManager[Any]:
     """Landings are left to the engine's own contacts."""
-    return mock.patch.object(stepping, "_FALL", np.inf)
+    return mock.patch.object(contact_settings, "_FALL", np.inf)
 
 
 def _smooth_floor() -> AbstractContextManager[Any]:

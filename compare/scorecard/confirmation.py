@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -12,14 +11,13 @@ import numpy as np
 from compare.scorecard import trials
 from compare.scorecard.trials import AT_REST, EPS
 from mjsim import ContactSettings, Run, simulate
-from model import Flow, Trajectory
+from model import Flow
+from model.arrays import Array
 
 ROLLING = trials.SMOOTH.replace(omega_0=10.0)
 SLIPPING = trials.SLIPPING.p
 SLIPPING_START = (0.0, 0.0, 13.85, -4.0, 0.0, 10.0)
 """A start close enough to steady slipping to settle within a few seconds."""
-BRACKET = 0.01
-"""Relative width to which the onset of hovering is bisected."""
 
 
 @dataclass(frozen=True)
@@ -86,13 +84,19 @@ def _margins() -> Iterator[Row]:
     """With servo the margin comes to the depth, and the gap to nothing."""
     for memory, solimp in itertools.product((True, False), (0.03, 0.1)):
         settings = _at(1e-3, solimp, memory=memory, impratio=30.0)
-        run = Run([SLIPPING], [SLIPPING_START], 10.0, [Flow.steady(SLIPPING.omega_0)], settings, batched=False)
-        *_, (block,) = run
+        last, margins = _steady_slipping(settings)
         for k, (contact, axis, friction) in enumerate((("A", 1, SLIPPING.mu), ("B", 0, SLIPPING.eta))):
-            load, slip = block[-1][f"force_{contact}"][axis] / SLIPPING.m, float(block[-1][f"slip_speed_{contact}"])
+            load, slip = last[f"force_{contact}"][axis] / SLIPPING.m, float(last[f"slip_speed_{contact}"])
             what = f"margin at {contact} in slipping, d = {solimp:g}{'' if memory else ', no memory'}"
             margin = settings.margin(load, friction, slip)
-            yield Row(what, "m", margin, float(run.margins[0, k]), _turning(settings.timestep))
+            yield Row(what, "m", margin, float(margins[k]), _turning(settings.timestep))
+
+
+def _steady_slipping(settings: ContactSettings) -> tuple[np.void, Array]:
+    """Last sample of a run that settles in slipping at both points, and the margins (2,) there."""
+    run = Run([SLIPPING], [SLIPPING_START], 10.0, [Flow.steady(SLIPPING.omega_0)], settings, batched=False)
+    *_, (block,) = run
+    return block[-1], run.margins[0]
 
 
 def _creep() -> Iterator[Row]:
@@ -111,24 +115,17 @@ def _creep() -> Iterator[Row]:
 
 
 def _hover() -> Iterator[Row]:
-    """The friction damping b_f from which steady slipping loses contact in some step, by bisection."""
+    """The friction damping b_f at which steady slipping has no margin left, on a line through two smaller ones.
+
+    There it would begin to hover; near that a contact that is disturbed goes on hovering.
+    """
     for solimp in (0.3, 0.5):
-        low, high = 0.01, 1.0
-        while high - low > BRACKET * high:
-            middle = (low + high) / 2
-            run = _every_step(solimp, middle)
-            closed = np.all((run.force_A[1000:, 1] > 0) & (run.force_B[1000:, 0] > 0))
-            low, high = (middle, high) if closed else (low, middle)
-        run, settings = _every_step(solimp, low), _at(1e-3, solimp, low)
-        load, slip = float(run.force_A[-1, 1]) / SLIPPING.m, float(run.slip_speed_A[-1])
-        limit = low / settings.hover_number(load, SLIPPING.mu, slip)
-        yield Row(f"b_f h from which slipping hovers, d = {solimp:g}", "1", limit, (low + high) / 2, BRACKET)
-
-
-def _every_step(solimp: float, damping: float) -> Trajectory:
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="the ball slips")  # that it may hover is the question
-        return simulate(SLIPPING, SLIPPING_START, 3.0, settings=_at(1e-3, solimp, damping), sample_interval=1e-3)
+        settings = [_at(1e-3, solimp, damping) for damping in (0.1, 0.2)]
+        (_, (first, _)), (last, (second, _)) = (_steady_slipping(each) for each in settings)
+        load, slip = last["force_A"][1] / SLIPPING.m, float(last["slip_speed_A"])
+        limit = 0.2 / settings[1].hover_number(load, SLIPPING.mu, slip)
+        what = f"b_f h at which slipping begins to hover, d = {solimp:g}"
+        yield Row(what, "1", limit, float(0.1 + 0.1 * first / (first - second)), _turning(1e-3))
 
 
 def _decay() -> Iterator[Row]:

@@ -51,13 +51,13 @@ class Contender:
         count = int((t_end - skip) / (every * h)) + 1
         stepper = self.start(p, x0)
         stepper.advance(np.full((before, 1), p.omega_0))
-        rows = np.empty((count, recorder.SENSORS + recorder.NSENSOR))
+        rows = np.empty((count, recorder.COLUMNS))
         for row in rows:
             stepper.advance(np.full((every, 1), p.omega_0), row[None])
         with np.errstate(invalid="ignore"):
             sound = rows[np.logical_and.accumulate((np.abs(rows) < _HUGE).all(axis=1))]
         times = (before + every * np.arange(len(sound), dtype=float)) * h
-        block = recorder.samples(times, sound, p, self.loop.lead)
+        block = recorder.samples(times, sound, p)
         failure = "" if len(sound) == count else "diverged"
         header = Header("mujoco", p, Flow.steady(p.omega_0), self.loop.to_mapping(), failure=failure)
         return Trajectory.from_blocks(header, [block], Events())

@@ -1,0 +1,129 @@
+"""Landings: where in a step they are, and how the ball goes on from there.
+
+A ball that lands is taken to the moment at which the gap closes. There `mj_forward` gives the impulses, then the
+margins, friction forces and accelerations of what follows: as at the start of a run, which is a landing, too, if the
+ball comes down on what it touches. With these accelerations it is taken back to the times of the steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from mjsim.balls import GAPS, Balls, Runs
+from mjsim.corrections import lands
+from model.arrays import Array
+
+_ROUNDS = 60
+"""Most rounds of the search for margins and forces that belong to a state, or to an impact."""
+_SAME = 1e-12
+"""Change from one round to the next with which it ends, relative to the largest acceleration."""
+_UNDAMPED = 1e-6
+"""Factor that takes the damping from the contacts: the impulse of an impact is that of the margin alone."""
+_TOUCH = 1e-15
+"""Least margin of a ball that has just landed, m: more than the round-off of a gap, or the engine sees no contact."""
+
+Mask = npt.NDArray[np.bool_]
+
+
+def begin(balls: Balls, fluid: Array) -> None:
+    """Let all runs go on from states at one time, where positions are not yet ahead of velocities."""
+    closed = touching(balls) | ((balls.gaps <= 0) & (balls.speeds < 0))
+    balls.last[:] = balls.qvel
+    balls.qpos[:3] += balls.leads * balls.qvel[:3]
+    runs = np.arange(balls.qpos.shape[1])
+    restart(balls, runs, np.zeros(len(runs)), closed, fluid)
+
+
+def touching(balls: Balls) -> Mask:
+    """Which contacts are closed or as good as that, (2, runs)."""
+    slow = np.abs(balls.speeds) * balls.settings.timestep < balls.reach
+    return (balls.loads > 0) | ((np.abs(balls.gaps) < balls.reach) & slow)
+
+
+def moments(balls: Balls) -> Array:
+    """When in the coming step open contacts close, (2, runs), s after its beginning; inf for those that don't."""
+    h, lead, last = balls.steps, balls.leads, balls.last[GAPS]
+    due = (balls.loads == 0) & lands(balls.gaps, balls.speeds, last, balls.hover(slice(None)), balls.ball)
+    rates = (balls.speeds - last) / h
+    gaps = balls.gaps - lead * (balls.speeds + rates * lead / 2)  # at the beginning of the step
+    speeds, rates, gaps = balls.speeds[due], rates[due], gaps[due]
+    closing = np.sqrt(speeds**2 - 2 * rates * gaps)
+    falls = speeds < 0  # else it turns round first; of two forms of the root the one without cancellation
+    found = np.full(due.shape, np.inf)
+    found[due] = np.where(falls, 2 * gaps, closing + speeds) / np.where(falls, closing - speeds, -rates)
+    return found
+
+
+def restart(balls: Balls, runs: Runs, moment: Array, closed: Mask, fluid: Array) -> None:
+    """Let runs go on from moments (k,), s after the beginning of the step, at which contacts (2, k) are closed."""
+    h, lead = balls.steps[runs], balls.leads[runs]
+    v, before = balls.qvel[:, runs], (balls.qvel - balls.last)[:, runs] / h
+    place = balls.qpos[:3, runs] + (moment - lead) * (v + before * (moment + lead) / 2)[:3]
+    place[GAPS][closed] = 0.0
+    balls.qpos[:3, runs], balls.qvel[:, runs] = place, v + moment * before
+    hits = (closed & (balls.speeds < -balls.falls)[:, runs]).any(axis=0)
+    if hits.any():
+        _stop(balls, runs[hits], closed[:, hits], fluid)
+    balls.damp(runs)
+    _settle(balls, runs, closed & (np.abs(balls.speeds) <= balls.falls)[:, runs], fluid)
+    after = balls.acceleration[:, runs]
+    v = balls.qvel[:, runs] - moment * after
+    balls.qvel[:, runs], balls.last[:, runs], balls.before[:, runs] = v, v - h * after, h * after
+    balls.qpos[:3, runs] = place + (lead - moment) * (v + after * (moment + lead) / 2)[:3]
+
+
+def _settle(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
+    """Search for the margins, friction forces and accelerations that belong to the present state, at a fixed time."""
+    balls.last[:, runs], balls.before[:, runs] = balls.qvel[:, runs], 0.0
+    if balls.settings.servo:
+        balls.margins[:, runs] *= touches
+    for _ in range(_ROUNDS):
+        before = balls.acceleration[:, runs]
+        balls.forward(runs, fluid)
+        after = balls.acceleration[:, runs]
+        missing = after[GAPS] if balls.settings.servo else 0 * after[GAPS]
+        goes_on = _adjust(balls, runs, touches, missing, before)
+        balls.before[:, runs] = balls.steps[runs] * after
+        balls.last[:, runs] = balls.qvel[:, runs] - balls.before[:, runs]
+        runs, touches = runs[goes_on], touches[:, goes_on]
+        if len(runs) == 0:
+            return
+
+
+def _stop(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
+    """Apply the impulses that stop the given runs at the contacts that touch, (2, k), if there are such.
+
+    Without the damping of the contacts and the other forces on the ball, `mj_forward` gives the impulses at both
+    contacts at a fixed time, while the margins are adjusted until neither contact approaches or rebounds.
+    """
+    stopping, solref = runs, balls.solref[:, runs]
+    balls.damp(runs, np.abs(balls.speeds[:, runs]).max(axis=0) / balls.steps[runs])
+    balls.solref[1::2, runs] *= _UNDAMPED
+    balls.last[:, runs], balls.before[:, runs] = balls.qvel[:, runs], 0.0
+    balls.margins[:, runs] = _TOUCH * touches
+    balls.forward(runs, fluid)
+    others, h = np.zeros(balls.qvel.shape), balls.steps
+    others[:, runs] = balls.force[:, runs]
+    for _ in range(_ROUNDS):
+        before = balls.acceleration[:, runs]
+        balls.forward(runs, fluid, others[:, runs])
+        missing = balls.speeds[:, runs] / h[runs] + balls.acceleration[GAPS][:, runs]
+        goes_on = _adjust(balls, runs, touches, missing, before)
+        runs, touches = runs[goes_on], touches[:, goes_on]
+        if len(runs) == 0:
+            break
+    balls.qvel[:, stopping] += h[stopping] * balls.acceleration[:, stopping]
+    balls.solref[:, stopping] = solref
+
+
+def _adjust(balls: Balls, runs: Runs, touches: Mask, excess: Array, before: Array) -> Mask:
+    """Change the margins of contacts that touch by what their acceleration, (2, k), exceeds the wanted one.
+
+    Returns whether accelerations (6, k) or margins still differ from those `before`.
+    """
+    kept, after, stiffness = balls.margins[:, runs], balls.acceleration[:, runs], balls.stiffness[runs]
+    margins = balls.margins[:, runs] = touches * np.maximum(kept - excess / stiffness, 0.0)
+    changes = np.concatenate([after - before, (margins - kept) * stiffness])
+    differ: Mask = np.abs(changes).max(axis=0) > _SAME * np.abs(after).max(axis=0)
+    return differ

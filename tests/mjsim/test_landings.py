@@ -1,0 +1,76 @@
+"""Landings within a step: motions through impacts converge at second order, on a ball that hops for ever."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import analytic
+import mjsim
+from mjsim import ContactSettings, Run
+from mjsim.journal import Journal
+from model import Flow, Parameters
+
+HOPS = Parameters(
+    mu=0.455544891368194, eta=0.07254346340444341, j=0.23894921089415236, r=0.02210534827760574, R=0.05, m=0.03,
+    g=9.81, c=0.17417791846732222, omega_0=69.21145783256775,
+)  # fmt: skip
+"""Reference set of a hopping attractor; a hop lasts 0.22 s, and the floor is touched for half a millisecond of it."""
+START = [0.004068, 0.0822234, 57.2275, -100.0124, 0, 0, 0, 0]
+"""Close to it, in the air and rolling up the wall."""
+LASTS = 0.6
+"""Three landings: at 0.15, 0.37 and 0.60 s; the last one is just ahead of the end."""
+
+
+def deviations(steps: tuple[float, ...], batched: bool = False) -> list[float]:
+    """Largest error of height (relative to its range) and omega_c (relative) between the landings."""
+    exact = analytic.simulate(HOPS, START, LASTS, sample_interval=0.02)
+    errors = []
+    for step in steps:
+        settings = ContactSettings.for_problem(HOPS, step)
+        if batched:
+            (run,) = mjsim.simulate_many([HOPS], [START], LASTS, settings=settings, sample_interval=0.02)
+        else:
+            run = mjsim.simulate(HOPS, START, LASTS, settings=settings, sample_interval=0.02)
+        errors.append(
+            max(np.abs(run.y - exact.y).max() / np.ptp(exact.y), np.abs(run.omega_c / exact.omega_c - 1).max())
+        )
+    return errors
+
+
+@pytest.mark.parametrize("batched", [False, True])
+def test_motions_through_landings_are_of_second_order(batched: bool) -> None:
+    steps = (1e-3, 5e-4, 2.5e-4)
+    errors = deviations(steps, batched)
+    order = np.log(errors[0] / errors[-1]) / np.log(steps[0] / steps[-1])
+    assert order > 1.8
+    # A second-order method makes errors of (omega_c h)^2 and the like in smooth motion; landings add nothing to that.
+    assert errors[0] < (HOPS.omega_0 * steps[0]) ** 2
+
+
+def test_a_start_that_comes_down_on_the_floor_lands_at_once() -> None:
+    x0 = [0, -0.042, *START[2:]]
+    settings = ContactSettings.for_problem(HOPS, 2.5e-4)
+    exact = analytic.simulate(HOPS, x0, 0.02, sample_interval=0.01, initial_impact=True)
+    run = mjsim.simulate(HOPS, x0, 0.02, settings=settings, sample_interval=0.01)
+    speeds = HOPS.R * np.abs(run.omega_c - exact.omega_c)[1:], np.abs(run.v_y - exact.v_y)[1:]
+    # What forces of the size of the weight do in a step, times the share of it by which a landing may be misplaced.
+    assert np.max(speeds) < HOPS.g * settings.timestep * HOPS.omega_0 * settings.timestep
+
+
+@pytest.mark.parametrize("batched", [False, True])
+def test_a_run_taken_up_between_landings_gives_the_same_bits(tmp_path: Path, batched: bool) -> None:
+    def run(journal: Journal | None) -> Run:
+        settings = ContactSettings.for_problem(HOPS, 5e-4)
+        return Run(
+            [HOPS], [START], LASTS, [Flow.steady(HOPS.omega_0)], settings, sample_interval=5e-4, batched=batched,
+            journal=journal,
+        )  # fmt: skip
+
+    whole = np.concatenate([blocks[0] for blocks in run(None)])
+    list(islice(run(Journal(tmp_path, interval=0.0)), 2))
+    again = np.concatenate([blocks[0] for blocks in run(Journal(tmp_path, interval=0.0))])
+    np.testing.assert_array_equal(again, whole)
