@@ -42,7 +42,7 @@ REACH = 1.1
 LOOKED = 1.5
 """Length of the runs of a bracket in periods, of which the first sixth doesn't count."""
 ALONE = 2e-4
-"""Slip speed over sqrt(g R), just below the onset at both points, at which one of them slips alone."""
+"""How much the slip speeds of both may differ just below the onset, over sqrt(g R): beyond it, one slips alone."""
 SAMPLES, LASTS = 256, 5
 """Samples in a period there, and how many of them slip must last to count: friction may be full for a moment before."""
 SURE = 0.9
@@ -120,7 +120,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         low, high = bracket.runs
         if low is None or high is None:
             yield Missing(PROTOCOL, rhythm.set, f"in {at} there is slip at no amplitude, or at all")
-        elif _fastest(low) > ALONE:
+        elif _alone(low) > ALONE:
             yield Missing(PROTOCOL, rhythm.set, f"in {at} one contact slips before both do, too little to tell when")
         elif not sure_enough("slip_amplitude", onset, SURE * onset.value):
             yield Missing(PROTOCOL, rhythm.set, f"slip in {at} begins at no definite amplitude")
@@ -178,10 +178,10 @@ def rolls_on(run: Trajectory) -> bool:
     return bool(np.convolve(gone, np.ones(LASTS)).max() < LASTS)
 
 
-def _fastest(run: Trajectory) -> float:
-    """Largest slip speed but for the beginning of a run, over sqrt(g R)."""
+def _alone(run: Trajectory) -> float:
+    """Largest difference of the slip speeds but for the beginning of a run, over sqrt(g R)."""
     p, late = run.header.parameters, run.time > run.time[-1] / 6
-    return float(np.maximum(run.slip_speed_A, run.slip_speed_B)[late].max() / math.sqrt(p.g * p.R))
+    return float(np.abs(run.slip_speed_A - run.slip_speed_B)[late].max() / math.sqrt(p.g * p.R))
 
 
 def _mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator[Measurement | Missing]:
