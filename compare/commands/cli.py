@@ -1,7 +1,7 @@
 """The program ``dualball``: one command line for everything, one module a command.
 
-Exit codes: 0 done and as expected, 1 a verdict failed or a run broke down, 2 a mistake in what was asked,
-130 interrupted.
+Exit codes: 0 done and as expected, 1 a verdict failed, a run broke down or a design doesn't reach its fastest flow,
+2 a mistake in what was asked, 130 interrupted.
 """
 
 from __future__ import annotations
