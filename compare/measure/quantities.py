@@ -13,10 +13,9 @@ however well the numbers agree. The ceilings follow from what each protocol can 
 * friction opposes the slip of some point within a step: the law is off by what the slip turns in it, and the speed of a
   landing by the fall within a step, about a thousandth of either;
 * a motion through landings follows the step h to second order, (omega_0 h)^2 = 5e-5 with the coarser step of a hop; its
-  slow multipliers make ten times as much of it, and three standard uncertainties are to be resolved: 1.5e-3 for the
-  period and the mean of omega_c. The height is the square of a speed, twice that, and the lowest hops of the staircase
-  are a fifth as high; a multiplier comes from the ten hops in which a disturbance is neither too large nor lost in
-  that;
+  slow multipliers make ten times as much of it. Where the hops are lowest they still settle when they are measured, by
+  half a percent of their height, which is charged to all that is measured of them: three times that is to be resolved;
+  a multiplier comes from the ten hops in which a disturbance is neither too large nor lost in that;
 * what a pulsation or a jump does is compared at two time steps, to a part in a thousand of itself; the onset of slip is
   bracketed to that, and slip begins within a time step, a few hundredths of a period, near a maximum; the mean reading
   and the flow by which a ramp passes a fold are small differences of flows;
@@ -116,8 +115,8 @@ _ALL = (
     Quantity("time", "t", "s", 1e-2),
     Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
     Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
-    Quantity("orbit_period", "period", "s", 2e-3),
-    Quantity("orbit_omega_c", "mean ω_c of a period", "rad s-1", 2e-3),
+    Quantity("orbit_period", "period", "s", 2e-2),
+    Quantity("orbit_omega_c", "mean ω_c of a period", "rad s-1", 2e-2),
     Quantity("orbit_height", "height of the hops", "m", 2e-2),
     Quantity("orbit_multiplier", "largest |Floquet multiplier|", "1", 0.25),
     Quantity("orbit_birth", "ω₀ where hopping begins", "rad s-1", 2e-2),
