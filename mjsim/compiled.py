@@ -5,7 +5,11 @@ What is done to a ball stands in `mjsim.corrections`; this is only the loop over
 
 from __future__ import annotations
 
+import hashlib
 import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numba
 from numba import types
@@ -18,15 +22,24 @@ from model.arrays import Array
 
 for each in (source.slip, source.resistance, source.lands, source.hovering):  # the others call them
     register_jitable(each)
-_corrections, _eventful, _followed = (
-    numba.njit(cache=True)(each) for each in (source.corrections, source.eventful, source.followed)
-)
+# What is compiled is kept on disk. Of itself numba compiles a function again when its own file has changed; it must
+# also do so when that of the functions has which it calls.
+_STAMP = hashlib.sha256(b"".join(Path(each).read_bytes() for each in (__file__, source.__file__))).hexdigest()
+
+
+def _kept(function: Callable[..., Any]) -> Any:
+    dispatcher = numba.njit(cache=True)(function)
+    dispatcher._cache._cache_file._source_stamp = _STAMP
+    return dispatcher
+
+
+_corrections, _eventful, _followed = (_kept(each) for each in (source.corrections, source.eventful, source.followed))
 _BALL, _VELOCITY = len(Ball._fields), len(Velocity._fields)
 _ROWS = types.Array(types.float64, 2, "A")
 _GIVEN = types.Array(types.float64, 2, "A", readonly=True)
 
 
-@numba.njit(types.boolean(types.boolean, types.boolean, types.float64[::1], *[_GIVEN] * 4, *[_ROWS] * 8), cache=True)  # type: ignore[untyped-decorator]
+@_kept
 def drive(
     watched: bool, whole: bool, omega_0: Array, balls: Array, qvel: Array, contact: Array, normals: Array,
     last: Array, before: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
@@ -60,3 +73,7 @@ def drive(
             for i in range(_VELOCITY):
                 before[i, k], last[i, k] = qvel[i, k] - last[i, k], qvel[i, k]
     return True
+
+
+drive.compile((types.boolean, types.boolean, types.float64[::1], *[_GIVEN] * 4, *[_ROWS] * 8))
+drive.disable_compile()
