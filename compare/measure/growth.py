@@ -41,7 +41,7 @@ SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
 """Which of slip_x, slip_y, slip_z a case allows beyond the one it leaves."""
 REFINED = 16
 """Steps in one of `coarse_step`; every other run has twice as many."""
-STEPS, SKIPPED = 18, 3
+STEPS, SKIPPED = 20, 6
 """Steps of a record, and those at its start in which contact forces build up."""
 LARGE, SMALL, BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
 """Slips at the start in units of `start_unit`: so large that they neither end nor turn much in a record; small where

@@ -36,7 +36,7 @@ FLOWS = {
 HOLD, MEASURED, LATER = 12.0, 3.0, 2.0
 """How long each is held, the last part of it in which the motion is measured, and the first in which disturbances are
 too large to be linear, s."""
-REFINED = 40, 80
+REFINED = 8, 16
 """Steps in one of `coarse_step`."""
 SAMPLE = 1e-3
 """Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""

@@ -97,9 +97,13 @@ def columns(run: Trajectory) -> dict[str, Array]:
 
 
 def determined(case: Case) -> tuple[str, ...]:
-    """The quantities that a settled state of a case has: where both contacts roll, only sums of forces."""
+    """The quantities that a settled state of a case has.
+
+    Where both contacts roll, only sums of forces; and nothing but the wall turns a ball about the vertical.
+    """
     forces = SUMS if case is Case.RR else FORCES
-    return ("omega_c", "slip_x", "slip_y", "slip_z", "wall_spin", "v_y", *forces)
+    upright = () if case.B is Contact.N else ("slip_y",)
+    return ("omega_c", "slip_x", *upright, "slip_z", "wall_spin", "v_y", *forces)
 
 
 def family(case: Case) -> Case:
