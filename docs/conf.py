@@ -91,7 +91,7 @@ def source_links(app: Sphinx, where: object, *source: list[str]) -> None:
     """Links to modules, which a repository shows as files, lead to the reference; those to tests are only names."""
     text = source[-1]  # of a page, or of what a page includes
     if str(where).startswith("attractors/"):  # tables written by `dualball attractors --page`, to which a page links
-        text[0] = f"---\norphan: true\n---\n\n# Numbers: {Path(str(where)).name}\n\n{text[0]}"
+        text[0] = f"---\norphan: true\n---\n\n{text[0]}"
 
     def to_reference(link: re.Match[str]) -> str:
         name = link[2].removesuffix(".py").removesuffix("/__init__").strip("/").replace("/", ".")

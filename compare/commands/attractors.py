@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
         )
     data = {"engine": args.engine.name, "seed": args.seed, "sets": rows}
     if args.page:
-        write_text(args.page, _page(data))
+        write_text(args.page, f"# {args.page.stem.capitalize()}: what balls come to\n\n{_page(data)}")
     options.show(data, _table, args.json)
     return 0
 
@@ -188,7 +188,8 @@ def _page(data: dict[str, Any]) -> str:
     lines = _markdown([*_varied(data), *_COLUMNS], _rows(data))
     for branch in (branch for each in data["sets"] for branch in each["branches"]):
         name = branch["parameter"]
-        lines += ["", *(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}" for p in branch["places"]), ""]
+        lines += ["", f"## Followed in {name}", ""]
+        lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}" for p in branch["places"]), ""]
         head = [name, "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"]
         lines += _markdown(head, (_orbit_cells(orbit, name) for orbit in branch["orbits"]))
     return "\n".join(lines) + "\n"

@@ -70,26 +70,41 @@ def kept(name: str = KEPT[0]) -> Searched:
     return Searched.load(Path(str(resources.files("compare.runs"))) / name)
 
 
+INTRODUCTION = (
+    "# Where the ball hops for ever",
+    "",
+    "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: mu and eta are the "
+    "friction of floor and wall, kappa = c√(R/g) and Omega_0 = ω₀√(R/g). "
+    "`dualball search --kept --page docs/hopping.md` writes this page.",
+    "",
+)
+
+
 def page(*searches: Searched) -> str:
     """Results as a page of Markdown."""
-    return "\n".join(["# Where the ball hops for ever", "", *(line for each in searches for line in _section(each))])
+    return "\n".join([*INTRODUCTION, *(line for each in searches for line in _section(each))])
 
 
 def _section(record: Searched) -> list[str]:
     count, (low, high) = len(record.confirmed), interval(len(record.confirmed), record.sets)
     periods = [row["confirmed"]["landings"] for row in record.confirmed]
-    kinds = [f"{periods.count(n)} with {n} landing{'s' * (n > 1)} a period" for n in sorted(set(periods) - {0})]
+    kinds = [f"{periods.count(n)} with {n}" for n in sorted(set(periods) - {0})]
+    kinds += [f"{periods.count(0)} with no period of up to 16"] if 0 in periods else []
+    landings = f"Sets by landings in a period: {', '.join(kinds)}. " if kinds else ""
+    others = f", {len(record.rows) - count} of them not confirmed" if len(record.rows) > count else ""
+    broken = f" {record.failed} runs broke down." if record.failed else ""
     box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in record.search.box.items())
+    least, most = record.search.box["kappa"]
     lines = [
-        f"## {record.sets} sets in {box}",
+        f"## Drag from kappa = {least:.3g} to {most:.3g}: {record.sets} sets",
         "",
-        f"Each was started from {record.search.starts} random states. In {count} sets some start leads to hopping that "
-        f"the event-driven simulation confirms: {100 * count / record.sets:.2f} %, or {100 * low:.2f} to "
+        f"The box is {box}. "
+        f"Each set was started from {record.search.starts} random states. In {count} sets some start leads to hopping "
+        f"that the event-driven simulation confirms: {100 * count / record.sets:.2f} %, or {100 * low:.2f} to "
         f"{100 * high:.2f} % with {CONFIDENCE:.0%} confidence. That is what {record.search.starts} starts find: an "
         "attractor with a small basin is missed. "
-        f"Of them {', '.join([*kinds, f'{periods.count(0)} without a period of up to 16 landings'])}. "
-        f"By time stepping {len(record.rows)} sets still hopped after 60/c; {record.failed} runs broke down. In all "
-        "other sets every ball stopped landing.",
+        f"{landings}By time stepping {len(record.rows)} sets still hopped after 60/c{others}.{broken} "
+        "In all other sets every ball stopped landing.",
         "",
     ]  # fmt: skip
     lines += ["| | smallest with hopping | largest |", "| :-- | --: | --: |"]

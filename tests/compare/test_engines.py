@@ -38,7 +38,9 @@ def engines(*names):
     return pytest.mark.parametrize("name", [pytest.param(name, marks=mark) for name, mark in marks.items()])
 
 
-BEST, ALL = ("pybullet", "drake"), ("pybullet", "drake", "pybullet-defaults", "drake-defaults")
+ALL = [name for name, each in ENGINES.items() if each.needs]
+BEST = [name for name in ALL if ENGINES[name].as_it_comes != name]
+NEWCOMERS = [name for name in ALL if name not in BEST]
 
 
 def run(name, p, x0, t_end, step, interval=None):
@@ -123,7 +125,7 @@ def test_a_law_without_a_formula_is_not_taken_for_another(name, monkeypatch):
         loop.COORDINATES[name].drag([0.0] * 3, [1.0] * 6, 0.0, REFERENCE.replace(drag="oseen", nu_f=1e-5))
 
 
-@engines("pybullet-defaults", "drake-defaults")
+@engines(*NEWCOMERS)
 def test_a_newcomer_goes_round_and_round(name):
     seen = run(name, REFERENCE.replace(omega_0=12.0), (0, 0, 11.0, 0, 0, 0), 2.0, 2e-3, interval=0.02)
     assert seen.complete
