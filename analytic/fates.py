@@ -1,4 +1,4 @@
-"""What motions come to: a stationary motion, a periodic one, or neither; and what balls come to from many starts.
+"""What motions come to, from one start or many: a stationary motion, a periodic one, or neither.
 
 A run is followed window by window until what it does no longer changes. Any simulator may carry it out. What is
 recurrent is closed to an orbit by theory (`orbits`); what is recurrent and no stable orbit is chaotic if neighbours of

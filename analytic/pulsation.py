@@ -1,8 +1,8 @@
 """A ball that rolls at both points (RR) in a flow that pulsates: when it slips, and what it then reads on average.
 
-The flow is omega_0 = p.omega_0 + amplitude sin(2 pi frequency t). While the ball rolls, omega_c pulsates about the
-mean of the flow exactly: no error of the mean. The friction that this takes grows with the lag omega_c - omega_0, that
-is with the ball's acceleration (23), and the loads with omega_c^2. docs/theory.md derives what follows from it.
+The flow is omega_0 = p.omega_0 + amplitude sin(2 pi frequency t). While the ball rolls, omega_c pulsates about the mean
+of the flow exactly: no error of the mean. The friction that this takes grows with the lag omega_c - omega_0, which is
+proportional to the ball's acceleration (23); the loads grow with omega_c^2. docs/theory.md derives what follows.
 """
 
 from __future__ import annotations

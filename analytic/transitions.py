@@ -1,9 +1,9 @@
 """Which case comes next: the rules by which the motion goes on from a moment at which a case ends.
 
 Uniqueness. Where Coulomb's law allows the ball to roll on and to slip or lift away, it rolls on only if every slight
-slip dies out: at two rolling contacts that is `rolling_forces.slip_margin`, at a single one it is the same as that
-forces within its cone exist (docs/theory.md). Case and slip directions are then those of the contact problem of the
-accelerations.
+slip dies out: at two rolling contacts that is `rolling_forces.slip_margin`, at a single one this means that its cone
+holds forces that keep it rolling (docs/theory.md). Case and slip directions are then those of the contact problem of
+the accelerations.
 """
 
 from __future__ import annotations

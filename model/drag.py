@@ -4,7 +4,7 @@ c(|w|) = c C_D(Re) Re/24 with Re = 2 r |w|/nu_f: Stokes' coefficient c (10) time
 by. A law is that factor as a function of Re:
 
 * ``stokes``: 1 (the paper's);
-* ``schiller-naumann``: 1 + 0.15 Re^0.687, and from where that is less (Re = 990) that of a constant C_D = 0.44
+* ``schiller-naumann``: 1 + 0.15 Re^0.687, and from where that is less (Re = 989) that of a constant C_D = 0.44
   (Schiller and Naumann 1935; Clift, Grace and Weber, "Bubbles, Drops, and Particles", 1978);
 * ``quadratic``: C_D Re/24 with a constant C_D.
 """

@@ -1,1 +1,1 @@
-"""One module a figure; each reads stored results only."""
+"""One module a figure; measured points come from stored results, lines from theory."""

@@ -1,4 +1,7 @@
-"""All figures. To add one, write a module with what it selects, how that is drawn, its caption; add a record."""
+"""The figures of the report; those of the league and of a designed meter belong to their pages.
+
+To add one, write a module with what it selects, how that is drawn, its caption; add a record.
+"""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """The unstable state between two attractors, by following the edge of their basins.
 
 Where at one flow a ball slips on the floor (SS) or goes round with the fluid (SR, which is NR at y = 0), the straight
-line between the two measured states crosses the border between the balls that end in the one and in the other. The last
-two runs on either side of it shadow a ball on the border for a while, which comes to rest in the unstable state. The
-mean of the time that they stay together begins the next line, across the same border.
+line between the two measured states crosses the border between the two basins. Two runs close to it on either side stay
+together for a while near the unstable state, which a ball on the border would reach. The mean of their states while
+they are together begins the next line, across the same border.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The dotted arrows of Fig. 6: at which orbit does a ball on the floor leave it, by the engine's own contact?
 
-States of every case with a floor, all alike but for the speed of the orbit, go from slow, where the floor presses, to
-fast. A few orbits show about where the floor ceases to; its force at others, so much slower that the contact doesn't
-come and go, is extrapolated to zero over omega_c^2, with which the forces of an orbit go.
-Whether the wall's contact rolls or slips once the ball has left, the engine says.
+States of every case with a floor differ only in the speed of the orbit, from slow, where the floor presses, to fast. A
+few of them show roughly where it stops pressing; slower ones, at which the contact doesn't come and go, give its force,
+which is extrapolated to zero over omega_c^2. Whether the wall's contact rolls or slips once the ball has left, the
+engine says.
 """
 
 from __future__ import annotations

@@ -126,7 +126,7 @@ def neighbourhoods(
 
 
 def lifts(end: Bracket) -> bool:
-    """Whether rolling on both ends by losing the floor, not by slipping: it carries no more than a hovering contact."""
+    """Whether two-point rolling ends by losing the floor, not by slipping: it carries no more than what hovers."""
     run = end.runs[1]
     if run is None:
         return False

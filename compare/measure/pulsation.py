@@ -1,7 +1,7 @@
 """A rolling ball in a pulsating flow: how it follows, at which amplitude it slips, what it then reads on average.
 
-The mean flow is a part of the one at which rolling on both ends. A small pulsation shows the engine's own rhythm, from
-which every other run starts, so that it need not settle. Slip is what the engine's contacts show: both slip.
+The mean flow is a fixed part of that at which two-point rolling ends. A small pulsation shows the engine's own rhythm,
+from which every other run starts, so that it need not settle. Slip is what the engine's contacts show: both slip.
 Frequencies are powers of two, so that sets of about the same drag share batches.
 """
 
@@ -24,7 +24,7 @@ from model.drag import STOKES
 
 PROTOCOL = "pulsation"
 MEAN = 0.85
-"""Mean flow over the one at which rolling on both ends."""
+"""Mean flow over that at which two-point rolling ends."""
 SMALL = 0.01
 """Amplitude of the pulsation that shows the rhythm, over the mean flow."""
 SLOWEST = 0.5
@@ -59,7 +59,7 @@ class Rhythm:
     p: Parameters
     """With the mean flow."""
     end: float
-    """Flow at which rolling on both ends, rad s-1."""
+    """Flow at which two-point rolling ends, rad s-1."""
     frequency: float
     ratio: complex
     """omega_c over omega_0."""
@@ -102,7 +102,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         if p.drag != STOKES:
             yield Missing(PROTOCOL, name, "with this law of drag a large pulsation isn't a small one magnified")
         elif not ends:
-            yield Missing(PROTOCOL, name, "no flow was measured at which rolling on both ends by slipping")
+            yield Missing(PROTOCOL, name, "no flow was measured at which two-point rolling ends by slipping")
         else:
             base = 2.0 ** round(math.log2(SLOWEST * p.c / (2 * math.pi)))
             q = p.replace(omega_0=MEAN * ends[0])

@@ -6,8 +6,8 @@ eigenvalues of P are the exponents, all of them, and no direction is singled out
 to none, two time steps to none.
 
 Two states are special. A ball that spins in a fluid at rest (RS) feels the wall only while it goes round, with a
-friction of the order of omega_c^2: it takes a large push. And where floor and ball only just touch (SR), one direction
-of every push makes the ball lean on the floor, in the other it lifts off: there is a column for the first alone.
+friction of the order of omega_c^2: it takes a large push. And where floor and ball only just touch (SR), every push
+makes the ball lean on the floor one way and lifts it off the other way: only the first is used.
 """
 
 from __future__ import annotations

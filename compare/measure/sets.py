@@ -1,8 +1,8 @@
-"""The parameter sets that are measured: a few chosen by hand, and a design that fills the space of the five groups.
+"""The parameter sets that are measured: a few chosen by hand, and a design that fills a box of parameters evenly.
 
-Floor and wall differ in friction, either way; the wall's is below and above the inertia j; drag is weak and strong,
-and with two sets of another law than Stokes', at Reynolds numbers of hundreds.
-A protocol chooses omega_0 by itself; the one of a set counts for nothing.
+Friction is greater on the floor in some, on the wall in others, and the wall's is below and above the inertia j; drag
+is weak in some and strong in others. Two sets have another law of drag, at Reynolds numbers of hundreds. Each protocol
+chooses omega_0 itself: that of a set is not used.
 """
 
 from __future__ import annotations

@@ -87,12 +87,12 @@ class Rows:
     states: Mapping[str, Sequence[Settled]]
 
     def rolling(self) -> Iterator[Measurement | Missing]:
-        """The end of rolling on both: omega_01 or omega_03, from both sides."""
+        """The end of two-point rolling: omega_01 or omega_03, from both sides."""
         end = self.brackets.get("rolling")
         if end is None or None in end.runs:
-            yield self._missing(f"{self._range} ends rolling on both")
+            yield self._missing(f"{self._range} ends two-point rolling")
         elif onset.lifts(end):
-            yield self._missing("rolling on both ends by losing the floor, not by slipping: there is no omega_01")
+            yield self._missing("two-point rolling ends by losing the floor, not by slipping: there is no omega_01")
             yield self._bisected("omega_03", end, "from below", "loss of the floor")
             leaning = self.brackets.get("leaning")
             if leaning is None or None in leaning.runs:
@@ -100,7 +100,7 @@ class Rows:
             else:
                 yield self._bisected("omega_03", leaning, "from above", "return to rolling when pressed")
         else:
-            yield self._missing("rolling on both ends by slipping before the ball is lifted: there is no omega_03")
+            yield self._missing("two-point rolling ends by slipping before the ball is lifted: there is no omega_03")
             yield self._bisected("omega_01", end, "from below", "onset of slip")
             yield from self._extrapolated("omega_01", "slipping", "lag", "from above", "lag of settled slipping")
 

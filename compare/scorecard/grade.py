@@ -1,7 +1,8 @@
 """A score card for contact settings: what a ball that rolls and slips does under them, and what it should do.
 
-The settings run as they are in the study's scene, driven by its drag and wall, but without its corrections. Every
-number stands against closed-form theory or the event-driven simulation, and beside what other settings give.
+MuJoCo's settings run as they are in the study's scene, driven by its drag and wall but without its corrections; another
+engine runs in its own loop. Every number stands against closed-form theory or the event-driven simulation, and beside
+what other settings give.
 """
 
 from __future__ import annotations

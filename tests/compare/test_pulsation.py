@@ -67,7 +67,7 @@ def test_sets_without_slip_or_with_another_law_say_why(tmp_path) -> None:
         rows = [*pulsation.measure(lab, {"wall": wall, "other": other}, thresholds("other", P))]
         rows += unsteady.measure(lab, {"wall": wall}, Records())
     assert [row.reason for row in rows] == [
-        "no flow was measured at which rolling on both ends by slipping",
+        "no flow was measured at which two-point rolling ends by slipping",
         "with this law of drag a large pulsation isn't a small one magnified",
         "no flows were measured between which the ball slips at both points",
     ]
