@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from compare.measure.lab import Lab
+from compare.measure.lab import Lab, Level
 from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import Start, settle
 from model import Parameters
@@ -21,7 +21,7 @@ ROUGH = {
     "rough-floor-1": (1.7222, 0.0388, 0.482, 0.292, 0.1099, 2.635),
     "rough-floor-2": (1.2277, 0.1721, 0.611, 0.154, 0.1198, 2.099),
 }
-"""mu, eta, j, r/R, kappa, omega_0 sqrt(R/g)."""
+"""mu, eta, j, r/R, kappa, omega_0 sqrt(R/g). The second is left to the higher levels: its contacts hover for long."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -31,7 +31,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         return
     starts = [
         Start(name, _parameters(sets["reference"], *values), "rest", np.zeros(8)) for name, values in ROUGH.items()
-    ]
+    ][: 1 if lab.level is Level.QUICK else None]
     for start, settled in zip(starts, settle(lab, starts), strict=True):
         if settled.failure:
             yield Missing(NAME, start.set, settled.failure)
