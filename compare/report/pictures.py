@@ -43,6 +43,6 @@ def svg(figure: Figure) -> str:
         figure.draw_without_rendering()
     canvas: Any = FigureCanvasSVG(figure)  # draws once; `Figure.savefig` would do so twice, for the layout
     canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
-    text = re.sub(r"<!--.*?-->\s*", "", out.getvalue().decode(), flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->|\n\s*(?=\n)|(?<=\n) +", "", out.getvalue().decode(), flags=re.DOTALL)
     # Hundredths of a point are fine enough, and half as long.
     return re.sub(r' (?:d|x|y)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), text)
