@@ -50,9 +50,9 @@ def moments(balls: Balls) -> Array:
     speeds, rates, gaps = balls.speeds[due], rates[due], gaps[due]
     closing = np.sqrt(speeds**2 - 2 * rates * gaps)
     falls = speeds < 0  # else it turns round first; of two forms of the root the one without cancellation
-    found = np.full(due.shape, np.inf)
-    found[due] = np.where(falls, 2 * gaps, closing + speeds) / np.where(falls, closing - speeds, -rates)
-    return found
+    times = np.full(due.shape, np.inf)
+    times[due] = np.where(falls, 2 * gaps, closing + speeds) / np.where(falls, closing - speeds, -rates)
+    return times
 
 
 def restart(balls: Balls, runs: Runs, moment: Array, closed: Mask, fluid: Array) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -45,9 +46,12 @@ class Trial:
     """Claims whose verdict is another than without the fault, and what it is."""
 
 
-def theories(directory: Path, processes: int = 2) -> list[Trial]:
-    """Every wrong theory, judged on the measurements stored in a results directory."""
-    return _tried(functools.partial(_theory, directory), len(THEORIES), processes)
+def theories(directory: Path, processes: int = 2, whole: bool = True) -> list[Trial]:
+    """Every wrong theory, judged on the measurements stored in a results directory.
+
+    By all claims; unless `whole`, by the quickest ones first and only until one notices it.
+    """
+    return _tried(functools.partial(_theory, directory, whole), len(THEORIES), processes)
 
 
 def wrong_engines(directory: Path, processes: int = 2) -> list[Trial]:
@@ -76,14 +80,14 @@ class Judged:
     """By quantity the relative error of a theory that every check of it notices."""
 
 
-def judged(directory: Path, processes: int = 2) -> Judged:
+def judged(directory: Path, processes: int = 2, whole: bool = True) -> Judged:
     """Every wrong theory judged on the measurements stored in a results directory, and their resolving power."""
     power: dict[str, float] = {}
     for each in judge(CLAIMS, _stored(directory)[0]):
         if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
             for name, value in each.resolving_power.items():
                 power[name] = max(power.get(name, 0.0), value)
-    return Judged(results.load(directory).level.lower(), theories(directory, processes), power)
+    return Judged(results.load(directory).level.lower(), theories(directory, processes, whole), power)
 
 
 def page(levels: Sequence[Judged], measured: Sequence[Trial]) -> str:
@@ -132,18 +136,26 @@ def _told(trial: Trial) -> str:
 
 
 @functools.cache
-def _stored(directory: Path) -> tuple[Records, Outcomes]:
-    """Measurements, and the outcomes of the right theory."""
-    records = results.load(directory).records(directory)
-    return records, _outcomes(judge(CLAIMS, records))
+def _stored(directory: Path) -> tuple[Records, Outcomes, Sequence[Claim]]:
+    """Measurements, the outcomes of the right theory, and the claims, those that are judged quickest first."""
+    records, took, outcomes = results.load(directory).records(directory), dict[str, float](), dict[str, Outcome]()
+    for claim in CLAIMS:
+        begun = time.process_time()
+        outcomes[claim.id] = verdict(claim, records).outcome
+        took[claim.id] = time.process_time() - begun
+    return records, outcomes, sorted(CLAIMS, key=lambda claim: took[claim.id])
 
 
-def _theory(directory: Path, number: int) -> Trial:
-    records, right = _stored(directory)
+def _theory(directory: Path, whole: bool, number: int) -> Trial:
+    records, right, quickest_first = _stored(directory)
     forget()
+    noticed: tuple[tuple[str, Outcome], ...] = ()
     with believed(THEORIES[number]):
-        verdicts = [_patiently(claim, records) for claim in CLAIMS]
-    return Trial(THEORIES[number].what, _changed(right, _outcomes(verdicts)))
+        for claim in CLAIMS if whole else quickest_first:
+            noticed += _changed(right, _outcomes([_patiently(claim, records)]))
+            if noticed and not whole:
+                break
+    return Trial(THEORIES[number].what, noticed)
 
 
 def _patiently(claim: Claim, records: Records) -> Verdict:
@@ -163,7 +175,7 @@ def _too_long(number: int, frame: FrameType | None) -> None:
 def _engine(directory: Path, number: int) -> Trial:
     engines.register()
     wrong = WRONG_ENGINES[number]
-    _, right = _stored(directory)
+    _, right, _ = _stored(directory)
     apart = directory / "wrong-engines" / f"{number}"
     claims = [claim.id for claim in CLAIMS if claim.protocols and claim.protocols <= PROVING]
     verdicts = validation.validate(apart, level=lab.Level.QUICK, claims=claims, engine=wrong, workers=0, report=False)
