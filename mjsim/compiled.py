@@ -65,7 +65,7 @@ def drive(
         qpos[3, k], qpos[4:7, k] = 1.0, 0.0
         forces, (floor[0, k], floor[1, k], wall[0, k], wall[1, k]) = _corrections(
             Velocity(*to_fixed_tuple(qvel[:, k], _VELOCITY)), Velocity(*to_fixed_tuple(last[:, k], _VELOCITY)),
-            Velocity(*to_fixed_tuple(before[:, k], _VELOCITY)), ball.R - qpos[1, k], omega_0[k],
+            ball.R - qpos[1, k], omega_0[k],
             to_fixed_tuple(contact[:, k], 6), to_fixed_tuple(normals[:, k], 2), ball,
         )  # fmt: skip
         applied[0, k], applied[1, k], applied[2, k], applied[3, k], applied[4, k], applied[5, k] = forces

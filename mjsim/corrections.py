@@ -105,10 +105,10 @@ def resistance(w_z: Quantity, w_h: Quantity, w_y: Quantity, ball: Ball) -> Quant
 
 
 def corrections(
-    v: Velocity, last: Velocity, before: Velocity, rho: Quantity, omega_0: Quantity,
+    v: Velocity, last: Velocity, rho: Quantity, omega_0: Quantity,
     contact: Sequence[Quantity], normals: Sequence[Quantity], ball: Ball,
 ) -> tuple[tuple[Quantity, ...], tuple[Quantity, ...]]:  # fmt: skip
-    """What drives a step that begins with the velocities v, a step after `last`, which changed by `before` till then.
+    """What drives a step that begins with the velocities v, a step after `last`.
 
     Positions are half a step ahead, so that rho is already that at mid step.
 
@@ -134,11 +134,11 @@ def corrections(
 
     # Inertial forces at mid step. In the co-rotating frame they are 2 m omega_c v_h along the orbit and
     # -m rho omega_c^2 inwards, and I omega_c (-o_z, 0, o_x) on the spin. The engine has them with the velocities of the
-    # beginning of the step; what they grow by till its middle is added: the parabola through the last three velocities.
-    omega_c = v.omega_c + ahead * (1.75 * change.omega_c - 0.75 * before.omega_c)
-    v_h = v.v_h + ahead * (1.75 * change.v_h - 0.75 * before.v_h)
-    o_x = v.o_x + ahead * (1.75 * change.o_x - 0.75 * before.o_x)
-    o_z = v.o_z + ahead * (1.75 * change.o_z - 0.75 * before.o_z)
+    # beginning of the step; what they grow by till its middle is added: as much again as in the last step lies `ahead`.
+    omega_c = v.omega_c + ahead * change.omega_c
+    v_h = v.v_h + ahead * change.v_h
+    o_x = v.o_x + ahead * change.o_x
+    o_z = v.o_z + ahead * change.o_z
     inertial_z = 2 * ball.mass * (omega_c * v_h - v.omega_c * v.v_h)
     inertial_h = -ball.mass * rho * (omega_c * omega_c - v.omega_c * v.omega_c)
     moment_x = -ball.inertia * (omega_c * o_z - v.omega_c * v.o_z)

@@ -338,7 +338,7 @@ def test_interrupted_by_the_keyboard(tmp_path: Path) -> None:
         "compare",
         "sweep",
         "--vary",
-        "omega_0=5:10:2000",
+        "omega_0=5:10:400",
         "--batch",
         "2",
         "--workers",

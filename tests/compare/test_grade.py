@@ -84,7 +84,7 @@ def test_card_as_table_and_page(columns: list[Column]) -> None:
 def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, columns, capsys) -> None:
     asked = []
 
-    def measured(yours: Native, progress: object) -> list[Column]:
+    def measured(yours: Native, engine: object, progress: object) -> list[Column]:
         asked.append(yours)
         return columns
 
