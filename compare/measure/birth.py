@@ -19,7 +19,7 @@ from compare.statistics import Measured, straight_line
 from model import Case, Parameters
 
 PROTOCOL = "birth"
-STRONG = (3.0, 6.0)
+STRONG = (2.0, 4.0)
 """The first two drags, c sqrt(R/g): the fluid takes a ball along within a fraction of the time of its fall."""
 BEYOND = (1.6, 2.6)
 """The others, over the one to which the first two point: near to it, but so far off that states still settle soon."""

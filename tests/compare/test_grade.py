@@ -100,7 +100,7 @@ def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, columns, capsy
     assert asked[0].timestep == ours.timestep
     assert asked[0].cone == "pyramidal"
     assert asked[0].A.solimp == (0.5, 0.6, 1e-4, 0.5, 2.0)
-    assert asked[0].B.solref == ours.solref
+    assert asked[0].B.solref == ours.spring
 
 
 def test_settings_come_through_to_the_engine() -> None:
@@ -131,7 +131,7 @@ def test_a_scene_of_our_own_is_read_back(tmp_path: Path) -> None:
     of_scene = native.read(path)
     assert (of_scene.timestep, of_scene.cone, of_scene.impratio) == (5e-4, "elliptic", settings.impratio)
     for touch in (of_scene.A, of_scene.B):
-        assert touch.solref == settings.solref
+        assert touch.solref == settings.spring
         assert touch.solreffriction[0] == settings.solreffriction
         theory = of_scene.theory(touch, 9.81)
         for name in ("b_f", "k", "softness"):
