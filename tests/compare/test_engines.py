@@ -29,6 +29,12 @@ from model.drag import LAWS
 from model.kinematics import Motion as World
 from model.kinematics import from_world, to_world
 
+# Drake loads IPython, which leaves files open.
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
 REFERENCE = Parameters.named("reference")
 
 
