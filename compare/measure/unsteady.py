@@ -7,6 +7,7 @@ half as much as at first. Every number is measured with two time steps.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -116,7 +117,9 @@ def _jumped(lab: Lab, trial: Trial) -> Iterator[Measurement | Missing]:
     case, known = ("RR", ("jump_delay",)) if not trial.x0[3:6].any() else ("SS", ("jump_peak", "jump_height"))
     for name in known:
         coarse, fine = (answer[name] for answer in answers)
-        value = Measured(fine, abs(fine - coarse))
+        # Forces act in the middle of a step: a moment is known to half of the finer one.
+        late = 0.0 if name == "jump_height" else coarse_step(trial.p) / 4 / math.sqrt(12)
+        value = Measured(fine, math.hypot(fine - coarse, late))
         if np.isfinite(fine) and sure_enough(name, value, abs(fine)):
             yield measurement(lab, PROTOCOL, trial.set, trial.p, name, value, trial.tasks[-1], case=case)
         else:
