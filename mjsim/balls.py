@@ -59,7 +59,7 @@ class Balls:
         self._normal = np.array([Ball.of(p, settings) for p in parameters]).T
         self.table, self._still = self._normal.copy(), self._normal.copy()
         """`Ball` of each run, shape (fields, runs)."""
-        self.friction = np.array([(p.mu, p.eta) for p in parameters]).T
+        self.eta = np.array([p.eta for p in parameters])
         self.g = np.array([p.g for p in parameters])
         self.reach = np.array([settings.touching(p.g) for p in parameters])
         """Gaps within which a contact touches at the start, shape (runs,), m."""
@@ -82,14 +82,12 @@ class Balls:
         self._upright = lean(np.outer([1.0, 0, 0, 0], np.ones(self.qpos.shape[1])))
         self.last: Array = np.empty(self.qvel.shape)
         """The velocities a step ago."""
-        self.before: Array = np.zeros(self.qvel.shape)
-        """How much they changed in the step before that."""
-        self._lean_last, self._lean_before = lean(self.last), lean(self.before)
+        self._lean_last = lean(self.last)
         self._outputs = array(_OUTPUTS[0]), self.sensors[NORMALS]
         self._latest = self._contact = tuple(lean(output) for output in self._outputs)
-        self._written = self.last, self.before, self.qpos, self.margins, *self._driven
+        self._written = self.last, self.qpos, self.margins, *self._driven
         carried = ("qpos", "qvel", "qacc_warmstart", "pair_margin", "geom_surfacevel")
-        self._carried = {name: array(name) for name in carried} | {"last": self.last, "before": self.before}
+        self._carried = {name: array(name) for name in carried} | {"last": self.last}
 
     @property
     def solref(self) -> Array:
@@ -132,7 +130,7 @@ class Balls:
         elif not self._drive(fluid, self._ball, watched=False):
             return False
         else:
-            self._remember(slice(None))
+            self.last[:] = self.qvel
         self._contact = self._latest
         self.engine.step_all()
         return True
@@ -172,14 +170,9 @@ class Balls:
 
     def step(self, runs: Runs) -> None:
         """Let the given runs take a step."""
-        self._remember(runs)
+        self.last[:, runs] = self.qvel[:, runs]
         self.engine.step(runs)
         self._note(runs)
-
-    def _remember(self, runs: Runs | slice) -> None:
-        """Keep the velocities of some runs for the next step."""
-        self.before[:, runs] = self.qvel[:, runs] - self.last[:, runs]
-        self.last[:, runs] = self.qvel[:, runs]
 
     def forward(self, runs: Runs, fluid: Array, less: Array | float = 0.0) -> None:
         """Forces and accelerations of the present state of the given runs, at a fixed time.
@@ -207,7 +200,6 @@ class Balls:
         before, after = self.steps[runs], ticks * (self.settings.timestep / TICKS)
         ratio = after / before
         change = self.qvel[:, runs] - self.last[:, runs]
-        growth = change - self.before[:, runs]
         acceleration = change / before
         way = (after - before) * ahead
         self.qpos[:3, runs] += way * (self.qvel[:, runs] + acceleration * (after + before) * ahead / 2)[:3]
@@ -217,7 +209,6 @@ class Balls:
         self.speeds[:, runs] *= np.where(closed, shorter, 1.0)
         self.margins[:, runs] = np.maximum(softness + closed * self.gaps[:, runs], 0.0)
         self.last[:, runs] = self.qvel[:, runs] - change * ratio
-        self.before[:, runs] = change * ratio - growth * ratio**2
         self.ticks[runs] = ticks
         self._set_steps()
 

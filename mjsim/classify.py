@@ -111,9 +111,10 @@ class Classifier:
 
 
 def _lasting(contacts: npt.NDArray[np.intp], state: int, last: bool) -> npt.NDArray[np.intp]:
-    """Letters where those that don't last are replaced by what was before, or by what comes first in an unknown state.
+    """What a contact is in each sample: what doesn't last is replaced by what was before.
 
-    All of them if they are the `last`, else up to where more contacts may change the answer.
+    In an unknown state, by what comes first. All samples if they are the `last`, else up to where more may change the
+    answer.
     """
     if len(contacts) == 0:
         return contacts

@@ -42,7 +42,7 @@ _GIVEN = types.Array(types.float64, 2, "A", readonly=True)
 @_kept
 def drive(
     watched: bool, whole: bool, omega_0: Array, balls: Array, qvel: Array, contact: Array, normals: Array,
-    last: Array, before: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
+    last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
 ) -> bool:  # fmt: skip
     """As `mjsim.balls.Balls._drive`, for arrays (n, runs)."""
     runs = qpos.shape[1]
@@ -71,9 +71,9 @@ def drive(
         applied[0, k], applied[1, k], applied[2, k], applied[3, k], applied[4, k], applied[5, k] = forces
         if whole:
             for i in range(_VELOCITY):
-                before[i, k], last[i, k] = qvel[i, k] - last[i, k], qvel[i, k]
+                last[i, k] = qvel[i, k]
     return True
 
 
-drive.compile((types.boolean, types.boolean, types.float64[::1], *[_GIVEN] * 4, *[_ROWS] * 8))
+drive.compile((types.boolean, types.boolean, types.float64[::1], *[_GIVEN] * 4, *[_ROWS] * 7))
 drive.disable_compile()

@@ -69,13 +69,13 @@ def restart(balls: Balls, runs: Runs, moment: Array, closed: Mask, fluid: Array)
     _settle(balls, runs, closed & (np.abs(balls.speeds) <= balls.falls)[:, runs], fluid)
     after = balls.acceleration[:, runs]
     v = balls.qvel[:, runs] - moment * after
-    balls.qvel[:, runs], balls.last[:, runs], balls.before[:, runs] = v, v - h * after, h * after
+    balls.qvel[:, runs], balls.last[:, runs] = v, v - h * after
     balls.qpos[:3, runs] = place + (lead - moment) * (v + after * (moment + lead) / 2)[:3]
 
 
 def _settle(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
     """Search for the margins, friction forces and accelerations that belong to the present state, at a fixed time."""
-    balls.last[:, runs], balls.before[:, runs] = balls.qvel[:, runs], 0.0
+    balls.last[:, runs] = balls.qvel[:, runs]
     if balls.settings.servo:
         balls.margins[:, runs] *= touches
     for _ in range(_ROUNDS):
@@ -84,8 +84,7 @@ def _settle(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
         after = balls.acceleration[:, runs]
         missing = after[GAPS] if balls.settings.servo else 0 * after[GAPS]
         goes_on = _adjust(balls, runs, touches, missing, before)
-        balls.before[:, runs] = balls.steps[runs] * after
-        balls.last[:, runs] = balls.qvel[:, runs] - balls.before[:, runs]
+        balls.last[:, runs] = balls.qvel[:, runs] - balls.steps[runs] * after
         runs, touches = runs[goes_on], touches[:, goes_on]
         if len(runs) == 0:
             return
@@ -100,7 +99,7 @@ def _stop(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
     stopping, solref = runs, balls.solref[:, runs]
     balls.damp(runs, np.abs(balls.speeds[:, runs]).max(axis=0) / balls.steps[runs])
     balls.solref[1::2, runs] *= _UNDAMPED
-    balls.last[:, runs], balls.before[:, runs] = balls.qvel[:, runs], 0.0
+    balls.last[:, runs] = balls.qvel[:, runs]
     balls.margins[:, runs] = _TOUCH * touches
     balls.forward(runs, fluid)
     others, h = np.zeros(balls.qvel.shape), balls.steps

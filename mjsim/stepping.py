@@ -143,7 +143,7 @@ class Polar(Stepper):
         ticks, g, radius = balls.ticks[runs], balls.g[runs], self._R[runs]
         change = np.abs(self._rates(runs) - before).max(axis=0) / taken
         pace = np.maximum(np.abs(balls.qvel[0, runs]), np.sqrt(g / radius))
-        usual = balls.settings.timestep * pace * (g + balls.friction[1, runs] * radius * pace**2)
+        usual = balls.settings.timestep * pace * (g + balls.eta[runs] * radius * pace**2)
         allowed = _CHANGE * usual
         balls.damp(runs)
         grows, shrinks = (change < allowed / 4) & (left % (2 * ticks) == 0), (change > allowed) & (ticks > 1)
