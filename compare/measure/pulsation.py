@@ -132,15 +132,16 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 def _rhythms(lab: Lab, rhythms: Sequence[Rhythm]) -> list[Rhythm]:
     """Runs in a small pulsation, each from where the one before points to."""
-    found = list(rhythms)
+    followed = list(rhythms)
     for n in range(ROUNDS):
         refine = 4 if n == ROUNDS - 1 else 2
-        tasks = [_small(lab, each, refine) for each in found]
+        tasks = [_small(lab, each, refine) for each in followed]
         for k, (task, run) in enumerate(zip(tasks, lab.run(tasks), strict=True)):
-            ratio = _ratio(run, found[k].frequency, SMALL * found[k].p.omega_0)
-            moved = abs(ratio - found[k].ratio)
-            found[k] = replace(found[k], ratio=ratio, uncertainty=moved, tasks=(*found[k].tasks[-1:], task))
-    return found
+            ratio = _ratio(run, followed[k].frequency, SMALL * followed[k].p.omega_0)
+            moved = abs(ratio - followed[k].ratio)
+            tasks_of = (*followed[k].tasks[-1:], task)
+            followed[k] = replace(followed[k], ratio=ratio, uncertainty=moved, tasks=tasks_of)
+    return followed
 
 
 def _small(lab: Lab, rhythm: Rhythm, refine: int) -> Task:

@@ -18,7 +18,7 @@ from compare.measure.questions import lasting, rolling
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.measure.settling import Settled, Start, settle
 from compare.runs.tasks import Task
-from compare.statistics import Measured
+from compare.statistics import Measured, peaks, top
 from model import Case, Flow, Parameters, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -117,7 +117,7 @@ def _jumped(lab: Lab, trial: Trial) -> Iterator[Measurement | Missing]:
     case, known = ("RR", ("jump_delay",)) if not trial.x0[3:6].any() else ("SS", ("jump_peak", "jump_height"))
     for name in known:
         coarse, fine = (answer[name] for answer in answers)
-        # Forces act in the middle of a step: a moment is known to half of the finer one.
+        # Forces act in the middle of a step: a moment is known to half of the finer one, either way.
         late = 0.0 if name == "jump_height" else coarse_step(trial.p) / 4 / math.sqrt(12)
         value = Measured(fine, math.hypot(fine - coarse, late))
         if np.isfinite(fine) and sure_enough(name, value, abs(fine)):
@@ -130,12 +130,12 @@ def _answer(up: Trajectory, down: Trajectory) -> dict[str, float]:
     """What the part of omega_c shows that has the sign of the jump: 0 at first, 1 in the end."""
     t, odd = up.time, up.omega_c - down.omega_c
     y = odd / odd[-1]
-    k = int(y.argmax())
+    k, late = peaks(y)
     peak = {"jump_peak": np.nan, "jump_height": np.nan}
-    if 0 < k < len(t) // 2:
-        fit = np.polynomial.Polynomial.fit(t[k - 1 : k + 2], y[k - 1 : k + 2], 2)
-        top = float(fit.deriv().roots()[0])
-        peak = {"jump_peak": top, "jump_height": float(fit(top))}
+    if 0 < (first := int(y.argmax())) < len(t) // 2:
+        k, late = k[k == first], late[k == first]
+        at, height = t[k] + late * (t[1] - t[0]), top(y, k, late)
+        peak = {"jump_peak": float(at[0]), "jump_height": float(height[0])}
     return peak | {"jump_delay": float(np.trapezoid(1 - y, t))}
 
 
