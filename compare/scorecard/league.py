@@ -8,7 +8,6 @@ event-driven simulation, thresholds and cases against closed-form theory.
 from __future__ import annotations
 
 import functools
-import json
 import math
 import statistics
 import time
@@ -20,13 +19,12 @@ import analytic
 from compare.runs import engines
 from compare.runs.campaign import Campaign
 from compare.runs.engines import Engine, Settings
-from compare.runs.tasks import Task, carry_out, failed_path
-from compare.scorecard import grade, trials
+from compare.runs.tasks import Task, carry_out
+from compare.scorecard import grade, kept, trials
 from compare.scorecard.accuracy import LASTS, MOTIONS
 from compare.scorecard.trials import AT_REST, KICKED, PASSES, ROLLING, ROUGH, SLIPPING, SMOOTH, STATES, State
 from compare.statistics import plain
-from model import Case, Trajectory, storage
-from model.files import write_text
+from model import Case, Trajectory
 from model.trajectory import version
 
 STEPS = (4e-3, 2e-3, 1e-3)
@@ -138,9 +136,10 @@ def measure(
             row = tasks[each.name, step, discipline.name]
             reasons = [failed[task.key] for task in row if task.key in failed]
             entry.failures.update({discipline.name: reasons[0]} if reasons else {})
-            score = math.nan if reasons else discipline.score([_kept(campaign, task) for task in row])
+            score = math.nan if reasons else discipline.score([kept.run(campaign, task) for task in row])
             entry.scores[discipline.name] = score
-        entry.scores[COST] = _cost(campaign, each.task(step, SLIPPING, KICKED, PASSES, PASSES / 100))
+        passing = each.task(step, SLIPPING, KICKED, PASSES, PASSES / 100)
+        entry.scores[COST] = kept.cost(campaign, passing, functools.partial(_cost, passing))
         entries.append(entry)
     return entries
 
@@ -166,19 +165,10 @@ def from_mapping(data: dict[str, Any]) -> list[Entry]:
     ]
 
 
-def _kept(campaign: Campaign, task: Task) -> Trajectory:
-    path = campaign.path(task)
-    return storage.load(path if path.exists() else failed_path(path))
-
-
-def _cost(campaign: Campaign, task: Task) -> float:
-    """Processor time over simulated time of one run by itself, without what it takes to begin; kept beside the run."""
-    path = campaign.path(task).with_suffix(".cost.json")
-    if not path.exists():
-        half = replace(task, t_end=task.t_end / 2)
-        spent = statistics.median(_seconds(task) - _seconds(half) for _ in range(REPEATS)) / half.t_end
-        write_text(path, json.dumps(spent))
-    return float(json.loads(path.read_text("utf-8")))
+def _cost(task: Task) -> float:
+    """Processor time over simulated time of one run by itself, without what it takes to begin."""
+    half = replace(task, t_end=task.t_end / 2)
+    return statistics.median(_seconds(task) - _seconds(half) for _ in range(REPEATS)) / half.t_end
 
 
 def _seconds(task: Task) -> float:

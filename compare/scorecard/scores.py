@@ -23,13 +23,13 @@ import numpy as np
 import analytic
 from compare.runs.campaign import BATCH, Campaign
 from compare.runs.engines import MOREAU, NEWCOMER
-from compare.runs.tasks import Task, carry_out, failed_path
+from compare.runs.tasks import Task, carry_out
+from compare.scorecard import kept, trials
 from compare.scorecard import settings as ways
-from compare.scorecard import trials
 from compare.scorecard.trials import AT_REST, KICKED, PASSES, SLIPPING, STATES
 from compare.statistics import plain
 from mjsim import ContactSettings, Run
-from model import StorageError, Trajectory, storage
+from model import StorageError, Trajectory
 from model.files import write_text
 
 Settings = ContactSettings | analytic.Settings
@@ -123,9 +123,9 @@ def _scores(campaign: Campaign, method: Settings, exact: Trajectory) -> list[Sco
     *settling, passing = tasks(method)
     row = []
     for state, task in zip(STATES, settling, strict=True):
-        held = trials.held(_kept(campaign, task), state, (1 - WINDOW) * task.t_end)
+        held = trials.held(kept.run(campaign, task), state, (1 - WINDOW) * task.t_end)
         row.append(Score(*_identity(method), state.name, abs(held.omega_c), held.open))
-    run = _kept(campaign, passing)
+    run = kept.run(campaign, passing)
     if not run.complete:
         return [*row, Score(*_identity(method), trials.TRANSIENT, math.nan, math.nan)]
     error, _ = trials.deviation(run.time, run.x, exact)
@@ -134,19 +134,10 @@ def _scores(campaign: Campaign, method: Settings, exact: Trajectory) -> list[Sco
     return [*row, Score(*_identity(method), trials.TRANSIENT, error, 1 - float(carries.mean(axis=1).min()))]
 
 
-def _kept(campaign: Campaign, task: Task) -> Trajectory:
-    """The run of a task, or what there is of one that broke down."""
-    path = campaign.path(task)
-    return storage.load(path if path.exists() else failed_path(path))
-
-
 def cost(campaign: Campaign, method: Settings) -> float:
     """Processor time over simulated time of the transient: measured once, and kept beside its run."""
     *_, task = tasks(method)
-    path = campaign.path(task).with_suffix(".cost.json")
-    if not path.exists():
-        write_text(path, json.dumps(statistics.median(_time_spent(task) for _ in range(REPEATS)) / task.t_end))
-    return float(json.loads(path.read_text("utf-8")))
+    return kept.cost(campaign, task, lambda: statistics.median(_time_spent(task) for _ in range(REPEATS)) / task.t_end)
 
 
 def _time_spent(task: Task) -> float:
