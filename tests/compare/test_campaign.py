@@ -348,7 +348,14 @@ def test_interrupted_by_the_keyboard(tmp_path: Path) -> None:
         "-o",
         str(tmp_path),
     ]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # a shell starts what it runs in the background with SIGINT ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     while len(list(tmp_path.glob("*.h5"))) < 2:
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)
