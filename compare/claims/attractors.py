@@ -10,11 +10,10 @@ import analytic
 from analytic import orbits
 from analytic.orbits import NoOrbitError, Orbit
 from compare.claims.claim import Bearing, Claim
-from compare.claims.equations import state
 from compare.claims.judge import remembered
 from compare.measure.calm import hops
 from compare.measure.lab import Level
-from compare.measure.record import Measurement
+from compare.measure.record import Measurement, state
 from model import Parameters, Trajectory
 from model.kinematics import VARIABLES
 

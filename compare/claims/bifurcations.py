@@ -11,7 +11,7 @@ from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered
 from compare.measure.record import Measurement
 from compare.measure.settling import rotation_scale
-from model import Case, InputError, Parameters
+from model import Case, Parameters
 from model.kinematics import VARIABLES
 
 SECTION = "Bifurcations"
@@ -31,9 +31,9 @@ def _at(quantity: str, protocol: str = THRESHOLDS, side: str | None = None, of: 
         return side in (None, m.conditions["side"]) and (by.startswith(of) if of else not by.startswith(SLIPPING))
 
     return Bearing(
-        protocol=protocol,
-        quantity=quantity,
-        predict=lambda m: float(getattr(_thresholds(m.parameters), quantity)),
+        protocol,
+        quantity,
+        lambda m: float(getattr(_thresholds(m.parameters), quantity)),
         when=when,
         by=f"analytic.thresholds: {quantity}",
     )
@@ -45,11 +45,7 @@ SLIPPING = "floor force of settled slipping"
 
 @remembered
 def _unstable(p: Parameters) -> StationarySolution:
-    """The unstable state of SS; LookupError if theory has none."""
-    try:
-        return analytic.solution(p, Case.SS, stable=False)
-    except InputError as error:
-        raise LookupError(str(error)) from error
+    return analytic.solution(p, Case.SS, stable=False)
 
 
 def _edge(name: str) -> Bearing:
@@ -61,9 +57,9 @@ def _edge(name: str) -> Bearing:
 
     predict: Callable[[Measurement], float] = spin if name == "wall_spin" else variable
     return Bearing(
-        protocol=EDGE,
-        quantity=f"edge_{name}",
-        predict=predict,
+        EDGE,
+        f"edge_{name}",
+        predict,
         scale=rotation_scale if name == "omega_c" else lambda p: rotation_scale(p) * p.R / p.r,
         by="analytic.solution: SS beyond the fold, (37)-(41)",
     )
@@ -79,20 +75,6 @@ def _folds(m: Measurement) -> float:
 
 def _has_fold(m: Measurement) -> float:
     return float(math.isfinite(_thresholds(m.parameters).omega_04))
-
-
-def _number_of_folds(m: Measurement) -> float:
-    try:
-        return float(bifurcation.number_of_folds(m.parameters))
-    except InputError as error:
-        raise LookupError(str(error)) from error
-
-
-def _critical_drag(m: Measurement) -> float:
-    try:
-        return bifurcation.critical_drag(m.parameters)
-    except InputError as error:
-        raise LookupError(str(error)) from error
 
 
 def _claim(bifurcation: str, statement: str, *bearings: Bearing) -> Claim:
@@ -131,7 +113,7 @@ CLAIMS = (
         "F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
         _at("omega_04"),
-        Bearing(protocol=THRESHOLDS, quantity="folds", predict=_has_fold, by="analytic.thresholds: omega_04"),
+        Bearing(THRESHOLDS, "folds", _has_fold, by="analytic.thresholds: omega_04"),
     ),
     Claim(
         id="sub-branches",
@@ -149,11 +131,11 @@ CLAIMS = (
             "the wall at ω₀₂, without a jump."
         ),
         bearings=(
-            Bearing(protocol=THRESHOLDS, quantity="folds", predict=_folds, by="analytic.thresholds: eta_cr"),
+            Bearing(THRESHOLDS, "folds", _folds, by="analytic.thresholds: eta_cr"),
             Bearing(
-                protocol="birth",
-                quantity="critical_drag",
-                predict=_critical_drag,
+                "birth",
+                "critical_drag",
+                lambda m: bifurcation.critical_drag(m.parameters),
                 by="analytic.bifurcation.critical_drag",
             ),
             _at("omega_02", of=SLIPPING),
@@ -166,9 +148,9 @@ CLAIMS = (
         statement="There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
         bearings=(
             Bearing(
-                protocol=THRESHOLDS,
-                quantity="folds",
-                predict=_number_of_folds,
+                THRESHOLDS,
+                "folds",
+                lambda m: float(bifurcation.number_of_folds(m.parameters)),
                 by="analytic.bifurcation.number_of_folds",
             ),
         ),

@@ -9,19 +9,15 @@ import numpy as np
 
 import analytic
 from compare.claims.claim import Bearing, Claim
-from compare.claims.equations import state
 from compare.claims.judge import remembered
 from compare.measure.impacts import NAMES
-from compare.measure.record import Measurement
-from model import Parameters, SimulationError, Trajectory
+from compare.measure.record import Measurement, state
+from model import Parameters, Trajectory
 
 
 @remembered
 def _after(x: tuple[float, ...], p: Parameters, time: float) -> Trajectory:
-    try:
-        return analytic.simulate(p, np.array(x), time, sample_interval=time)
-    except SimulationError as error:
-        raise LookupError(str(error)) from error
+    return analytic.simulate(p, np.array(x), time, sample_interval=time)
 
 
 def _simulated(m: Measurement) -> Trajectory:
@@ -38,9 +34,9 @@ _SPEEDS: dict[str, Callable[[Parameters], float]] = {
 
 def _impact(name: str) -> Bearing:
     return Bearing(
-        protocol="impacts",
-        quantity=f"after_{name}",
-        predict=lambda m: float(getattr(_simulated(m), name)[-1]),
+        "impacts",
+        f"after_{name}",
+        lambda m: float(getattr(_simulated(m), name)[-1]),
         scale=_SPEEDS[name],
         by="analytic.simulate",
     )
@@ -55,14 +51,7 @@ CLAIMS = (
             "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
             "equations of motion say."
         ),
-        bearings=(
-            Bearing(
-                protocol="motions",
-                quantity="case",
-                predict=lambda m: float(_simulated(m).case[-1]),
-                by="analytic.simulate",
-            ),
-        ),
+        bearings=(Bearing("motions", "case", lambda m: float(_simulated(m).case[-1]), by="analytic.simulate"),),
     ),
     Claim(
         id="impacts",

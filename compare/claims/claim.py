@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from enum import StrEnum
 
 from compare.measure.lab import Level
@@ -53,16 +53,15 @@ Prediction = float | Measured
 """A predicted value, with its own uncertainty where it comes from an integrator."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Bearing:
-    """Measurements that bear on a claim, and what theory says they should be.
-
-    `predict` raises LookupError where theory knows no such state: that is a deviation, not a breakdown.
-    """
+    """Measurements that bear on a claim, and what theory says they should be."""
 
     protocol: str
     quantity: str
     predict: Callable[[Measurement], Prediction]
+    """Raises one of `judge.UNKNOWN` where theory knows no such state."""
+    _: KW_ONLY
     when: Callable[[Measurement], bool] = lambda m: True
     scale: Callable[[Parameters], float] | None = None
     """Natural size of the quantity, over which errors are counted; None for the predicted value itself."""

@@ -9,7 +9,7 @@ import numpy as np
 import analytic
 from compare.claims.claim import Bearing, Claim, Text
 from compare.claims.judge import remembered
-from compare.measure.record import Measurement
+from compare.measure.record import state
 from model import Case, Parameters
 from model.arrays import Array
 from model.cases import TRAITS
@@ -39,11 +39,6 @@ _RATES: dict[str, Callable[[Parameters], float]] = {
 """The natural size of each rate."""
 
 
-def state(m: Measurement) -> tuple[float, ...]:
-    """The full state that belongs to a measurement."""
-    return tuple(float(m.conditions[name]) for name in VARIABLES)
-
-
 @remembered
 def _rates(case: Case, x: tuple[float, ...], p: Parameters) -> Array:
     return analytic.vector_field(case, x, p)
@@ -60,9 +55,9 @@ def _forces(case: Case, x: tuple[float, ...], p: Parameters) -> dict[str, float]
 def _rate(case: Case, name: str) -> Bearing:
     k = VARIABLES.index(name)
     return Bearing(
-        protocol="field",
-        quantity=f"rate_{name}",
-        predict=lambda m: float(_rates(case, state(m), m.parameters)[k]),
+        "field",
+        f"rate_{name}",
+        lambda m: float(_rates(case, state(m), m.parameters)[k]),
         when=lambda m: m.conditions["case"] == case.name,
         scale=_RATES[name],
         by="analytic.vector_field",
@@ -71,9 +66,9 @@ def _rate(case: Case, name: str) -> Bearing:
 
 def _force(case: Case, name: str) -> Bearing:
     return Bearing(
-        protocol="field",
-        quantity=f"moving_force_{name}",
-        predict=lambda m: _forces(case, state(m), m.parameters)[name],
+        "field",
+        f"moving_force_{name}",
+        lambda m: _forces(case, state(m), m.parameters)[name],
         when=lambda m: m.conditions["case"] == case.name,
         scale=lambda p: p.m * p.g,
         by="analytic.contact_forces",

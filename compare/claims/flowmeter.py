@@ -10,7 +10,7 @@ from compare.claims.judge import remembered
 from compare.claims.stationary import cases, detected, lasting
 from compare.measure.record import Measurement
 from compare.measure.settling import scale
-from model import Case, InputError, Parameters
+from model import Case, Parameters
 
 SECTION = "Flowmeter"
 
@@ -21,11 +21,8 @@ def _slope(p: Parameters, case: Case) -> float:
 
 
 def slope(m: Measurement) -> float:
-    """Slope of the characteristic curve in the case that was detected; LookupError if theory has no such state."""
-    try:
-        return _slope(m.parameters, detected(m))
-    except InputError as error:
-        raise LookupError(str(error)) from error
+    """Slope of the characteristic curve in the case that was detected."""
+    return _slope(m.parameters, detected(m))
 
 
 def _slopes(by: str, predict: Callable[[Measurement], float], function: str, *cases: Case) -> Bearing:
@@ -34,18 +31,12 @@ def _slopes(by: str, predict: Callable[[Measurement], float], function: str, *ca
     def when(m: Measurement) -> bool:
         return m.conditions["by"] == by and detected(m) in cases
 
-    return Bearing(
-        protocol="slope", quantity="slope", predict=predict, when=when, scale=lambda p: 1.0, by=f"analytic.{function}"
-    )
+    return Bearing("slope", "slope", predict, when=when, scale=lambda p: 1.0, by=f"analytic.{function}")
 
 
 def _settled(quantity: str, predict: Callable[[Measurement], float], when: Callable[[Measurement], bool]) -> Bearing:
     return Bearing(
-        protocol="settled",
-        quantity=quantity,
-        predict=predict,
-        when=when,
-        scale=None if quantity == "case" else lambda p: scale(quantity, p),
+        "settled", quantity, predict, when=when, scale=None if quantity == "case" else lambda p: scale(quantity, p)
     )
 
 
@@ -163,9 +154,9 @@ CLAIMS = (
         bearings=(
             _settled("case", _unloads, _on_wall),
             Bearing(
-                protocol="thresholds",
-                quantity="omega_02",
-                predict=lambda m: analytic.unloading_limit(m.parameters),
+                "thresholds",
+                "omega_02",
+                lambda m: analytic.unloading_limit(m.parameters),
                 when=lambda m: m.conditions["side"] == "from above",
                 by="analytic.unloading_limit",
             ),
@@ -177,14 +168,8 @@ CLAIMS = (
         source="Fig. 13, left",
         statement="For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
         bearings=(
-            Bearing(protocol="hysteresis", quantity="case", predict=followed, by="analytic.stable_solutions"),
-            Bearing(
-                protocol="hysteresis",
-                quantity="omega_c",
-                predict=_reading,
-                scale=lambda p: scale("omega_c", p),
-                by="(32), (38), (46)",
-            ),
+            Bearing("hysteresis", "case", followed, by="analytic.stable_solutions"),
+            Bearing("hysteresis", "omega_c", _reading, scale=lambda p: scale("omega_c", p), by="(32), (38), (46)"),
         ),
         text=Text.CORRECTED,
         reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that is above ω₀₄.",

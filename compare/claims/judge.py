@@ -7,15 +7,18 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
+from analytic.orbits import NoOrbitError
 from compare.claims.claim import Bearing, Check, Claim, Outcome, Verdict
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Records
 from compare.statistics import COVERAGE, Measured
-from model import InputError
+from model import InputError, SimulationError
 from model.errors import suggestion
 
 F = TypeVar("F", bound=Callable[..., Any])
 _remembered: list[Any] = []
+UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
+"""What a prediction raises where theory knows no such state or motion: that is a deviation, not a breakdown."""
 
 
 def remembered(function: F) -> F:
@@ -72,7 +75,7 @@ def check(bearing: Bearing, m: Measurement) -> Check:
     """One measurement beside its prediction; what must be equal to the last digit has no scale but 1."""
     try:
         prediction = bearing.predict(m)
-    except LookupError:
+    except UNKNOWN:
         prediction = math.nan
     own = prediction if isinstance(prediction, Measured) else Measured(float(prediction), 0.0)
     exact = quantity(m.quantity).resolves == 0

@@ -33,20 +33,15 @@ CLAIMS = (
             "the normal force, has that size where the contact slips, and opposes the slip."
         ),
         bearings=(
-            Bearing(protocol=PROTOCOL, quantity="law", predict=_none, scale=lambda p: 1.0, by="(12), (13)"),
-            Bearing(
-                protocol=PROTOCOL, quantity="law_in_motion", predict=_none, scale=lambda p: 1.0,
-                by="Table 3, (14)-(17)",
-            ),
-            Bearing(protocol=PROTOCOL, quantity="friction_ratio", predict=coulomb, by="(14), (15)"),
+            Bearing(PROTOCOL, "law", _none, scale=lambda p: 1.0, by="(12), (13)"),
+            Bearing(PROTOCOL, "law_in_motion", _none, scale=lambda p: 1.0, by="Table 3, (14)-(17)"),
+            Bearing(PROTOCOL, "friction_ratio", coulomb, by="(14), (15)"),
         ),
     ),
     Claim(
         id="eq-10", section=SECTION, source="(9), (10)",
         statement="A ball sinks freely at the speed at which Stokes' drag balances its weight less buoyancy.",
-        bearings=(
-            Bearing(protocol=PROTOCOL, quantity="v_y", predict=sinking, by="analytic.stokes.sinking_speed"),
-        ),
+        bearings=(Bearing(PROTOCOL, "v_y", sinking, by="analytic.stokes.sinking_speed"),),
         text=Text.CORRECTED, reason="Table 1 gives the unit of m·c as kg m/s; it is kg/s.",
     ),
 )  # fmt: skip

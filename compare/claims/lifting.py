@@ -8,8 +8,7 @@ import numpy as np
 
 from analytic import slip_stability
 from compare.claims.claim import Bearing, Claim
-from compare.claims.equations import state
-from compare.measure.record import Measurement
+from compare.measure.record import Measurement, state
 from model import Case
 
 
@@ -31,16 +30,16 @@ def _lifting(inner: Case, outer: Case) -> Claim:
         f"{', whatever its orbit' if never else f' the wall alone, in {outer.name}, would drive it up'}.",
         bearings=(
             Bearing(
-                protocol="lift",
-                quantity="lifts",
-                predict=lambda m: float(_lift(m, slip_stability.lift_acceleration) > 0),
+                "lift",
+                "lifts",
+                lambda m: float(_lift(m, slip_stability.lift_acceleration) > 0),
                 when=along,
                 by="slip_stability.lift_acceleration",
             ),
             Bearing(
-                protocol="lift",
-                quantity="lift_onset",
-                predict=lambda m: _lift(m, slip_stability.lift_onset),
+                "lift",
+                "lift_onset",
+                lambda m: _lift(m, slip_stability.lift_onset),
                 when=along,
                 by="slip_stability.lift_onset",
             ),

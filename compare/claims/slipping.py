@@ -9,9 +9,8 @@ import numpy as np
 
 from analytic import slip_bounds, slip_stability
 from compare.claims.claim import Bearing, Claim, Outcome, Relation, Text
-from compare.claims.equations import state
 from compare.measure.field import slip_unit
-from compare.measure.record import Measurement
+from compare.measure.record import Measurement, state
 from model import Case
 
 
@@ -42,14 +41,7 @@ def _arrow(inner: Case, outer: Case) -> Claim:
         source="(56)-(59)" if inner is Case.NR else "(53), Fig. 6",
         statement=f"Out of any state of {inner.name} a slip along any direction of {outer.name} grows at the rate γ.",
         bearings=(
-            Bearing(
-                protocol="growth",
-                quantity="gamma",
-                predict=_gamma,
-                when=_out_of(inner, outer),
-                scale=slip_unit,
-                by="slip_stability.gamma",
-            ),
+            Bearing("growth", "gamma", _gamma, when=_out_of(inner, outer), scale=slip_unit, by="slip_stability.gamma"),
             *((_GAMMA_NR,) if inner is Case.NR else ()),
         ),
     )
@@ -61,12 +53,7 @@ def _gamma_nr(m: Measurement) -> float:
 
 
 _GAMMA_NR = Bearing(
-    protocol="growth",
-    quantity="gamma",
-    predict=_gamma_nr,
-    when=_out_of(Case.NR, Case.NS),
-    scale=slip_unit,
-    by="slip_bounds.gamma_nr",
+    "growth", "gamma", _gamma_nr, when=_out_of(Case.NR, Case.NS), scale=slip_unit, by="slip_bounds.gamma_nr"
 )
 
 
@@ -89,20 +76,14 @@ def _bound(
     square = "_square" if by == "stationary" else ""
     return (
         Bearing(
-            protocol="bounds",
-            quantity=f"gamma_zero{square}",
-            predict=lambda m: bound(m).zero,
+            "bounds",
+            f"gamma_zero{square}",
+            lambda m: bound(m).zero,
             when=when,
             scale=(lambda p: p.g / p.R) if from_rest else None,
             by="slip_bounds",
         ),
-        Bearing(
-            protocol="bounds",
-            quantity=f"gamma_slope{square}",
-            predict=lambda m: bound(m).slope,
-            when=when,
-            by="slip_bounds",
-        ),
+        Bearing("bounds", f"gamma_slope{square}", lambda m: bound(m).slope, when=when, by="slip_bounds"),
     )
 
 
@@ -138,10 +119,10 @@ def _neutral(quantity: str, case: Case, by: str) -> Bearing:
     def predict(m: Measurement) -> float:
         return slip_stability.neutral_flow(case, m.parameters)
 
-    return Bearing(
-        protocol="thresholds", quantity=quantity, predict=predict, when=lambda m: m.conditions["by"] == by,
-        by="slip_stability.neutral_flow",
-    )  # fmt: skip
+    def when(m: Measurement) -> bool:
+        return m.conditions["by"] == by
+
+    return Bearing("thresholds", quantity, predict, when=when, by="slip_stability.neutral_flow")
 
 
 def _watched(inner: Case, end: str, beyond: Case) -> Bearing:
@@ -151,13 +132,7 @@ def _watched(inner: Case, end: str, beyond: Case) -> Bearing:
         stable = slip_stability.stability(inner, m.parameters) is slip_stability.SlipStability.STABLE
         return float(inner if stable else beyond)
 
-    return Bearing(
-        protocol="watched",
-        quantity="case",
-        predict=predict,
-        when=lambda m: m.conditions["end"] == end,
-        by="slip_stability.stability",
-    )
+    return Bearing("watched", "case", predict, when=lambda m: m.conditions["end"] == end, by="slip_stability.stability")
 
 
 CLAIMS = (
@@ -168,9 +143,9 @@ CLAIMS = (
         "Out of rolling on the wall alone, slip grows the most along β₁, whatever the state.",
         (
             Bearing(
-                protocol="steepest",
-                quantity="steepest",
-                predict=lambda m: float(slip_bounds.steepest_nr(np.array(state(m)), m.parameters)),
+                "steepest",
+                "steepest",
+                lambda m: float(slip_bounds.steepest_nr(np.array(state(m)), m.parameters)),
                 scale=lambda p: 1.0,
                 by="slip_bounds.steepest_nr",
             ),
@@ -237,9 +212,9 @@ CLAIMS = (
         "Rolling at both points is the convex combination of slipping to either side that doesn't slip.",
         (
             Bearing(
-                protocol="growth",
-                quantity="filippov_share",
-                predict=lambda m: slip_bounds.filippov_share(Case[str(m.conditions["outer"])], _held(m), m.parameters),
+                "growth",
+                "filippov_share",
+                lambda m: slip_bounds.filippov_share(Case[str(m.conditions["outer"])], _held(m), m.parameters),
                 scale=lambda p: 1.0,
                 by="slip_bounds.filippov_share",
             ),
@@ -252,12 +227,7 @@ CLAIMS = (
         "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
         (
             Bearing(
-                protocol="growth",
-                quantity="gamma",
-                predict=_gamma,
-                when=_along(*_RR_RS, "rest"),
-                scale=slip_unit,
-                by="slip_stability.gamma",
+                "growth", "gamma", _gamma, when=_along(*_RR_RS, "rest"), scale=slip_unit, by="slip_stability.gamma"
             ),
             _neutral("omega_01", Case.RR, "onset of slip"),
             _neutral("omega_02", Case.NR, "onset of sliding on the wall"),
@@ -271,9 +241,9 @@ CLAIMS = (
         statement="(α, β) = (0, 0) and (π, π) are the global extrema of γ.",
         bearings=(
             Bearing(
-                protocol="growth",
-                quantity="gamma",
-                predict=_greatest_as_printed,
+                "growth",
+                "gamma",
+                _greatest_as_printed,
                 when=_along(*_RR_SS, "sideways"),
                 scale=slip_unit,
                 relation=Relation.AT_MOST,

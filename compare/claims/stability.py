@@ -8,7 +8,7 @@ from compare.claims.claim import Bearing, Claim, Relation, Text
 from compare.claims.judge import remembered
 from compare.measure.rates import natural_size
 from compare.measure.record import Measurement
-from model import Case, InputError, Parameters
+from model import Case, Parameters
 
 SECTION = "Stability"
 PROTOCOL = "rates"
@@ -74,20 +74,21 @@ def bearings(case: Case) -> tuple[Bearing, ...]:
 
     by = "analytic.stationary_solutions: eigenvalues of the exact Jacobian"
     return (
-        Bearing(protocol=PROTOCOL, quantity="decay_rate", predict=decay_rate, when=when, size=size, by=by),
-        Bearing(protocol=PROTOCOL, quantity="frequency", predict=frequency, when=when, size=size, by=by),
-        Bearing(protocol=PROTOCOL, quantity="modes", predict=count, when=when, by=by),
+        Bearing(PROTOCOL, "decay_rate", decay_rate, when=when, size=size, by=by),
+        Bearing(PROTOCOL, "frequency", frequency, when=when, size=size, by=by),
+        Bearing(PROTOCOL, "modes", count, when=when, by=by),
     )
 
 
 def _leaning_rate(m: Measurement) -> float:
-    """- Re of the nearest of the modes of a ball that leans on the floor, s-1; LookupError if it can't lean."""
-    try:
-        values, _ = analytic.leaning_modes(m.parameters)
-    except InputError as error:
-        raise LookupError(str(error)) from error
+    """- Re of the nearest of the modes of a ball that leans on the floor, s-1."""
+    values, _ = analytic.leaning_modes(m.parameters)
     nearest_mode = min(values, key=lambda value: abs(complex(value.real, abs(value.imag)) - eigenvalue(m)))
     return -float(nearest_mode.real)
+
+
+def _leans(m: Measurement) -> bool:
+    return m.conditions["case"] == Case.SR.name
 
 
 def _leaning(grows: bool) -> Bearing:
@@ -95,12 +96,10 @@ def _leaning(grows: bool) -> Bearing:
 
     def when(m: Measurement) -> bool:
         slow = bool(m.parameters.omega_0 < analytic.thresholds(m.parameters).omega_03)
-        return m.conditions["case"] == Case.SR.name and m.conditions["mode"] == 1 and slow is grows
+        return _leans(m) and m.conditions["mode"] == 1 and slow is grows
 
-    return Bearing(
-        protocol=PROTOCOL, quantity="decay_rate", predict=lambda m: 0.0, when=when, size=size,
-        relation=Relation.AT_MOST if grows else Relation.AT_LEAST, by="analytic.thresholds: omega_03",
-    )  # fmt: skip
+    relation, by = Relation.AT_MOST if grows else Relation.AT_LEAST, "analytic.thresholds: omega_03"
+    return Bearing(PROTOCOL, "decay_rate", lambda m: 0.0, when=when, size=size, relation=relation, by=by)
 
 
 CLAIMS = (
@@ -125,10 +124,7 @@ CLAIMS = (
         ),
         bearings=(
             *bearings(Case.SR), _leaning(False), _leaning(True),
-            Bearing(
-                protocol=PROTOCOL, quantity="decay_rate", predict=_leaning_rate, size=size, by="analytic.leaning_modes",
-                when=lambda m: m.conditions["case"] == Case.SR.name,
-            ),
+            Bearing(PROTOCOL, "decay_rate", _leaning_rate, size=size, when=_leans, by="analytic.leaning_modes"),
         ),
         text=Text.CORRECTED,
         reason=(

@@ -11,7 +11,7 @@ from compare.claims.claim import Bearing, Claim, Text
 from compare.claims.judge import remembered
 from compare.measure.record import Measurement
 from compare.measure.settling import FORCES, SUMS, family, scale
-from model import Case, InputError, Parameters
+from model import Case, Parameters
 from model.kinematics import VARIABLES
 
 SECTION = "Stationary states"
@@ -34,11 +34,8 @@ def cases(p: Parameters) -> set[Case]:
 
 @remembered
 def solution(p: Parameters, case: Case) -> StationarySolution:
-    """The stable solution of a case; LookupError if theory has none."""
-    try:
-        return analytic.solution(p, case)
-    except InputError as error:
-        raise LookupError(str(error)) from error
+    """The stable solution of a case; `InputError` if theory has none."""
+    return analytic.solution(p, case)
 
 
 def detected(m: Measurement) -> Case:
@@ -118,10 +115,7 @@ def bearings(
     def predict(m: Measurement) -> float:
         return number(m.quantity, state(m), m.parameters)
 
-    return tuple(
-        Bearing(protocol="settled", quantity=q, predict=predict, when=when, scale=partial(scale, q), by=by)
-        for q in quantities
-    )
+    return tuple(Bearing("settled", q, predict, when=when, scale=partial(scale, q), by=by) for q in quantities)
 
 
 def is_in(*cases: Case) -> When:
@@ -146,14 +140,14 @@ def _from_floor(m: Measurement) -> bool:
 
 
 def _cases(when: When) -> Bearing:
-    return Bearing(protocol="settled", quantity="case", predict=case, when=when, by="analytic.stable_solutions")
+    return Bearing("settled", "case", case, when=when, by="analytic.stable_solutions")
 
 
 def _with_fluid(when: When = lambda m: True) -> Bearing:
     def begins(m: Measurement) -> bool:
         return m.conditions["start"] == "with the fluid" and when(m)
 
-    return Bearing(protocol="settled", quantity="case", predict=rolling, when=begins, by="analytic.thresholds")
+    return Bearing("settled", "case", rolling, when=begins, by="analytic.thresholds")
 
 
 def _plane(figure: str, source: str, axis: str) -> Claim:
@@ -167,9 +161,9 @@ def _plane(figure: str, source: str, axis: str) -> Claim:
         ),
         bearings=(
             Bearing(
-                protocol="plane",
-                quantity="cases",
-                predict=reachable,
+                "plane",
+                "cases",
+                reachable,
                 when=lambda m: m.conditions["figure"] == figure,
                 by="analytic.stable_solutions",
             ),

@@ -10,12 +10,11 @@ import numpy as np
 import analytic
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered
-from compare.measure.record import Measurement
+from compare.measure.record import Measurement, state
 from compare.measure.settling import family
 from compare.measure.unloading import first_top
 from compare.statistics import Measured
-from model import Case, Contact, Parameters, SimulationError, Trajectory
-from model.kinematics import VARIABLES
+from model import Case, Contact, Parameters, Trajectory
 
 SECTION = "Flowmeter"
 PROTOCOL = "unloading"
@@ -26,16 +25,11 @@ STEPS = 100
 
 @remembered
 def _motion(p: Parameters, x0: tuple[float, ...], t_end: float) -> Trajectory:
-    """The motion by theory; LookupError if it breaks down."""
-    try:
-        return analytic.simulate(p, x0, t_end, sample_interval=t_end / SAMPLES)
-    except SimulationError as error:
-        raise LookupError(str(error)) from error
+    return analytic.simulate(p, x0, t_end, sample_interval=t_end / SAMPLES)
 
 
 def _run(m: Measurement) -> Trajectory:
-    x0 = tuple(float(m.conditions[name]) for name in VARIABLES[:6])
-    return _motion(m.parameters, x0, float(m.conditions["duration"]))
+    return _motion(m.parameters, state(m), float(m.conditions["duration"]))
 
 
 def _case(m: Measurement) -> float:
@@ -99,7 +93,7 @@ def _bearing(quantity: str, predict: Callable[[Measurement], float], event: str 
         begun, conditions = str(m.conditions["start"]), m.conditions
         return begun.startswith(start) and (not event or conditions["event"] == event)
 
-    return Bearing(protocol=PROTOCOL, quantity=quantity, predict=_sure(predict), when=when, by="analytic.simulate")
+    return Bearing(PROTOCOL, quantity, _sure(predict), when=when, by="analytic.simulate")
 
 
 CLAIMS = (

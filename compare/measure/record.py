@@ -100,6 +100,11 @@ def state_of(x: Array) -> dict[str, float]:
     return dict(zip(VARIABLES, x.tolist(), strict=False))
 
 
+def state(m: Measurement) -> tuple[float, ...]:
+    """The state (8) among the conditions of a measurement, zero where it isn't named."""
+    return tuple(float(m.conditions.get(name, 0.0)) for name in VARIABLES)
+
+
 @dataclass(frozen=True)
 class Missing:
     """What a protocol could not measure, and why, in a sentence for the reader."""
