@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from compare.claims.claim import Check, Verdict
 from compare.measure.record import Measurement, Records
@@ -14,6 +14,8 @@ from model import Trajectory, storage
 
 if TYPE_CHECKING:  # it takes half a second to load, and much that hands over material never draws
     from matplotlib.figure import Figure
+
+    from compare.scorecard.league import Entry
 
 
 @dataclass(frozen=True)
@@ -24,22 +26,6 @@ class Motion:
     load: Callable[[], Trajectory] = field(repr=False, compare=False)
 
 
-class Score(Protocol):
-    """What a way of setting an engine reaches in one quantity."""
-
-    @property
-    def method(self) -> str: ...
-    @property
-    def quantity(self) -> str: ...
-    @property
-    def error(self) -> float:
-        """Relative, of omega_c."""
-
-    @property
-    def cost(self) -> float:
-        """Processor time over simulated time."""
-
-
 @dataclass(frozen=True)
 class Material:
     """What figures are made of: verdicts, measurements, and run files; without any, theory alone is drawn."""
@@ -48,10 +34,10 @@ class Material:
     records: Records = Records()
     directory: Path = Path()
     """The results directory, where names of run files begin."""
-    ladder: tuple[Score, ...] = ()
-    """Scores under settings that each have one thing more than the one before."""
-    frontier: tuple[Score, ...] = ()
-    """Scores of methods over their cost."""
+    ladder: tuple[Entry, ...] = ()
+    """What is reached under settings that each have one thing more than the one before."""
+    frontier: tuple[Entry, ...] = ()
+    """What methods reach, with their cost."""
 
     @cached_property
     def by_claim(self) -> Mapping[str, Verdict]:

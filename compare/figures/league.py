@@ -1,35 +1,42 @@
-"""Error against cost of all engines in the league."""
+"""Error against cost: of all engines in the league, or of ways of setting one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from matplotlib.figure import Figure
 
 from compare.figures import style
 from compare.runs.engines import ENGINES
-from compare.scorecard.league import CASES, COST, CREEP, DISCIPLINES, ROLLING_ENDS, WALL, Entry
+from compare.scorecard.league import CASES, COST, CREEP, ROLLING_ENDS, WALL, Entry
 
 COLUMNS = 3
-_LEAST = 1e-16
+LEAST = 1e-16
 """Smaller errors are drawn here: an error may be zero."""
 
 
 def draw(entries: Sequence[Entry]) -> Figure:
-    """A panel for each error; marks of an engine at several time steps are joined."""
-    left_out = {CREEP, ROLLING_ENDS, WALL, CASES}
-    shown = [d.name for d in DISCIPLINES if d.name not in left_out and any(d.name in e.scores for e in entries)]
+    """A panel for each error of omega_c in the league."""
+    looks = {e.name: {"marker": ENGINES[e.name].mark, "color": ENGINES[e.name].colour} for e in entries}
+    return error_over_cost(entries, looks, leave_out=(CREEP, ROLLING_ENDS, WALL, CASES))
+
+
+def error_over_cost(
+    entries: Sequence[Entry], looks: Mapping[str, Mapping[str, Any]], leave_out: Sequence[str] = ()
+) -> Figure:
+    """A panel for each discipline; marks of one name at several time steps are joined, with the looks of that name."""
+    shown = [name for name in dict.fromkeys(n for e in entries for n in e.scores) if name not in (*leave_out, COST)]
     lines = -(-len(shown) // COLUMNS)
     figure = style.figure(11, 0.9 + 3.0 * lines)
     panels = figure.subplots(lines, COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
     for axes, discipline in zip(panels, shown, strict=False):
-        for name in dict.fromkeys(entry.name for entry in entries):
+        for name, look in looks.items():
             own = [e for e in entries if e.name == name and math.isfinite(e.scores.get(discipline, math.nan))]
             own.sort(key=lambda entry: entry.scores[COST])
-            x, y = [e.scores[COST] for e in own], [max(e.scores[discipline], _LEAST) for e in own]
-            engine = ENGINES[name]
-            axes.plot(x, y, marker=engine.mark, color=engine.colour, mfc="white", ms=6, lw=1, label=name)
+            x, y = [e.scores[COST] for e in own], [max(e.scores[discipline], LEAST) for e in own]
+            axes.plot(x, y, mfc="white", ms=6, lw=1, label=name, **look)
         axes.set(xscale="log", yscale="log")
         axes.set_title(discipline, fontsize=10)
         axes.grid(alpha=0.3)

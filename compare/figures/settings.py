@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from matplotlib.figure import Figure
 
-from compare.figures import style
-from compare.figures.drawing import GapError, Material, Score
+from compare.figures import league, style
+from compare.figures.drawing import GapError, Material
+from compare.scorecard.league import Entry
+from compare.scorecard.scores import OPEN
 
-_LEAST = 1e-16
-"""Smaller errors are drawn here: an error may be zero."""
-COLUMNS = 3
 _MARKS = "os^vDP*X"
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B")
 _OF_STATES = (
@@ -24,18 +25,18 @@ _OF_STATES = (
 
 @dataclass(frozen=True)
 class Comparison:
-    """The scores of a figure."""
+    """The entries of a figure."""
 
     figure: str
-    scores: tuple[Score, ...]
+    entries: tuple[Entry, ...]
 
 
 def select(material: Material, figure: str) -> Comparison:
-    """The scores of the "ladder", or those of the "frontier", which have a cost; `GapError` if there are none."""
-    scores = material.ladder if figure == "ladder" else material.frontier
-    if not scores:
+    """The entries of the "ladder", or those of the "frontier", which have a cost; `GapError` if there are none."""
+    entries = material.ladder if figure == "ladder" else material.frontier
+    if not entries:
         raise GapError(f"{'the ladder of settings' if figure == 'ladder' else 'error against cost'} was not measured")
-    return Comparison(figure, scores)
+    return Comparison(figure, entries)
 
 
 def caption(of: Comparison) -> str:
@@ -54,55 +55,26 @@ def caption(of: Comparison) -> str:
 
 def draw(of: Comparison) -> Figure:
     """Either figure."""
-    return (_ladder if of.figure == "ladder" else _frontier)(of)
+    looks = [{"marker": mark, "color": colour} for mark, colour in zip(_MARKS, _COLOURS, strict=True)]
+    if of.figure == "ladder":
+        return _ladder(of, looks)
+    names = dict.fromkeys(entry.name for entry in of.entries)
+    return league.error_over_cost(of.entries, dict(zip(names, itertools.cycle(looks), strict=False)))
 
 
-def _ladder(of: Comparison) -> Figure:
+def _ladder(of: Comparison, looks: Sequence[Mapping[str, Any]]) -> Figure:
     """Rows of settings, a mark for each state."""
-    methods = list(dict.fromkeys(score.method for score in of.scores))
+    methods = [entry.name for entry in of.entries]
     figure = style.figure(9, 1.1 + 0.33 * len(methods))
     axes = figure.add_subplot()
-    for k, quantity in enumerate(dict.fromkeys(score.quantity for score in of.scores)):
-        own = [s for s in of.scores if s.quantity == quantity and math.isfinite(s.error)]
-        x, y = [max(s.error, _LEAST) for s in own], [methods.index(s.method) for s in own]
-        axes.plot(x, y, f"{_MARKS[k]}-", color=_COLOURS[k], mfc="white", lw=0.6, label=quantity)
+    shown = [name for name in of.entries[0].scores if name != OPEN]
+    for name, look in zip(shown, looks, strict=False):
+        own = [(k, e.scores[name]) for k, e in enumerate(of.entries) if math.isfinite(e.scores[name])]
+        x, y = [max(error, league.LEAST) for _, error in own], [k for k, _ in own]
+        axes.plot(x, y, "-", mfc="white", lw=0.6, label=name, **look)
     axes.set_yticks(range(len(methods)), methods, fontsize=8.5)
     axes.invert_yaxis()
     axes.set(xscale="log", xlabel="$|\\Delta\\omega_c|/\\omega_c$")
     axes.grid(alpha=0.3)
     figure.legend(loc="outside upper center", ncols=5, fontsize=8, frameon=False)
     return figure
-
-
-def _frontier(of: Comparison) -> Figure:
-    """A panel for each state and one for the transient."""
-    quantities = list(dict.fromkeys(score.quantity for score in of.scores))
-    rows = -(-len(quantities) // COLUMNS)
-    figure = style.figure(11, 0.8 + 3.1 * rows)
-    panels = figure.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
-    looks = _looks(of.scores)
-    for axes, quantity in zip(panels, quantities, strict=False):
-        for method, look in looks.items():
-            own = [s for s in of.scores if (s.method, s.quantity) == (method, quantity)]
-            own.sort(key=lambda score: score.cost)
-            axes.plot([s.cost for s in own], [max(s.error, _LEAST) for s in own], label=method, ms=5, lw=1, **look)
-        axes.set(xscale="log", yscale="log")
-        axes.set_title(quantity, fontsize=10)
-        axes.grid(alpha=0.3)
-    for axes in panels[len(quantities) :]:
-        axes.set_visible(False)
-    for axes in panels[::COLUMNS]:
-        axes.set_ylabel("$|\\Delta\\omega_c|/\\omega_c$")
-    for axes in panels[max(0, len(quantities) - COLUMNS) : len(quantities)]:
-        axes.set_xlabel("processor time per simulated time")
-        axes.tick_params(labelbottom=True)
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8, frameon=False
-    )
-    return figure
-
-
-def _looks(scores: Sequence[Score]) -> dict[str, dict[str, str]]:
-    """Mark and colour of each method."""
-    names = list(dict.fromkeys(score.method for score in scores))
-    return {name: {"marker": _MARKS[k % 8], "color": _COLOURS[k % 8], "mfc": "white"} for k, name in enumerate(names)}

@@ -15,8 +15,7 @@ from compare.runs.campaign import Campaign
 from compare.runs.engines import EVENT, MUJOCO
 from compare.runs.tasks import Task
 from compare.scorecard import trials
-from compare.scorecard.scores import WINDOW
-from compare.scorecard.trials import AT_REST, KICKED, PASSES, ROUGH, SLIPPING, SMOOTH, Held, State
+from compare.scorecard.trials import AT_REST, KICKED, PASSES, ROUGH, SLIPPING, SMOOTH, WINDOW, Held, State
 from mjsim import ContactSettings
 from model import Case, Contact, Parameters
 from model.arrays import Array

@@ -15,16 +15,15 @@ from typing import Any
 
 from compare.runs import progress
 from compare.runs.campaign import Campaign
-from compare.scorecard import accuracy, confirmation, league, scores, standings, trials
-from compare.scorecard.accuracy import Rows, number
-from compare.scorecard.scores import Score
+from compare.scorecard import accuracy, confirmation, league, scores, standings
+from compare.scorecard.accuracy import Rows
+from compare.scorecard.league import Entry
 from model import InputError
 from model.files import write_text
 from model.parameters import check_choice, check_names
 
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 """Time steps of error against cost, s."""
-QUANTITIES = [*(state.name for state in trials.STATES), trials.TRANSIENT]
 
 
 def write(page: Path, name: str, rows: Rows) -> None:
@@ -43,30 +42,10 @@ def markdown(rows: Rows) -> str:
     return "\n".join([head, f"|{'---|' * len(rows[0])}", *body])
 
 
-def by_method(scored: Sequence[Score]) -> dict[tuple[str, float | None], list[Score]]:
-    """Scores of each method and step, in order."""
-    rows: dict[tuple[str, float | None], list[Score]] = {}
-    for score in scored:
-        rows.setdefault((score.method, score.step), []).append(score)
-    return rows
-
-
-def _errors(scored: Sequence[Score]) -> Rows:
-    """A row for each method: its errors, and the largest share of open samples."""
-    rows = [["settings", *QUANTITIES, "open"]]
-    for (method, _), row in by_method(scored).items():
-        rows.append([method, *(number(score.error) for score in row), f"{max(score.open for score in row):.0%}"])
-    return rows
-
-
-def _frontier(campaign: Campaign) -> Rows:
-    """Error and cost, by method and step."""
-    rows = [["method", "h", *QUANTITIES, "time per simulated time"]]
-    for (method, step), row in by_method(scores.frontier(campaign, STEPS)).items():
-        errors = {score.quantity: number(score.error) for score in row}
-        shown = f"{1e3 * step:g} ms" if step else "as it needs"
-        rows.append([method, shown, *(errors.get(each, "") for each in QUANTITIES), f"{row[0].cost:.2g}"])
-    return rows
+def _of_settings(entries: Sequence[Entry]) -> Rows:
+    """Entries of one time step, which isn't named."""
+    (_, _, *head), *body = standings.rows(entries)
+    return [["settings", *head], *([name, *cells] for name, _, *cells in body)]
 
 
 TABLES: dict[str, Callable[[Campaign], Rows]] = {
@@ -75,9 +54,9 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "transient": accuracy.transient,
     "events": accuracy.event_times,
     "split": accuracy.force_split,
-    "ablation": lambda campaign: _errors(scores.ladder(campaign)),
-    "frontier": _frontier,
-    "variants": lambda campaign: _errors(scores.variants(campaign)),
+    "ablation": lambda campaign: _of_settings(scores.ladder(campaign)),
+    "frontier": lambda campaign: standings.rows(scores.frontier(campaign, STEPS)),
+    "variants": lambda campaign: _of_settings(scores.variants(campaign)),
 }
 """The tables by name."""
 

@@ -22,7 +22,7 @@ from compare.runs.engines import Engine, Settings
 from compare.runs.tasks import Task, carry_out
 from compare.scorecard import grade, kept, trials
 from compare.scorecard.accuracy import LASTS, MOTIONS
-from compare.scorecard.trials import AT_REST, KICKED, PASSES, ROLLING, ROUGH, SLIPPING, SMOOTH, STATES, State
+from compare.scorecard.trials import AT_REST, KICKED, PASSES, ROLLING, ROUGH, SLIPPING, SMOOTH, STATES, WINDOW, State
 from compare.statistics import plain
 from model import Case, Trajectory
 from model.trajectory import version
@@ -30,8 +30,6 @@ from model.trajectory import version
 STEPS = (4e-3, 2e-3, 1e-3)
 """Time steps, s."""
 QUICK = (2e-3,)
-WINDOW = 0.1
-"""Last part of a settled run, which is averaged."""
 MARGINS = (1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 """How far from omega_02, relative, it is asked whether the wall holds the ball."""
 RIDES = 4.0
@@ -40,6 +38,8 @@ REPEATS = 3
 """Cost is the median of as many timings."""
 CREEP, ROLLING_ENDS, WALL, CASES, COST = "creep (m/s)", "ω₀₁", "ω₀₂", "cases (of 9)", "cost"
 Runs = Sequence[Trajectory]
+Show = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
 
 
 @dataclass(frozen=True)
@@ -114,12 +114,23 @@ def measure(
     those: Sequence[Contestant],
     steps: Sequence[float] = STEPS,
     quick: bool = False,
-    show: Callable[[str, int, int], None] = lambda what, done, total: None,
+    show: Show = lambda what, done, total: None,
 ) -> list[Entry]:
     """The entries of all contestants that are installed; runs that are there already aren't repeated."""
     asked = [discipline for discipline in DISCIPLINES if discipline.quick or not quick]
     those = [each for each in those if not each.engine.missing]
     starters = [(each, step) for each in those for step in (steps if "timestep" in each.engine.options else [None])]
+    return scored(campaign, starters, asked, cost, show)
+
+
+def scored(
+    campaign: Campaign,
+    starters: Sequence[tuple[Contestant, float | None]],
+    asked: Sequence[Discipline],
+    cost: Callable[[Task], float] | None = None,
+    show: Show = lambda what, done, total: None,
+) -> list[Entry]:
+    """What contestants reach with a time step each in some disciplines, and what a run takes by `cost`, if given."""
     tasks = {
         (each.name, step, discipline.name): [each.task(step, *run) for run in discipline.runs]
         for each, step in starters
@@ -138,8 +149,9 @@ def measure(
             entry.failures.update({discipline.name: reasons[0]} if reasons else {})
             score = math.nan if reasons else discipline.score([kept.run(campaign, task) for task in row])
             entry.scores[discipline.name] = score
-        passing = each.task(step, SLIPPING, KICKED, PASSES, PASSES / 100)
-        entry.scores[COST] = kept.cost(campaign, passing, functools.partial(_cost, passing))
+        if cost:
+            passing = each.task(step, *APPROACH.runs[0])
+            entry.scores[COST] = kept.cost(campaign, passing, functools.partial(cost, passing))
         entries.append(entry)
     return entries
 
@@ -165,7 +177,7 @@ def from_mapping(data: dict[str, Any]) -> list[Entry]:
     ]
 
 
-def _cost(task: Task) -> float:
+def cost(task: Task) -> float:
     """Processor time over simulated time of one run by itself, without what it takes to begin."""
     half = replace(task, t_end=task.t_end / 2)
     return statistics.median(_seconds(task) - _seconds(half) for _ in range(REPEATS)) / half.t_end
@@ -177,7 +189,8 @@ def _seconds(task: Task) -> float:
     return time.process_time() - begin
 
 
-def _stationary(state: State) -> Discipline:
+def stationary(state: State) -> Discipline:
+    """Relative error of omega_c in a state that is settled in from rest."""
     lasts = math.ceil(state.forgets / (1 - WINDOW))
 
     def score(runs: Runs) -> float:
@@ -189,7 +202,7 @@ def _stationary(state: State) -> Discipline:
 def _creep() -> Discipline:
     """Of the rolling state, from the same run."""
     lasts = math.ceil(ROLLING.forgets / (1 - WINDOW))
-    rolling = _stationary(ROLLING)
+    rolling = stationary(ROLLING)
     return replace(rolling, name=CREEP, score=lambda runs: trials.held(runs[0], ROLLING, (1 - WINDOW) * lasts).creep)
 
 
@@ -253,10 +266,11 @@ def _cases() -> Discipline:
 
 
 _SLIDES, _HITS = MOTIONS.values()
+APPROACH = _motion(trials.TRANSIENT, SLIPPING, KICKED, PASSES)
 DISCIPLINES = (
-    *(_stationary(state) for state in STATES[:3]),
+    *(stationary(state) for state in STATES[:3]),
     _creep(),
-    _motion(trials.TRANSIENT, SLIPPING, KICKED, PASSES),
+    APPROACH,
     _motion("lands on the floor", State(SMOOTH, Case.RR), _SLIDES, LASTS),
     _motion("hits the wall", State(SMOOTH, Case.RR), _HITS, LASTS),
     _end_of_rolling(),

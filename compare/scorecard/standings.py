@@ -10,19 +10,18 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from compare.scorecard.accuracy import number
-from compare.scorecard.league import CASES, COST, DISCIPLINES, WALL, Entry
-
-Rows = list[list[str]]
+from compare.scorecard.accuracy import Rows, number
+from compare.scorecard.league import CASES, COST, WALL, Entry
+from compare.scorecard.scores import OPEN
 
 
 def rows(entries: Sequence[Entry]) -> Rows:
     """A head, and a row for each entry; only disciplines that some entry has."""
-    asked = [each.name for each in DISCIPLINES if any(each.name in entry.scores for entry in entries)]
-    table = [["engine", "step", *asked, COST]]
+    asked = list(dict.fromkeys(name for entry in entries for name in entry.scores))
+    table = [["engine", "step", *asked]]
     for entry in entries:
         step = "its own" if entry.step is None else f"{1e3 * entry.step:g} ms"
-        cells = ["failed" if name in entry.failures else cell(name, entry.scores.get(name)) for name in (*asked, COST)]
+        cells = ["failed" if name in entry.failures else cell(name, entry.scores.get(name)) for name in asked]
         table.append([entry.name, step, *cells])
     return table
 
@@ -37,6 +36,8 @@ def cell(discipline: str, score: float | None) -> str:
         return f"{score:.0f}"
     if discipline == COST:
         return f"{score:.2g}"
+    if discipline == OPEN:
+        return f"{score:.0%}"
     if discipline == WALL:
         return f"≤ {score:g}"
     return number(score)

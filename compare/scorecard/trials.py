@@ -20,6 +20,8 @@ from model.arrays import Array
 
 EPS = float(np.finfo(float).eps)
 SMOOTH, ROUGH = Parameters.named("reference"), Parameters.named("high-wall-friction")
+WINDOW = 0.1
+"""Last part of a settled run, which is averaged."""
 AT_REST = (0.0,) * 8
 """Start against the wall, on the floor."""
 

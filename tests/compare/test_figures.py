@@ -20,6 +20,7 @@ from compare.figures.drawing import GapError, Material
 from compare.figures.registry import FIGURES, figures_of
 from compare.measure.record import Measurement, Records
 from compare.runs.engines import ENGINES
+from compare.scorecard.league import COST, Entry
 from model import Case, InputError, Parameters, StorageError
 
 DEPENDS = {
@@ -36,14 +37,6 @@ DEPENDS = {
 }
 """The parameters that a caption must give with their values; those of the other figures depend on none."""
 WITH_SCALES = ["fig-7", "fig-8", "fig-9", "fig-10", "fig-11", "fig-12", "fig-13-left", "fig-13-right"]
-
-
-@dataclasses.dataclass(frozen=True)
-class Score:
-    method: str
-    quantity: str
-    error: float
-    cost: float = math.nan
 
 
 def measurement(quantity: str, value: float, set: str = "reference", omega_0: float = 10.0, **changes) -> Measurement:
@@ -87,7 +80,8 @@ def material() -> Material:
         verdict("fig-7", (check(plane[0], 129.0, 0.0), check(plane[1], 1.0, 0.0))),
         verdict("prop-1", (check(states[0], 10.0), check(states[1], 10.0))),
     )
-    scores = tuple(Score(name, "RR at 12", error, 0.1) for name, error in (("a", 0.0), ("b", math.nan), ("c", 1e-3)))
+    errors = {"a": 0.0, "b": math.nan, "c": 1e-3}
+    scores = tuple(Entry(name, 1e-3, {"RR at 12": error, COST: 0.1}) for name, error in errors.items())
     return Material(verdicts, Records((*states, *plane)), Path("nowhere"), scores, scores)
 
 

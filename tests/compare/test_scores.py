@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import json
 import math
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import pytest
 from compare.runs.campaign import Campaign
 from compare.runs.tasks import carry_out
 from compare.scorecard import scores, settings, trials
-from compare.scorecard.scores import Score
+from compare.scorecard.league import COST
 from compare.scorecard.trials import ROLLING, SLIPPING, STATES
 from mjsim import ContactSettings
 from model import Trajectory
@@ -54,9 +53,10 @@ def test_settings_are_named_after_what_they_are(step: float) -> None:
 
 
 def test_no_run_begins_where_it_should_end() -> None:
-    for state, task in zip(STATES, scores.tasks(ContactSettings.at(STEP)), strict=False):
-        assert task.parameters == state.p
-        assert abs(task.x0[2] / state.solution.x[2] - 1) > 0.01
+    for state, discipline in zip(STATES, scores.ERRORS, strict=False):
+        ((asked, x0, *_),) = discipline.runs
+        assert asked is state
+        assert abs(x0[2] / state.solution.x[2] - 1) > 0.01
 
 
 def test_errors_are_those_of_the_run(exact: Trajectory) -> None:
@@ -76,37 +76,35 @@ def test_errors_are_those_of_the_run(exact: Trajectory) -> None:
     assert slip == 0
 
 
-def test_ladder_as_records(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ladder_as_records(tmp_path: Path, campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     rungs = settings.ladder(STEP)
     monkeypatch.setattr(settings, "ladder", lambda step: [rungs[3], rungs[-1]])
-    scored = scores.ladder(campaign, STEP)
-    assert [score.quantity for score in scored] == 2 * [*(state.name for state in STATES), trials.TRANSIENT]
-    poor, ours = scored[: len(scored) // 2], scored[len(scored) // 2 :]
-    for worse, better in zip(poor, ours, strict=True):
-        assert better.error < worse.error
-        assert better.open == 0
-    plain = json.loads(json.dumps([score.to_mapping() for score in scored]))
-    assert plain[0]["method"] == settings.name(rungs[3])
-    assert plain[0]["cost"] is None  # JSON has no nan
-    assert repr([Score.from_mapping(values) for values in plain]) == repr(scored)
+    poor, ours = scores.ladder(campaign)
+    assert poor.name == settings.name(rungs[3])
+    assert list(ours.scores) == [*(state.name for state in STATES), trials.TRANSIENT, scores.OPEN]
+    assert all(ours.scores[name] < poor.scores[name] for name in ours.scores)
+    assert ours.scores[scores.OPEN] == 0
+    monkeypatch.setattr(scores, "ladder", lambda _: [poor])
+    monkeypatch.setattr(scores, "frontier", lambda *_: [ours])
+    scores.write(campaign, tmp_path)
+    assert scores.read(tmp_path) == {"ladder": (poor,), "frontier": (ours,)}
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_a_run_that_breaks_down_has_no_error(campaign: Campaign) -> None:
+def test_a_run_that_breaks_down_has_no_error(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     """Known to diverge: a pyramidal cone with a low impedance."""
     wild = ContactSettings.at(STEP, solimp=0.1, solreffriction=20 * STEP, cone="pyramidal", memory=False, order=1)
-    scored = scores.scores(campaign, [wild])
-    assert all(math.isnan(score.error) for score in scored if score.quantity == ROLLING.name)
+    monkeypatch.setattr(settings, "variants", lambda step: [wild])
+    monkeypatch.setattr(scores, "ASKED", scores.ASKED[:1])
+    (entry,) = scores.variants(campaign)
+    assert math.isnan(entry.scores[ROLLING.name])
+    assert entry.failures.keys() == {ROLLING.name}
 
 
 def test_frontier_has_a_cost_that_is_measured_once(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(settings, "rivals", lambda step: [ContactSettings.at(step)])
     monkeypatch.setattr(scores, "BATCH", 2)
-    scored = scores.frontier(campaign, [STEP])
-    assert {(score.method, score.step) for score in scored} == {
-        ("ours", STEP),
-        ("time-stepping", STEP),
-        ("event", None),
-    }
-    assert all(score.cost > 0 for score in scored)
-    assert scores.frontier(campaign, [STEP]) == scored
+    entries = scores.frontier(campaign, [STEP])
+    assert [(e.name, e.step) for e in entries] == [("ours", STEP), ("time-stepping", STEP), ("event", None)]
+    assert all(entry.scores[COST] > 0 for entry in entries)
+    assert scores.frontier(campaign, [STEP]) == entries
