@@ -54,10 +54,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 def _range(records: Records, name: str) -> tuple[float, float] | None:
     """The measured flows at which slipping begins and at which the wall begins to carry; None without either."""
-    ends = [
-        [m.value for m in records.select("thresholds", q, lambda m: m.set == name)] for q in ("omega_01", "omega_02")
-    ]
-    return (ends[0][0], ends[1][0]) if all(ends) and ends[0][0] < ends[1][0] else None
+    begins, ends = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
+    return (begins.value, ends.value) if begins and ends and begins.value < ends.value else None
 
 
 Slopes = dict[tuple[str, float], tuple[Measured, list[Settled]]]

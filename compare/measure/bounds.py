@@ -20,7 +20,6 @@ from compare.measure.lab import Lab, time_unit
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import Start, high, settle
-from compare.measure.watched import ends_of_rolling
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured, straight_line
 from model import Case, Parameters, State, Trajectory
@@ -247,8 +246,8 @@ def _rolling(omega_c: float) -> Array:
 
 def _hanging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tuple[list[Line], list[Missing]]:
     """The lines out of NR, through states settled above the measured omega_02."""
-    ends = ends_of_rolling(records, "omega_02")
-    flows = {name: [ends[name] * factor for factor in HANGING] for name in sets if name in ends}
+    ends = {name: records.threshold(name, "omega_02") for name in sets}
+    flows = {name: [end.value * factor for factor in HANGING] for name, end in ends.items() if end}
     starts = [
         Start(name, q, "on the wall", np.array([high(q), 0, q.omega_0, 0, 0, 0, 0, 0]))
         for name in flows

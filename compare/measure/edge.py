@@ -110,10 +110,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 def _limits(records: Records, name: str) -> tuple[float, float] | None:
     """omega_02 and omega_04 of a set, as measured; None without either."""
-    ends = [
-        [m.value for m in records.select("thresholds", q, lambda m: m.set == name)] for q in ("omega_02", "omega_04")
-    ]
-    return (ends[0][0], ends[1][0]) if all(ends) else None
+    low, high = records.threshold(name, "omega_02"), records.threshold(name, "omega_04")
+    return (low.value, high.value) if low and high else None
 
 
 def _part(edge: Edge, low: float, high: float) -> float:

@@ -17,7 +17,6 @@ import numpy as np
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
-from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
@@ -95,7 +94,8 @@ def polynomial(time: Array, values: Array, degree: int, at: float) -> tuple[Arra
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Rates of change and contact forces, each with the state they belong to."""
     starts = [(name, *start) for name, p in sets.items() for start in _starts(p, STARTS[lab.level], name)]
-    tasks = [_tasks(lab, p, x) for _, p, x in starts]
+    lasts = CENTRES[-1] + HALF + APART
+    tasks = [lab.pair(p, x, lasts, coarse_step(p) / REFINED) for _, p, x in starts]
     lab.complete([task for pair in tasks for task in pair])
     runs = [lab.run(pair) for pair in tasks]
     kept = Counter[tuple[str, Case]]()
@@ -159,12 +159,6 @@ def constrained(case: Case, x: Array, p: Parameters) -> Array:
     held = [name in TRAITS[case].constraints for name in VARIABLES]
     x = np.where(held, 0.0, x)
     return State.of(x)._replace(slip_z=-State.of(x).v_h / p.r).stacked() if case is Case.RN else x
-
-
-def _tasks(lab: Lab, p: Parameters, x: Array) -> list[Task]:
-    step = coarse_step(p) / REFINED
-    lasts = (CENTRES[-1] + HALF + APART) * step
-    return [lab.task(p, x, lasts, step / times, samples=round(lasts / step) * times) for times in (1, 2)]
 
 
 def _seen(coarse: Trajectory, fine: Trajectory, centre: int) -> tuple[Sighting, Sighting, Sighting] | None:

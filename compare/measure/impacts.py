@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from compare.measure.lab import Lab, coarse_step, time_unit
+from compare.measure.lab import Lab, coarse_step, state_units, time_unit
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.runs.tasks import Task
 from compare.statistics import Measured
@@ -54,7 +54,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield Missing(NAME, name, f"{how}: the contact did not close for good within {LASTS:g} sqrt(R/g)")
             continue
         step = coarse_step(p) / REFINED
-        units = dict(zip(VARIABLES, _units(p), strict=True))
+        units = dict(zip(VARIABLES, state_units(p), strict=True))
         changes = [
             abs(getattr(fine, quantity)[2 * at] - getattr(coarse, quantity)[at]) / units[quantity] for quantity in NAMES
         ]
@@ -68,15 +68,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _start(p: Parameters, how: str) -> tuple[Parameters, Array]:
-    return p.replace(omega_0=FLOW / time_unit(p)), np.array(LANDINGS[how]) * _units(p)
-
-
-def _units(p: Parameters) -> Array:
-    unit, speed = time_unit(p), math.sqrt(p.g * p.R)
-    return np.array([p.R, speed, 1 / unit, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
+    return p.replace(omega_0=FLOW / time_unit(p)), np.array(LANDINGS[how]) * state_units(p)
 
 
 def _tasks(lab: Lab, p: Parameters, x: Array) -> list[Task]:
     step = coarse_step(p) / REFINED
-    count = round(LASTS * time_unit(p) / step)
-    return [lab.task(p, x, count * step, step / times, samples=count * times) for times in (1, 2)]
+    return lab.pair(p, x, round(LASTS * time_unit(p) / step), step)

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
+import numpy as np
 import numpy.typing as npt
 
 from compare.runs.campaign import Campaign, Failure
 from compare.runs.engines import Engine, Settings
 from compare.runs.tasks import Task
 from model import Flow, Parameters, Trajectory
+from model.arrays import Array
 
 
 class Level(IntEnum):
@@ -53,6 +55,10 @@ class Lab:
             sample_interval=max(step, t_end / samples),
         )
 
+    def pair(self, p: Parameters, x0: npt.ArrayLike, steps: int, step: float) -> list[Task]:
+        """A run of so many steps of so many s, and one with twice as many of half; each step is a sample."""
+        return [self.task(p, x0, steps * step, step / times, samples=steps * times) for times in (1, 2)]
+
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """The trajectories of the tasks, in order; raises for one that failed."""
         return self.campaign.run(tasks)
@@ -70,6 +76,12 @@ class Lab:
 def time_unit(p: Parameters) -> float:
     """sqrt(R/g), s: the time in which the ball falls by half of R."""
     return math.sqrt(p.R / p.g)
+
+
+def state_units(p: Parameters) -> Array:
+    """Natural sizes of the state (8,): R, sqrt(g R), sqrt(g/R), and sqrt(g R)/r for slip."""
+    speed = math.sqrt(p.g * p.R)
+    return np.array([p.R, speed, speed / p.R, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
 
 
 def coarse_step(p: Parameters) -> float:

@@ -6,14 +6,13 @@ case, at each of which friction has to build up or die out; in between there may
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
 
 from compare.measure.field import constrained
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.lab import Lab, Level, coarse_step, state_units, time_unit
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
@@ -122,9 +121,7 @@ def _plain(run: Trajectory) -> npt.NDArray[np.bool_]:
 
 
 def _start(p: Parameters, Omega_0: float, state: tuple[float, ...]) -> tuple[Parameters, Array]:
-    unit, speed = time_unit(p), math.sqrt(p.g * p.R)
-    units = np.array([p.R, speed, 1 / unit, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
-    x = State.of(np.array(state) * units)
+    x = State.of(np.array(state) * state_units(p))
     if x.y == x.v_y == x.slip_x == 0 and x.h > 0:  # it rolls on the floor
         x = x._replace(slip_z=-x.v_h / p.r)
-    return p.replace(omega_0=Omega_0 / unit), x.stacked()
+    return p.replace(omega_0=Omega_0 / time_unit(p)), x.stacked()

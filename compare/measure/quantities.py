@@ -42,6 +42,8 @@ class Quantity:
     """Largest error of a prediction, over the scale of the quantity, that a check may overlook."""
 
 
+_SPEEDS = {"v_y": "v_y", "v_h": "v_h"}
+_TURNS = {"omega_c": "ω_c", "slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
 _DETERMINED = {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}
 """What the balances say of the forces where both contacts roll."""
 _ALL = (
@@ -68,42 +70,15 @@ _ALL = (
     Quantity("gamma_slope", "dγ/dω₀", "s-1", 2e-2),
     Quantity("gamma_zero_square", "ω₀² at γ = 0", "rad2 s-2", 2e-2),
     Quantity("gamma_slope_square", "dγ/d(ω₀²)", "rad-1", 2e-2),
-    *(
-        Quantity(f"rate_{name}", f"d{symbol}/dt", unit, 5e-3)
-        for name, symbol, unit in (
-            ("v_y", "v_y", "m s-2"),
-            ("omega_c", "ω_c", "rad s-2"),
-            ("slip_x", "ω̃_x", "rad s-2"),
-            ("slip_y", "ω̃_y", "rad s-2"),
-            ("slip_z", "ω̃_z", "rad s-2"),
-            ("v_h", "v_h", "m s-2"),
-        )
-    ),
-    *(
-        Quantity(f"after_{name}", f"{symbol} after", unit, 5e-2)
-        for name, symbol, unit in (
-            ("v_y", "v_y", "m s-1"),
-            ("v_h", "v_h", "m s-1"),
-            ("omega_c", "ω_c", "rad s-1"),
-            ("slip_x", "ω̃_x", "rad s-1"),
-            ("slip_y", "ω̃_y", "rad s-1"),
-            ("slip_z", "ω̃_z", "rad s-1"),
-        )
-    ),
+    *(Quantity(f"rate_{name}", f"d{symbol}/dt", "m s-2", 5e-3) for name, symbol in _SPEEDS.items()),
+    *(Quantity(f"rate_{name}", f"d{symbol}/dt", "rad s-2", 5e-3) for name, symbol in _TURNS.items()),
+    *(Quantity(f"after_{name}", f"{symbol} after", "m s-1", 5e-2) for name, symbol in _SPEEDS.items()),
+    *(Quantity(f"after_{name}", f"{symbol} after", "rad s-1", 5e-2) for name, symbol in _TURNS.items()),
     Quantity("omega_01", "ω₀₁", "rad s-1", 1e-4),
     Quantity("omega_02", "ω₀₂", "rad s-1", 1e-4),
     Quantity("omega_03", "ω₀₃", "rad s-1", 1e-4),
     Quantity("omega_04", "ω₀₄", "rad s-1", 1e-3),
-    *(
-        Quantity(f"edge_{name}", f"{symbol} on the edge", "rad s-1", resolves)
-        for name, symbol, resolves in (
-            ("omega_c", "ω_c", 1e-3),
-            ("slip_x", "ω̃_x", 1e-3),
-            ("slip_y", "ω̃_y", 1e-3),
-            ("slip_z", "ω̃_z", 1e-3),
-            ("wall_spin", "ω_x⁰", 1e-3),
-        )
-    ),
+    *(Quantity(f"edge_{n}", f"{s} on the edge", "rad s-1", 1e-3) for n, s in (_TURNS | {"wall_spin": "ω_x⁰"}).items()),
     Quantity("lifts", "leaves the floor", "1", 0.0),
     Quantity("lift_onset", "ω_c at A_y = 0", "rad s-1", 2e-2),
     Quantity("critical_drag", "c at η = η_cr", "s-1", 4e-3),

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 import model
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.lab import Lab, Level, coarse_step, state_units, time_unit
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.measure.settled import SPIN
 from compare.measure.settling import SOLVED, family, high
@@ -140,10 +140,8 @@ def settled(records: Records, name: str) -> Iterator[State]:
 
 
 def units(state: State) -> Array:
-    """Natural sizes of the active variables: R, sqrt(g R), sqrt(g/R), and R/r of that for what the ball spins."""
-    p, rate = state.p, 1 / time_unit(state.p)
-    natural = {"y": p.R, "v_y": p.R * rate, "omega_c": rate}
-    return np.array([natural.get(name, rate * p.R / p.r) for name in TRAITS[state.case].active])
+    """Natural sizes of the active variables."""
+    return state_units(state.p)[_active(state)]
 
 
 def _suits(state: State) -> bool:

@@ -141,6 +141,12 @@ class Records:
             if m.protocol == protocol and quantity in (None, m.quantity) and where(m):
                 yield m
 
+    def threshold(self, set: str, quantity: str) -> Measured | None:
+        """The surest value of a threshold of a set, as the protocol of that name measured it; None if it did not."""
+        measured = self.select("thresholds", quantity, lambda m: m.set == set)
+        best = min(measured, key=lambda m: m.uncertainty, default=None)
+        return Measured(best.value, best.uncertainty) if best else None
+
 
 def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
     """Write records, whole or not at all; `about` says what they are (JSON-able). Raises `StorageError`."""

@@ -22,28 +22,7 @@ from model.drag import QUADRATIC
 
 PROTOCOL = "settled"
 QUICK = (0.43, 0.62, 0.9, 1.13, 1.4, 1.7, 2.05, 2.5, 3.1, 4.2)
-DEFAULT = (
-    0.43,
-    0.51,
-    0.62,
-    0.75,
-    0.9,
-    1.02,
-    1.13,
-    1.26,
-    1.4,
-    1.53,
-    1.7,
-    1.87,
-    2.05,
-    2.27,
-    2.5,
-    2.78,
-    3.1,
-    3.43,
-    3.8,
-    4.2,
-)
+DEFAULT = tuple(sorted((*QUICK, 0.51, 0.75, 1.02, 1.26, 1.53, 1.87, 2.27, 2.78, 3.43, 3.8)))
 """Flows, omega_0 sqrt(R/g)."""
 SPIN = 1.0
 """Spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r."""

@@ -103,7 +103,7 @@ def _flow_and_case(m: Measurement) -> tuple[float, Case]:
 
 def _wide(name: str, p: Parameters, records: Records) -> Iterator[Curve]:
     """Across the onset of slipping, and from there to the flow at which the wall begins to carry the ball."""
-    one, two = (_threshold(records, name, threshold) for threshold in ("omega_01", "omega_02"))
+    one, two = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
     if one is not None:
         q, x0 = p.replace(omega_0=one.value), (0.0, 0.0, one.value, 0.0, 0.0, 0.0, 0.0, 0.0)
         around = tuple(one.value * (1 + d) for d in ACROSS)
@@ -111,13 +111,6 @@ def _wide(name: str, p: Parameters, records: Records) -> Iterator[Curve]:
         if two is not None and two.value > one.value:
             noise = math.hypot(one.uncertainty, two.uncertainty)
             yield Curve("mean", name, q, (*around[:2], two.value), (0.0,) * 8, noise)
-
-
-def _threshold(records: Records, name: str, threshold: str) -> Measured | None:
-    """The surest measurement of a threshold, by whatever protocol."""
-    measured = [m for m in records.measurements if m.set == name and m.quantity == threshold]
-    best = min(measured, key=lambda m: m.uncertainty, default=None)
-    return Measured(best.value, best.uncertainty) if best else None
 
 
 def _neighbours(curve: Curve, states: Sequence[Settled]) -> Measured:

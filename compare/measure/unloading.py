@@ -60,13 +60,13 @@ class Trial:
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Settle a ball on the wall of every set that carries it, and begin from there."""
-    limits = {name: _limit(records, name, ("omega_02",)) for name in sets}
     begin: list[tuple[str, Start]] = []
     for name, p in sets.items():
-        if (limit := limits[name]) is None:
+        if (limit := records.threshold(name, "omega_02")) is None:
             yield Missing(PROTOCOL, name, "no flow was measured that is the least to hold a ball on the wall")
             continue
-        flows = {"unloading": ABOVE * limit, "push": LIFTED * max(limit, _limit(records, name, ("omega_03",)) or 0.0)}
+        lifts = records.threshold(name, "omega_03") or limit
+        flows = {"unloading": ABOVE * limit.value, "push": LIFTED * max(limit.value, lifts.value)}
         for kind, omega in flows.items():
             q = p.replace(omega_0=omega)
             begin.append((kind, Start(name, q, kind, np.array([high(q), 0.0, omega, 0.0, 0.0, 0.0]))))
@@ -82,11 +82,6 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             trials += [_push(lab, state, upwards) for upwards in (True, False)]
     lab.complete([task for trial in trials for task in trial.tasks])
     yield from _rows(lab, trials)
-
-
-def _limit(records: Records, name: str, quantities: Sequence[str]) -> float | None:
-    values = [m.value for q in quantities for m in records.select("thresholds", q, lambda m: m.set == name)]
-    return values[0] if values else None
 
 
 def _unloading(lab: Lab, state: Settled, landing: bool) -> Trial:

@@ -75,13 +75,13 @@ def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tupl
     hanging = _hanging(lab, sets, records)
     slights, missing = [], []
     for quantity, case in ENDS.items():
-        ends = ends_of_rolling(records, quantity)
         for name, p in sets.items():
-            if name not in ends or (case is Case.NR and name not in hanging):
+            end = records.threshold(name, quantity)
+            if end is None or (case is Case.NR and name not in hanging):
                 missing.append(Missing(NAME, name, f"{quantity}, at which {case.name} would end, was not measured"))
                 continue
             for factor, side in zip(SIDES, ("below", "above"), strict=True):
-                q = p.replace(omega_0=ends[name] * factor)
+                q = p.replace(omega_0=end.value * factor)
                 x = State(omega_c=q.omega_0)
                 if case is Case.NR:  # the spin about the radial axis is the same, whatever the orbit
                     x = x._replace(y=HIGH * p.R, slip_x=hanging[name] - p.R / p.r * q.omega_0)
@@ -90,16 +90,10 @@ def _slights(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> tupl
     return slights, missing
 
 
-def ends_of_rolling(records: Records, quantity: str) -> dict[str, float]:
-    """The measured flow of every set at which rolling ends, rad s-1: of several values the most certain one."""
-    values = sorted((m for m in records.measurements if m.quantity == quantity), key=lambda m: -m.uncertainty)
-    return {m.set: m.value for m in values}
-
-
 def _hanging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict[str, float]:
     """The spin about the radial axis, slip_x + R/r omega_c, of balls that have settled on the wall alone."""
-    ends = ends_of_rolling(records, "omega_02")
-    flows = {name: sets[name].replace(omega_0=ends[name] * SIDES[1]) for name in sets if name in ends}
+    ends = {name: records.threshold(name, "omega_02") for name in sets}
+    flows = {name: sets[name].replace(omega_0=end.value * SIDES[1]) for name, end in ends.items() if end}
     starts = [
         Start(name, q, "on the wall", np.array([high(q), 0, q.omega_0, 0, 0, 0, 0, 0])) for name, q in flows.items()
     ]
