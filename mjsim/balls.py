@@ -122,8 +122,8 @@ class Balls:
         """Normal forces of the contacts in the last step, shape (2, runs), N and N m."""
         return _rows(self._contact[1])
 
-    def step_all(self, fluid: Array) -> bool:
-        """Let all runs take a step, unless something happens in it that has to be looked at: then return False."""
+    def drive_all(self, fluid: Array) -> bool:
+        """Set what drives a step of all runs, unless something happens in it that has to be looked at: then False."""
         if self._compiled:
             if not self._compiled(False, True, fluid, self.table, self.qvel, *self._contact, *self._written):
                 return False
@@ -132,7 +132,6 @@ class Balls:
         else:
             self.last[:] = self.qvel
         self._contact = self._latest
-        self.engine.step_all()
         return True
 
     def drive(self, fluid: Array, moving: Runs, watched: bool = True) -> bool:

@@ -84,10 +84,12 @@ class Polar(Stepper):
             if row is not None:
                 row[:, : recorder.NQ], row[:, recorder.NQ : recorder.SENSORS] = balls.qpos.T, balls.qvel.T
                 row[:, -1] = balls.leads
-            if not (self._whole and balls.step_all(fluid)):
+            if self._whole and balls.drive_all(fluid):
+                balls.engine.step_all()  # mj_step
+                if row is not None:
+                    row[:, recorder.SENSORS : -1] = balls.sensors.T
+            else:
                 self._divided(fluid, row)
-            elif row is not None:
-                row[:, recorder.SENSORS : -1] = balls.sensors.T
             self._steps, row = self._steps + 1, None
 
     def _divided(self, fluid: Array, row: Array | None) -> None:
