@@ -61,9 +61,9 @@ $(VENV)/installed-dev: requirements-dev.lock $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
 	@touch $@
 
-$(VENV)/installed-engines: $(VENV)/installed
+$(VENV)/installed-engines: requirements-engines.lock $(VENV)/installed
 	@for engine in drake pybullet; do \
-	    $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary :all: $$engine || \
+	    $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary :all: -c $< $$engine || \
 	        echo "the league goes on without $$engine, which has no wheel for this Python"; \
 	done
 	@touch $@
@@ -71,6 +71,7 @@ $(VENV)/installed-engines: $(VENV)/installed
 lock:
 	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml -o requirements.lock
 	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
+	uv pip compile --universal --no-annotate --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra engines -c requirements.lock -o requirements-engines.lock
 
 clean:
 	rm -rf $(VENV) build docs/_build docs/api *.egg-info
