@@ -25,9 +25,10 @@ import numpy.typing as npt
 
 from mjsim import limits, recorder
 from mjsim.classify import Classifier, Regularised
+from mjsim.contact_settings import ContactSettings
+from mjsim.corrections import Ball, resistance
 from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
-from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 from model.kinematics import Motion, frame, from_world, slip_speeds, to_world
 from model.parameters import Range, check_number
 from model.trajectory import SAMPLE, current_versions, version
@@ -93,7 +94,7 @@ class Coordinates:
     """What place and velocity of a scene are."""
 
     start: Callable[[State, Parameters], tuple[Array, Array]]
-    drag: Callable[[_Floats, _Floats, float, Parameters], _Floats]
+    drag: Callable[[_Floats, _Floats, float, Ball], _Floats]
     """The force of the fluid at a place, a velocity and an omega_0."""
     azimuth: Callable[[float, _Floats], float]
     """The azimuth, not wrapped, from that before the step."""
@@ -103,26 +104,15 @@ class Coordinates:
     """Whether the axes of the scene turn with the ball."""
 
 
-def _coefficient(p: Parameters, speed: float) -> float:
-    """m c(|w|) in kg s-1, at a speed |w| in m s-1. Raises KeyError for a law of `model.drag` without a formula here."""
-    Re = 2 * p.r * speed / (p.nu_f or math.inf)
-    factor: dict[str, float] = {
-        STOKES: 1.0,
-        SCHILLER_NAUMANN: max(1 + 0.15 * Re**0.687, 0.44 * Re / 24),
-        QUADRATIC: p.C_D * Re / 24,
-    }
-    return p.m * p.c * factor[p.drag]
-
-
 def _joint_start(x: State, p: Parameters) -> tuple[Array, Array]:
     qpos, qvel = recorder.joint_state(x, 0.0, p)
     return qpos[:3], qvel @ _SPIN.T
 
 
-def _joint_drag(place: _Floats, velocity: _Floats, omega_0: float, p: Parameters) -> _Floats:
-    rho, (omega_c, v_h, v_y, *_) = p.R - place[1], velocity
+def _joint_drag(place: _Floats, velocity: _Floats, omega_0: float, ball: Ball) -> _Floats:
+    rho, (omega_c, v_h, v_y, *_) = ball.R - place[1], velocity
     along = rho * (omega_c - omega_0)
-    mc = _coefficient(p, math.hypot(v_h, v_y, along))
+    mc = resistance(along, v_h, v_y, ball)
     return -mc * rho * along, -mc * v_h, -mc * v_y
 
 
@@ -136,10 +126,10 @@ def _free_start(x: State, p: Parameters) -> tuple[Array, Array]:
     return motion.position, np.concatenate([motion.velocity, motion.spin])
 
 
-def _free_drag(place: _Floats, velocity: _Floats, omega_0: float, p: Parameters) -> _Floats:
+def _free_drag(place: _Floats, velocity: _Floats, omega_0: float, ball: Ball) -> _Floats:
     (x, y, _), (v_x, v_y, v_z, *_) = place, velocity
     w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
-    mc = _coefficient(p, math.hypot(w_x, w_y, v_z))
+    mc = resistance(w_x, w_y, v_z, ball)
     return -mc * w_x, -mc * w_y, -mc * v_z
 
 
@@ -195,7 +185,8 @@ def simulate(
     with closing(build(_imported(library), p, settings)) as scene:
         place, velocity = coordinates.start(x, p)
         scene.start(place.tolist(), velocity.tolist())
-        run = _Run(scene, coordinates, p, place.tolist(), velocity.tolist())
+        ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
+        run = _Run(scene, coordinates, ball, place.tolist(), velocity.tolist())
         done = 0
         try:
             while done < count:
@@ -242,7 +233,7 @@ _WIDTH = 1 + 3 + 6 + 2 * 5
 class _Run:
     scene: Scene
     coordinates: Coordinates
-    p: Parameters
+    ball: Ball
     place: _Floats
     velocity: _Floats
     theta: float = 0.0
@@ -259,11 +250,11 @@ class _Run:
             self._step(fluid)
 
     def _step(self, omega_0: float) -> None:
-        drag_force, azimuth, p = self.coordinates.drag, self.coordinates.azimuth, self.p
-        self.place, self.velocity = self.scene.advance(drag_force(self.place, self.velocity, omega_0, p))
-        if self.coordinates.turning and self.place[1] >= p.R:
+        drag = self.coordinates.drag(self.place, self.velocity, omega_0, self.ball)
+        self.place, self.velocity = self.scene.advance(drag)
+        if self.coordinates.turning and self.place[1] >= self.ball.R:
             raise BreakdownError("reached the vessel's axis, where polar coordinates end,")
-        self.theta = azimuth(self.theta, self.place)
+        self.theta = self.coordinates.azimuth(self.theta, self.place)
 
 
 def _samples(time: Array, rows: Array, coordinates: Coordinates, p: Parameters) -> npt.NDArray[np.void]:

@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 
 import analytic
 from compare.commands import cli
-from compare.engines import loop
 from compare.measure import newcomer
 from compare.measure.lab import Lab, Level
 from compare.measure.record import Records
@@ -122,13 +121,6 @@ def test_free_flight_obeys_newton_and_the_law_of_drag(name, law):
     turned = np.linalg.norm(begin.spin) * lasts * speed / p.R  # the spin keeps its direction in space
     for slip in ("slip_x", "slip_y", "slip_z"):
         assert getattr(seen, slip)[-1] == pytest.approx(getattr(truth, slip), abs=2 * speed / p.r + turned)
-
-
-@pytest.mark.parametrize("name", loop.COORDINATES)
-def test_a_law_without_a_formula_is_not_taken_for_another(name, monkeypatch):
-    monkeypatch.setattr("model.drag.LAWS", (*LAWS, "oseen"))
-    with pytest.raises(KeyError, match="oseen"):
-        loop.COORDINATES[name].drag([0.0] * 3, [1.0] * 6, 0.0, REFERENCE.replace(drag="oseen", nu_f=1e-5))
 
 
 @engines(*NEWCOMERS)
