@@ -14,6 +14,7 @@ The engine is driven by -m c(|w|) w (9) alone, with the velocity w relative to t
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import math
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -66,6 +67,55 @@ class Scene(Protocol):
 
     def close(self) -> None:
         """Give up what the engine holds."""
+
+
+class Library(Protocol):
+    """What an engine comes in."""
+
+    @property
+    def name(self) -> str:
+        """What it is called where it is installed."""
+
+    @property
+    def missing(self) -> str:
+        """Why it can't be used here, and what to do about it; empty if it can."""
+
+    @property
+    def version(self) -> str:
+        """Or that it isn't installed."""
+
+    def load(self) -> Any:
+        """What a scene is built with; `InputError` if it is missing."""
+
+
+@dataclass(frozen=True)
+class Package:
+    """A Python package of the extra ``engines``."""
+
+    name: str
+    module: str
+    """The module to import, which may be called otherwise."""
+
+    @property
+    def missing(self) -> str:
+        """As in `Library`."""
+        return "" if importlib.util.find_spec(self.module.split(".")[0]) else self._advice
+
+    @property
+    def version(self) -> str:
+        """As in `Library`."""
+        return version(self.name)
+
+    def load(self) -> Any:
+        """The module."""
+        try:
+            return importlib.import_module(self.module)
+        except ImportError as error:
+            raise InputError(self._advice) from error
+
+    @property
+    def _advice(self) -> str:
+        return f'{self.name} is not installed: pip install "dualball[engines]"'
 
 
 class BreakdownError(RuntimeError):
@@ -155,7 +205,7 @@ COORDINATES = {"joints": JOINTS, "free": FREE}
 
 def simulate(
     engine: str,
-    library: str,
+    library: Library,
     build: Callable[[Any, Parameters, N], Scene],
     p: Parameters,
     x0: npt.ArrayLike,
@@ -165,7 +215,7 @@ def simulate(
     sample_interval: float | None,
     progress: Callable[[float], None],
 ) -> Trajectory:
-    """One run of an engine with the scene that `build` makes of its library, and from rest of the azimuth.
+    """One run of an engine with the scene that `build` makes of what its library loads, and from rest of the azimuth.
 
     Where it breaks down, the header says why.
 
@@ -182,7 +232,7 @@ def simulate(
     check_number("h", x.h, "m", Range(high=p.R, below=True), "to be off the axis it")
     rows, failure = np.empty((count, _WIDTH)), ""
     coordinates = COORDINATES[settings.coordinates]
-    with closing(build(_imported(library), p, settings)) as scene:
+    with closing(build(library.load(), p, settings)) as scene:
         place, velocity = coordinates.start(x, p)
         scene.start(place.tolist(), velocity.tolist())
         ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
@@ -201,28 +251,11 @@ def simulate(
             failure = f"{error} by t = {done * every * settings.timestep:g} s"
     time = np.arange(done, dtype=float) * (every * settings.timestep)
     given = {"t_end": float(t_end), "sample_interval": every * settings.timestep, "x0": list(x), "theta_0": 0.0}
-    versions = {**current_versions(), library: version(library)}
+    versions = {**current_versions(), library.name: library.version}
     header = Header(engine, p, flow, asdict(settings) | given, failure=failure, versions=versions)
     classifier = Classifier(p, settings)
     block = classifier.add(_samples(time, rows[:done], coordinates, p), last=True)
     return Trajectory.from_blocks(header, [block], classifier.events)
-
-
-def module(library: str) -> str:
-    """The module of an engine's library, which is named as it is installed."""
-    return {"drake": "pydrake"}.get(library, library)
-
-
-def how_to_install(library: str) -> str:
-    """What to say where it isn't."""
-    return f'{library} is not installed: pip install "dualball[engines]"'
-
-
-def _imported(library: str) -> Any:
-    try:
-        return importlib.import_module({"drake": "pydrake.all"}.get(library, library))
-    except ImportError as error:
-        raise InputError(how_to_install(library)) from error
 
 
 _WIDTH = 1 + 3 + 6 + 2 * 5

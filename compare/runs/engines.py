@@ -5,7 +5,6 @@ To add an engine, add a record. It is named in tasks and files by `Engine.name`;
 
 from __future__ import annotations
 
-import importlib.util
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +17,7 @@ from mjsim import ContactSettings
 from mjsim.journal import Journal
 from model import InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
+from model.trajectory import version
 
 if TYPE_CHECKING:  # a task names its engine
     from compare.runs.tasks import Task
@@ -50,9 +50,9 @@ class Engine:
     sources: tuple[str, ...]
     """Packages whose sources determine the results."""
     stands_on: tuple[str, ...]
-    """Libraries whose versions do."""
-    needs: str = ""
-    """Library of the extra ``engines`` without which it can't run."""
+    """Packages whose versions do."""
+    needs: loop.Library | None = None
+    """What it can't run without, and what not everybody has; its version counts, too."""
     as_it_comes: str = ""
     """Name of the same engine as a newcomer would use it."""
     mark: str
@@ -62,8 +62,14 @@ class Engine:
     @property
     def missing(self) -> str:
         """Why it can't run here; empty if it can."""
-        absent = self.needs and importlib.util.find_spec(loop.module(self.needs)) is None
-        return loop.how_to_install(self.needs) if absent else ""
+        return self.needs.missing if self.needs else ""
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Of all that determines its results."""
+        return {name: version(name) for name in self.stands_on} | (
+            {self.needs.name: self.needs.version} if self.needs else {}
+        )
 
     def configured(self, given: Mapping[str, float]) -> Settings:
         """`configure`, but an option that belongs to other engines is an `InputError`."""
@@ -128,13 +134,45 @@ def _theory(method: str) -> Simulate:
     return simulate
 
 
-def _adapter(name: str, library: str, scene: Callable[[Any, Parameters, Any], loop.Scene]) -> Simulate:
-    def simulate(task: Task, progress: Callable[[float], None]) -> Trajectory:
-        settings: Any = task.chosen_settings
-        given = task.parameters, task.x0, task.t_end, task.fluid, settings, task.sample_interval, progress
-        return loop.simulate(name, library, scene, *given)
+def _adapted(
+    adapter: Any, library: loop.Library, newcomer_step: float, marks: str, colour: str
+) -> tuple[Engine, Engine]:
+    """Records of an engine with the best settings of its adapter and with a newcomer's.
 
-    return simulate
+    The adapter is a module of `compare.engines`, with `Settings`, `newcomer` and `scene`; each record has a mark.
+    """
+
+    def named(name: str) -> Simulate:
+        def simulate(task: Task, progress: Callable[[float], None]) -> Trajectory:
+            settings: Any = task.chosen_settings
+            given = task.parameters, task.x0, task.t_end, task.fluid, settings, task.sample_interval, progress
+            return loop.simulate(name, library, adapter.scene, *given)
+
+        return simulate
+
+    name, other = library.name, f"{library.name}-defaults"
+    best = Engine(
+        name=name,
+        settings=adapter.Settings,
+        options=("timestep",),
+        configure=lambda given: adapter.Settings(**given),
+        at=lambda step: adapter.Settings(timestep=step),
+        simulate=named(name),
+        sources=("model", "mjsim", "compare.engines"),
+        stands_on=("numpy",),
+        needs=library,
+        as_it_comes=other,
+        mark=marks[0],
+        colour=colour,
+    )
+    return best, replace(
+        best,
+        name=other,
+        configure=lambda given: adapter.newcomer(given.get("timestep", newcomer_step)),
+        at=adapter.newcomer,
+        simulate=named(other),
+        mark=marks[1],
+    )
 
 
 def _time_stepping(given: Mapping[str, float]) -> analytic.Settings:
@@ -186,52 +224,12 @@ MOREAU = replace(
     mark="^",
     colour="#009E73",
 )
-PYBULLET = Engine(
-    name="pybullet",
-    settings=pybullet.Settings,
-    options=("timestep",),
-    configure=lambda given: pybullet.Settings(**given),  # type: ignore[arg-type]
-    at=lambda step: pybullet.Settings(timestep=step),
-    simulate=_adapter("pybullet", "pybullet", pybullet.scene),
-    sources=("model", "mjsim", "compare.engines"),
-    stands_on=("numpy", "pybullet"),
-    needs="pybullet",
-    as_it_comes="pybullet-defaults",
-    mark="v",
-    colour="#E69F00",
-)
-PYBULLET_NEWCOMER = replace(
-    PYBULLET,
-    name="pybullet-defaults",
-    configure=lambda given: pybullet.newcomer(given.get("timestep", 1 / 240)),
-    at=pybullet.newcomer,
-    simulate=_adapter("pybullet-defaults", "pybullet", pybullet.scene),
-    mark="1",
-)
-DRAKE = Engine(
-    name="drake",
-    settings=drake.Settings,
-    options=("timestep",),
-    configure=lambda given: drake.Settings(**given),  # type: ignore[arg-type]
-    at=lambda step: drake.Settings(timestep=step),
-    simulate=_adapter("drake", "drake", drake.scene),
-    sources=("model", "mjsim", "compare.engines"),
-    stands_on=("numpy", "drake"),
-    needs="drake",
-    as_it_comes="drake-defaults",
-    mark="D",
-    colour="#56B4E9",
-)
-DRAKE_NEWCOMER = replace(
-    DRAKE,
-    name="drake-defaults",
-    configure=lambda given: drake.newcomer(given.get("timestep", 1e-3)),
-    at=drake.newcomer,
-    simulate=_adapter("drake-defaults", "drake", drake.scene),
-    mark="+",
+_OTHERS = (
+    _adapted(pybullet, loop.Package("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
+    _adapted(drake, loop.Package("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
 )
 ENGINES: dict[str, Engine] = {
-    each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU, PYBULLET, PYBULLET_NEWCOMER, DRAKE, DRAKE_NEWCOMER)
+    each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU, *(each for pair in _OTHERS for each in pair))
 }
 """Every engine by name."""
 ALIASES = {"analytic": "event"}

@@ -23,7 +23,6 @@ from mjsim import ContactSettings
 from mjsim.engine import Blocks
 from mjsim.journal import Journal
 from model import Flow, InputError, Parameters, State, Trajectory, storage
-from model.trajectory import version
 
 LONG = 1e6
 """Steps from which on a run that hands out its samples keeps a journal and has a worker of its own, without batch."""
@@ -240,7 +239,7 @@ def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool]) -> Traj
 @functools.cache
 def _code(engine: Engine) -> dict[str, str]:
     """Digest of the sources that produce an engine's results, and the versions they stand on."""
-    return {"sources": sources(*engine.sources), **{name: version(name) for name in engine.stands_on}}
+    return {"sources": sources(*engine.sources), **engine.versions}
 
 
 @functools.cache

@@ -25,7 +25,6 @@ from compare.scorecard.accuracy import LASTS, MOTIONS
 from compare.scorecard.trials import AT_REST, KICKED, PASSES, ROLLING, ROUGH, SLIPPING, SMOOTH, STATES, WINDOW, State
 from compare.statistics import plain
 from model import Case, Trajectory
-from model.trajectory import version
 
 STEPS = (4e-3, 2e-3, 1e-3)
 """Time steps, s."""
@@ -160,10 +159,9 @@ def to_mapping(those: Sequence[Contestant], entries: Sequence[Entry]) -> dict[st
     """JSON-able data: contestants with versions and settings, those that are missing with the reason, and entries."""
     about = []
     for each in those:
-        versions = {name: version(name) for name in each.engine.stands_on}
         steps = [entry.step for entry in entries if entry.name == each.name]
         settings = {"settings": asdict(each.settings(steps[0]))} if steps else {}
-        about.append({"name": each.name, "missing": each.engine.missing, "versions": versions, **settings})
+        about.append({"name": each.name, "missing": each.engine.missing, "versions": each.engine.versions, **settings})
     data: dict[str, Any] = plain({"contestants": about, "entries": [asdict(entry) for entry in entries]})
     return data
 
