@@ -14,6 +14,10 @@ from model.arrays import Array
 from model.errors import InputError, StorageError
 from model.parameters import NOT_NEGATIVE, POSITIVE, check_number, parse_number
 
+GAP = 10.0
+"""An interval this many times the usual one (the median) is a gap in a measured flow: it wasn't measured there. A few
+samples lost, or knots written by hand at uneven times, stay below it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Flow:
@@ -106,12 +110,13 @@ class Flow:
         return replace(flow, waves=np.array(rows).reshape(-1, 3))
 
     @classmethod
-    def from_csv(cls, path: str | Path) -> Self:
+    def from_csv(cls, path: str | Path, longest_interval: float | None = None) -> Self:
         """A measured flow: lines of time in s and omega_0 in rad s-1, with linear interpolation between them.
 
         Commas, semicolons or white space separate the two; a first line without numbers is taken as the header, and
-        what follows a # as a comment. Raises `StorageError` for a file that can't be read, `InputError` that names
-        the line where a field is missing or not a finite number, or where times don't increase.
+        what follows a # as a comment. Over more than `longest_interval`, in s, nothing is interpolated; `GAP` times the
+        median interval if None. Raises `StorageError` for a file that can't be read, `InputError` that names the line
+        where a field is missing or not a finite number, where times don't increase, or after a gap.
         """
         try:
             lines = Path(path).read_text("utf-8-sig").rstrip().splitlines()
@@ -131,6 +136,16 @@ class Flow:
         if not samples:
             raise InputError(f"{path} has no line with a time and a value of omega_0")
         times, values = zip(*samples, strict=True)
+        if len(times) > 1:
+            intervals = np.diff(times)
+            usual = float(np.median(intervals))
+            if longest_interval is None:
+                longest_interval = GAP * usual
+            for k in np.flatnonzero(intervals > check_number("longest_interval", longest_interval, "s", POSITIVE))[:1]:
+                raise InputError(
+                    f"{path}, line {rows[k + 1][0]}: a gap of {intervals[k]:g} s from t = {times[k]:g} s on; usual are "
+                    f"{usual:g} s, and longest_interval = {longest_interval:g} s"
+                )
         return cls.sampled(times, values, kind="measured")
 
     @classmethod
@@ -182,8 +197,8 @@ def _is_number(text: str) -> bool:
 
 def _sample(fields: Sequence[str], last: float) -> tuple[float, float]:
     """Time and omega_0 of a line after that of the `last` time."""
-    if len(fields) != 2 or not all(fields):
-        raise InputError(f"needs two values, time and omega_0, but has {len([f for f in fields if f])}")
+    if len(fields) != 2:
+        raise InputError(f"needs two values, time and omega_0, but has {len(fields)}")
     time, omega_0 = parse_number("time", fields[0], "s"), parse_number("omega_0", fields[1], "rad s-1")
     if time <= last:
         raise InputError(f"times must increase, but {time:g} s comes after {last:g} s")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import re
 import sys
 from collections.abc import Sequence
 
@@ -18,7 +19,8 @@ from model.trajectory import current_versions
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with the given arguments, the process's own for None; return its exit code."""
-    words = sys.argv[1:] if argv is None else argv
+    # argparse takes -1e-6 and -inf for options, unlike -1: a space in front makes values of them.
+    words = [re.sub(r"^-(?=\.?\d|inf|nan)", " -", word) for word in (sys.argv[1:] if argv is None else argv)]
     args = _parser(words).parse_args(words)
     try:
         return int(args.run(args))

@@ -27,10 +27,15 @@ def add_flow(parser: argparse.ArgumentParser) -> None:
     wave = "a mean with waves on it, frequencies in Hz"
     choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
     choice.add_argument("--flow", type=Path, metavar="FILE", help="measured, as CSV: time, omega_0 on each line")
+    group.add_argument(
+        "--longest-interval", type=number, metavar="s", help="between lines of --flow; default: 10 usual ones"
+    )
 
 
 def flow(args: argparse.Namespace) -> Flow | None:
     """The flow that the options of `add_flow` describe; None for a steady one."""
+    if args.longest_interval is not None and not args.flow:
+        raise InputError("--longest-interval is for --flow")
     if args.ramp:
         return Flow.ramp(*args.ramp)
     if args.staircase:
@@ -42,7 +47,7 @@ def flow(args: argparse.Namespace) -> Flow | None:
                 "--sine needs a mean in rad/s, then for each wave its amplitude in rad/s and frequency in Hz"
             )
         return Flow.sines(mean, zip(waves[::2], waves[1::2], [0.0] * (len(waves) // 2), strict=True))
-    return Flow.from_csv(args.flow) if args.flow else None
+    return Flow.from_csv(args.flow, args.longest_interval) if args.flow else None
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:

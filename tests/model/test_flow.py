@@ -92,8 +92,10 @@ def test_measured(tmp_path: Path, text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("time,omega_0\n0,5\n1,\n", "line 3: needs two values, time and omega_0, but has 1"),
-        ("0,5\n,6\n", "line 2: needs two values, time and omega_0, but has 1"),
+        ("time,omega_0\n0,5\n1,\n", "line 3: omega_0 = '' must be a number in rad s-1"),
+        ("0,5\n,6\n", "line 2: time = '' must be a number in s"),
+        ("0,5\n1\n", "line 2: needs two values, time and omega_0, but has 1"),
+        ("0,5\n1,6,\n", "line 2: .* but has 3"),
         ("0,5\n\n2,6\n", "line 2: .* but has 0"),
         ("0,5,1\n", "line 1: .* but has 3"),
         ("0,5\n2,6\n1,7\n", "line 3: times must increase, but 1 s comes after 2 s"),
@@ -101,6 +103,7 @@ def test_measured(tmp_path: Path, text: str) -> None:
         ("0,5\n10:31,6\n", "line 2: time = '10:31' must be a number in s"),
         ("0,5\n1,nan\n", "line 2: omega_0 = nan rad s-1 must be finite"),
         ("0,5\nnan,6\n", "line 2: time = nan s must be finite"),
+        ("# logger\n0,5\n1,6\n2,6\n2.5,5\n13,6\n", "line 6: a gap of 10.5 s from t = 2.5 s on; usual are 1 s, and"),
         ("time,omega_0\n", "no line with a time"),
         ("", "no line with a time"),
     ],
@@ -109,6 +112,18 @@ def test_bad_measurements(tmp_path: Path, text: str, says: str) -> None:
     (tmp_path / "flow.csv").write_text(text)
     with pytest.raises(InputError, match=says):
         Flow.from_csv(tmp_path / "flow.csv")
+
+
+def test_a_gap_that_is_accepted(tmp_path: Path) -> None:
+    path = tmp_path / "flow.csv"
+    path.write_text("0,5\n1,6\n2,7\n13,18\n")
+    assert Flow.from_csv(path, longest_interval=11)(12.0) == 17
+    with pytest.raises(InputError, match=r"line 4: .*longest_interval = 10.5 s"):
+        Flow.from_csv(path, longest_interval=10.5)
+    with pytest.raises(InputError, match="longest_interval = 0 s is out of range"):
+        Flow.from_csv(path, longest_interval=0)
+    path.write_text("0,5\n1,6\n2,7\n11,16\n")
+    assert Flow.from_csv(path)(10.0) == 15  # nine usual intervals
 
 
 def test_unreadable_measurements(tmp_path: Path) -> None:
