@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from model import Case, Flow, Parameters, State
-from model.arrays import Array
+from model.arrays import Array, Real
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,11 @@ class Fluid:
     waves: tuple[tuple[float, float, float], ...] = ()
     """Amplitude in rad s-1, angular frequency in rad s-1, phase in rad."""
 
-    def __call__(self, t: float) -> float:
-        omega_0 = self.value + self.slope * (t - self.start)
+    def __call__(self, t: Real) -> Real:
+        """omega_0 at a time, or at times of any shape."""
+        omega_0, sin = self.value + self.slope * (t - self.start), math.sin if isinstance(t, float) else np.sin
         for amplitude, omega, phase in self.waves:
-            omega_0 += amplitude * math.sin(omega * t + phase)
+            omega_0 = omega_0 + amplitude * sin(omega * t + phase)
         return omega_0
 
     @classmethod

@@ -58,7 +58,7 @@ def path(t: Array, at: Moment, p: Parameters, omega_0: Fluid) -> Path:
     middle, half = (ends[1:] + ends[:-1]) / 2, np.diff(ends) / 2
     nodes = middle[:, None] + half[:, None] * _NODES
     w = omega_c(nodes, at, p, omega_0)
-    power = -p.m * p.c * p.R**2 * w * (w - _fluid(nodes, omega_0))
+    power = -p.m * p.c * p.R**2 * w * (w - omega_0(nodes))
     theta, work = (np.append(0.0, np.cumsum(half * (f @ _WEIGHTS))) for f in (w, power))
     here = np.searchsorted(ends, t)
     x = np.zeros((len(t), 8))
@@ -77,7 +77,7 @@ def end(at: Moment, until: float, p: Parameters, omega_0: Fluid, leave_rolling: 
     periods = sum((until - at.time) * omega / (2 * math.pi) for _, omega, _ in omega_0.waves)
     for start, stop in pairwise(np.linspace(at.time, until, 2 + int(periods))):
         times = np.linspace(start, stop, _SCAN)
-        gone = margin(omega_c(times, at, p, omega_0), p, _fluid(times, omega_0)) < 0
+        gone = margin(omega_c(times, at, p, omega_0), p, omega_0(times)) < 0
         if gone[0]:
             return float(start)
         if np.any(gone):
@@ -127,9 +127,3 @@ def onset(at: Moment, p: Parameters, omega_0: float) -> tuple[Case, Moment]:
     if abs(A_x) <= 16 * math.ulp(1.0) * B_y:
         return Case.SR, replace(at, alpha=alpha, beta=math.nan)
     return Case.SS, replace(at, alpha=alpha, beta=beta)
-
-
-def _fluid(t: Array, omega_0: Fluid) -> Array:
-    """omega_0 at times t, same shape."""
-    waves = [amplitude * np.sin(omega * t + phase) for amplitude, omega, phase in omega_0.waves]
-    return np.asarray(omega_0.value + omega_0.slope * (t - omega_0.start) + sum(waves))

@@ -19,7 +19,7 @@ from compare.measure.record import Measurement, Missing, Records, measurement, s
 from compare.measure.settling import Settled, Start, settle
 from compare.runs.tasks import Task
 from compare.statistics import Measured, peaks, top
-from model import Case, Flow, Parameters, Trajectory
+from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
@@ -103,9 +103,7 @@ def _ramp(lab: Lab, state: Settled, begins: float, ends: float, rate: float) -> 
 
 def _on_floor(state: Settled) -> Array:
     """Its mean state, on the floor and at the wall to the last digit."""
-    x0 = np.zeros(8)
-    x0[2:6] = state.mean[2:6]
-    return x0
+    return State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
 
 
 def _jumped(lab: Lab, trial: Trial) -> Iterator[Measurement | Missing]:
