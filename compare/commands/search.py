@@ -12,6 +12,7 @@ from rich.markdown import Markdown
 
 from compare.commands import options, running
 from compare.runs import basins, progress, regions, search
+from compare.runs.campaign import Campaign
 from compare.runs.search import BOX, Search, Searched
 from compare.runs.workers import processes
 from model import InputError
@@ -38,7 +39,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--quiet", action="store_true", help="no progress")
 
     command = options.command(
-        commands, "basins", plane, "what becomes of the ball from each start of a plane of states"
+        commands, "basins", plane, "what becomes of the ball from each start of a plane of states, resumable"
     )
     options.add_parameters(command)
     running.add_start(command)
@@ -48,8 +49,11 @@ def add(commands: options.Commands) -> None:
         "--mujoco", type=int, default=0, metavar="N", help="MuJoCo, too, on every N-th point both ways"
     )
     command.add_argument("--timestep", type=options.number, default=2.5e-4, metavar="s", help="that of MuJoCo")
+    command.add_argument("-o", "--output", type=Path, default=Path("basins"), metavar="DIR")
+    running.add_workers(command)
     command.add_argument("--save", type=Path, metavar="FILE", help="write the map as JSON")
     command.add_argument("--json", action="store_true", help="print the shares as JSON")
+    command.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -95,7 +99,13 @@ def plane(args: argparse.Namespace) -> int:
     """Map the basins and show their shares."""
     p = options.parameters(args)
     coarse = int(check_number("mujoco", args.mujoco, "points", Range(0, whole=True)))
-    mapped = basins.basins(p, running.start(args)._asdict(), _axis(args.across), _axis(args.up), coarse, args.timestep)
+    given = p, running.start(args)._asdict(), _axis(args.across), _axis(args.up), coarse, args.timestep
+    with (
+        progress.shown(quiet=args.quiet or args.json) as show,
+        Campaign(args.output, running.workers(args), limit=args.limit) as campaign,
+    ):
+        campaign.report = lambda now: show("basins", now.done, now.total, now.failed)
+        mapped = basins.basins(campaign, *given)
     if args.save:
         mapped.save(args.save)
     shares = {fate: mapped.share(fate) for fate in basins.FATES if mapped.share(fate)[0]}

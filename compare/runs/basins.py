@@ -1,7 +1,8 @@
 """Basins: which attractor the ball comes to from each start of a two-dimensional slice through the states.
 
-A fine map by time stepping, and a coarse one by MuJoCo on some of its points. What the two disagree about should lie
-at the boundaries of the basins, where the least error decides: `Basins.differences` says how far away it is.
+A fine map by time stepping, and a coarse one by MuJoCo on some of its points: runs of a campaign, so that a map goes on
+where it stopped. What the two disagree about should lie at the boundaries of the basins, where the least error decides:
+`Basins.differences` says how far away it is.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -17,10 +18,13 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-import mjsim
-from analytic import Settings, simulate_many
+from analytic import Settings
+from analytic.simulation import start_state
+from compare.runs.campaign import Campaign
+from compare.runs.engines import MOREAU, MUJOCO
+from compare.runs.tasks import Task
 from mjsim import ContactSettings
-from model import Case, Contact, InputError, Parameters, StorageError, Trajectory
+from model import Case, Contact, InputError, Parameters, StorageError, Trajectory, storage
 from model.arrays import Array
 from model.files import write_text
 from model.kinematics import VARIABLES
@@ -28,14 +32,13 @@ from model.parameters import check_names
 
 FATES = ("hops", "RR", "SS", "off the floor", "undecided")
 """What may become of a ball. SR and NR are one: in SR the floor carries nothing (Prop. 3)."""
-DURATION, QUIET = 60.0, 6.0
-"""How long time stepping follows a ball, and without a landing, in 1/c."""
-MUJOCO_DURATION, LAST = 10.0, 3.0
-"""How long MuJoCo follows it, and the part at the end that counts, in 1/c."""
-SAMPLES = 4000
-"""Samples of that: of a hop, one is within a tenth of its height. The landing itself may be shorter than a step."""
+DURATION, LAST = 10.0, 3.0
+"""How long a ball is followed, and the part at the end that counts, in 1/c."""
+SAMPLES = 500
+"""Samples of a run. One in ten of a hop is within the lowest fifth of its height: that all 150 at the end miss it has a
+chance of 1e-7. The landing itself may be shorter than a step."""
 HOP = 1e-4
-"""Range of y/R from which a ball that lands again and again hops: a hop known to last is six times as high."""
+"""Range of y/R from which a ball that comes down again and again hops: a hop known to last is six times as high."""
 STEPS = 140
 """Steps of time stepping in sqrt(R/g)."""
 
@@ -99,8 +102,8 @@ class Basins:
 
 
 def basins(
-    p: Parameters, start: Mapping[str, float], across: tuple[str, float, float, int], up: tuple[str, float, float, int],
-    coarse: int = 0, timestep: float = 2.5e-4,
+    campaign: Campaign, p: Parameters, start: Mapping[str, float], across: tuple[str, float, float, int],
+    up: tuple[str, float, float, int], coarse: int = 0, timestep: float = 2.5e-4,
 ) -> Basins:  # fmt: skip
     """Fates of starts on a plane: two axes (variable, from, to, points), all other variables as in `start`, else zero.
 
@@ -113,49 +116,32 @@ def basins(
     base = np.array([start.get(name, 0.0) for name in VARIABLES])
     states = np.tile(base, (len(y), len(x), 1))
     states[..., VARIABLES.index(across[0])], states[..., VARIABLES.index(up[0])] = x, y[:, None]
-    fates = by_stepping(p, states.reshape(-1, 8)).reshape(states.shape[:2])
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
-    mujoco = by_mujoco(p, few.reshape(-1, 8), timestep) if coarse else np.empty(0, np.int64)
-    return Basins(
-        p, tuple(base.tolist()), across[0], up[0], x, y, fates, coarse, mujoco.reshape(few.shape[:2]), timestep
-    )
+    fine_settings = Settings(method=MOREAU.name, step=math.sqrt(p.R / p.g) / STEPS)
+    fine = _tasks(states, MOREAU.name, p, fine_settings)
+    tasks = [*fine, *_tasks(few, MUJOCO.name, p, ContactSettings.for_problem(p, timestep))]
+    broken = {failure.task.key for failure in campaign.complete(tasks)}
+    files = [None if task.key in broken else campaign.path(task) for task in tasks]
+    fates = np.array([_fate(storage.load(file)) if file else FATES.index("undecided") for file in files])
+    by_stepping, by_mujoco = fates[: len(fine)].reshape(states.shape[:2]), fates[len(fine) :].reshape(few.shape[:2])
+    return Basins(p, tuple(base.tolist()), across[0], up[0], x, y, by_stepping, coarse, by_mujoco, timestep)
 
 
-def by_stepping(p: Parameters, x0s: Array) -> npt.NDArray[np.int64]:
-    """Fates (n,) of starts (n, 8) by time stepping."""
-    runs = simulate_many(
-        p, x0s, DURATION / p.c, settings=Settings(method="time-stepping", step=math.sqrt(p.R / p.g) / STEPS),
-        sample_interval=1 / p.c, quiet=QUIET / p.c,
-    )  # fmt: skip
-    last = slice(-int(LAST), None)
-    rise = runs.high[:, last, 0].max(axis=1) - runs.low[:, last, 0].min(axis=1)
-    lands = np.max(runs.landings[:, last], axis=1) > 0
-    return np.array([
-        FATES.index("undecided") if failure else _fate(bool(landed and r > HOP * p.R), Case(case))
-        for failure, landed, r, case in zip(runs.failure, lands, rise, runs.case[:, -1], strict=True)
-    ])  # fmt: skip
+def _tasks(states: Array, engine: str, p: Parameters, settings: Settings | ContactSettings) -> Sequence[Task]:
+    """A run from each state (m, n, 8); raises `InputError` where a ball can't start."""
+    lasts = DURATION / p.c
+    starts = [start_state(x, p, Settings()) for x in states.reshape(-1, len(VARIABLES))]
+    return [
+        Task(engine=engine, parameters=p, x0=x, t_end=lasts, settings=settings, sample_interval=lasts / SAMPLES)
+        for x in starts
+    ]
 
 
-def by_mujoco(p: Parameters, x0s: Array, timestep: float) -> npt.NDArray[np.int64]:
-    """Fates (n,) of starts (n, 8) by MuJoCo."""
-    settings = ContactSettings.for_problem(p, timestep)
-    runs = mjsim.simulate_many(
-        [p] * len(x0s), list(x0s), MUJOCO_DURATION / p.c, settings=settings,
-        sample_interval=MUJOCO_DURATION / p.c / SAMPLES,
-    )  # fmt: skip
-    return np.array([_of_trajectory(run, p) for run in runs])
-
-
-def _of_trajectory(run: Trajectory, p: Parameters) -> int:
-    if not run.complete:
-        return FATES.index("undecided")
-    late = run.y[run.time > (MUJOCO_DURATION - LAST) / p.c]
-    return _fate(bool(np.ptp(late) > HOP * p.R and late.min() < np.ptp(late) / 10), run.cases[-1])
-
-
-def _fate(hops: bool, case: Case) -> int:
-    """What a ball comes to that is in a case at the end."""
-    if hops:
+def _fate(run: Trajectory) -> int:
+    """What the ball of a whole run comes to."""
+    late, case = run.y[run.time > (1 - LAST / DURATION) * run.time[-1]], run.cases[-1]
+    rise = np.ptp(late)
+    if rise > HOP * run.header.parameters.R and late.min() < rise / 5:
         return FATES.index("hops")
     if case in (Case.RR, Case.SS):
         return FATES.index(case.name)

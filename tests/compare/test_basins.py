@@ -8,6 +8,7 @@ import pytest
 from analytic import stable_solutions
 from compare.commands import cli
 from compare.runs.basins import FATES, Basins, basins
+from compare.runs.campaign import Campaign
 from model import InputError, Parameters, StorageError
 
 BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
@@ -28,13 +29,29 @@ def made_up(fates, mujoco=((0, 0), (0, 0)), coarse=2) -> Basins:
     )
 
 
-def test_fates_are_the_stable_solutions_that_theory_has():
+def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(tmp_path):
     """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both engines alike."""
     assert {s.case.name for s in stable_solutions(BISTABLE)} == {"SS", "SR", "NR"}
-    basin = basins(BISTABLE, {"y": 0.002}, ("omega_c", 5.0, 45.0, 3), ("slip_x", -1.0, 1.0, 2), coarse=2)
-    assert {FATES[k] for k in basin.fates.ravel()} == {"SS", "off the floor"}
-    np.testing.assert_array_equal(basin.mujoco, basin.fates[::2, ::2])
-    assert len(basin.differences()) == 0
+    given, seen, maps = (BISTABLE, {"y": 0.002}, ("omega_c", 5.0, 45.0, 3), ("slip_x", -1.0, 1.0, 2), 2), [], []
+    for _ in range(2):
+        with Campaign(tmp_path, workers=0, report=lambda now: seen.append(now.done)) as campaign:
+            maps.append(basins(campaign, *given))
+        next(tmp_path.glob("*.h5")).unlink()  # as if it had been killed before the last run was whole
+    assert (seen[0], seen[-2:]) == (0, [7, 8])
+    for basin in maps:
+        assert {FATES[k] for k in basin.fates.ravel()} == {"SS", "off the floor"}
+        np.testing.assert_array_equal(basin.mujoco, basin.fates[::2, ::2])
+        assert len(basin.differences()) == 0
+
+
+def test_a_ball_that_hops_on(tmp_path):
+    """From states near the top of the hop."""
+    p = Parameters.named("hopping")
+    with Campaign(tmp_path, workers=0) as campaign:
+        basin = basins(
+            campaign, p, {"omega_c": 57.3, "slip_x": -106.0}, ("y", 6.36e-3, 6.4e-3, 2), ("v_y", 0.0, 1e-3, 2)
+        )
+    assert {FATES[k] for k in basin.fates.ravel()} == {"hops"}
 
 
 def test_distance_from_a_boundary_in_cells():
@@ -69,13 +86,15 @@ def test_kept_as_a_file(tmp_path):
         ({}, {"h": 0.06}, "h = 0.06 m"),
     ],
 )
-def test_bad_input(changes, start, message):
-    with pytest.raises(InputError, match=message):
-        basins(BISTABLE.replace(**changes), start, ("omega_c", 0.0, 1.0, 2), ("slip_x", 0.0, 1.0, 2))
+def test_bad_input(changes, start, message, tmp_path):
+    with pytest.raises(InputError, match=message), Campaign(tmp_path, workers=0) as campaign:
+        basins(campaign, BISTABLE.replace(**changes), start, ("omega_c", 0.0, 1.0, 2), ("slip_x", 0.0, 1.0, 2))
 
 
-def test_command(capsys):
-    assert cli.main(["basins", "--omega-0", "40", "--across", "omega_c=5:45:2", "--up", "slip_x=0:1:2", "--json"]) == 0
+def test_command(capsys, tmp_path):
+    to = ["--output", str(tmp_path), "--workers", "0"]
+    across = ["--omega-0", "40", "--across", "omega_c=5:45:2", "--up", "slip_x=0:1:2"]
+    assert cli.main(["basins", *across, *to, "--json"]) == 0
     assert '"shares"' in capsys.readouterr().out
-    assert cli.main(["basins", "--across", "omega=5:45:2", "--up", "slip_x=0:1:2"]) == 2
+    assert cli.main(["basins", *to, "--across", "omega=5:45:2", "--up", "slip_x=0:1:2"]) == 2
     assert "unknown state variable 'omega'" in capsys.readouterr().err
