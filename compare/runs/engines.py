@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import analytic
 import mjsim
-from compare.engines import drake, loop, pybullet
+from compare.engines import drake, loop, pybullet, siconos
 from mjsim import ContactSettings
 from mjsim.journal import Journal
 from model import InputError, Parameters, SimulationError, Trajectory
@@ -22,7 +22,7 @@ from model.trajectory import version
 if TYPE_CHECKING:  # a task names its engine
     from compare.runs.tasks import Task
 
-Settings = ContactSettings | analytic.Settings | pybullet.Settings | drake.Settings
+Settings = ContactSettings | analytic.Settings | pybullet.Settings | drake.Settings | siconos.Settings
 """Numerical settings of any engine."""
 Simulate = Callable[["Task", Callable[[float], None]], Trajectory]
 """One whole run; the function is called with the fraction done, from time to time."""
@@ -227,6 +227,7 @@ MOREAU = replace(
 _OTHERS = (
     _adapted(pybullet, loop.Package("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
     _adapted(drake, loop.Package("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
+    _adapted(siconos, siconos.LIBRARY, 1e-3, "p2", "#000000"),
 )
 ENGINES: dict[str, Engine] = {
     each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU, *(each for pair in _OTHERS for each in pair))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 import math
 import statistics
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -22,6 +21,7 @@ from compare.runs.engines import Engine, Settings
 from compare.runs.tasks import Task, carry_out
 from compare.scorecard import grade, kept, trials
 from compare.scorecard.accuracy import LASTS, MOTIONS
+from compare.scorecard.contenders import processor_time
 from compare.scorecard.trials import AT_REST, KICKED, PASSES, ROLLING, ROUGH, SLIPPING, SMOOTH, STATES, WINDOW, State
 from compare.statistics import plain
 from model import Case, Trajectory
@@ -182,9 +182,9 @@ def cost(task: Task) -> float:
 
 
 def _seconds(task: Task) -> float:
-    begin = time.process_time()
+    begin = processor_time()
     carry_out([task])
-    return time.process_time() - begin
+    return processor_time() - begin
 
 
 def stationary(state: State) -> Discipline:

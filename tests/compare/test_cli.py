@@ -234,7 +234,7 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str], name: str) -> Non
         ("simulate --time=-1", "t_end = -1 s is out of range"),
         ("simulate --timestep=-1", "timestep"),
         ("simulate --sample-interval=1e-9", "sample_interval = 1e-09 s is out of range"),
-        ("simulate --engine event --timestep 0.1", "pybullet, pybullet-defaults, drake, drake-defaults, not for event"),
+        ("simulate --engine event --timestep 0.1", "drake-defaults, siconos, siconos-defaults, not for event"),
         ("simulate --restitution 0.5", "--restitution is for event, time-stepping, not for mujoco"),
         ("simulate --engine event --restitution 1.5", "restitution = 1.5 1 is out of range"),
         ("simulate --flow absent.txt", "cannot read the flow from absent.txt"),

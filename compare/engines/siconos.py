@@ -1,0 +1,184 @@
+"""Siconos: Moreau's time stepping by a theta method, rigid contacts with Coulomb's cone, impacts by Newton's law.
+
+It has no wheel, and where a distribution packages it, it belongs to the system's Python. There it runs, a process for
+each run (`_siconos_worker.py`), which takes a step a line. `DUALBALL_SICONOS_PYTHON` names another Python that has it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+import select
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from compare.engines.loop import BreakdownError, Scene, Touch, tangents
+from model import InputError, Parameters
+from model.arrays import Array
+from model.parameters import POSITIVE, Range, check_choice, check_number
+
+PROGRAM = Path(__file__).with_name("_siconos_worker.py")
+PATIENCE = 60.0
+"""For how long, s, an answer is waited for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """The engine's settings: by default the best known, a ball in turning axes and contacts solved to round-off."""
+
+    timestep: float = 1e-3
+    """s"""
+    coordinates: str = "joints"
+    """``joints`` for a ball in axes that turn with it, or ``free`` for a free ball."""
+    facets: int = 1
+    """Planes that make up the wall."""
+    theta: float = 0.5
+    """Of `MoreauJeanOSI`: the share of forces that is taken at the end of a step."""
+    activation: float = 1e-9
+    """`ConstraintActivationThreshold`, m: a contact counts as closed if half a step further its gap is less than that.
+    At zero a resting contact that is open by round-off is left open, and the ball falls for a step."""
+    newton: float = 1e-10
+    """`NewtonTolerance`, N s, of the iteration on the ball's equations of motion."""
+    tolerance: float = 1e-14
+    """Of `FrictionContact`'s solver, non-smooth Gauss-Seidel, relative."""
+    iterations: int = 1000
+    """Most iterations of that solver."""
+
+    def __post_init__(self) -> None:
+        check_number("timestep", self.timestep, "s", POSITIVE)
+        check_choice("coordinates", self.coordinates, ("joints", "free"))
+        check_number("facets", self.facets, "planes", Range(1, whole=True))
+        check_number("theta", self.theta, "1", Range(0.5, 1))
+        check_number("newton", self.newton, "N s", POSITIVE)
+        check_number("tolerance", self.tolerance, "1", POSITIVE)
+        check_number("iterations", self.iterations, "iterations", Range(1, whole=True))
+
+    @property
+    def memory(self) -> bool:
+        """Friction is not regularised."""
+        return False
+
+    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
+        """For round-off, 1e-9 m s-1."""
+        return np.full(np.shape(load), 1e-9)
+
+
+def newcomer(timestep: float) -> Settings:
+    """The engine's defaults: a free ball in a prism of 64 planes."""
+    return Settings(timestep=timestep, coordinates="free", facets=64, activation=0.0, newton=1e-6, tolerance=1e-4)
+
+
+@dataclass(frozen=True)
+class _Installation:
+    """Siconos in another Python, a `loop.Library`."""
+
+    name: str = "siconos"
+
+    @property
+    def missing(self) -> str:
+        """Why it can't be used here, and what to do about it; empty if it can."""
+        python, _ = _look(os.environ.get(_NAMED))
+        if python:
+            return ""
+        if _NAMED in os.environ:
+            return f"siconos is not installed for {os.environ[_NAMED]}, which {_NAMED} names"
+        return "siconos is not installed: on Debian or Ubuntu, apt-get install python3-siconos"
+
+    @property
+    def version(self) -> str:
+        """Or that it isn't installed."""
+        return _look(os.environ.get(_NAMED))[1]
+
+    def load(self) -> str:
+        """The Python that has it; `InputError` if there is none."""
+        if self.missing:
+            raise InputError(self.missing)
+        return _look(os.environ.get(_NAMED))[0]
+
+
+LIBRARY = _Installation()
+_NAMED = "DUALBALL_SICONOS_PYTHON"
+
+
+@functools.cache
+def _look(named: str | None) -> tuple[str, str]:
+    """The first Python that has Siconos and the version; an empty name if none does."""
+    for python in [named] if named else [sys.executable, shutil.which("python3", path=os.defpath)]:
+        command = [python or "", "-I", "-c", "import siconos; print(siconos.version)"]
+        try:
+            version = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True).stdout
+        except (OSError, subprocess.SubprocessError):
+            continue
+        return command[0], version.strip()
+    return "", "not installed"
+
+
+def scene(python: str, p: Parameters, settings: Settings) -> Scene:
+    """The ball in a process of its own; `InputError` if Siconos doesn't work there."""
+    return _Remote(python, p, settings)
+
+
+class _Remote(Scene):
+    def __init__(self, python: str, p: Parameters, settings: Settings) -> None:
+        self._process = subprocess.Popen(
+            [python, "-I", PROGRAM],  # -I: its own packages, not ours
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},  # matrices are of six rows
+            start_new_session=True,  # Ctrl-C is for us
+        )
+        walls = [(place.tolist(), normal.tolist()) for place, normal in tangents(p, settings.facets)]
+        numbers = {name: getattr(p, name) for name in ("m", "r", "R", "j", "mu", "eta", "g")}
+        try:
+            self._ask({**asdict(settings), **numbers, "walls": walls})
+        except BreakdownError as error:
+            self.close()
+            raise InputError(f"siconos {error}") from error
+
+    def _ask(self, what: Any) -> Any:
+        sent, answers = self._process.stdin, self._process.stdout
+        assert sent
+        assert answers
+        with contextlib.suppress(OSError):  # it has ended, which the answer will show
+            print(json.dumps(what), file=sent, flush=True)
+        if not select.select([answers], [], [], PATIENCE)[0]:
+            raise BreakdownError(f"gave no answer for {PATIENCE:g} s")
+        line = answers.readline()
+        if not line:
+            raise BreakdownError(f"ended ({self._last_words()})")
+        answer = json.loads(line)
+        if isinstance(answer, dict):
+            raise BreakdownError(f"could not go on ({answer['error']})")
+        return answer
+
+    def _last_words(self) -> str:
+        assert self._process.stderr
+        words = self._process.stderr.read().strip().splitlines()
+        return words[-1] if words else f"exit code {self._process.wait()}"
+
+    def start(self, place: Sequence[float], velocity: Sequence[float]) -> None:
+        self._ask([*place, *velocity])
+
+    def advance(self, force: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+        place, velocity = self._ask(list(force))
+        return place, velocity
+
+    def touches(self) -> list[Touch]:
+        return [Touch(contact, np.array(force), gap) for contact, force, gap in self._ask([])]
+
+    def close(self) -> None:
+        """End the process."""
+        with contextlib.suppress(BrokenPipeError), self._process:
+            self._process.kill()

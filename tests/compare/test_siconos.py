@@ -1,0 +1,82 @@
+"""Siconos in a process of its own: what becomes of a process that can't be had, ends, hangs or gives no numbers."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from compare.commands import cli
+from compare.engines import siconos
+from compare.engines.siconos import Settings
+from compare.runs.engines import ENGINES
+from compare.runs.tasks import Task, carry_out
+from model import InputError, Parameters
+
+REFERENCE = Parameters.named("reference")
+ENGINE = ENGINES["siconos"]
+
+
+@pytest.fixture
+def elsewhere(monkeypatch):
+    """No Siconos wherever this machine may have one."""
+    siconos._look.cache_clear()
+    monkeypatch.delenv("DUALBALL_SICONOS_PYTHON", raising=False)
+    monkeypatch.setattr(siconos.shutil, "which", lambda *_, **__: None)
+    yield monkeypatch
+    siconos._look.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("named", "says"),
+    [
+        (None, "siconos is not installed: on Debian or Ubuntu, apt-get install python3-siconos"),
+        ("absent", "siconos is not installed for absent, which DUALBALL_SICONOS_PYTHON names"),
+    ],
+)
+def test_where_it_is_missing_the_program_says_what_to_do(named, says, elsewhere, capsys):
+    if named:
+        elsewhere.setenv("DUALBALL_SICONOS_PYTHON", named)
+    assert ENGINE.missing == says
+    assert ENGINE.versions["siconos"] == "not installed"
+    assert cli.main(["simulate", "--engine", "siconos", "--time", "0.05"]) == 2
+    assert capsys.readouterr().err == f"dualball: error: {says}\n"
+
+
+def test_a_python_without_its_libraries_is_the_person_s_error():
+    with pytest.raises(InputError, match=r"siconos ended \(ModuleNotFoundError: No module named 'siconos"):
+        siconos.scene(sys.executable, REFERENCE, Settings())
+
+
+@pytest.mark.parametrize(
+    ("program", "says"),
+    [
+        ("import os; os.abort()", "ended (exit code -6)"),
+        ("raise ValueError('too much')", "ended (ValueError: too much)"),
+        ("""print('{"error": "RuntimeError: singular"}')""", "could not go on (RuntimeError: singular)"),
+        ("import time; time.sleep(60)", "gave no answer for 0.5 s"),
+        ("for _ in range(3): print(STATE, flush=True), input(), print([], flush=True), input()", "diverged"),
+    ],
+)
+def test_a_process_that_fails_is_the_run_s_failure(program, says, tmp_path, monkeypatch):
+    """Whatever it does in the first step; it is gone after that."""
+    script = tmp_path / "program.py"
+    state = "STATE = '[[0, NaN, 0], [0, 0, 0, 0, 0, 0]]'"
+    script.write_text(f"{state}\nfor _ in range(2):\n    input()\n    print('null', flush=True)\ninput()\n{program}\n")
+    started = []
+
+    def start(*args, **options):
+        started.append(popen(*args, **options))
+        return started[-1]
+
+    popen = siconos.subprocess.Popen
+    monkeypatch.setattr(siconos, "PROGRAM", script)
+    monkeypatch.setattr(siconos, "PATIENCE", 0.5)
+    monkeypatch.setattr(siconos, "_look", lambda named: (sys.executable, "4.4.0"))
+    monkeypatch.setattr(siconos.subprocess, "Popen", start)
+    task = Task(engine="siconos", parameters=REFERENCE, x0=(0.0,) * 6, t_end=0.01, settings=Settings())
+    (run,) = carry_out([task])
+    assert run.header.failure.startswith(says)
+    assert run.header.versions["siconos"] == "4.4.0"
+    assert not run.complete
+    assert all(each.returncode is not None for each in started)
