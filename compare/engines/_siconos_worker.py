@@ -62,9 +62,16 @@ class Scene:
         options = solver.numericsSolverOptions()
         options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = given["iterations"]
         options.dparam[numerics.SICONOS_DPARAM_TOL] = given["tolerance"]
-        clock, stepping = kernel.TimeDiscretisation(0.0, given["timestep"]), kernel.MoreauJeanOSI(given["theta"])
+        clock, projection = kernel.TimeDiscretisation(0.0, given["timestep"]), given["projection"]
+        if projection is None:
+            stepping = kernel.MoreauJeanOSI(given["theta"])
+            self.simulation = kernel.TimeStepping(system, clock, stepping, solver)
+        else:
+            stepping = kernel.MoreauJeanDirectProjectionOSI(given["theta"])
+            gaps = kernel.MLCPProjectOnConstraints(numerics.SICONOS_MLCP_ENUM, 1.0)
+            self.simulation = kernel.TimeSteppingDirectProjection(system, clock, stepping, solver, gaps)
+            self.simulation.setConstraintTolUnilateral(projection)
         stepping.setConstraintActivationThreshold(given["activation"])
-        self.simulation = kernel.TimeStepping(system, clock, stepping, solver)
         self.simulation.setNewtonTolerance(given["newton"])
         self.simulation.initialize()
 

@@ -47,6 +47,9 @@ class Settings:
     activation: float = 1e-9
     """`ConstraintActivationThreshold`, m: a contact counts as closed if half a step further its gap is less than that.
     At zero a resting contact that is open by round-off is left open, and the ball falls for a step."""
+    projection: float | None = 1e-12
+    """`ConstraintTolUnilateral`, m, up to which `TimeSteppingDirectProjection` takes a ball out of an overlap. None for
+    `TimeStepping`, which leaves it there: up to a step's way after an impact, for as long as the contact lasts."""
     newton: float = 1e-10
     """`NewtonTolerance`, N s, of the iteration on the ball's equations of motion."""
     tolerance: float = 1e-14
@@ -75,7 +78,9 @@ class Settings:
 
 def newcomer(timestep: float) -> Settings:
     """The engine's defaults: a free ball in a prism of 64 planes."""
-    return Settings(timestep=timestep, coordinates="free", facets=64, activation=0.0, newton=1e-6, tolerance=1e-4)
+    return Settings(
+        timestep=timestep, coordinates="free", facets=64, activation=0.0, projection=None, newton=1e-6, tolerance=1e-4
+    )
 
 
 @dataclass(frozen=True)
