@@ -10,13 +10,13 @@ The Python that runs it isn't that of the project: nothing but Siconos, numpy an
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from typing import Any
 
 import numpy as np
 import siconos.kernel as kernel
-import siconos.mechanics.collision.bodies as bodies
 import siconos.numerics as numerics
 
 
@@ -158,16 +158,34 @@ class Turning(Scene):
         return contact.relation().C()
 
 
+class Contact(kernel.NewtonEuler3DR):  # type: ignore[misc]
+    """A ball's contact with a surface that says how far it is from a centre, and its normal there."""
+
+    def __init__(self, r: float, surface: Any) -> None:
+        super().__init__()
+        self.r, self.surface = r, surface
+
+    def computeh(self, time: float, q: Any, gap: Any) -> None:
+        """Gap, contact points and normal."""
+        distance, normal = self.surface(q)
+        gap[0] = distance - self.r
+        self.nc()[:] = normal
+        self.pc1()[:] = self.pc2()[:] = q[:3] - self.r * normal
+
+
 class Free(Scene):
-    """A free ball in a vessel of planes."""
+    """A free ball in a true cylinder."""
 
     def start(self, place: list[float], velocity: list[float]) -> None:
         """Place, velocity and spin in world axes."""
-        ball = bodies.SphereNEDS(self.r, self.mass, self.inertia * np.eye(3), [*place, 1.0, 0.0, 0.0, 0.0], velocity)
-        planes = [([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]), *self.given["walls"]]
-        self.simulate(
-            ball, [bodies.SphereNEDSPlanR(self.r, *normal, -np.dot(place, normal)) for place, normal in planes]
-        )
+
+        def wall(q: Any) -> Any:
+            rho = math.hypot(q[0], q[1])
+            return self.R + self.r - rho, np.array([-q[0] / rho, -q[1] / rho, 0.0])
+
+        up, orientation = np.array([0.0, 0.0, 1.0]), [1.0, 0.0, 0.0, 0.0]
+        ball = kernel.NewtonEulerDS([*place, *orientation], velocity, self.mass, self.inertia * np.eye(3))
+        self.simulate(ball, [Contact(self.r, surface) for surface in (lambda q: (q[2], up), wall)])
 
     def advance(self, force: list[float]) -> Any:
         """Under a force in world axes."""
