@@ -7,8 +7,11 @@ k = 1/(1+j): the same both ways. Coulomb's law is then
     A = project(a - C B, mu),  B = project(b - C A, eta),
 
 where a and b are what A and B need if the other one gives nothing; `contact_problem` states the law. A sweep computes
-A from B and B from that, and a few of them settle most steps, as they start from the impulses of the step before.
-Where they approach slowly or swing, pseudo-transient continuation takes over (see `contact_problem.Continuation`);
+A from B and B from that. Newton's method on the change of a sweep settles most steps in one or two, as it starts from
+the impulses of the step before; while the ball rolls at both points B is undetermined along one direction, and a little
+damping keeps it from drifting there. Where a contact begins to stick, slide or open, Newton's method may end in another
+solution than sweeps do: then, and where sweeps may lead away from a solution (mu eta > 1), plain sweeps are taken.
+Where these approach slowly or swing, pseudo-transient continuation takes over (see `contact_problem.Continuation`);
 where that fails, it starts again from nothing and from damped sweeps.
 
 **Which solution.** Where mu > 1, sticking and slipping may both obey the law. Taken is the one that continues the last
@@ -23,6 +26,8 @@ from typing import NamedTuple
 
 from analytic.compiling import compiled
 
+EAGER, WHOLE = 5, 1e4
+"""Most sweeps with Newton's method from the start, and the length of its steps in `_continued`."""
 PLAIN_SWEEPS = 6
 """Sweeps before the continuation takes over."""
 ATTEMPT = 100
@@ -53,16 +58,22 @@ def project(n: float, s: float, t: float, friction: float) -> Impulse:
 
 
 @compiled
-def _project_rate(at: Impulse, friction: float, by: Impulse) -> Impulse:
-    """Derivative of `project` at an unlimited impulse in the direction `by`."""
-    if at.n <= 0:
+def _held(need: Impulse, friction: float) -> Impulse:
+    """Which share of a need `project` meets along the disk, 0 if open, 1 if sticking, and the direction there."""
+    if need.n <= 0:
         return Impulse(0.0, 0.0, 0.0)
-    size, limit = math.sqrt(at.s * at.s + at.t * at.t), friction * at.n
-    if size <= limit:
-        return by
-    e_s, e_t, turn = at.s / size, at.t / size, limit / size
-    along = friction * by.n - turn * (e_s * by.s + e_t * by.t)
-    return Impulse(by.n, turn * by.s + along * e_s, turn * by.t + along * e_t)
+    size, limit = math.sqrt(need.s * need.s + need.t * need.t), friction * need.n
+    return Impulse(limit / size, need.s / size, need.t / size) if size > limit else Impulse(1.0, 0.0, 0.0)
+
+
+@compiled
+def _project_rate(held: Impulse, friction: float, by: Impulse) -> Impulse:
+    """Derivative of `project` in the direction `by`, at a need that is so `_held`."""
+    share, e_s, e_t = held
+    if share == 0 or share == 1:
+        return Impulse(share * by.n, share * by.s, share * by.t)
+    along = friction * by.n - share * (e_s * by.s + e_t * by.t)
+    return Impulse(by.n, share * by.s + along * e_s, share * by.t + along * e_t)
 
 
 @compiled
@@ -91,6 +102,7 @@ def _dot(a: Impulse, b: Impulse) -> float:
 @compiled
 def _continued(at_A: Impulse, at_B: Impulse, step: Impulse, span: float, mu: float, eta: float, k: float) -> Impulse:
     """An implicit Euler step of length `span` of dB/dt = f(B) - B, where a sweep f takes B on by `step`."""
+    at_A, at_B = _held(at_A, mu), _held(at_B, eta)
     x = _sweep_rate(at_A, at_B, Impulse(1.0, 0.0, 0.0), mu, eta, k)
     y = _sweep_rate(at_A, at_B, Impulse(0.0, 1.0, 0.0), mu, eta, k)
     z = _sweep_rate(at_A, at_B, Impulse(0.0, 0.0, 1.0), mu, eta, k)
@@ -102,6 +114,37 @@ def _continued(at_A: Impulse, at_B: Impulse, step: Impulse, span: float, mu: flo
 
 
 @compiled
+def _sense(need: Impulse, given: Impulse) -> int:
+    """0 if a contact that needs an impulse and is given another is open, 1 if it sticks, 2 if it slides."""
+    if given.n == 0:
+        return 0
+    return 1 if given.s == need.s and given.t == need.t else 2
+
+
+@compiled
+def _quickly(
+    a: Impulse, b: Impulse, start: Impulse, mu: float, eta: float, k: float, enough: float
+) -> tuple[Impulse, Impulse, float]:
+    """`both` by Newton's method, as long as no contact begins to stick, slide or open; else the change is inf."""
+    B, before = start, -1
+    for _ in range(EAGER):
+        need_A = _less(a, B, k)
+        A = project(need_A.n, need_A.s, need_A.t, mu)
+        need_B = _less(b, A, k)
+        after = project(need_B.n, need_B.s, need_B.t, eta)
+        sense = 3 * _sense(need_A, A) + _sense(need_B, after)
+        if before not in (-1, sense):
+            break
+        step = Impulse(after.n - B.n, after.s - B.s, after.t - B.t)
+        change = abs(step.n) + abs(step.s) + abs(step.t)
+        if change <= enough:
+            return A, after, change
+        step, before = _continued(need_A, need_B, step, WHOLE, mu, eta, k), sense
+        B = Impulse(B.n + step.n, B.s + step.s, B.t + step.t)
+    return start, start, math.inf
+
+
+@compiled
 def both(
     a: Impulse, b: Impulse, start: Impulse, mu: float, eta: float, j: float, enough: float
 ) -> tuple[Impulse, Impulse, float]:
@@ -109,7 +152,12 @@ def both(
 
     That is at most `enough` (m s-1) unless `MAX_SWEEPS` were not enough.
     """
-    k, A, B = 1 / (1 + j), start, start
+    k = 1 / (1 + j)
+    if mu * eta < 1:
+        A, B, change = _quickly(a, b, start, mu, eta, k, enough)
+        if change <= enough:
+            return A, B, change
+    A, B = start, start
     change, last, span, growth = math.inf, math.inf, 1.0, 8.0
     for count in range(MAX_SWEEPS):
         attempt, sweeps = count // ATTEMPT, count % ATTEMPT

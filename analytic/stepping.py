@@ -13,6 +13,8 @@ from analytic.rigid_body import Forces, Velocities
 TOLERANCE = 1e-14
 """Change of an impulse per mass in a sweep at which it stops, relative to sqrt(g R) or to the fastest velocity."""
 MAX_ITERATIONS = 100
+ROUGH = 1e-4
+"""How well an iteration solves the contacts, relative to the last change of velocities."""
 LOCATING = 10
 """Most solutions of a stretch to locate its landing: the parabola triples the digits with each."""
 LANDINGS = 20
@@ -86,12 +88,12 @@ class Solved(NamedTuple):
 
 @compiled
 def solve(
-    at: At, dt: float, omega_0: float, in_A: bool, in_B: bool, to_A: float, to_B: float, start: Impulse, p: Constants
+    at: At, dt: float, omega_0: float, in_A: bool, in_B: bool, to_A: float, to_B: float, start: Forces, p: Constants
 ) -> Solved:
     """Velocities after dt, 0 for an impact, with closed contacts A, B whose normal velocities aim at to_A, to_B.
 
     Smooth forces, at the mean of old and new velocity, and the contacts are iterated together; `start` is a first
-    guess for B where both are closed.
+    guess of the impulses.
     """
     v_h, v_y, v_k, o_x, o_y, o_z = old = at.u
     m, r, j = p.m, p.r, p.j
@@ -107,9 +109,12 @@ def solve(
         slip_A = (0.0, 0.0)
     if dt == 0 or rest * _size(slip_B[0], slip_B[1]) <= p.eta * load:
         slip_B = (0.0, 0.0)
-    A = Impulse(0.0, 0.0, 0.0)
-    B = start if in_A and in_B else A
-    new, last = old, 0.0
+    A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
+    if in_A:
+        A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
+    if in_B:
+        B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m)
+    new, last, change = old, 0.0, p.g * dt
     for _ in range(MAX_ITERATIONS):
         u = _mean(old, new)
         x_i = at.h - p.R + dt / 2 * u.v_h
@@ -120,12 +125,13 @@ def solve(
         f_h = v_h - dt * (spin * u.v_k + c * w_h)
         f_y = v_y - dt * (p.g + c * u.v_y)
         f_k = v_k + dt * (spin * u.v_h - c * w_k)
-        f_x, f_z = o_x - dt * spin * u.o_z, o_z + dt * spin * u.o_x
+        f_x = o_x - dt * spin * u.o_z  # f_z takes the new o_x, which saves two iterations of seven
+        f_z = o_z + dt * spin * (o_x + f_x - A.t / (j * r)) / 2
         a = Impulse(to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1]))
         b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * o_y + slip_B[1]))
-        residual = 0.0
+        residual, aim = 0.0, max(enough, ROUGH * change)
         if in_A and in_B:
-            A, B, residual = both(a, b, B, p.mu, p.eta, j, enough)
+            A, B, residual = both(a, b, B, p.mu, p.eta, j, aim)
         elif in_A:
             A = project(a.n, a.s, a.t, p.mu)
         elif in_B:
@@ -137,7 +143,7 @@ def solve(
         new = after
         # Changes shrink at a steady rate: what is left is this one times the rate.
         settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
-        if settled or not residual <= enough:
+        if (settled and residual <= enough) or not residual <= aim:
             break
         last = change
     u = _mean(old, new)
@@ -194,7 +200,7 @@ def _crossing(gap: float, rate: float, end: float, dt: float) -> float:
 
 @compiled
 def _stretch(
-    at: At, dt: float, omega_0: float, in_A: bool, in_B: bool, start: Impulse, p: Constants
+    at: At, dt: float, omega_0: float, in_A: bool, in_B: bool, start: Forces, p: Constants
 ) -> tuple[At, Solved, float]:
     """The ball after dt, or at its first landing on floor or wall; and the time of that."""
     time = dt
@@ -222,8 +228,8 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     """The ball a step of dt later, with omega_0 from the middle of the step."""
     nothing = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     at, P, impact, case, work, landings, residual = ball.at, nothing, nothing, ball.case, ball.work, ball.landings, 0.0
-    last, blow = ball.P, ball.impact
-    start = Impulse((last.B_x - blow.B_x) / p.m, (last.B_y - blow.B_y) / p.m, (last.B_z - blow.B_z) / p.m)
+    q, b = ball.P, ball.impact  # first guess: the impulses of the last step but those of landings
+    start = Forces(q.A_x - b.A_x, q.A_y - b.A_y, q.A_z - b.A_z, q.B_x - b.B_x, q.B_y - b.B_y, q.B_z - b.B_z)
     left, count = dt, 0
     while left > 0 and residual == 0:
         in_A, in_B = at.y <= 0 and at.u.v_y <= 0, at.h <= 0 and at.u.v_h <= 0
@@ -256,7 +262,7 @@ def _worse(new: float, residual: float) -> float:
 @compiled
 def _collided(at: At, in_A: bool, in_B: bool, dt: float, p: Constants) -> Solved:
     """An impact by Newton's restitution; a rebound that would last less than a hundredth of a step is none."""
-    start, least = Impulse(0.0, 0.0, 0.0), p.g * dt / 200
+    start, least = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p.g * dt / 200
     to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > least else 0.0
     to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > least else 0.0
     s = solve(at, 0.0, 0.0, in_A, in_B, to_A, to_B, start, p)
