@@ -122,7 +122,7 @@ def simulate_many(
     return Ensemble(times, case=case, landings=landings, end=end, failure=tuple(failure), **blank)
 
 
-def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
+def random_starts(p: Parameters, count: int, seed: int | Sequence[int] = 0) -> Array:
     """States (count, 8): at the wall, half of them on the floor, half up to R above it with speeds up to sqrt(g R).
 
     omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all evenly spread.
@@ -136,3 +136,13 @@ def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
     x[:, 0] = np.where(flying, rng.uniform(0, p.R, count), 0.0)
     x[:, 1] = np.where(flying, rng.uniform(-1, 1, count) * math.sqrt(p.g * p.R), 0.0)
     return x
+
+
+def interval(hits: int, of: int) -> tuple[float, float]:
+    """Confidence interval of 95 % of a share (Clopper-Pearson); all of [0, 1] if nothing was tried."""
+    from scipy.stats import binomtest  # slow to import
+
+    if of == 0:
+        return 0.0, 1.0
+    low, high = binomtest(hits, of).proportion_ci(0.95)
+    return float(low), float(high)

@@ -14,10 +14,9 @@ from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import binomtest
 
 from analytic import orbits
-from analytic.ensemble import random_starts
+from analytic.ensemble import interval, random_starts
 from analytic.motion import natural_units
 from analytic.orbits import NoOrbitError, Orbit, extent, scale
 from analytic.simulation import simulate
@@ -101,9 +100,8 @@ class Attractor:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The share's confidence interval of 95 % (Wilson)."""
-        interval = binomtest(self.count, self.starts).proportion_ci(0.95, "wilson")
-        return float(interval.low), float(interval.high)
+        """The share's confidence interval, `ensemble.interval`."""
+        return interval(self.count, self.starts)
 
     @property
     def run(self) -> Trajectory:
@@ -181,7 +179,7 @@ def _decided(
     if not _alike(before, now):
         return None
     same = (fate for fate in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
-    return next(same, None) or _closed(now)
+    return next(same, None) or closed(now)
 
 
 def windows(p: Parameters, x: Array, lasting: float, run: Run) -> Iterator[Trajectory]:
@@ -216,7 +214,7 @@ def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> Stati
     return min(near, key=lambda each: (each.case is not case, distance(each)), default=None)
 
 
-def _closed(last: Trajectory) -> Fate | None:
+def closed(last: Trajectory) -> Fate | None:
     """A recurrent motion that closes: with the stable orbit that theory has near it, or after all that one sees.
 
     None if it doesn't close.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -9,23 +10,22 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.ensemble import simulate_many
+from analytic.fates import closed
 from analytic.settings import Settings
 from analytic.simulation import simulate
-from model import Case, Parameters
+from model import Case, Contact, Parameters
 from model.arrays import Array
 
 DURATION = 60.0
 """How long the screen follows a ball, in 1/c: transients decay as exp(-c t) at the slowest, but near folds."""
-QUIET = 3.0
-"""Without a landing for this long, in 1/c, a ball has settled."""
+QUIET, LOOKS = 3.0, 12
+"""Without a landing for this long, in 1/c, a ball has settled; how often that is looked for in this time."""
 STEPS = 70
 """Steps of the screen in sqrt(R/g)."""
+SEEN, SAMPLES = 25.0, 4000
+"""How long the ball is watched for a period, in sqrt(R/g): twice the longest that is looked for; and samples."""
 CONFIRMING = 12.0
-"""How long the confirmation follows a ball, in 1/c; the last third of it counts."""
-MOST_HOPS = 16
-"""Longest period that is looked for, in landings on the floor."""
-REPEATS = 1e-3
-"""How closely the impulses of landings must repeat, relative to the largest."""
+"""How long a ball with no period is followed, in 1/c, or four times `SEEN`; the last third of it counts."""
 
 
 def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Array, int]:
@@ -33,10 +33,12 @@ def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Ar
 
     One thread; p.c must be positive.
     """
-    settings, lasts, unit = Settings(method="time-stepping", step=math.sqrt(p.R / p.g) / STEPS), DURATION / p.c, 1 / p.c
-    runs = simulate_many(p, x0s, lasts, settings=settings, sample_interval=unit, quiet=QUIET * unit, threads=1)
+    settings, quiet = Settings(method="time-stepping", step=math.sqrt(p.R / p.g) / STEPS), QUIET / p.c
+    runs = simulate_many(
+        p, x0s, DURATION / p.c, settings=settings, sample_interval=quiet / LOOKS, quiet=quiet, threads=1
+    )
     failed = np.array([bool(each) for each in runs.failure])
-    hops = np.any(runs.landings[:, -int(QUIET) :] > 0, axis=1) & ~failed
+    hops = np.any(runs.landings[:, -LOOKS:] > 0, axis=1) & ~failed
     return hops, runs.x[:, -1], int(failed.sum())
 
 
@@ -45,36 +47,42 @@ class Hopping:
     """A motion that hops on, in natural units."""
 
     landings: int
-    """Landings on the floor in a period; 0 if none was found up to `MOST_HOPS`."""
+    """Landings on the floor in a period; 0 if no periodic motion was found near it."""
     period: float
     """In sqrt(R/g); with no period found the mean time between landings."""
     omega_c: float
     """Mean omega_c/omega_0."""
     height: float
     """Greatest height y/R."""
+    multiplier: float = math.nan
+    """Largest modulus of the Floquet multipliers; nan without a period."""
 
 
 def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     """The hopping that a state leads to by the event-driven simulation; None if it ends.
 
-    Raises `SimulationError` if that can't go on.
+    That is a stable periodic motion near it if there is one; else the ball is followed for `CONFIRMING`.
+    Raises `SimulationError` if the simulation can't go on.
     """
-    run = simulate(p, x, CONFIRMING / p.c, sample_interval=CONFIRMING / p.c / 3000)
-    late = run.time[-1] * 2 / 3
-    on_floor = (run.events.impulse_A[:, 1] > 0) & np.isin(run.events.from_case, [Case.NR, Case.NS, Case.NN])
-    landings = on_floor & (run.events.impulse_A[:, 1] > 1e-3 * p.m * math.sqrt(p.g * p.R))
-    times, impulses = run.events.time[landings], run.events.impulse_A[landings, 1]
-    times, impulses = times[times > late], impulses[times > late]
+    unit = math.sqrt(p.R / p.g)
+    seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SAMPLES)
+    if not any(map(_lands, seen.events.from_case, seen.events.to_case)):
+        return None
+    fate = closed(seen)
+    if fate and fate.orbit and (landings := sum(itertools.starmap(_lands, fate.orbit.changes))):
+        orbit = fate.orbit
+        omega_c, height = float(orbit.mean[2]) / p.omega_0, float(orbit.cycle.y.max()) / p.R
+        return Hopping(landings, orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max()))
+    lasts = max(CONFIRMING / p.c, 4 * SEEN * unit)
+    run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SAMPLES)
+    last = run.time > run.time[-1] * 2 / 3
+    times = run.events.time[list(map(_lands, run.events.from_case, run.events.to_case))]
+    times = times[times > run.time[-1] * 2 / 3]
     if len(times) < 3 or run.time[-1] - times[-1] > 3 * np.max(np.diff(times)):
         return None
-    count = next((n for n in range(1, min(MOST_HOPS, len(times) // 2) + 1) if _repeats(impulses, n)), 0)
-    unit = math.sqrt(p.R / p.g)
-    last = run.time > late
-    span = times[-1] - times[-1 - count] if count else float(np.mean(np.diff(times)))
-    return Hopping(
-        count, float(span) / unit, float(np.mean(run.omega_c[last])) / p.omega_0, float(run.y[last].max()) / p.R
-    )
+    between, omega_c = float(np.mean(np.diff(times))), float(np.mean(run.omega_c[last]))
+    return Hopping(0, between / unit, omega_c / p.omega_0, float(run.y[last].max()) / p.R)
 
 
-def _repeats(impulses: Array, n: int) -> bool:
-    return bool(np.max(np.abs(impulses[n:] - impulses[:-n])) <= REPEATS * impulses.max())
+def _lands(before: int, after: int) -> bool:
+    return Case(before).A is Contact.N and Case(after).A is not Contact.N

@@ -131,9 +131,9 @@ class Loop:
             if abs(short) < 1e-15 * self.period:
                 break
             late += short
+            if not abs(late) < self.period / 4:
+                raise NoOrbitError(f"after {self.period:g} s the ball is far from where it was")
             x = self._followed(x, short)
-        if not abs(late) < self.period / 4:
-            raise NoOrbitError(f"after {self.period:g} s the ball is far from where it was")
         changes = tuple((Case(a), Case(b)) for a, b in zip(run.events.from_case, run.events.to_case, strict=True))
         turn = run.theta[-1] - run.theta[0] + late * (x[2] + run.x[-1][2]) / 2
         return Return(x, float(self.period + late), changes, float(turn))

@@ -10,6 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markdown import Markdown
 
+from analytic.ensemble import interval
 from compare.commands import options, running
 from compare.runs import basins, progress, regions, search
 from compare.runs.campaign import Campaign
@@ -114,7 +115,7 @@ def plane(args: argparse.Namespace) -> int:
         print(json.dumps({"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}))
         return 0
     for fate, (hits, of) in shares.items():
-        low, high = regions.interval(hits, of)
+        low, high = interval(hits, of)
         print(f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to {100 * high:.1f} %)")
     if coarse:
         print(

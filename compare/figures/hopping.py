@@ -16,10 +16,10 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from analytic.ensemble import interval
 from compare.figures import style
 from compare.runs import regions
 from compare.runs.basins import FATES, Basins
-from compare.runs.regions import interval
 from compare.runs.search import LOGARITHMIC, Searched
 from model.kinematics import VARIABLES
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from analytic.ensemble import interval
 from compare.runs.search import BOX, LOGARITHMIC, Searched
 
 PARTS = 6
 """Parts of equal width into which the range of a group is cut."""
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -26,21 +26,6 @@ class Part:
     sets: int
     hopping: int
     """Sets among them with hopping that the event-driven simulation confirms."""
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Confidence interval of their share (Clopper-Pearson)."""
-        return interval(self.hopping, self.sets)
-
-
-def interval(hits: int, of: int) -> tuple[float, float]:
-    """Confidence interval of a share (Clopper-Pearson); all of [0, 1] if nothing was tried."""
-    from scipy.stats import binomtest  # slow to import
-
-    if of == 0:
-        return 0.0, 1.0
-    low, high = binomtest(hits, of).proportion_ci(CONFIDENCE)
-    return float(low), float(high)
 
 
 def parts(record: Searched) -> Iterator[Part]:
@@ -89,7 +74,7 @@ def _section(record: Searched) -> list[str]:
     count, (low, high) = len(record.confirmed), interval(len(record.confirmed), record.sets)
     periods = [row["confirmed"]["landings"] for row in record.confirmed]
     kinds = [f"{periods.count(n)} with {n}" for n in sorted(set(periods) - {0})]
-    kinds += [f"{periods.count(0)} with no period of up to 16"] if 0 in periods else []
+    kinds += [f"{periods.count(0)} with no period found"] if 0 in periods else []
     landings = f"Sets by landings in a period: {', '.join(kinds)}. " if kinds else ""
     others = f", {len(record.rows) - count} of them not confirmed" if len(record.rows) > count else ""
     broken = f" {record.failed} runs broke down." if record.failed else ""
@@ -101,7 +86,7 @@ def _section(record: Searched) -> list[str]:
         f"The box is {box}. "
         f"Each set was started from {record.search.starts} random states. In {count} sets some start leads to hopping "
         f"that the event-driven simulation confirms: {100 * count / record.sets:.2f} %, or {100 * low:.2f} to "
-        f"{100 * high:.2f} % with {CONFIDENCE:.0%} confidence. That is what {record.search.starts} starts find: an "
+        f"{100 * high:.2f} % with 95 % confidence. That is what {record.search.starts} starts find: an "
         "attractor with a small basin is missed. "
         f"{landings}By time stepping {len(record.rows)} sets still hopped after 60/c{others}.{broken} "
         "In all other sets every ball stopped landing.",
@@ -112,7 +97,7 @@ def _section(record: Searched) -> list[str]:
     lines += ["", "| | from | to | sets | hopping | share, % | 95 % interval, % |"]
     lines += ["| :-- | --: | --: | --: | --: | --: | --: |"]
     for part in parts(record):
-        low, high = part.interval
+        low, high = interval(part.hopping, part.sets)
         share = f"{100 * part.hopping / part.sets:.2f}" if part.sets else ""
         lines.append(
             f"| {part.group} | {part.low:.3g} | {part.high:.3g} | {part.sets} | {part.hopping} | {share} "

@@ -23,6 +23,7 @@ from typing import Any, Self
 import numpy as np
 
 from analytic import hopping
+from analytic.ensemble import random_starts
 from compare.runs.engines import EVENT
 from compare.runs.tasks import sources
 from compare.runs.workers import Workers
@@ -80,21 +81,13 @@ def parameters(point: Array) -> Parameters:
     return p.replace(mu=mu, eta=eta, j=j, r=size * p.R, c=kappa / unit, omega_0=Omega_0 / unit)
 
 
-def random_starts(p: Parameters, count: int, rng: np.random.Generator) -> Array:
-    """States (count, 8): orbits from half backwards to twice omega_0, any spin, every other ball off the floor."""
-    x = np.zeros((count, 8))
-    x[:, 0] = rng.uniform(0, p.R, count) * rng.integers(0, 2, count)
-    x[:, 2] = p.omega_0 * rng.uniform(-0.5, 2, count)
-    x[:, 3:6] = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, (count, 3))
-    return x
-
-
 def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
     """Search the sets of a chunk and write its file."""
     rows = []
     for k, point in enumerate(points):
-        p, rng = parameters(point), np.random.default_rng([search.seed, chunk * CHUNK + k])
-        hops, x, failed = hopping.screen(p, random_starts(p, search.starts, rng))
+        p = parameters(point)
+        starts = random_starts(p, search.starts, [search.seed, chunk * CHUNK + k])
+        hops, x, failed = hopping.screen(p, starts)
         row: dict[str, Any] = {"hops": int(hops.sum()), "failed": failed}
         if hops.any():
             row |= {"x": x[hops][0].tolist()} | _confirmed(p, x[hops])
