@@ -28,6 +28,7 @@ from compare.report import pictures, report, results, wording
 from compare.report.results import Summary
 from model import Case, Parameters, StorageError
 
+pytestmark = pytest.mark.usefixtures("few_figures")
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = (
     "--headless",
@@ -105,7 +106,7 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def page(directory: Path) -> Path:
+def page(directory: Path, few_figures: None) -> Path:
     material = Material(VERDICTS, Records(tuple(check.measurement for check in VERDICTS[0].checks)), directory)
     return report.write(material, Summary.of(directory, VERDICTS, Level.QUICK, []))
 

@@ -17,6 +17,7 @@ from compare.measure.record import Measurement, Missing, Records
 from compare.report import results
 from model import InputError, Parameters, SimulationError, StorageError
 
+pytestmark = pytest.mark.usefixtures("few_figures")
 SETS = {"mine": Parameters.named("reference"), "undamped": Parameters.named("reference").replace(c=0.0)}
 Rows = Iterator[Measurement | Missing]
 
