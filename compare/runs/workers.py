@@ -20,6 +20,8 @@ from typing import Any
 from model import InputError
 from model.parameters import Range, check_number
 
+PATIENCE = 10.0
+"""How long a scheduler has to answer, s."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -65,7 +67,7 @@ def dask(address: str) -> Workers:
     except ImportError as error:
         raise InputError("--scheduler needs Dask: pip install 'dualball[cluster]'") from error
     try:
-        client: Any = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
+        client: Any = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
     count = sum(client.nthreads().values())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ import mjsim
 from analytic import thresholds
 from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Bearing, Check, Claim, Outcome, Verdict
-from compare.figures import bifurcation_diagrams, deviations, gallery, slipping, style, unloading
+from compare.figures import bifurcation_diagrams, deviations, gallery, periodic, slipping, style, unloading
 from compare.figures.drawing import GapError, Material
 from compare.figures.registry import FIGURES, figures_of
 from compare.measure.record import Measurement, Records
@@ -94,6 +95,16 @@ def no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(mjsim, "Run", refuse)
     monkeypatch.setattr(mjsim, "simulate", refuse)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def short_branch() -> Iterator[None]:
+    """Of the branch of hops a few orbits: following it takes a second for each."""
+    flow = periodic.SET.omega_0 / thresholds(periodic.SET).omega_02
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(periodic, "LOW", 0.99 * flow)
+        patch.setattr(periodic, "HIGH", 1.01 * flow)
+        yield
 
 
 @pytest.mark.parametrize("results", [True, False], ids=["with results", "theory alone"])
