@@ -14,14 +14,12 @@ STEP = 1e-100
 """Complex step: its square vanishes beside any state, so that the derivative is exact to round-off."""
 
 
-def jacobian(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+def jacobian(case: Case, x: npt.ArrayLike, p: Parameters) -> Array:
     """Exact Jacobians of the vector field at states x (..., 6 or 8), shape (..., d, d), rad s-1.
 
     Rows and columns are the active variables of the case, ``TRAITS[case].active``; in RN slip_z moves with v_h.
-    `omega_0` in rad s-1 is p.omega_0 unless given, and broadcasts against (...).
     """
     state = dynamics.check_state(case, x, p)
-    fluid = p.omega_0 if omega_0 is None else np.asarray(omega_0, dtype=float)
     active = TRAITS[case].active
     columns = []
     for name in active:
@@ -29,7 +27,7 @@ def jacobian(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike
         z = z._replace(**{name: getattr(z, name) + 1j * STEP})
         if case is Case.RN:
             z = z._replace(slip_z=-z.v_h / p.r)
-        rates = _complex_rates(case, z, p, fluid)
+        rates = _complex_rates(case, z, p, p.omega_0)
         rows = (np.imag(getattr(rates, row)) / STEP for row in active)
         columns.append(np.stack(np.broadcast_arrays(*rows), axis=-1))
     return np.stack(np.broadcast_arrays(*columns), axis=-1)

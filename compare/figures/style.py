@@ -56,9 +56,9 @@ def named(p: Parameters, *names: str) -> str:
     return ", ".join(values)
 
 
-def dimensionless_x(axes: Axes, p: Parameters, label: str = UP_TO_UNITS) -> None:
+def dimensionless_x(axes: Axes, p: Parameters) -> None:
     """A second scale at the top: angular velocity in units of sqrt(g/R)."""
-    axes.secondary_xaxis("top", functions=_scale(p)).set_xlabel(label)
+    axes.secondary_xaxis("top", functions=_scale(p)).set_xlabel(UP_TO_UNITS)
 
 
 def dimensionless_y(axes: Axes, p: Parameters, label: str) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ NAMED = 5
 """Files that can't be gathered and are named one by one."""
 
 
-def collect(directory: Path, output: Path, progress: Callable[[int, int], None] = lambda done, total: None) -> int:
+def collect(directory: Path, output: Path) -> int:
     """Gather all runs of a directory, whole ones and failed ones, in the order of their names; return their number.
 
     Raises `StorageError` if there are none, the output can't be written, or, with their names, some can't be read or
@@ -41,7 +41,7 @@ def collect(directory: Path, output: Path, progress: Callable[[int, int], None] 
     if not files:
         raise StorageError(f"there are no runs in {directory}")
     rows, problems, known = [], [], dict[str, Path]()
-    for k, file in enumerate(files, start=1):
+    for file in files:
         try:
             trajectory = storage.load(file)
         except StorageError as error:
@@ -50,7 +50,6 @@ def collect(directory: Path, output: Path, progress: Callable[[int, int], None] 
             if (first := known.setdefault(_identity(trajectory), file)) is not file:
                 problems.append(f"{first} and {file} hold the same run")
             rows.append(_row(trajectory, file.relative_to(directory)))
-        progress(k, len(files))
     if problems:
         more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
         raise StorageError("; ".join(problems[:NAMED]) + more)

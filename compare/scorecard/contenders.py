@@ -21,6 +21,8 @@ from mjsim.stepping import Stepper
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.trajectory import columns
 
+_TIMED, _REPEATS = 1500, 5
+"""Steps that are timed at once, and how often."""
 _HUGE = 1e8
 """A coordinate, speed or force beyond this, in SI units, has diverged."""
 
@@ -125,11 +127,11 @@ def processor_time() -> float:
     return time.process_time() + ended.children_user + ended.children_system
 
 
-def costs(contenders: Sequence[Contender | Other], steps: int = 1500, repeats: int = 5) -> list[float]:
+def costs(contenders: Sequence[Contender | Other]) -> list[float]:
     """Medians of time per step over that of our defaults, measured in turn."""
-    clocks = [contender.clock(steps) for contender in (OURS, *contenders)]
+    clocks = [contender.clock(_TIMED) for contender in (OURS, *contenders)]
     times: list[list[float]] = [[] for _ in clocks]
-    for _ in range(repeats):
+    for _ in range(_REPEATS):
         for clock, spent in zip(clocks, times, strict=True):
             spent.append(clock())
     ours, *others = (statistics.median(spent) for spent in times)

@@ -11,6 +11,8 @@ from rich.table import Table
 from model import Case, Flow, Parameters, storage
 from model.kinematics import UNITS, VARIABLES
 
+LISTED = 20
+"""Most phases, and most events, that are listed."""
 PART = 10_000
 """Samples that are read at a time, so that a file may be larger than memory."""
 
@@ -47,8 +49,8 @@ def describe(path: Path) -> dict[str, Any]:
     }
 
 
-def table(about: dict[str, Any], most: int = 20) -> Table:
-    """What `describe` returned as a table of two columns; at most so many phases and events are listed."""
+def table(about: dict[str, Any]) -> Table:
+    """What `describe` returned as a table of two columns."""
     rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     rows.add_column(style="bold")
     rows.add_column()
@@ -62,9 +64,9 @@ def table(about: dict[str, Any], most: int = 20) -> Table:
     rows.add_row("settings", ", ".join(f"{k} = {_short(v)}" for k, v in about["settings"].items()))
     rows.add_row("samples", f"{about['samples']} over {about['duration']:g} s")
     shown = [f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in about["cases"]]
-    rows.add_row("cases", _listed(shown, most))
+    rows.add_row("cases", _listed(shown))
     events = [f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in about["events"]]
-    rows.add_row("events", _listed(events, most))
+    rows.add_row("events", _listed(events))
     last = (
         f"{name} = {about['last'][name]:.9g} {u}" for name, u in zip(VARIABLES, UNITS, strict=True) if about["last"]
     )
@@ -89,6 +91,6 @@ def _short(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _listed(items: list[str], most: int) -> str:
-    more = f"\n… and {len(items) - most} more" if len(items) > most else ""
-    return ("\n".join(items[:most]) + more) or "none"
+def _listed(items: list[str]) -> str:
+    more = f"\n… and {len(items) - LISTED} more" if len(items) > LISTED else ""
+    return ("\n".join(items[:LISTED]) + more) or "none"
