@@ -24,10 +24,10 @@ mutants: $(VENV)/installed
 	$(BIN)/python -m compare.mutants results --engines --least 0.95 --page docs/mutants.md
 
 test: $(VENV)/installed-dev
-	$(BIN)/pytest -n 2 --dist loadgroup
+	$(BIN)/pytest -n 2 --dist loadfile
 
 test-all: $(VENV)/installed-dev
-	$(BIN)/pytest -n 2 --dist loadgroup -m "slow or not slow"
+	$(BIN)/pytest -n 2 --dist loadfile -m "slow or not slow"
 
 verdicts: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet -o $(RESULTS)

@@ -16,7 +16,7 @@ import mjsim
 from analytic import thresholds
 from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Bearing, Check, Claim, Outcome, Verdict
-from compare.figures import bifurcation_diagrams, deviations, gallery, periodic, slipping, style, unloading
+from compare.figures import bifurcation_diagrams, deviations, gallery, periodic, slipping, style, unloading, unsteady
 from compare.figures.drawing import GapError, Material
 from compare.figures.registry import FIGURES, figures_of
 from compare.measure.record import Measurement, Records
@@ -98,12 +98,13 @@ def no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True, scope="module")
-def short_branch() -> Iterator[None]:
-    """Of the branch of hops a few orbits: following it takes a second for each."""
+def few_points() -> Iterator[None]:
+    """Of the branch of hops a few orbits, and few frequencies of pulsation: theory takes about a second for each."""
     flow = periodic.SET.omega_0 / thresholds(periodic.SET).omega_02
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(periodic, "LOW", 0.99 * flow)
         patch.setattr(periodic, "HIGH", 1.01 * flow)
+        patch.setattr(unsteady, "POINTS", 3)
         yield
 
 
