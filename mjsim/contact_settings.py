@@ -55,8 +55,8 @@ class ContactSettings:
 
     timestep: float = 1e-3
     """Time step, s."""
-    solref: tuple[float, float] = (2e-3, 0.5)
-    """Time constant (s) and damping ratio of the normal rows."""
+    solref: tuple[float, float] = (3e-3, 0.75)
+    """Time constant (s) and damping ratio of the normal rows: the fastest by `contact_decay` for mu, eta up to 1."""
     solreffriction: float = 2.0
     """Time constant tc_f of the friction rows, s."""
     solimp: float = 1e-3
@@ -219,6 +219,17 @@ class ContactSettings:
     def shifts_surfaces(self) -> bool:
         """Whether floor and wall get surface velocities."""
         return self.memory or self.friction_lag != 0
+
+    def contact_decay(self, mu: float, eta: float) -> float:
+        """What is left, at worst, of a small displacement after a step, where a ball slips at both contacts.
+
+        With a low impedance the accelerations are those of springs and dampers, -K (2/tc v + 1/(tc dr)^2 gap), and
+        friction turns them against each other: K = [[1, eta], [-mu, 1]], with the eigenvalues 1 +- i sqrt(mu eta).
+        Beyond 1 the contacts chatter.
+        """
+        (time, ratio), pull = self.solref, 1 + 1j * math.sqrt(mu * eta)
+        damping, stiffness = 2 * self.timestep / time, (self.timestep / (time * ratio)) ** 2
+        return float(np.abs(np.roots([1, pull * (damping + stiffness) - 2, 1 - pull * damping])).max())
 
     def touching(self, g: float) -> float:
         """Gap (m) within which a ball at the start counts as touching: twice the depth to which gravity presses it."""

@@ -19,9 +19,16 @@ from model.parameters import Range, check_number
 def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> None:
     """Refuse a state on or beyond the axis, where polar coordinates end.
 
-    Warn if contact can't be continuous at its slip speeds, taking the load of gravity for both contacts.
+    Warn if contact can't be continuous at its slip speeds, taking the load of gravity for both contacts, or if friction
+    at both makes them chatter.
     """
     x = State.one(x0)
+    if settings.contact_decay(p.mu, p.eta) > 1:
+        warnings.warn(
+            f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters with these settings; "
+            "a longer time constant of solref is stable",
+            stacklevel=4,
+        )
     if settings.coordinates == "polar":
         check_number("h", x.h, "m", Range(high=p.R, below=True), "to be off the axis it")
     for contact, friction, speed, gap in zip("AB", (p.mu, p.eta), slip_speeds(x, p), (x.y, x.h), strict=True):

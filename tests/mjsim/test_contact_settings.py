@@ -1,9 +1,14 @@
 """What settings are refused, and those that fit a problem."""
 
+import contextlib
+
+import numpy as np
 import pytest
 
+import analytic
+import mjsim
 from mjsim import ContactSettings
-from model import InputError, Parameters
+from model import Case, InputError, Parameters
 
 P = Parameters.named("reference")
 
@@ -44,3 +49,22 @@ def test_for_problem_keeps_slipping_continuous(timestep, name) -> None:
         assert settings.hover_number(p.g, friction, p.R * p.omega_0) <= 0.5
         assert settings.fastest_slip(p.g, friction) >= 2 * p.R * p.omega_0
     assert settings.largest_timestep >= timestep * (1 - 1e-12)
+
+
+def test_contacts_die_out_for_all_friction_up_to_one() -> None:
+    settings = ContactSettings.at(2e-3)
+    for mu in np.linspace(0, 1, 11):
+        assert all(settings.contact_decay(mu, eta) < 1 for eta in np.linspace(0, 1, 11))
+
+
+@pytest.mark.parametrize(("solref", "holds"), [((3, 0.75), True), ((2, 1.0), True), ((2, 0.5), False)])
+def test_decay_tells_which_contacts_hold_a_slipping_ball(solref, holds) -> None:
+    p = Parameters(m=0.016, r=0.0221, R=0.0613, j=0.657, mu=0.92, eta=0.4, g=7.9, c=0.907, omega_0=15.9)
+    (steady,) = (each for each in analytic.stationary_solutions(p) if each.case is Case.SS)
+    step = 2e-3
+    settings = ContactSettings.for_problem(p, step, solref=(solref[0] * step, solref[1]))
+    assert (settings.contact_decay(p.mu, p.eta) < 1) == holds
+    with contextlib.nullcontext() if holds else pytest.warns(UserWarning, match="chatters"):
+        run = mjsim.simulate(p, steady.x, 0.4, settings=settings, sample_interval=step)
+    load, expected = run.force_A[100:, 1], steady.force_A[1]
+    assert (np.abs(load - expected).max() < 1e-3 * expected) == holds
