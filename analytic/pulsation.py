@@ -1,8 +1,8 @@
 """A ball that rolls at both points (RR) in a flow that pulsates: when it slips, and what it then reads on average.
 
 The flow is omega_0 = p.omega_0 + amplitude sin(2 pi frequency t). While the ball rolls, omega_c pulsates about the mean
-of the flow exactly: no error of the mean. The friction that this takes grows with the lag omega_c - omega_0, which is
-proportional to the ball's acceleration (23); the loads grow with omega_c^2. docs/theory.md derives what follows.
+of the flow exactly, with any law of drag: no error of the mean. The friction that this takes grows with the lag
+omega_c - omega_0, whose drag accelerates the ball (23); the loads grow with omega_c^2. docs/theory.md derives the rest.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from analytic import bifurcation, drag, slip_bounds, stationary
-from analytic.response import rolling_rate
 from analytic.simulation import simulate
 from analytic.two_point_rolling import MARGINS
 from model import Case, Flow, InputError, Parameters, SimulationError, State
@@ -22,15 +21,48 @@ from model.arrays import Array
 
 PHASES = 720
 """Phases of a period at which slip is looked for, and once more in the cell of the least margin."""
+HARMONICS, FINE = np.arange(1, 64, 2), np.arange(1, 512, 2)
+"""Of the lag: odd ones, as a sine and every law of drag are; and so many that those left out are 10^-8 of it."""
+NEWTON, SOLVED = 50, 1e-9
+"""Most steps of Newton's method for it, and what may be left of its equation, over the flow's acceleration."""
 PERIODS, ROUNDS, SETTLED = 3, 50, 1e-9
 """Length of the runs of `mean_error`, the most of them, and when the mean is settled."""
 
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
     """omega_c and omega_0 in rad s-1 of RR that has pulsated for long, at phases of the flow in rad, same shape."""
-    k = rolling_rate(p)
-    gain, wave = k / (k + 2j * math.pi * frequency), amplitude * np.exp(1j * np.asarray(phase))
-    return p.omega_0 + np.imag(gain * wave), p.omega_0 + np.imag(wave)
+    phase, lag = np.asarray(phase, dtype=float), _lag(p, amplitude, frequency)
+    omega_0 = p.omega_0 + amplitude * np.sin(phase)
+    return omega_0 + np.real(np.exp(1j * phase[..., None] * HARMONICS) @ lag), omega_0
+
+
+def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex:
+    """That of omega_c in `swing` over that of omega_0; with Stokes' law `response.transfer` at any amplitude."""
+    return complex(1 + 1j * _lag(p, amplitude, frequency, FINE)[0] / amplitude)
+
+
+def _lag(
+    p: Parameters, amplitude: float, frequency: float, harmonics: npt.NDArray[np.int64] = HARMONICS
+) -> npt.NDArray[np.complex128]:
+    """Complex amplitudes at some harmonics of D = omega_c - omega_0 in rad s-1, where (23) repeats itself.
+
+    D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With Stokes' law the first
+    step of Newton's method has nothing left to do. Raises ArithmeticError if it doesn't converge.
+    """
+    turn, inertia = 2 * math.pi * frequency, 1 + 2 * p.j
+    phase = np.linspace(0.0, math.pi, 2 * len(harmonics), endpoint=False)
+    waves, push = np.exp(1j * phase[:, None] * harmonics), amplitude * turn * np.cos(phase)
+    amplitudes = waves.conj().T / len(harmonics)
+    derivative = turn * np.real(waves * (1j * harmonics) @ amplitudes)
+    rate = drag.coefficient(p.R * amplitude, p) / inertia
+    lag = -amplitude * turn * np.real(np.exp(1j * phase) / (rate + 1j * turn))
+    for _ in range(NEWTON):
+        speed = p.R * np.abs(lag)
+        left = derivative @ lag + drag.coefficient(speed, p) * lag / inertia + push
+        if np.abs(left).max() <= SOLVED * amplitude * turn:
+            return np.asarray(amplitudes @ lag, dtype=np.complex128)
+        lag = lag - np.linalg.solve(derivative + drag.slope(speed, p) / inertia * np.eye(len(lag)), left)
+    raise ArithmeticError(f"no periodic lag in a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz")
 
 
 def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stability") -> float:
@@ -56,7 +88,7 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
     if slack(low) <= 0:
         return 0.0
     while slack(high) > 0:
-        low, high = high, 1.1 * high
+        low, high = high, 1.25 * high
     return float(brentq(slack, low, high, rtol=1e-12))
 
 

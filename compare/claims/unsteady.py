@@ -12,6 +12,7 @@ from compare.claims.judge import remembered
 from compare.measure.record import Measurement
 from compare.measure.unsteady import caught_up
 from model import Case, Flow, InputError, Parameters
+from model.drag import STOKES
 from model.kinematics import VARIABLES
 
 SECTION = "Unsteady flow"
@@ -21,7 +22,10 @@ FAR, SAMPLES = 3.0, 20_000
 
 
 def _ratio(m: Measurement) -> complex:
-    return complex(response.transfer(m.parameters, Case.RR, float(m.conditions["f"])))
+    p, frequency = m.parameters, float(m.conditions["f"])
+    if p.drag == STOKES:
+        return complex(response.transfer(p, Case.RR, frequency))
+    return pulsation.first_harmonic(p, float(m.conditions["amplitude"]), frequency)
 
 
 @remembered
@@ -72,11 +76,11 @@ CLAIMS = (
         section=SECTION,
         source="(23)",
         statement=(
-            "Rolling at both points the ball follows the flow, pulsating or after a jump, as a lag of first order with "
-            "the time constant (1 + 2j)/c."
+            "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag alone accelerates it "
+            "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c."
         ),
         bearings=(
-            _at_frequency("gain", lambda m: abs(_ratio(m)), "analytic.response.transfer"),
+            _at_frequency("gain", lambda m: abs(_ratio(m)), "analytic.response.transfer, pulsation.first_harmonic"),
             _at_frequency("phase_lag", lambda m: -math.atan2(_ratio(m).imag, _ratio(m).real), "the same"),
             Bearing(
                 protocol=UNSTEADY,
@@ -92,8 +96,9 @@ CLAIMS = (
         source="(23), (66), (67), (73), (82)",
         statement=(
             "In a pulsating flow a rolling ball begins to slip where the friction that its acceleration takes, or the "
-            "load at its fastest, is more than floor and wall can hold: not before slip lasts, and not after no forces "
-            "allow rolling, nearly always the same."
+            "load at its fastest, is more than floor and wall can hold: not before slip can last, and not after no "
+            "forces allow rolling, nearly always the same amplitude. In between Coulomb's law allows both; slip that "
+            "lasts below the first or rolling beyond the second would refute it."
         ),
         bearings=tuple(
             Bearing(

@@ -1,8 +1,10 @@
 """A rolling ball in a pulsating flow: how it follows, at which amplitude it slips, what it then reads on average.
 
 The mean flow is a fixed part of that at which two-point rolling ends. A small pulsation shows the engine's own rhythm,
-from which every other run starts, so that it need not settle. Slip is what the engine's contacts show: both slip.
-Frequencies are powers of two, so that sets of about the same drag share batches.
+from which every other run starts, so that it need not settle. With Stokes' law a large pulsation is a small one
+magnified; with another one the amplitude is raised step by step until the ball slips, and the rhythm looked at anew.
+Slip is what the engine's contacts show: both slip. Frequencies are powers of two, so that sets of about the same drag
+share batches.
 """
 
 from __future__ import annotations
@@ -18,15 +20,17 @@ from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
 from compare.runs.tasks import Task
 from compare.statistics import Measured
-from model import Case, Contact, Flow, Parameters, Trajectory
+from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
 PROTOCOL = "pulsation"
 MEAN = 0.85
 """Mean flow over that at which two-point rolling ends."""
-SMALL = 0.01
-"""Amplitude of the pulsation that shows the rhythm, over the mean flow."""
+SMALL = 0.5
+"""Amplitude of the pulsation that shows the rhythm, over what the mean flow lacks to the end of rolling."""
+RUNG, RUNGS = 1.5, 12
+"""Factor by which the amplitude is raised at a time with another law of drag than Stokes', and how often at most."""
 SLOWEST = 0.5
 """The lowest angular frequency, about, in units of c."""
 OCTAVES = {Level.QUICK: (3, 6), Level.DEFAULT: (0, 1, 3, 4, 6, 7), Level.FULL: (0, 1, 2, 3, 4, 5, 6, 7)}
@@ -58,25 +62,26 @@ class Rhythm:
     set: str
     p: Parameters
     """With the mean flow."""
-    end: float
-    """Flow at which two-point rolling ends, rad s-1."""
     frequency: float
-    ratio: complex
+    amplitude: float
+    """Of the pulsation, rad s-1."""
+    reach: float
+    """How far omega_c may swing in the largest pulsation that is tried, rad s-1."""
+    begin: float = 0.0
+    """omega_c less the mean flow as a period begins, over the amplitude;"""
+    power: float = 0.0
+    """the power of the amplitude with which that grows."""
+    ratio: complex = 1.0
     """omega_c over omega_0."""
-    uncertainty: float
+    uncertainty: float = math.inf
     """Of its parts."""
-    tasks: tuple[Task, ...]
-
-    @property
-    def reach(self) -> float:
-        """The largest amplitude that is tried, rad s-1."""
-        return REACH * (self.end - self.p.omega_0) / abs(self.ratio)
+    tasks: tuple[Task, ...] = ()
 
     def start(self, amplitude: float) -> Array:
         """The state of a ball that follows a pulsation, as it begins."""
-        x = np.zeros(8)
-        x[2] = self.p.omega_0 + amplitude * self.ratio.imag
-        return x
+        return State(
+            omega_c=self.p.omega_0 + amplitude * self.begin * (amplitude / self.amplitude) ** self.power
+        ).stacked()
 
     def steps(self, lab: Lab, largest: float) -> int:
         """Usual number of time steps in a period, a power of two, for amplitudes up to the `largest`."""
@@ -99,17 +104,17 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     rhythms = []
     for name, p in sets.items():
         ends = [m.value for m in records.select("thresholds", "omega_01", lambda m, name=name: m.set == name)]  # type: ignore[misc]
-        if p.drag != STOKES:
-            yield Missing(PROTOCOL, name, "with this law of drag a large pulsation isn't a small one magnified")
-        elif not ends:
+        if not ends:
             yield Missing(PROTOCOL, name, "no flow was measured at which two-point rolling ends by slipping")
         else:
             base = 2.0 ** round(math.log2(SLOWEST * p.c / (2 * math.pi)))
             q = p.replace(omega_0=MEAN * ends[0])
-            rhythms += [Rhythm(name, q, ends[0], base * 2.0**n, 1.0, math.inf, ()) for n in OCTAVES[lab.level]]
+            room = ends[0] - q.omega_0
+            rhythms += [Rhythm(name, q, base * 2.0**n, SMALL * room, REACH * room) for n in OCTAVES[lab.level]]
     rhythms = _rhythms(lab, rhythms)
     for rhythm in rhythms:
         yield from _followed(lab, rhythm)
+    rhythms = _raised(lab, [rhythm for rhythm in rhythms if _rolls(lab, rhythm)])
     brackets = narrow(lab, [_search(lab, rhythm) for rhythm in rhythms])
     slipping = []
     for rhythm, bracket in zip(rhythms, brackets, strict=True):
@@ -131,46 +136,75 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _rhythms(lab: Lab, rhythms: Sequence[Rhythm]) -> list[Rhythm]:
-    """Runs in a small pulsation, each from where the one before points to."""
+    """Runs in pulsations of their amplitudes, each from where the one before points to."""
     followed = list(rhythms)
     for n in range(ROUNDS):
         refine = 4 if n == ROUNDS - 1 else 2
-        tasks = [_small(lab, each, refine) for each in followed]
-        for k, (task, run) in enumerate(zip(tasks, lab.run(tasks), strict=True)):
-            ratio = _ratio(run, followed[k].frequency, SMALL * followed[k].p.omega_0)
-            moved = abs(ratio - followed[k].ratio)
-            tasks_of = (*followed[k].tasks[-1:], task)
-            followed[k] = replace(followed[k], ratio=ratio, uncertainty=moved, tasks=tasks_of)
+        tasks = [
+            r.task(lab, r.amplitude, r.start(r.amplitude), PERIODS, r.amplitude, refine, SAMPLES) for r in followed
+        ]
+        for k, (rhythm, task, run) in enumerate(zip(followed, tasks, lab.run(tasks), strict=True)):
+            period = (len(run.time) - 1) // PERIODS
+            ratio = _ratio(run, rhythm, period)
+            followed[k] = replace(
+                rhythm,
+                begin=(_limit(run.omega_c[period::period]) - rhythm.p.omega_0) / rhythm.amplitude,
+                ratio=ratio,
+                uncertainty=abs(ratio - rhythm.ratio),
+                tasks=(*rhythm.tasks[-1:], task),
+            )
     return followed
 
 
-def _small(lab: Lab, rhythm: Rhythm, refine: int) -> Task:
-    amplitude = SMALL * rhythm.p.omega_0
-    return rhythm.task(lab, amplitude, rhythm.start(amplitude), PERIODS, amplitude, refine)
+def _ratio(run: Trajectory, rhythm: Rhythm, period: int) -> complex:
+    """omega_c over omega_0, by the Fourier sum over the last two periods."""
+    phase = 2 * math.pi * rhythm.frequency * run.time[-2 * period :]
+    return complex(2j * np.mean(run.omega_c[-2 * period :] * np.exp(-1j * phase)) / rhythm.amplitude)
 
 
-def _ratio(run: Trajectory, frequency: float, amplitude: float) -> complex:
-    """omega_c over omega_0 in the second half of a run; a cubic takes up what has not yet died out."""
-    late = run.time >= run.time[-1] / 2
-    phase, t = 2 * math.pi * frequency * run.time[late], run.time[late] / run.time[-1]
-    terms = np.stack([np.sin(phase), np.cos(phase), *(t**n for n in range(4))], axis=-1)
-    (sine, cosine, *_), *_ = np.linalg.lstsq(terms, run.omega_c[late])
-    return complex(sine, cosine) / amplitude
+def _followed(lab: Lab, rhythm: Rhythm) -> Iterator[Measurement | Missing]:
+    if not _rolls(lab, rhythm):
+        yield Missing(
+            PROTOCOL,
+            rhythm.set,
+            f"at {rhythm.frequency:g} Hz a ball slips in a pulsation half as large as in a slow one",
+        )
+        return
+    gain, lag, by = abs(rhythm.ratio), -math.atan2(rhythm.ratio.imag, rhythm.ratio.real), rhythm.uncertainty
+    yield _record(lab, rhythm, "gain", Measured(gain, by), rhythm.tasks, amplitude=rhythm.amplitude)
+    yield _record(lab, rhythm, "phase_lag", Measured(lag, by / gain), rhythm.tasks, amplitude=rhythm.amplitude)
 
 
-def _followed(lab: Lab, rhythm: Rhythm) -> Iterator[Measurement]:
-    gain, lag = abs(rhythm.ratio), -math.atan2(rhythm.ratio.imag, rhythm.ratio.real)
-    yield _record(lab, rhythm, "gain", Measured(gain, rhythm.uncertainty), rhythm.tasks)
-    yield _record(lab, rhythm, "phase_lag", Measured(lag, rhythm.uncertainty / gain), rhythm.tasks)
+def _raised(lab: Lab, rhythms: Sequence[Rhythm]) -> list[Rhythm]:
+    """The rhythms at the last of rising amplitudes at which the ball rolls, and how their beginnings have changed."""
+    raised, todo = list(rhythms), [k for k, rhythm in enumerate(rhythms) if rhythm.p.drag != STOKES]
+    for _ in range(RUNGS):
+        begin = [
+            replace(each, amplitude=RUNG * each.amplitude, begin=each.begin * RUNG**each.power)
+            for each in (raised[k] for k in todo)
+        ]
+        higher = {k: rhythm for k, rhythm in zip(todo, _rhythms(lab, begin), strict=True) if _rolls(lab, rhythm)}
+        for k, rhythm in higher.items():
+            raised[k] = replace(rhythm, power=math.log(rhythm.begin / raised[k].begin, RUNG))
+        todo = list(higher)
+    return raised
+
+
+def _rolls(lab: Lab, rhythm: Rhythm) -> bool:
+    return rolls_on(*lab.run(rhythm.tasks[-1:]))
 
 
 def _search(lab: Lab, rhythm: Rhythm) -> Search:
     def task(amplitude: float, bracket: Bracket, care: Care) -> Task:
-        start, largest = rhythm.start(amplitude), rhythm.reach
-        return rhythm.task(lab, amplitude, start, LOOKED * care.time, largest, 2 * care.refine, SAMPLES)
+        start = rhythm.start(amplitude)
+        return rhythm.task(lab, amplitude, start, LOOKED * care.time, begin.high, 2 * care.refine, SAMPLES)
 
-    # Where slip begins is not known yet: the least amplitude at which it may is taken for a rough width.
-    return Search(Bracket(0.0, rhythm.reach), task, rolls_on, WIDTH[lab.level] * rhythm.reach / 2)
+    if rhythm.p.drag == STOKES:
+        # Where slip begins is not known yet: the least amplitude at which it may is taken for a rough width.
+        begin, width = Bracket(0.0, rhythm.reach / abs(rhythm.ratio)), rhythm.reach / abs(rhythm.ratio) / 2
+    else:
+        begin, width = Bracket(0.99 * rhythm.amplitude, RUNG * rhythm.amplitude), rhythm.amplitude
+    return Search(begin, task, rolls_on, WIDTH[lab.level] * width)
 
 
 def rolls_on(run: Trajectory) -> bool:

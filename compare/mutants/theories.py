@@ -19,7 +19,7 @@ from compare.mutants.exchange import (
     swapped,
     times,
 )
-from model import Case, Parameters, State
+from model import Case, Flow, Parameters, State
 from model.drag import STOKES
 
 
@@ -82,6 +82,15 @@ def _without_lag(right: Function) -> Function:
     def function(*given: Any) -> Any:
         omega_c, _ = right(*given)
         return omega_c, omega_c
+
+    return function
+
+
+def _ramped(right: Function) -> Function:
+    """Simulations with 5 % more drag where the flow is a ramp."""
+
+    def function(p: Parameters, x0: Any, t_end: float, flow: Flow | None = None, **named: Any) -> Any:
+        return right(other(c=1.05)(p) if flow and flow.kind == "ramp" else p, x0, t_end, flow, **named)
 
     return function
 
@@ -181,10 +190,14 @@ THEORIES: tuple[WrongTheory, ...] = (
                 lambda right: lambda p: p.c),
     WrongTheory("response to a pulsation 2 % large", "analytic.response", "transfer", scaled(1.02)),
     WrongTheory("pulsation takes no friction", "analytic.pulsation", "swing", _without_lag),
+    WrongTheory("slip begins 3 % late in a pulsation", "analytic.pulsation", "slip_onset", scaled(1.03)),
+    WrongTheory("slip begins 3 % early in a pulsation", "analytic.pulsation", "slip_onset", scaled(0.97)),
+    WrongTheory("rolling follows a pulsation as under Stokes' drag", "analytic.pulsation", "_lag", given(_by_stokes)),
     WrongTheory("mean reading of a pulsation with 2 % more floor friction", "analytic.pulsation", "mean_error",
                 given(other(mu=1.02))),
     WrongTheory("ringing after a jump in a fluid with 5 % more drag", "analytic.response", "step_response",
                 given(other(c=1.05))),
+    WrongTheory("a ramp in a fluid with 5 % more drag", "analytic.simulation", "simulate", _ramped),
 )  # fmt: skip
 
 

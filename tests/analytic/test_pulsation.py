@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from analytic import pulsation, simulate
-from analytic.response import rolling_rate
+from analytic import pulsation, response, simulate
 from model import Case, Flow, Parameters
 
 REFERENCE = Parameters.named("reference")
@@ -14,7 +13,14 @@ SETS = {
     "slips at both": REFERENCE.replace(omega_0=12.0),
     "slow": REFERENCE.replace(omega_0=4.0),
     "slips at the floor": Parameters.named("high-wall-friction").replace(omega_0=20.0),
+    "wake": REFERENCE.replace(omega_0=11.0, nu_f=5e-5, drag="schiller-naumann"),
+    "quadratic": REFERENCE.replace(omega_0=11.0, nu_f=2e-5, drag="quadratic"),
 }
+
+
+def rolling_rate(p: Parameters) -> float:
+    """With Stokes' law; some rate of this order with others."""
+    return p.c / (1 + 2 * p.j)
 
 
 def slips(p: Parameters, amplitude: float, frequency: float) -> bool:
@@ -40,6 +46,21 @@ def test_forces_may_allow_more_on_a_rough_floor() -> None:
     assert pulsation.slip_onset(p, 1.0, "infeasible") == pytest.approx(pulsation.slip_onset(p, 1.0), rel=1e-9)
     rough = p.replace(mu=0.92, eta=0.4, j=0.66)
     assert pulsation.slip_onset(rough, 100.0, "infeasible") > 1.05 * pulsation.slip_onset(rough, 100.0)
+
+
+@pytest.mark.parametrize("frequency", [0.1, 1.0])
+@pytest.mark.parametrize("name", ["slips at both", "wake", "quadratic"])
+def test_the_first_harmonic_is_that_of_the_simulation(name: str, frequency: float) -> None:
+    p, amplitude = SETS[name], 0.8 * pulsation.slip_onset(SETS[name], frequency)
+    x0 = [0, 0, float(pulsation.swing(p, amplitude, frequency, 0.0)[0]), 0, 0, 0]
+    flow = Flow.sine(p.omega_0, amplitude, frequency)
+    run = simulate(p, x0, 1 / frequency, flow, sample_interval=1 / (256 * frequency))
+    ratio = 2j * np.mean((run.omega_c * np.exp(-2j * np.pi * frequency * run.time))[:-1]) / amplitude
+    assert pulsation.first_harmonic(p, amplitude, frequency) == pytest.approx(ratio, rel=1e-5)
+    if name == "slips at both":
+        assert ratio == pytest.approx(response.transfer(p, Case.RR, frequency), rel=1e-7)
+    else:  # the stronger the pulsation, the more closely it is followed
+        assert abs(ratio / pulsation.first_harmonic(p, amplitude / 2, frequency)) > 1.02
 
 
 @pytest.mark.parametrize("p", SETS.values(), ids=SETS)
