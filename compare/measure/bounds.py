@@ -91,71 +91,62 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     hanging, missing = _hanging(lab, sets, records)
     yield from missing
     lines += hanging
-    tasks = [_tasks(lab, line, line.first, True) for line in lines]
-    lab.complete([task for some in tasks for task in some])
-    begun = [_points(lab, line, line.first, some) for line, some in zip(lines, tasks, strict=True)]
-    around = [_around(line, points) for line, points in zip(lines, begun, strict=True)]
-    more = [_tasks(lab, line, flows, False) for line, flows in zip(lines, around, strict=True)]
-    lab.complete([task for some in more for task in some])
-    for line, points, flows, some in zip(lines, begun, around, more, strict=True):
-        if points is None:
+    begun = _points(lab, lines, [line.first for line in lines])
+    around = _points(lab, lines, [_around(line, points) for line, points in zip(lines, begun, strict=True)])
+    for line, first, more in zip(lines, begun, around, strict=True):
+        if np.isnan(first.gammas).any():
             yield Missing(
                 NAME, line.set, f"slips from {line.inner.name} to {line.outer.name} did not stay in {line.outer.name}"
             )
             continue
-        yield from _result(lab, line, points, flows, some)
-
-
-def _tasks(lab: Lab, line: Line, flows: Sequence[float], first: bool) -> list[Task]:
-    """Two sizes with the shorter step for every flow; with `first`, one with the longer step, too."""
-    large, small = line.sizes
-    tasks = []
-    for push in map(line.push, flows):
-        tasks += [push.task(lab, large, 2), push.task(lab, small, 2)]
-        tasks += [push.task(lab, large)] if first else []
-    return tasks
+        yield from _result(lab, line, first, more)
 
 
 @dataclass(frozen=True)
 class _Points:
-    """gamma at flows, how it goes to a vanishing step, and its uncertainty; rad s-2."""
+    """gamma along a line for a vanishing step and size of slip in rad s-2, (n,), nan where the case was another."""
 
-    flows: tuple[float, ...]
-    gammas: tuple[float, ...]
-    shifts: tuple[float, ...]
-    """What to add, at the first and the second flow."""
-    noise: float
-
-
-def _points(lab: Lab, line: Line, flows: Sequence[float], tasks: Sequence[Task]) -> _Points | None:
-    """The first two points; None if a record was not in the case."""
-    runs = lab.run(tasks)
-    pushes = [line.push(flow) for flow in flows]
-    fine = np.array([_vanishing(push, runs[3 * k], runs[3 * k + 1]) for k, push in enumerate(pushes)])
-    rates = np.array([[push.rate(runs[3 * k], 2)[0], push.rate(runs[3 * k + 2])[0]] for k, push in enumerate(pushes)])
-    if np.isnan(rates).any() or np.isnan(fine).any():
-        return None
-    p = pushes[0].p
-    change = rates[:, 0] - rates[:, 1]
-    noise = math.hypot(np.abs(change).max() * DOUBT, fine[:, 1].max(), floor(p) * slip_unit(p))
-    return _Points(tuple(flows), tuple(fine[:, 0].tolist()), tuple((change * LIMIT).tolist()), noise)
+    flows: Array
+    gammas: Array
+    noise: Array
+    """Standard uncertainties."""
+    tasks: tuple[Task, ...]
 
 
-def _vanishing(push: Push, large: Trajectory, small: Trajectory) -> tuple[float, float]:
-    """gamma for a vanishing size, of which one is twice the other, and what a degree of the polynomials changes."""
-    rates = 2 * push.rate(small, 2) - push.rate(large, 2)
-    return float(rates[0]), float(abs(rates[1] - rates[0]))
+def _points(lab: Lab, lines: Sequence[Line], flows: Sequence[Sequence[float]]) -> list[_Points]:
+    """The points of every line at its flows: from two sizes with the shorter step, and one with the longer one."""
+    pushes = [[line.push(flow) for flow in own] for line, own in zip(lines, flows, strict=True)]
+    tasks = [[_tasks(lab, line, push) for push in own] for line, own in zip(lines, pushes, strict=True)]
+    lab.complete([task for own in tasks for three in own for task in three])
+    points = []
+    for own, some, at in zip(pushes, tasks, flows, strict=True):
+        values = [_point(push, *lab.run(three)) for push, three in zip(own, some, strict=True)]
+        gammas, noise = np.reshape(values, (-1, 2)).T
+        points.append(_Points(np.array(at), gammas, noise, tuple(task for three in some for task in three)))
+    return points
 
 
-def _around(line: Line, points: _Points | None) -> tuple[float, ...]:
+def _tasks(lab: Lab, line: Line, push: Push) -> tuple[Task, ...]:
+    large, small = line.sizes
+    return push.task(lab, large, 2), push.task(lab, small, 2), push.task(lab, large)
+
+
+def _point(push: Push, large: Trajectory, small: Trajectory, coarse: Trajectory) -> tuple[float, float]:
+    """gamma, and its uncertainty by what the step and a degree of the polynomials change; nan if a case was another."""
+    rates = 2 * push.rate(small, 2) - push.rate(large, 2)  # for a vanishing size: one is twice the other
+    change = (push.rate(large, 2) - push.rate(coarse))[0]
+    noise = math.hypot(change * DOUBT, rates[1] - rates[0], floor(push.p) * slip_unit(push.p))
+    return float(rates[0] + change * LIMIT), noise
+
+
+def _around(line: Line, points: _Points) -> tuple[float, ...]:
     """Two flows around the zero of the line through the first two; none if there is none ahead."""
-    if points is None or line.last:
+    if line.last:
         return line.last
-    q = np.array(points.flows) ** line.power
-    rates = np.array(points.gammas) + points.shifts
+    q, rates = points.flows**line.power, points.gammas
     slope = np.diff(rates)[0] / np.diff(q)[0]
     zero = float(q[0] - rates[0] / slope) if slope else math.inf
-    if not 0 < zero < (FAR * max(points.flows)) ** line.power:
+    if not 0 < zero < (FAR * max(points.flows)) ** line.power:  # or nan
         return ()
     _, x = line.at(points.flows[0])
     start = State.of(x).omega_c if line.power == 1 else 0.0
@@ -163,26 +154,18 @@ def _around(line: Line, points: _Points | None) -> tuple[float, ...]:
     return tuple(start + (zero ** (1 / line.power) - start) * factor for factor in around)
 
 
-def _result(
-    lab: Lab, line: Line, points: _Points, flows: Sequence[float], tasks: Sequence[Task]
-) -> Iterator[Measurement | Missing]:
-    reached, gammas = list(points.flows), list(points.gammas)
-    runs = lab.run(tasks)
-    for flow, large, small in zip(flows, runs[::2], runs[1::2], strict=True):
-        gamma, _ = _vanishing(line.push(flow), large, small)
-        if not math.isnan(gamma):
-            reached.append(flow)
-            gammas.append(gamma)
-    q = np.array(reached) ** line.power
-    one, other = points.shifts
-    shifts = one + (other - one) * (q - q[0]) / (q[1] - q[0])
-    gamma = np.array(gammas) + shifts
+def _result(lab: Lab, line: Line, first: _Points, more: _Points) -> Iterator[Measurement | Missing]:
+    there = ~np.isnan(more.gammas)
+    q = np.append(first.flows, more.flows[there]) ** line.power
+    gamma = np.append(first.gammas, more.gammas[there])
+    # What the step changes may be little by chance at one of them.
+    noise = np.maximum(np.append(first.noise, more.noise[there]), first.noise.max())
     if line.bent:
-        zero, slope = _curve(q, gamma, points.noise)
+        zero, slope = _curve(q, gamma, noise)
     else:
         # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none.
-        _, slope = straight_line(q, gamma, points.noise)
-        zero, _ = straight_line(q, gamma, points.noise * math.sqrt(len(q)))
+        _, slope = straight_line(q, gamma, noise)
+        zero, _ = straight_line(q, gamma, noise * math.sqrt(len(q)))
     if not slope.uncertainty <= COARSE * abs(slope.value):
         what = f"{line.inner.name} to {line.outer.name}, {line.by}"
         yield Missing(NAME, line.set, f"growth of slip from {what}, changes too little with the flow")
@@ -193,10 +176,10 @@ def _result(
     for what, value in zip((f"gamma_zero{square}", f"gamma_slope{square}"), (zero, slope), strict=True):
         if what.startswith("gamma_zero") and abs(value.value) > BEYOND * np.abs(q).max():
             continue
-        yield measurement(lab, NAME, line.set, p, what, value, tasks, **conditions)
+        yield measurement(lab, NAME, line.set, p, what, value, (*first.tasks, *more.tasks), **conditions)
 
 
-def _curve(q: Array, gamma: Array, noise: float) -> tuple[Measured, Measured]:
+def _curve(q: Array, gamma: Array, noise: Array) -> tuple[Measured, Measured]:
     """Zero of a curve through points (n,), and its slope there; uncertain by a third of what the last degree changes.
 
     nan without a single zero between the points.
@@ -209,7 +192,7 @@ def _curve(q: Array, gamma: Array, noise: float) -> tuple[Measured, Measured]:
 
     degree = len(q) - 1
     best = at_zero(gamma, degree)
-    shifted = [at_zero(gamma + shift, degree) - best for shift in noise * np.eye(len(q))]
+    shifted = [at_zero(gamma + shift, degree) - best for shift in np.diag(noise)]
     spread = np.linalg.norm([(best - at_zero(gamma, degree - 1)) / 3, *shifted], axis=0)
     zero, slope = (Measured(*pair) for pair in zip(best.tolist(), spread.tolist(), strict=True))
     return zero, slope

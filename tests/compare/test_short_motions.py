@@ -116,10 +116,10 @@ def test_growth_passes_through_zero_where_it_should(lab: Lab, monkeypatch: pytes
 @pytest.mark.parametrize("power", [1.3, 1.687, 2.0])
 def test_a_bent_line_has_its_zero_and_slope(power: float) -> None:
     q = np.array([0.0, 1.1, 1.5, 2.0])
-    zero, slope = bounds._curve(q, q**power - 1.7, 1e-6)
+    zero, slope = bounds._curve(q, q**power - 1.7, np.full(len(q), 1e-6))
     assert abs(zero.value - 1.7 ** (1 / power)) < 3 * zero.uncertainty < 0.03
     assert abs(slope.value - power * zero.value ** (power - 1)) < 3 * slope.uncertainty < 0.06
-    assert np.isnan([m.value for m in bounds._curve(q, q + 1, 1e-6)]).all()
+    assert np.isnan([m.value for m in bounds._curve(q, q + 1, np.full(len(q), 1e-6))]).all()
 
 
 def _end(quantity: str, name: str = "reference") -> Measurement:
