@@ -54,8 +54,8 @@ class Hopping:
     """Mean omega_c/omega_0."""
     height: float
     """Greatest height y/R."""
-    multiplier: float = math.nan
-    """Largest modulus of the Floquet multipliers; nan without a period."""
+    multiplier: float | None = None
+    """Largest modulus of the Floquet multipliers; None without a period."""
 
 
 def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
