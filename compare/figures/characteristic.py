@@ -10,7 +10,7 @@ from compare.figures import style
 from compare.figures.drawing import GapError, Material
 from compare.figures.flow_curve import Curve, fold_curve, plain_curve, top
 from compare.measure.record import Measurement
-from compare.runs.engines import ENGINES, NEWCOMER
+from compare.runs.engines import NEWCOMER
 from model import Parameters
 
 SETS = ("reference", "high-wall-friction")
@@ -56,12 +56,9 @@ def draw(curves: tuple[Curve, ...]) -> Figure:
         fastest = max([m.parameters.omega_0 for m in curve.states], default=top(p)) * 1.04
         (fold_curve if p.eta < p.j else plain_curve)(above, p, fastest)
         above.set_title(f"η = {p.eta:g} {'<' if p.eta < p.j else '>'} j = {p.j:g}", fontsize=11)
-        for engine in ENGINES:
-            own = [m for m in curve.states if m.engine == engine]
-            look = ENGINES[engine]
-            off = [(m.parameters.omega_0, max(_deviation(m), _LEAST)) for m in own]
-            if own:
-                below.plot(*zip(*off, strict=True), ls="none", marker=look.mark, color=look.colour, mfc="white", ms=5)
+        for engine in dict.fromkeys(m.engine for m in curve.states):
+            off = [(m.parameters.omega_0, max(_deviation(m), _LEAST)) for m in curve.states if m.engine == engine]
+            below.plot(*zip(*off, strict=True), ls="none", ms=5, **style.mark_of(engine))
         style.points(above, curve.states)
         above.set(ylim=(0, 1.05 * max([fastest, *(m.value for m in curve.states)])), ylabel=style.OMEGA_C)
         style.legend(above, loc="upper left", frameon=False)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,7 +12,6 @@ from compare.claims.claim import Check
 from compare.figures import style
 from compare.figures.drawing import Drawing, GapError, Material
 from compare.measure.quantities import quantity
-from compare.runs.engines import ENGINES
 from compare.statistics import COVERAGE
 
 _WIDEST = 1.5
@@ -73,9 +71,8 @@ def draw(strips: Strips) -> Figure:
     within = np.abs(ratio) <= _WIDEST
     for engine in engines:
         own = within & [c.measurement.engine == engine for c in strips.checks]
-        mark, colour = (ENGINES[engine].mark, ENGINES[engine].colour) if engine in ENGINES else ("D", "0.3")
-        look: dict[str, Any] = {"ms": 3, "mfc": "none"} if many else {"ms": 4.5, "mfc": "white"}
-        axes.plot(ratio[own], lanes[own], marker=mark, color=colour, ls="none", label=engine, rasterized=many, **look)
+        look = style.mark_of(engine) | ({"ms": 3, "mfc": "none"} if many else {"ms": 4.5})
+        axes.plot(ratio[own], lanes[own], ls="none", label=engine, rasterized=many, **look)
     for side, arrow in ((-1, "<"), (1, ">")):
         beyond = side * ratio > _WIDEST
         at = np.full(beyond.sum(), side * _WIDEST)

@@ -9,7 +9,6 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from compare.figures import style
-from compare.runs.engines import ENGINES
 from compare.scorecard.league import CASES, COST, CREEP, ROLLING_ENDS, WALL, Entry
 
 COLUMNS = 3
@@ -19,7 +18,7 @@ LEAST = 1e-16
 
 def draw(entries: Sequence[Entry]) -> Figure:
     """A panel for each error of omega_c in the league."""
-    looks = {e.name: {"marker": ENGINES[e.name].mark, "color": ENGINES[e.name].colour} for e in entries}
+    looks = {entry.name: style.mark_of(entry.name) for entry in entries}
     return error_over_cost(entries, looks, leave_out=(CREEP, ROLLING_ENDS, WALL, CASES))
 
 
@@ -36,7 +35,7 @@ def error_over_cost(
             own = [e for e in entries if e.name == name and math.isfinite(e.scores.get(discipline, math.nan))]
             own.sort(key=lambda entry: entry.scores[COST])
             x, y = [e.scores[COST] for e in own], [max(e.scores[discipline], LEAST) for e in own]
-            axes.plot(x, y, mfc="white", ms=6, lw=1, label=name, **look)
+            axes.plot(x, y, ms=6, lw=1, label=name, **look)
         axes.set(xscale="log", yscale="log")
         axes.set_title(discipline, fontsize=10)
         axes.grid(alpha=0.3)

@@ -18,7 +18,6 @@ from analytic.bifurcation import Exists
 from compare.claims.claim import Check
 from compare.figures import style
 from compare.figures.drawing import Material
-from compare.runs.engines import ENGINES
 from model import Parameters
 from model.arrays import Array
 
@@ -159,8 +158,7 @@ def _far_label(axes: Axes, here: tuple[float, float], text: str) -> None:
 def _points(axes: Axes, plane: Plane) -> None:
     for engine in dict.fromkeys(check.measurement.engine for check in plane.checks):
         x, y = _places(check for check in plane.checks if check.measurement.engine == engine)
-        look: dict[str, Any] = {"marker": ENGINES[engine].mark, "color": ENGINES[engine].colour, "mfc": "white"}
-        axes.plot(x, y, ls="none", ms=4.5, label=f"{engine}, as predicted", **look)
+        axes.plot(x, y, ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
     if failed := [check for check in plane.checks if not check.agrees]:
         axes.plot(*_places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
 

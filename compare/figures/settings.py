@@ -55,7 +55,7 @@ def caption(of: Comparison) -> str:
 
 def draw(of: Comparison) -> Figure:
     """Either figure."""
-    looks = [{"marker": mark, "color": colour} for mark, colour in zip(_MARKS, _COLOURS, strict=True)]
+    looks = [{"marker": mark, "color": colour, "mfc": "white"} for mark, colour in zip(_MARKS, _COLOURS, strict=True)]
     if of.figure == "ladder":
         return _ladder(of, looks)
     names = dict.fromkeys(entry.name for entry in of.entries)
@@ -71,7 +71,7 @@ def _ladder(of: Comparison, looks: Sequence[Mapping[str, Any]]) -> Figure:
     for name, look in zip(shown, looks, strict=False):
         own = [(k, e.scores[name]) for k, e in enumerate(of.entries) if math.isfinite(e.scores[name])]
         x, y = [max(error, league.LEAST) for _, error in own], [k for k, _ in own]
-        axes.plot(x, y, "-", mfc="white", lw=0.6, label=name, **look)
+        axes.plot(x, y, "-", lw=0.6, label=name, **look)
     axes.set_yticks(range(len(methods)), methods, fontsize=8.5)
     axes.invert_yaxis()
     axes.set(xscale="log", xlabel="$|\\Delta\\omega_c|/\\omega_c$")

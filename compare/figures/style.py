@@ -100,15 +100,20 @@ def guides(axes: Axes, values: dict[str, float]) -> None:
         axes.annotate(THRESHOLD_LABELS[key], (value, 0.02 + 0.07 * step), **place, **_TEXT, color="0.25", zorder=0.5)
 
 
+def mark_of(engine: str) -> dict[str, Any]:
+    """The mark of what an engine gave."""
+    given = ENGINES.get(engine)  # theory against theory has none
+    return {"marker": given.mark if given else "D", "color": given.colour if given else "0.3", "mfc": "white"}
+
+
 def points(axes: Axes, states: Sequence[Measurement], lift: float = 0.0, way: str = "", **look: Any) -> None:
     """Measured values over omega_0 by engine, drawn higher by `lift`; capped bars of three standard uncertainties."""
     for engine in dict.fromkeys(m.engine for m in states):
-        own, given = [m for m in states if m.engine == engine], ENGINES[engine]
+        own = [m for m in states if m.engine == engine]
         omegas, values = [m.parameters.omega_0 for m in own], [m.value + lift for m in own]
         bars = [3 * m.uncertainty for m in own]
-        own_look: dict[str, Any] = {"marker": given.mark, "color": given.colour, "mfc": "white", "ms": 5}
-        own_look |= {"label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4} | look
-        axes.errorbar(omegas, values, yerr=bars, ls="none", **own_look)
+        usual = {"ms": 5, "label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4}
+        axes.errorbar(omegas, values, yerr=bars, ls="none", **mark_of(engine) | usual | look)
 
 
 def legend(axes: Axes, **where: Any) -> None:

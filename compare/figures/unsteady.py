@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,7 +18,6 @@ from compare.figures.bifurcation_diagrams import slipping
 from compare.figures.drawing import Material, Motion
 from compare.measure.record import Measurement
 from compare.measure.unsteady import JUMP
-from compare.runs.engines import ENGINES
 from model import Case, Flow, Parameters
 
 SET = "reference"
@@ -115,9 +113,9 @@ def draw_pulsation(of: Measurements) -> Figure:
 
 def _marks(axes: Axes, rows: list[Measurement], unit: float = 1.0) -> None:
     for engine in dict.fromkeys(m.engine for m in rows):
-        own, given = [m for m in rows if m.engine == engine], ENGINES[engine]
+        own = [m for m in rows if m.engine == engine]
         at, values = [float(m.conditions["f"]) for m in own], [unit * m.value for m in own]
-        axes.plot(at, values, given.mark, color=given.colour, mfc="white", ms=6, label=engine, zorder=5)
+        axes.plot(at, values, ls="none", ms=6, label=engine, zorder=5, **style.mark_of(engine))
 
 
 def caption_unsteady(of: Measurements) -> str:
@@ -181,8 +179,7 @@ def _law(axes: Axes, rows: list[Measurement]) -> None:
     passed = [ramp_end(p, rate, x) - end for rate in rates.tolist()]
     axes.loglog(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
     for m in rows:
-        given = ENGINES[m.engine]
-        look: dict[str, Any] = {"color": given.colour, "mfc": "white", "ms": 6, "zorder": 5, "label": m.engine}
-        axes.plot([float(m.conditions["rate"])], [m.value - end], given.mark, **look)
+        at = float(m.conditions["rate"]), m.value - end
+        axes.plot(*at, ls="none", ms=6, zorder=5, label=m.engine, **style.mark_of(m.engine))
     axes.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)")
     style.legend(axes, loc="upper left")
