@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from types import FrameType
 from typing import Any
 
@@ -45,7 +46,7 @@ def processes(count: int) -> Workers:
     def start() -> Executor:
         for name in _THREADS:  # inherited by the workers; numpy reads it when they import it
             os.environ.setdefault(name, "1")
-        return ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_ignore_interrupts)
+        return ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_follow_the_parent)
 
     def stop(executor: Executor, at_once: bool) -> None:
         assert isinstance(executor, ProcessPoolExecutor)
@@ -99,5 +100,13 @@ def interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _ignore_interrupts() -> None:
+def _follow_the_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    threading.Thread(target=_die_with_the_parent, daemon=True).start()
+
+
+def _die_with_the_parent() -> None:
+    """However it ends: a worker whose campaign was killed would go on with its batch, for nobody."""
+    if parent := parent_process():
+        parent.join()
+        os._exit(1)

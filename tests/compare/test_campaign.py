@@ -332,6 +332,25 @@ def test_a_long_run_that_is_killed_goes_on_to_the_bit(tmp_path: Path) -> None:
     assert [path.suffix for path in (tmp_path / "killed").iterdir()] == [".h5"]
 
 
+def test_workers_end_with_a_killed_campaign(tmp_path: Path) -> None:
+    program = tmp_path / "campaign.py"
+    program.write_text("""
+import time
+from compare.runs.workers import processes
+if __name__ == "__main__":
+    work = processes(1).start().submit(time.sleep, 600)
+    while not work.running():
+        time.sleep(0.01)
+    print("works", flush=True)
+    time.sleep(600)
+""")
+    process = subprocess.Popen([sys.executable, str(program)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout
+    assert process.stdout.readline() == "works\n"
+    process.kill()
+    process.communicate(timeout=60)  # the pipe ends once the worker, which holds it, too, is gone
+
+
 def test_interrupted_by_the_keyboard(tmp_path: Path) -> None:
     # Many runs of some tenths of a second: however late the interrupt comes, most of them are still to be done.
     sweep = f"sweep --vary omega_0=5:10:400 --batch 2 --workers 2 --time 50 -o {tmp_path}"
