@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich import box
 from rich.table import Table
 
 import analytic
 from analytic import orbit_branch
 from analytic.fates import LASTING, Attractor
 from analytic.orbits import Orbit
+from compare import pages
 from compare.commands import options, running
 from compare.runs.engines import EVENT
 from compare.runs.sweep import Axis, grid
@@ -162,36 +162,28 @@ def _finite(value: float) -> float | None:
 _COLUMNS = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
 
 
-def _varied(data: dict[str, Any]) -> list[str]:
-    return [name for name in data["sets"][0] if name not in ("attractors", "branches")]
-
-
-def _rows(data: dict[str, Any]) -> Iterator[list[str]]:
-    for each in data["sets"]:
-        for row in each["attractors"]:
-            yield [*(f"{each[name]:.6g}" for name in _varied(data)), *_cells(row)]
+def _rows(data: dict[str, Any]) -> pages.Rows:
+    varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
+    body = [
+        [*(f"{each[name]:.6g}" for name in varied), *_cells(row)] for each in data["sets"] for row in each["attractors"]
+    ]
+    return [[*varied, *_COLUMNS], *body]
 
 
 def _table(data: dict[str, Any]) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, title=f"What balls come to ({data['engine']})", title_justify="left")
-    for column in (*_varied(data), *_COLUMNS):
-        table.add_column(column)
-    for row in _rows(data):
-        table.add_row(*row)
-    table.caption = "\n".join(_way(branch) for each in data["sets"] for branch in each["branches"])
-    table.caption_justify = "left"
-    return table
+    caption = "\n".join(_way(branch) for each in data["sets"] for branch in each["branches"])
+    return pages.table(f"What balls come to ({data['engine']})", _rows(data), caption=caption)
 
 
 def _page(data: dict[str, Any]) -> str:
     """The same in Markdown, with the orbits of each branch."""
-    lines = _markdown([*_varied(data), *_COLUMNS], _rows(data))
+    lines = [pages.markdown(_rows(data))]
     for branch in (branch for each in data["sets"] for branch in each["branches"]):
         name = branch["parameter"]
         lines += ["", f"## Followed in {name}", ""]
         lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}" for p in branch["places"]), ""]
         head = [name, "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"]
-        lines += _markdown(head, (_orbit_cells(orbit, name) for orbit in branch["orbits"]))
+        lines.append(pages.markdown([head, *(_orbit_cells(orbit, name) for orbit in branch["orbits"])]))
     return "\n".join(lines) + "\n"
 
 
@@ -203,12 +195,6 @@ def _orbit_cells(orbit: dict[str, Any], name: str) -> list[str]:
 def _largest(row: dict[str, Any]) -> float:
     """The largest modulus of the multipliers; nan if there are none."""
     return max((abs(complex(*each)) for each in row["multipliers"]), default=math.nan)
-
-
-def _markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """A table of Markdown, line by line."""
-    cells = [head, ["---"] * len(head), *rows]
-    return ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells]
 
 
 def _cells(row: dict[str, Any]) -> list[str]:

@@ -17,7 +17,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from types import FrameType
 
-from compare import validation
+from compare import pages, validation
 from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Claim, Outcome, Text, Verdict
 from compare.claims.judge import forget, judge, verdict
@@ -108,8 +108,8 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial]) -> str:
     for title, trials in (("Wrong theories", first.trials), ("Wrong engines", measured)):
         if trials:
             seen = sum(bool(trial.noticed) for trial in trials)
-            lines += ["", f"## {title}: {seen} of {len(trials)} noticed", "", "| fault | noticed by |", "|---|---|"]
-            lines += [f"| {trial.what} | {_told(trial)} |" for trial in trials]
+            lines += ["", f"## {title}: {seen} of {len(trials)} noticed", ""]
+            lines.append(pages.markdown([["fault", "noticed by"], *([each.what, _told(each)] for each in trials)]))
     return "\n".join([*lines, *_powers(levels)]) + "\n"
 
 
@@ -122,12 +122,12 @@ def _powers(levels: Sequence[Judged]) -> Iterator[str]:
         "The relative error of a theory that every measurement of a quantity would",
     )
     yield from ("notice, of all sets the largest; and the ceiling, beyond which a check is inconclusive.", "")
-    yield f"| quantity | ceiling | {' | '.join(each.name for each in levels)} |"
-    yield "|---" * (2 + len(levels)) + "|"
+    rows = [["quantity", "ceiling", *(each.name for each in levels)]]
     for name, quantity in QUANTITIES.items():
         if quantity.resolves and any(name in each.power for each in levels):
             powers = (f"{each.power[name]:.1g}" if name in each.power else "–" for each in levels)
-            yield f"| {quantity.symbol} | {quantity.resolves:.1g} | {' | '.join(powers)} |"
+            rows.append([quantity.symbol, f"{quantity.resolves:.1g}", *powers])
+    yield pages.markdown(rows)
 
 
 def _told(trial: Trial) -> str:

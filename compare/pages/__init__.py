@@ -1,10 +1,17 @@
-"""Pages that need nothing but themselves, filled in from templates that share `base.html`."""
+"""Pages that need nothing but themselves, filled in from templates that share `base.html`; and tables of text."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import jinja2
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+Rows = Sequence[Sequence[str]]
+"""A table: its head, then its body."""
 
 
 def render(package: str, template: str, **values: Any) -> str:
@@ -12,3 +19,20 @@ def render(package: str, template: str, **values: Any) -> str:
     loader = jinja2.ChoiceLoader([jinja2.PackageLoader(package), jinja2.PackageLoader("compare.pages")])
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
     return environment.get_template(template).render(**values)
+
+
+def markdown(rows: Rows) -> str:
+    """A table in Markdown."""
+    cells = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells)
+
+
+def table(title: str, rows: Rows, no_wrap: bool = False, **look: Any) -> Table:
+    """A table for the terminal; with `no_wrap` only its head and first column may take several lines."""
+    usual: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "caption_justify": "left"}
+    shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
+    for k, name in enumerate(rows[0]):
+        shown.add_column(name, justify="right" if k else "left")
+    for name, *cells in rows[1:]:
+        shown.add_row(Text(name), *(Text(cell, no_wrap=no_wrap) for cell in cells))
+    return shown

@@ -8,12 +8,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from rich import box
 from rich.table import Table
 
 from analytic import drag, flowmeter
 from analytic.design import THRESHOLDS, Choice, Design, Sensitivity
 from analytic.flowmeter import End
 from compare import pages
+from compare.pages import Rows
 
 SYMBOLS = {
     "omega_01": "ω₀₁",
@@ -28,8 +30,6 @@ SYMBOLS = {
 }
 UNITS = {"r": "m", "R": "m", "rho_b": "kg/m³", "rho_f": "kg/m³", "nu_f": "m²/s", "gravity": "m/s²"}
 _NONE = "–"
-Rows = list[list[str]]
-"""A table: its head, then its body."""
 
 
 def sentences(made: Design) -> list[str]:
@@ -101,10 +101,14 @@ def sensitivities(made: Design) -> Rows:
     return rows
 
 
+def _titled(made: Design) -> list[tuple[str, Rows]]:
+    tables = {"The best of each material": materials, "Thresholds": thresholds, "Sensitivities": sensitivities}
+    return [(title, rows(made)) for title, rows in tables.items()]
+
+
 def tables(made: Design) -> list[Table | str]:
     """All of it, for the terminal."""
-    titles = {"The best of each material": materials, "Thresholds": thresholds, "Sensitivities": sensitivities}
-    shown = [_table(title, rows(made)) for title, rows in titles.items()]
+    shown = [pages.table(title, rows, box=box.HEAVY_HEAD) for title, rows in _titled(made)]
     return [*shown, *(f"{name} can't be used: {why}" for name, why in made.refused.items()), *sentences(made)]
 
 
@@ -148,11 +152,7 @@ def page(made: Design) -> str:
         "meter.html",
         made=made,
         sentences=sentences(made),
-        tables=[
-            ("The best of each material", materials(made)),
-            ("Thresholds", thresholds(made)),
-            ("Sensitivities", sensitivities(made)),
-        ],
+        tables=_titled(made),
         asked=_asked(made),
         figures=drawn,
     )
@@ -199,12 +199,3 @@ def _number(x: float) -> str:
 
 def _sensitivity(s: Sensitivity) -> str:
     return f"{s.value:+.3f}".replace("+0.000", "0").replace("-0.000", "0") if math.isfinite(s.value) else _NONE
-
-
-def _table(title: str, rows: Rows) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold")
-    for k, name in enumerate(rows[0]):
-        table.add_column(name, justify="right" if k else "left")
-    for row in rows[1:]:
-        table.add_row(*row)
-    return table

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from analytic import rolling_forces
+from compare.pages import Rows
 from compare.runs.campaign import Campaign
 from compare.runs.engines import EVENT, MUJOCO
 from compare.runs.tasks import Task
@@ -20,8 +21,6 @@ from mjsim import ContactSettings
 from model import Case, Contact, Parameters
 from model.arrays import Array
 
-Rows = list[list[str]]
-"""A table: its head, then its rows."""
 STEPS = (4e-3, 1e-3)
 """Time steps of stationary states, s."""
 REACHED = (

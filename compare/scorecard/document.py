@@ -13,10 +13,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from compare import pages
+from compare.pages import Rows
 from compare.runs import progress
 from compare.runs.campaign import Campaign
 from compare.scorecard import accuracy, confirmation, league, scores, standings
-from compare.scorecard.accuracy import Rows
 from compare.scorecard.league import Entry
 from model import InputError
 from model.files import write_text
@@ -33,13 +34,7 @@ def write(page: Path, name: str, rows: Rows) -> None:
     if text.count(begin) != 1 or text.count(end) != 1:
         raise InputError(f"{page} must have the lines {begin!r} and {end!r} once each")
     before, rest = text.split(begin)
-    write_text(page, f"{before}{begin}\n{markdown(rows)}\n{end}{rest.split(end)[1]}")
-
-
-def markdown(rows: Rows) -> str:
-    """A table with its head."""
-    head, *body = (f"| {' | '.join(row)} |" for row in rows)
-    return "\n".join([head, f"|{'---|' * len(rows[0])}", *body])
+    write_text(page, f"{before}{begin}\n{pages.markdown(rows)}\n{end}{rest.split(end)[1]}")
 
 
 def _of_settings(entries: Sequence[Entry]) -> Rows:

@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from rich import box
 from rich.table import Table
-from rich.text import Text
 
-from compare.scorecard.accuracy import Rows, number
+from compare import pages
+from compare.pages import Rows
+from compare.scorecard.accuracy import number
 from compare.scorecard.league import CASES, COST, WALL, Entry
 from compare.scorecard.scores import OPEN
 
@@ -49,14 +49,10 @@ def tables(entries: Sequence[Entry]) -> Iterator[Table]:
     for step in steps or [None]:
         own = [entry for entry in entries if entry.step in (step, None)]
         title = "League" if step is None else f"League, step {1e3 * step:g} ms"
-        shown = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left", title_style="bold", padding=0)
-        shown.add_column("")
-        for entry in own:
-            shown.add_column(entry.name.replace("-", "- "), justify="right")
-        head, *body = rows(own)
-        for name, *cells in list(zip(head, *body, strict=True))[2:]:
-            shown.add_row(name, *(Text(cell, no_wrap=True) for cell in cells))
-        yield shown
+        _, _, *lines = zip(*rows(own), strict=True)
+        yield pages.table(
+            title, [["", *(entry.name.replace("-", "- ") for entry in own)], *lines], no_wrap=True, padding=0
+        )
 
 
 def settings(data: dict[str, Any]) -> Rows:

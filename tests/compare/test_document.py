@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from compare import pages
 from compare.runs.campaign import Campaign
 from compare.scorecard import accuracy, document
 from compare.scorecard.accuracy import REACHED
@@ -23,7 +24,7 @@ def test_a_table_is_put_in_its_place(tmp_path: Path) -> None:
     for _ in range(2):
         document.write(page, "x", ROWS)
         assert page.read_text() == (
-            "before\n<!-- begin: x -->\n| a | b |\n|---|---|\n| 1 | 2 |\n| 3 | 4 |\n<!-- end: x -->\n"
+            "before\n<!-- begin: x -->\n| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 | 4 |\n<!-- end: x -->\n"
             "after <!-- begin: y --><!-- end: y -->\n"
         )
     with pytest.raises(InputError, match="must have the lines '<!-- begin: z -->'"):
@@ -36,7 +37,7 @@ def test_the_page_has_a_place_for_every_table(name: str, tmp_path: Path) -> None
     page.write_text((DOCS / name).read_text("utf-8"), "utf-8")
     for table in tables:
         document.write(page, table, ROWS)
-    assert page.read_text("utf-8").count(document.markdown(ROWS)) == len(tables)
+    assert page.read_text("utf-8").count(pages.markdown(ROWS)) == len(tables)
 
 
 def test_the_transient_converges_and_is_extrapolated(tmp_path: Path) -> None:
