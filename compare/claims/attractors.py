@@ -17,7 +17,6 @@ from compare.measure.record import Measurement, state
 from model import Parameters, Trajectory
 from model.kinematics import VARIABLES
 
-SECTION = "Beyond the paper"
 LASTS = 60.0
 """How long theory simulates a motion that settles, in units of 1/c: the slowest part decays in 2 (1 + 2 j)/c."""
 
@@ -62,7 +61,6 @@ def _after_rest(quantity: str, predict: Callable[[Trajectory], float]) -> Bearin
 CLAIMS = (
     Claim(
         id="choice",
-        section=SECTION,
         source="Definitions 1-3",
         statement="For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip grows.",
         bearings=(
@@ -72,7 +70,6 @@ CLAIMS = (
     ),
     Claim(
         id="hopping",
-        section=SECTION,
         source="Section 5.3, last paragraph",
         statement="A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on the wall.",
         bearings=(
@@ -84,7 +81,6 @@ CLAIMS = (
     Claim(
         id="hopping-multiplier",
         level=Level.DEFAULT,
-        section=SECTION,
         source="Section 5.3, last paragraph",
         statement="Disturbances of the hopping shrink from hop to hop by its largest Floquet multiplier.",
         bearings=(_bearing("orbit_multiplier", lambda orbit: float(np.abs(orbit.multipliers).max())),),
@@ -92,7 +88,6 @@ CLAIMS = (
     Claim(
         id="swing",
         level=Level.DEFAULT,
-        section=SECTION,
         source="Section 5.3, last paragraph",
         statement="Between the Hopf points of SS the ball swings for ever and slips all the time (very rough floor).",
         bearings=(
@@ -104,7 +99,6 @@ CLAIMS = (
     Claim(
         id="calm",
         level=Level.DEFAULT,
-        section=SECTION,
         source="Section 5.3, last paragraph",
         statement="In strong drag, κ > 2, no ball was found that hops on.",
         bearings=(
@@ -119,7 +113,6 @@ CLAIMS = (
     Claim(
         id="hopping-birth",
         level=Level.DEFAULT,
-        section=SECTION,
         source="Section 5.3, last paragraph, (85)",
         statement="Hopping begins with hops of no height at ω₀₂, where the wall begins to carry the ball.",
         bearings=(

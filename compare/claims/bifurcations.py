@@ -14,7 +14,6 @@ from compare.measure.settling import rotation_scale
 from model import Case, Parameters
 from model.kinematics import VARIABLES
 
-SECTION = "Bifurcations"
 THRESHOLDS, EDGE = "thresholds", "edge"
 
 
@@ -80,7 +79,6 @@ def _has_fold(m: Measurement) -> float:
 def _claim(bifurcation: str, statement: str, *bearings: Bearing) -> Claim:
     return Claim(
         id=f"table-5-{bifurcation}",
-        section=SECTION,
         source=f"Table 5, {bifurcation}",
         statement=statement,
         bearings=bearings,
@@ -117,14 +115,12 @@ CLAIMS = (
     ),
     Claim(
         id="sub-branches",
-        section=SECTION,
         source="Prop. 7, (87)-(90), Fig. 10",
         statement="Between ω₀₂ and ω₀₄ an unstable state of slipping at both points divides two attractors.",
         bearings=tuple(_edge(name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "wall_spin")),
     ),
     Claim(
         id="eta-critical",
-        section=SECTION,
         source="(87), Fig. 7",
         statement=(
             "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
@@ -143,7 +139,6 @@ CLAIMS = (
     ),
     Claim(
         id="one-fold",
-        section=SECTION,
         source="after Prop. 7",
         statement="There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
         bearings=(

@@ -45,7 +45,6 @@ def _impact(name: str) -> Bearing:
 CLAIMS = (
     Claim(
         id="cases",
-        section="Laws and cases",
         source="Fig. 2, Table 3",
         statement=(
             "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
@@ -55,7 +54,6 @@ CLAIMS = (
     ),
     Claim(
         id="impacts",
-        section="Laws and cases",
         source="extension",
         statement="A ball that lands does not rebound, and friction takes its share of the impulse.",
         bearings=tuple(_impact(name) for name in NAMES),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from compare.claims import (
     attractors,
     bifurcations,
@@ -19,19 +21,17 @@ from compare.claims import (
 )
 from compare.claims.claim import Claim
 
-CLAIMS: tuple[Claim, ...] = (
-    *stationary.CLAIMS,
-    *stability.CLAIMS,
-    *bifurcations.CLAIMS,
-    *flowmeter.CLAIMS,
-    *unloading.CLAIMS,
-    *laws.CLAIMS,
-    *slipping.CLAIMS,
-    *lifting.CLAIMS,
-    *cases.CLAIMS,
-    *equations.CLAIMS,
-    *formal.CLAIMS,
-    *attractors.CLAIMS,
-    *unsteady.CLAIMS,
-)
+SECTIONS: dict[str, tuple[Claim, ...]] = {
+    "Stationary states": stationary.CLAIMS,
+    "Bifurcations": (*stationary.DIAGRAMS, *bifurcations.CLAIMS),
+    "Stability": stability.CLAIMS,
+    "Flowmeter": (*flowmeter.CLAIMS, *unloading.CLAIMS),
+    "Laws and cases": (*laws.CLAIMS, *cases.CLAIMS),
+    "Slipping": (*slipping.CLAIMS, *lifting.CLAIMS),
+    "Equations of motion": equations.CLAIMS,
+    "Formal": formal.CLAIMS,
+    "Beyond the paper": attractors.CLAIMS,
+    "Unsteady flow": unsteady.CLAIMS,
+}
+CLAIMS = tuple(replace(claim, section=section) for section, claims in SECTIONS.items() for claim in claims)
 """Every claim there is."""

@@ -116,8 +116,6 @@ class Claim:
     """One checkable statement."""
 
     id: str
-    section: str
-    """Part of the catalogue."""
     source: str
     """Proposition, equation, figure or table."""
     statement: str
@@ -130,6 +128,8 @@ class Claim:
     expected: Outcome = Outcome.CONFIRMED
     level: Level = Level.QUICK
     """The least level at which it is measured."""
+    section: str = ""
+    """Part of the `catalogue`, which says it."""
 
     def __post_init__(self) -> None:
         if (self.algebra is not None) != (self.text is Text.FORMAL) or bool(self.bearings) == bool(self.algebra):

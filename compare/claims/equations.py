@@ -79,7 +79,6 @@ def _claim(case: Case) -> Claim:
     own = case not in _SOURCES
     return Claim(
         id=f"motion-{case.name}",
-        section="Equations of motion",
         source=_SOURCES.get(case, "(20)"),
         statement=f"In case {case.name} the ball moves, its contacts press and rub, as the equations say.",
         bearings=(

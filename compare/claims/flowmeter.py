@@ -12,8 +12,6 @@ from compare.measure.record import Measurement
 from compare.measure.settling import scale
 from model import Case, Parameters
 
-SECTION = "Flowmeter"
-
 
 @remembered
 def _slope(p: Parameters, case: Case) -> float:
@@ -99,28 +97,24 @@ def _on_wall(m: Measurement) -> bool:
 CLAIMS = (
     Claim(
         id="slope-rolling",
-        section=SECTION,
         source="Section 5.3",
         statement="Rolling at both points, or carried by the wall alone, the ball reads the flow: dω_c/dω₀ = 1.",
         bearings=(_slopes("neighbours", slope, "characteristic_slope", Case.RR, Case.NR),),
     ),
     Claim(
         id="slope-slipping",
-        section=SECTION,
         source="Section 5.3, (38), (41)",
         statement="While the ball slips at both points its reading rises by (38), (41), at first hardly at all.",
         bearings=(_slopes("neighbours", slope, "characteristic_slope", Case.SS),),
     ),
     Claim(
         id="slope-jump",
-        section=SECTION,
         source="Section 5.3",
         statement="At ω₀₁ the slope of the characteristic curve jumps: from 1 to 0, as the equations have it.",
         bearings=(_slopes("jump", lambda m: analytic.slope_jump(m.parameters), "slope_jump", Case.SS),),
     ),
     Claim(
         id="slope-mean",
-        section=SECTION,
         source="Section 5.3",
         statement=(
             "Between ω₀₁ and ω₀₂ the slope is small: what is measured on average from end to end is what theory says, "
@@ -130,7 +124,6 @@ CLAIMS = (
     ),
     Claim(
         id="operating-range",
-        section=SECTION,
         source="Section 5.3",
         statement=(
             "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, from rest the ball "
@@ -148,7 +141,6 @@ CLAIMS = (
     ),
     Claim(
         id="unloading-limit",
-        section=SECTION,
         source="Section 5.3, (85)",
         statement="The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and sinks.",
         bearings=(
@@ -164,7 +156,6 @@ CLAIMS = (
     ),
     Claim(
         id="fig-13-left",
-        section=SECTION,
         source="Fig. 13, left",
         statement="For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
         bearings=(

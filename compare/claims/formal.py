@@ -99,7 +99,6 @@ def _second_rate(p: Parameters) -> float:
 CLAIMS = (
     Claim(
         id="fig-12",
-        section="Formal",
         source="Fig. 12",
         statement="With (12) released all bifurcations of Table 5 appear for η > j as well.",
         algebra=_figure_12,
@@ -108,7 +107,6 @@ CLAIMS = (
     ),
     Claim(
         id="eq-83-rough",
-        section="Formal",
         source="(82), (83), end of section 4.3",
         statement="(83) is a bound for η > 1 only, and contradicts (12) there; (82) does so unless η < j.",
         algebra=_pulling,

@@ -7,7 +7,6 @@ from compare.claims.claim import Bearing, Claim, Text
 from compare.measure.laws import FLUIDS
 from compare.measure.record import Measurement
 
-SECTION = "Laws and cases"
 PROTOCOL = "laws"
 
 
@@ -27,7 +26,7 @@ def sinking(m: Measurement) -> float:
 
 CLAIMS = (
     Claim(
-        id="table-3", section=SECTION, source="Table 3, (12)-(17)",
+        id="table-3", source="Table 3, (12)-(17)",
         statement=(
             "A contact that rolls doesn't slip; contacts press and never pull; friction stays within mu or eta times "
             "the normal force, has that size where the contact slips, and opposes the slip."
@@ -39,7 +38,7 @@ CLAIMS = (
         ),
     ),
     Claim(
-        id="eq-10", section=SECTION, source="(9), (10)",
+        id="eq-10", source="(9), (10)",
         statement="A ball sinks freely at the speed at which Stokes' drag balances its weight less buoyancy.",
         bearings=(Bearing(PROTOCOL, "v_y", sinking, by="analytic.stokes.sinking_speed"),),
         text=Text.CORRECTED, reason="Table 1 gives the unit of m·c as kg m/s; it is kg/s.",

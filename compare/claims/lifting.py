@@ -24,7 +24,6 @@ def _lifting(inner: Case, outer: Case) -> Claim:
     never = inner is Case.RS
     return Claim(
         id=f"lift-{inner.name}-{outer.name}",
-        section="Slipping",
         source="Fig. 6, dotted",
         statement=f"Out of {inner.name} the ball {'never ' * never}lifts off the floor{'' if never else ' once'}"
         f"{', whatever its orbit' if never else f' the wall alone, in {outer.name}, would drive it up'}.",

@@ -37,7 +37,6 @@ def _out_of(inner: Case, outer: Case) -> Callable[[Measurement], bool]:
 def _arrow(inner: Case, outer: Case) -> Claim:
     return Claim(
         id=f"slip-{inner.name}-{outer.name}",
-        section="Slipping",
         source="(56)-(59)" if inner is Case.NR else "(53), Fig. 6",
         statement=f"Out of any state of {inner.name} a slip along any direction of {outer.name} grows at the rate γ.",
         bearings=(
@@ -98,7 +97,6 @@ def _sign(m: Measurement, name: str) -> int:
 def _claim(id: str, source: str, statement: str, bearings: tuple[Bearing, ...], reason: str = "") -> Claim:
     return Claim(
         id=id,
-        section="Slipping",
         source=source,
         statement=statement,
         bearings=bearings,
@@ -236,7 +234,6 @@ CLAIMS = (
     ),
     Claim(
         id="extrema",
-        section="Slipping",
         source="after (80)",
         statement="(α, β) = (0, 0) and (π, π) are the global extrema of γ.",
         bearings=(

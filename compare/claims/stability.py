@@ -10,7 +10,6 @@ from compare.measure.rates import natural_size
 from compare.measure.record import Measurement
 from model import Case, Parameters
 
-SECTION = "Stability"
 PROTOCOL = "rates"
 
 
@@ -104,12 +103,12 @@ def _leaning(grows: bool) -> Bearing:
 
 CLAIMS = (
     Claim(
-        id="prop-1-rate", section=SECTION, source="Prop. 1, (23)",
+        id="prop-1-rate", source="Prop. 1, (23)",
         statement="Rolling at both points, ω_c approaches the flow with the one rate c/(1 + 2j).",
         bearings=bearings(Case.RR),
     ),
     Claim(
-        id="prop-2", section=SECTION, source="Prop. 2, (24), (33)",
+        id="prop-2", source="Prop. 2, (24), (33)",
         statement=(
             "In a fluid at rest a ball that spins next to the wall keeps its spin, whatever it is (a zero eigenvalue); "
             "going round dies out at the rate c/(1 + j)."
@@ -117,7 +116,7 @@ CLAIMS = (
         bearings=bearings(Case.RS),
     ),
     Claim(
-        id="prop-3-rate", section=SECTION, source="Prop. 3, (25), (35)",
+        id="prop-3-rate", source="Prop. 3, (25), (35)",
         statement=(
             "Where the floor slips and the wall rolls, leaning on the floor dies out above ω₀₃ = √(g/jR) and grows "
             "below, at the rates of the eigenvalues of f_SR."
@@ -133,12 +132,12 @@ CLAIMS = (
         ),
     ),
     Claim(
-        id="prop-4-rate", section=SECTION, source="Prop. 4, section 5.2",
+        id="prop-4-rate", source="Prop. 4, section 5.2",
         statement="Disturbances of slipping at both points die out, with the four eigenvalues of f_SS.",
         bearings=bearings(Case.SS),
     ),
     Claim(
-        id="prop-5-rate", section=SECTION, source="Prop. 5, (27), (46)",
+        id="prop-5-rate", source="Prop. 5, (27), (46)",
         statement=(
             "Carried by the wall alone the ball keeps any height (a zero eigenvalue); it swings about it with a pair "
             "of eigenvalues, and ω_c dies out at c/(1 + j)."
@@ -146,7 +145,7 @@ CLAIMS = (
         bearings=bearings(Case.NR),
     ),
     Claim(
-        id="prop-6-rate", section=SECTION, source="Prop. 6, (28), (48), (49)",
+        id="prop-6-rate", source="Prop. 6, (28), (48), (49)",
         statement=(
             "The ball that sinks along the wall has a pair of eigenvalues ± iω₀, which never dies out, a zero for the "
             "cyclic y, and else decay only."

@@ -14,7 +14,6 @@ from compare.measure.settling import FORCES, SUMS, family, scale
 from model import Case, Parameters
 from model.kinematics import VARIABLES
 
-SECTION = "Stationary states"
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
 _SUMS = {"force_Ax-By": ("Ax", -1, "By"), "force_Ay+By": ("Ay", 1, "By"), "force_Bx+By": ("Bx", 1, "By")}
 When = Callable[[Measurement], bool]
@@ -153,7 +152,6 @@ def _with_fluid(when: When = lambda m: True) -> Bearing:
 def _plane(figure: str, source: str, axis: str) -> Claim:
     return Claim(
         id=figure,
-        section="Bifurcations",
         source=source,
         statement=(
             f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
@@ -177,7 +175,6 @@ _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Ca
 CLAIMS = (
     Claim(
         id="prop-1",
-        section=SECTION,
         source="Prop. 1, (30)-(32)",
         statement=(
             "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
@@ -187,14 +184,12 @@ CLAIMS = (
     ),
     Claim(
         id="prop-1-rough",
-        section=SECTION,
         source="Prop. 1, (83), (86)",
         statement="With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
         bearings=(*bearings(("omega_c",), _both(_above, _ROLLS), by="(32)"), _with_fluid(_above)),
     ),
     Claim(
         id="prop-2-forces",
-        section=SECTION,
         source="Prop. 2, (33), (34)",
         statement="In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
         bearings=bearings(
@@ -206,7 +201,6 @@ CLAIMS = (
     ),
     Claim(
         id="prop-3-5",
-        section=SECTION,
         source="Props. 3 and 5, (35), (36), (46), (47)",
         statement=(
             "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
@@ -222,7 +216,6 @@ CLAIMS = (
     ),
     Claim(
         id="prop-4",
-        section=SECTION,
         source="Prop. 4, (37)-(42)",
         statement=(
             "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
@@ -232,7 +225,6 @@ CLAIMS = (
     ),
     Claim(
         id="prop-6",
-        section=SECTION,
         source="Prop. 6, (49), (50)",
         statement=(
             "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
@@ -242,16 +234,17 @@ CLAIMS = (
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
     ),
+)
+
+DIAGRAMS = (
     Claim(
         id="fig-9",
-        section="Bifurcations",
         source="Fig. 9",
         statement="Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
         bearings=bearings(("wall_spin",), is_in(Case.NS, Case.NR), by="(91)"),
     ),
     Claim(
         id="fig-10",
-        section="Bifurcations",
         source="Fig. 10",
         statement="For η < j the spins on the wall in rolling, slipping and in the lifted state join as drawn.",
         bearings=(
@@ -261,7 +254,6 @@ CLAIMS = (
     ),
     Claim(
         id="fig-11",
-        section="Bifurcations",
         source="Fig. 11",
         statement="For η > j rolling ends at ω₀₃ upon the state whose spin on the wall falls like 1/ω₀.",
         bearings=(

@@ -16,7 +16,6 @@ from compare.measure.unloading import first_top
 from compare.statistics import Measured
 from model import Case, Contact, Parameters, Trajectory
 
-SECTION = "Flowmeter"
 PROTOCOL = "unloading"
 SAMPLES = 2000
 STEPS = 100
@@ -99,7 +98,6 @@ def _bearing(quantity: str, predict: Callable[[Measurement], float], event: str 
 CLAIMS = (
     Claim(
         id="fig-13-right",
-        section=SECTION,
         source="Fig. 13, right; section 5.3",
         statement=(
             "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
@@ -115,7 +113,6 @@ CLAIMS = (
     ),
     Claim(
         id="push",
-        section=SECTION,
         source="section 5.3",
         statement="A small push lifts the ball from SR to NR, where it stays off the floor.",
         bearings=(_bearing("case", _case, start="push"), _bearing("lift", _lift)),

@@ -15,7 +15,6 @@ from model import Case, Flow, InputError, Parameters
 from model.drag import STOKES
 from model.kinematics import VARIABLES
 
-SECTION = "Unsteady flow"
 PULSATION, UNSTEADY = "pulsation", "unsteady"
 FAR, SAMPLES = 3.0, 20_000
 """Where theory's ramp ends beyond the fold, over the overshoot of a slow one; samples of it."""
@@ -73,7 +72,6 @@ def _at_frequency(quantity: str, predict: Callable[[Measurement], float], by: st
 CLAIMS = (
     Claim(
         id="pulsation-lag",
-        section=SECTION,
         source="(23)",
         statement=(
             "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag alone accelerates it "
@@ -92,7 +90,6 @@ CLAIMS = (
     ),
     Claim(
         id="pulsation-slip",
-        section=SECTION,
         source="(23), (66), (67), (73), (82)",
         statement=(
             "In a pulsating flow a rolling ball begins to slip where the friction that its acceleration takes, or the "
@@ -113,7 +110,6 @@ CLAIMS = (
     ),
     Claim(
         id="pulsation-mean",
-        section=SECTION,
         source="(23), (26), Definitions 1-3",
         statement="A pulsation that makes the ball slip makes its mean reading low.",
         bearings=(
@@ -126,7 +122,6 @@ CLAIMS = (
     ),
     Claim(
         id="jump-slipping",
-        section=SECTION,
         source="(26), (38)-(42)",
         statement="After a jump of the flow a ball that slips at both points overshoots its new reading and rings.",
         bearings=(
@@ -146,7 +141,6 @@ CLAIMS = (
     ),
     Claim(
         id="ramp-fold",
-        section=SECTION,
         source="(26), (88)",
         statement="A flow that rises steadily keeps the ball slipping beyond the fold, before it catches up.",
         bearings=(

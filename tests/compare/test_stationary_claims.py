@@ -19,7 +19,7 @@ from compare.measure.record import Measurement, Records
 from compare.measure.settling import determined, family, scale
 from model import Case, Parameters
 
-CLAIMS = (*stationary.CLAIMS, *flowmeter.CLAIMS)
+CLAIMS = (*stationary.CLAIMS, *stationary.DIAGRAMS, *flowmeter.CLAIMS)
 SETS = {
     "slipping": Parameters.named("reference").replace(mu=0.3, eta=0.2),
     "rolling": Parameters.named("high-wall-friction"),
