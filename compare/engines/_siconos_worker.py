@@ -94,7 +94,7 @@ class Scene:
             impulse = contact.lambda_(1)
             if impulse[0] > 0:
                 force = self.directions(contact)[:, :3].T @ impulse / self.given["timestep"]
-                shown.append((min(number, 1), force.tolist(), contact.y(0)[0]))
+                shown.append((number, force.tolist(), contact.y(0)[0]))
         return shown
 
 
