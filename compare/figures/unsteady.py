@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 import analytic
 from analytic import bifurcation, pulsation, response
@@ -92,12 +93,12 @@ def draw_pulsation(of: Measurements) -> Figure:
     onset.loglog(frequencies, onsets, color=style.COLOURS[Case.RR], lw=2)
     onset.margins(y=0.12)
     for limit, text, at, shift in (
-        (pulsation.slow_onset(p), "slow", 1.0, 3),
-        (pulsation.fast_onset(p), "fast", 0.1, -3),
+        (pulsation.slow_onset(p), "limit of slow pulsations", 1.0, 3),
+        (pulsation.fast_onset(p), "limit of fast pulsations", 0.12, -3),
     ):
         onset.axhline(limit, **style.GUIDE)
         style.name(onset, at, limit, text, (0, shift))
-    error.plot(frequencies, errors, color=style.COLOURS[Case.SS], lw=2)
+    error.plot(frequencies, errors, ".-", color=style.COLOURS[Case.SS], lw=1.5, ms=5)
     _marks(gain, of.of("gain"))
     _marks(phase, of.of("phase_lag"), 180 / math.pi)
     _marks(onset, of.of("slip_amplitude"))
@@ -163,7 +164,7 @@ def _ramps(axes: Axes) -> None:
         x, span = analytic.solution(p, Case.SS).x, 15.0
         flow = Flow.ramp(end - 8, end - 8 + span, span / rate)
         run = analytic.simulate(p, x, span / rate, flow, sample_interval=span / rate / 2000)
-        axes.plot(flow(run.time), run.omega_c, color="black", alpha=shade, lw=1.5, label=f"{rate:g} rad/s²")
+        axes.plot(flow(run.time), run.omega_c, color="black", alpha=shade, lw=1.5, label=f"flow rises by {rate:g} rad/s²")
     axes.axline((end, end), slope=1, color=style.COLOURS[Case.NR], lw=1.5)
     axes.set(xlim=(end - 6, end + 7), ylim=(15, 55), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {"omega_04": end})
@@ -182,4 +183,8 @@ def _law(axes: Axes, rows: list[Measurement]) -> None:
         at = float(m.conditions["rate"]), m.value - end
         axes.plot(*at, ls="none", ms=6, zorder=5, label=m.engine, **style.mark_of(m.engine))
     axes.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+    axes.set_yticks([0.5, 1, 2, 5])
     style.legend(axes, loc="upper left")
