@@ -94,7 +94,7 @@ CLAIMS = (
         statement=(
             "In a pulsating flow a rolling ball begins to slip where the friction that its acceleration takes, or the "
             "load at its fastest, is more than floor and wall can hold: not before slip can last, and not after no "
-            "forces allow rolling, nearly always the same amplitude. In between Coulomb's law allows both; slip that "
+            "forces allow rolling, mostly the same amplitude. In between Coulomb's law allows both; slip that "
             "lasts below the first or rolling beyond the second would refute it."
         ),
         bearings=tuple(

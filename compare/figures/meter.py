@@ -46,7 +46,7 @@ def characteristic(made: Design) -> Figure:
         color=style.FORCE,
         alpha=0.25,
         lw=1,
-        label="limit: at worst, as meant",
+        label="limit, from at worst to as meant",
     )
     axes.set(xlim=(0, flows[-1]), ylim=(0, None), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {key: getattr(made.thresholds, key) for key in THRESHOLDS})
