@@ -164,7 +164,7 @@ def _ramps(axes: Axes) -> None:
         x, span = analytic.solution(p, Case.SS).x, 15.0
         flow = Flow.ramp(end - 8, end - 8 + span, span / rate)
         run = analytic.simulate(p, x, span / rate, flow, sample_interval=span / rate / 2000)
-        axes.plot(flow(run.time), run.omega_c, color="black", alpha=shade, lw=1.5, label=f"flow rises by {rate:g} rad/s²")
+        axes.plot(flow(run.time), run.omega_c, color="black", alpha=shade, lw=1.5, label=f"rising by {rate:g} rad/s²")
     axes.axline((end, end), slope=1, color=style.COLOURS[Case.NR], lw=1.5)
     axes.set(xlim=(end - 6, end + 7), ylim=(15, 55), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {"omega_04": end})
