@@ -12,10 +12,13 @@ however well the numbers agree. The ceilings follow from what each protocol can 
   its height of some tenths of a millimetre shows;
 * friction opposes the slip of some point within a step: the law is off by what the slip turns in it, and the speed of a
   landing by the fall within a step, about a thousandth of either;
-* a motion through landings follows the step h to second order, (omega_0 h)^2 = 5e-5 with the coarser step of a hop; its
-  slow multipliers make ten times as much of it. Where the hops are lowest they still settle when they are measured, by
-  half a percent of their height, which is charged to all that is measured of them: three times that is to be resolved;
-  a multiplier comes from the ten hops in which a disturbance is neither too large nor lost in that;
+* a motion through landings follows the step h to second order, (omega_0 h)^2/24 = 5e-5 with the coarser step of a hop,
+  three quarters of which is its difference from the finer; a disturbance that shrinks by a tenth from hop to hop piles
+  up to ten times as much: 4e-4. A step of the flow by 4e-2 has shrunk to a hundredth when the hops are measured: 4e-4.
+  Both together, three times, are 1.7e-3 of omega_c. Hops are as high as the flow is above the one where they begin, a
+  sixteenth of it where they are lowest: sixteen times as much of the height, 2.7e-2. The time in the air goes with the
+  root of the height: half as much of the period. A multiplier comes from the ten hops in which a disturbance is neither
+  too large nor lost in that;
 * what a pulsation or a jump does is compared at two time steps, to a part in a thousand of itself; the onset of slip is
   bracketed to that, and slip begins within a time step, a few hundredths of a period, near a maximum; the mean reading
   and the flow by which a ramp passes a fold are small differences of flows;
@@ -90,9 +93,9 @@ _ALL = (
     Quantity("time", "t", "s", 1e-2),
     Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
     Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
-    Quantity("orbit_period", "period", "s", 2e-2),
-    Quantity("orbit_omega_c", "mean ω_c of a period", "rad s-1", 2e-2),
-    Quantity("orbit_height", "height of the hops", "m", 2e-2),
+    Quantity("orbit_period", "period", "s", 1.5e-2),
+    Quantity("orbit_omega_c", "mean ω_c of a period", "rad s-1", 2e-3),
+    Quantity("orbit_height", "height of the hops", "m", 3e-2),
     Quantity("orbit_multiplier", "largest |Floquet multiplier|", "1", 0.25),
     Quantity("orbit_birth", "ω₀ where hopping begins", "rad s-1", 2e-2),
     Quantity("hops", "hops on", "1", 0.0),

@@ -62,10 +62,18 @@ class Hops(NamedTuple):
         }
 
     @property
-    def drift(self) -> float:
-        """Relative change of the height from the first half to the second."""
-        half = len(self.height) // 2
-        return float(abs(self.height[half:].mean() / self.height[:half].mean() - 1))
+    def spread(self) -> dict[str, float]:
+        """Half the range that each value has over single hops.
+
+        Disturbances swing while they die out, so that means of parts may agree by chance.
+        """
+        periods = np.diff(self.time)
+        single = {
+            "orbit_period": periods,
+            "orbit_omega_c": np.diff(self.theta) / periods,
+            "orbit_height": self.height,
+        }
+        return {name: float(np.ptp(values)) / 2 for name, values in single.items()}
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -88,7 +96,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         births.append((q.omega_0, *(each.values["orbit_height"] for each in last)))
         conditions = {**state_of(constrained(Case.NR, last[1].x[-1], q)), "period": last[1].values["orbit_period"]}
         for name, value in last[1].values.items():
-            error = math.hypot(value - last[0].values[name], value * last[1].drift)
+            error = math.hypot(value - last[0].values[name], last[1].spread[name])
             yield measurement(lab, NAME, SET, q, name, Measured(value, error), tasks, **conditions)
         if k:
             parts = (runs[0], LATER), (runs[1], LATER), (runs[1], 2 * LATER)
