@@ -37,6 +37,8 @@ CHOICES = {
     "coordinates": ("polar", "free"),
     "wall": ("tangent", "prism"),
 }
+_LEFT, _STURDY = 0.95, (3.0, 0.75)
+"""Most that contacts may leave by `contact_decay`; the fastest that are stable for all mu, eta up to 1, in steps."""
 _FALL = 0.01
 """Way in a step from which on it is an impact, in units of the gap that counts as touching."""
 
@@ -45,7 +47,8 @@ _FALL = 0.01
 class ContactSettings:
     """How MuJoCo is set; names are its own where it has one. The defaults belong to a step of 1 ms.
 
-    `at` scales the times of the defaults to another step; `for_problem` also looks at the speeds of a run.
+    `at` scales the times of the defaults to another step; `suited` looks at the friction of a ball, and `for_problem`
+    also at the speeds of a run.
 
     Raises
     ------
@@ -55,8 +58,8 @@ class ContactSettings:
 
     timestep: float = 1e-3
     """Time step, s."""
-    solref: tuple[float, float] = (3e-3, 0.75)
-    """Time constant (s) and damping ratio of the normal rows: the fastest by `contact_decay` for mu, eta up to 1."""
+    solref: tuple[float, float] = (2e-3, 0.5)
+    """Time constant (s) and damping ratio of the normal rows; `suited` makes them slower where friction asks for it."""
     solreffriction: float = 2.0
     """Time constant tc_f of the friction rows, s."""
     solimp: float = 1e-3
@@ -268,6 +271,13 @@ class ContactSettings:
         }
         return cls.from_mapping(scaled | changes)
 
+    def suited(self, p: Parameters) -> Self:
+        """With slower contacts if the friction of a ball would make these chatter, else as they are."""
+        if self.contact_decay(p.mu, p.eta) <= _LEFT:
+            return self
+        steps, ratio = _STURDY
+        return dataclasses.replace(self, solref=(steps * self.timestep, ratio))
+
     @classmethod
     def for_problem(
         cls, p: Parameters, timestep: float = 1e-3, max_slip_speed: float | None = None, **changes: Any
@@ -280,6 +290,8 @@ class ContactSettings:
         friction keeps its own. The engine's least impedance, 1e-4, may stop that short.
         """
         settings = cls.at(timestep, **changes)
+        if "solref" not in changes:
+            settings = settings.suited(p)
         speed = (
             abs(p.R * p.omega_0) if max_slip_speed is None else check_number("max_slip_speed", max_slip_speed, "m/s")
         )

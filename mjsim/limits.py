@@ -26,7 +26,7 @@ def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> 
     if settings.contact_decay(p.mu, p.eta) > 1:
         warnings.warn(
             f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters with these settings; "
-            "a longer time constant of solref is stable",
+            "ContactSettings.suited gives slower contacts",
             stacklevel=4,
         )
     if settings.coordinates == "polar":

@@ -67,7 +67,6 @@ def run(args: argparse.Namespace) -> int:
         if len(way.values) != 2:
             raise InputError(f"a motion is followed over a range: write {way.name}=from:to")
     starts = np.array([running.start(args)]) if args.start else args.starts
-    settings = running.settings(args)
 
     def simulate(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
         task = Task(
@@ -75,14 +74,14 @@ def run(args: argparse.Namespace) -> int:
             parameters=p,
             x0=State.of(x0),
             t_end=duration,
-            settings=settings,
+            settings=running.settings(args, p),
             sample_interval=interval,
         )
         return carry_out([task])[0]
 
     rows = []
     for p in grid(options.parameters(args), axes):
-        own = {} if args.engine is EVENT and settings == EVENT.configure({}) else {"run": simulate}
+        own = {} if args.engine is EVENT and running.settings(args, p) == EVENT.configure({}, p) else {"run": simulate}
         attractors = analytic.attractors(p, starts, seed=args.seed, lasting=args.time, **own)
         branches = [
             orbit_branch.follow(each.fate.orbit, way.name, way.values[0], way.values[1])

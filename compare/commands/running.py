@@ -13,7 +13,7 @@ from compare.runs import engines
 from compare.runs.engines import Settings
 from compare.runs.tasks import Task
 from compare.runs.workers import Workers, dask
-from model import Flow, InputError, State
+from model import Flow, InputError, Parameters, State
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import Range, check_names, check_number, parse_number
 
@@ -72,16 +72,16 @@ def _engine(name: str) -> engines.Engine:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-def settings(args: argparse.Namespace) -> Settings:
-    """Settings of the engine that the options of `add_engine` choose."""
+def settings(args: argparse.Namespace, p: Parameters) -> Settings:
+    """Settings of the engine that the options of `add_engine` choose, for a ball."""
     chosen: engines.Engine = args.engine
-    return chosen.configured(given(args, ("timestep", "rtol", "restitution")))
+    return chosen.configured(given(args, ("timestep", "rtol", "restitution")), p)
 
 
 def task(args: argparse.Namespace, **more: Any) -> Task:
     """The run that the options of `add_engine`, `add_start`, ``--time`` and the parameters describe."""
     engine, p, x0 = args.engine.name, parameters(args), start(args)
-    return Task(engine=engine, parameters=p, x0=x0, t_end=args.time, settings=settings(args), **more)
+    return Task(engine=engine, parameters=p, x0=x0, t_end=args.time, settings=settings(args, p), **more)
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:

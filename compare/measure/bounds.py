@@ -18,7 +18,7 @@ from compare.measure.field import DOUBT, LIMIT, floor, slip_unit
 from compare.measure.growth import LARGE, SMALL, SMOOTH, Push
 from compare.measure.lab import Lab, time_unit
 from compare.measure.quantities import quantity
-from compare.measure.record import Measurement, Missing, Records, measurement
+from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
 from compare.measure.settling import Start, high, settle
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured, straight_line
@@ -166,15 +166,19 @@ def _result(lab: Lab, line: Line, first: _Points, more: _Points) -> Iterator[Mea
         # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none.
         _, slope = straight_line(q, gamma, noise)
         zero, _ = straight_line(q, gamma, noise * math.sqrt(len(q)))
+    growth = f"growth of slip from {line.inner.name} to {line.outer.name}, {line.by},"
     if not slope.uncertainty <= COARSE * abs(slope.value):
-        what = f"{line.inner.name} to {line.outer.name}, {line.by}"
-        yield Missing(NAME, line.set, f"growth of slip from {what}, changes too little with the flow")
+        yield Missing(NAME, line.set, f"{growth} changes too little with the flow, or is too uncertain")
         return
     p, x = line.at(line.first[0])
+    natural = (p.g / p.R) ** (line.power / 2)
     conditions = line.push(line.first[0]).conditions | {"by": line.by, "omega_c": State.of(x).omega_c}
     square = "_square" if line.power == 2 else ""
     for what, value in zip((f"gamma_zero{square}", f"gamma_slope{square}"), (zero, slope), strict=True):
-        if what.startswith("gamma_zero") and abs(value.value) > BEYOND * np.abs(q).max():
+        if value is zero and abs(zero.value) > BEYOND * np.abs(q).max():
+            continue
+        if value is zero and not sure_enough(what, zero, max(abs(zero.value), natural)):
+            yield Missing(NAME, line.set, f"{growth} has too uncertain a zero")
             continue
         yield measurement(lab, NAME, line.set, p, what, value, (*first.tasks, *more.tasks), **conditions)
 

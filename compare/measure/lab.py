@@ -51,7 +51,7 @@ class Lab:
             x0=x0,
             t_end=t_end,
             flow=flow,
-            settings=settings or self.engine.at(step),
+            settings=settings or self.engine.at(step, p),
             sample_interval=max(step, t_end / samples),
         )
 

@@ -41,9 +41,9 @@ class Engine:
     settings: type[Settings]
     options: tuple[str, ...]
     """Options of the command line that `configure` takes."""
-    configure: Callable[[Mapping[str, float]], Settings]
+    configure: Callable[[Mapping[str, float], Parameters], Settings]
     """Settings of a person's run from such options; those not given have their defaults."""
-    at: Callable[[float], Settings]
+    at: Callable[[float, Parameters], Settings]
     """Settings of a study for a time step in s; engines without a step ignore it."""
     simulate: Simulate | None = None
     stream: Stream | None = None
@@ -71,23 +71,23 @@ class Engine:
             {self.needs.name: self.needs.version} if self.needs else {}
         )
 
-    def configured(self, given: Mapping[str, float]) -> Settings:
+    def configured(self, given: Mapping[str, float], p: Parameters) -> Settings:
         """`configure`, but an option that belongs to other engines is an `InputError`."""
         for name in given:
             if name not in self.options:
                 others = ", ".join(each.name for each in ENGINES.values() if name in each.options)
                 raise InputError(f"--{name} is for {others}, not for {self.name}")
-        return self.configure(given)
+        return self.configure(given, p)
 
 
 STUDY_SLIP = 2.0
 """Slip speed in m/s for which contact in the studies' settings is continuous, under the load of gravity, at mu = 1."""
 
 
-def _mujoco_study(step: float) -> ContactSettings:
-    """One setting for every parameter set, so that all runs of a step share a batch."""
-    rough = Parameters.named("reference").replace(mu=1.0, eta=1.0)
-    return ContactSettings.for_problem(rough, step, STUDY_SLIP)
+def _mujoco_study(step: float, p: Parameters) -> ContactSettings:
+    """One of two settings for all parameter sets, so that runs of a step share a batch."""
+    rough = Parameters.named("reference").replace(mu=1.0, eta=0.0)
+    return ContactSettings.for_problem(rough, step, STUDY_SLIP).suited(p)
 
 
 def newcomer(step: float) -> ContactSettings:
@@ -155,8 +155,8 @@ def _adapted(
         name=name,
         settings=adapter.Settings,
         options=("timestep",),
-        configure=lambda given: adapter.Settings(**given),
-        at=lambda step: adapter.Settings(timestep=step),
+        configure=lambda given, p: adapter.Settings(**given),
+        at=lambda step, p: adapter.Settings(timestep=step),
         simulate=named(name),
         sources=("model", "mjsim", "compare.engines"),
         stands_on=("numpy",),
@@ -168,8 +168,8 @@ def _adapted(
     return best, replace(
         best,
         name=other,
-        configure=lambda given: adapter.newcomer(given.get("timestep", newcomer_step)),
-        at=adapter.newcomer,
+        configure=lambda given, p: adapter.newcomer(given.get("timestep", newcomer_step)),
+        at=lambda step, p: adapter.newcomer(step),
         simulate=named(other),
         mark=marks[1],
     )
@@ -184,7 +184,7 @@ MUJOCO = Engine(
     name="mujoco",
     settings=ContactSettings,
     options=("timestep",),
-    configure=lambda given: ContactSettings.at(given.get("timestep", ContactSettings.timestep)),
+    configure=lambda given, p: ContactSettings.at(given.get("timestep", ContactSettings.timestep)).suited(p),
     at=_mujoco_study,
     stream=mujoco,
     sources=("model", "mjsim"),
@@ -196,8 +196,8 @@ MUJOCO = Engine(
 NEWCOMER = replace(
     MUJOCO,
     name="mujoco-defaults",
-    configure=lambda given: newcomer(given.get("timestep", ContactSettings.timestep)),
-    at=newcomer,
+    configure=lambda given, p: newcomer(given.get("timestep", ContactSettings.timestep)),
+    at=lambda step, p: newcomer(step),
     stream=_unwarned,
     mark="x",
     colour="#CC79A7",
@@ -206,8 +206,8 @@ EVENT = Engine(
     name="event",
     settings=analytic.Settings,
     options=("rtol", "restitution"),
-    configure=lambda given: analytic.Settings(**given),  # type: ignore[arg-type]
-    at=lambda step: analytic.Settings(),
+    configure=lambda given, p: analytic.Settings(**given),  # type: ignore[arg-type]
+    at=lambda step, p: analytic.Settings(),
     simulate=_theory("event"),
     sources=("model", "analytic"),
     stands_on=("numpy", "scipy"),
@@ -218,8 +218,8 @@ MOREAU = replace(
     EVENT,
     name="time-stepping",
     options=("timestep", "rtol", "restitution"),
-    configure=_time_stepping,
-    at=lambda step: _time_stepping({"timestep": step}),
+    configure=lambda given, p: _time_stepping(given),
+    at=lambda step, p: _time_stepping({"timestep": step}),
     simulate=_theory("time-stepping"),
     mark="^",
     colour="#009E73",

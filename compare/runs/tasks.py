@@ -85,7 +85,7 @@ class Task:
     @property
     def chosen_settings(self) -> Settings:
         """The settings, also where `settings` is None."""
-        return self.settings or self.simulator.configure({})
+        return self.settings or self.simulator.configure({}, self.parameters)
 
     @property
     def long(self) -> bool:

@@ -91,7 +91,7 @@ class Other:
 
     def task(self, p: Parameters, x0: npt.ArrayLike, t_end: float, interval: float) -> Task:
         """A run of the engine."""
-        settings = self.engine.configure({"timestep": self.timestep})
+        settings = self.engine.configure({"timestep": self.timestep}, p)
         return Task(engine=self.name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval)
 
     def run(self, p: Parameters, x0: npt.ArrayLike, t_end: float, interval: float, skip: float = 0.0) -> Trajectory:

@@ -99,7 +99,7 @@ def contestants(chosen: Sequence[str] | None = None) -> list[Contestant]:
 
 
 def _settings(engine: Engine) -> Callable[[float | None], Settings]:
-    return lambda step: engine.configure({} if step is None else {"timestep": step})
+    return lambda step: engine.configure({} if step is None else {"timestep": step}, SLIPPING.p)
 
 
 def _prism(step: float | None) -> Settings:

@@ -49,7 +49,7 @@ NEWCOMERS = [name for name in ALL if name not in BEST]
 
 
 def run(name, p, x0, t_end, step, interval=None):
-    settings = ENGINES[name].at(step)
+    settings = ENGINES[name].at(step, p)
     task = Task(engine=name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval or step)
     (trajectory,) = carry_out([task])
     return trajectory
@@ -62,7 +62,7 @@ def test_stationary_states_are_those_of_theory(name, state):
 
     Sinking in shortens its lever. Friction works against creep, as drag does: m c R^2 omega_c d omega_c.
     """
-    settings, p, x = ENGINES[name].at(4e-3), state.p, state.solution.x
+    settings, p, x = ENGINES[name].at(4e-3, state.p), state.p, state.solution.x
     tolerance = 1e-12
     if name == "drake":
         load = max(state.solution.force_A[1], state.solution.force_B[0])
