@@ -16,7 +16,7 @@ import numpy as np
 
 from compare.measure import field
 from compare.measure.field import DOUBT, LIMIT, polynomial, random_state, slope_weights
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.lab import Lab, Level, coarse_step, dragged_speed, time_unit
 from compare.measure.quantities import quantity
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.runs.tasks import Task
@@ -59,7 +59,7 @@ COARSE = quantity("gamma").resolves / COVERAGE
 loaded, slip turns too fast."""
 SMOOTH = "without friction at both contacts there is nothing that rolls"
 SINKING = 0.5
-"""Speed at which a ball sinks on which the fluid also pulls along the wall as hard as its weight, over g/c."""
+"""Speed over `dragged_speed` at which a ball sinks on which the fluid also pulls along the wall at that speed."""
 SIDEWAYS = (0.3, 1.0, 0.3)
 """A direction of slip that is almost that of the wall's contact alone."""
 
@@ -192,8 +192,8 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[Push]:
     still = p.replace(omega_0=0.0)
     for side in (1, -1):
         yield Push(name, still, Case.RR, Case.RS, np.zeros(8), np.array([0.0, side, 0.0]), "rest")
-        sinking = State.of(random_state(Case.NR, p, rng))._replace(v_y=-SINKING * p.g / p.c)
-        dragged = p.replace(omega_0=sinking.omega_c + p.g / (p.c * p.R))
+        sinking = State.of(random_state(Case.NR, p, rng))._replace(v_y=-SINKING * dragged_speed(p))
+        dragged = p.replace(omega_0=sinking.omega_c + dragged_speed(p) / p.R)
         yield Push(name, dragged, Case.NR, Case.NS, sinking.stacked(), np.array([0.0, 0.8 * side, 0.6]), "dragged")
     for (inner, outer), count in PUSHES.items():
         for _ in range(count * more):

@@ -15,6 +15,7 @@ from compare.runs.engines import Engine, Settings
 from compare.runs.tasks import Task
 from model import Flow, Parameters, Trajectory
 from model.arrays import Array
+from model.drag import STOKES
 
 
 class Level(IntEnum):
@@ -82,6 +83,14 @@ def state_units(p: Parameters) -> Array:
     """Natural sizes of the state (8,): R, sqrt(g R), sqrt(g/R), and sqrt(g R)/r for slip."""
     speed = math.sqrt(p.g * p.R)
     return np.array([p.R, speed, speed / p.R, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
+
+
+def dragged_speed(p: Parameters) -> float:
+    """A speed relative to the fluid, m s-1, at which drag is about as large as the weight, or larger.
+
+    By Stokes' law g/c. In thin fluids with another law that is far too fast: no more than 20 sqrt(g R) then.
+    """
+    return p.g / p.c if p.drag == STOKES else min(p.g / p.c, 20 * math.sqrt(p.g * p.R))
 
 
 def coarse_step(p: Parameters) -> float:

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from compare.measure import record
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.record import Measurement, Missing, Records
 from compare.runs.engines import Engine
 from compare.runs.tasks import sources
@@ -22,6 +22,10 @@ from model import Parameters
 from model.files import make_directory
 
 DIRECTORY = "measurements"
+UNDAMPED = "without drag (c = 0 s-1) no motion settles, and nothing can be measured"
+MOST = 1e5
+"""Coarse time steps in 1/c up to which a protocol waits for motions to settle: a settled state takes some 40/c, and all
+of them together a thousand times as long."""
 Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
 
 
@@ -35,6 +39,8 @@ class Protocol:
     """Protocols whose measurements it goes out from."""
     level: Level = Level.QUICK
     """The least level of which it is a part."""
+    waits: bool = True
+    """Whether it waits for motions to settle."""
 
 
 def directory(results: Path, engine: Engine, level: Level, sets: Mapping[str, Parameters]) -> Path:
@@ -68,10 +74,10 @@ def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], befo
     """
     path = kept / f"{protocol.name}.h5"
     if not path.exists():
-        settling = {name: p for name, p in sets.items() if p.c > 0}
+        weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
         rows = [
-            *protocol.measure(lab, settling, before),
-            *(Missing(protocol.name, name, UNDAMPED) for name in sets if name not in settling),
+            *protocol.measure(lab, {name: p for name, p in sets.items() if name not in weak}, before),
+            *(Missing(protocol.name, name, why) for name, why in weak.items()),
         ]
         make_directory(kept)
         about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
@@ -79,4 +85,10 @@ def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], befo
     return record.load(path)
 
 
-UNDAMPED = "without drag (c = 0 s-1) no motion settles, and nothing can be measured"
+def _too_weak(p: Parameters, protocol: Protocol) -> str:
+    """Why drag is too weak for a protocol; empty if it isn't."""
+    if p.c == 0:
+        return UNDAMPED
+    steps = 1 / (p.c * coarse_step(p))
+    weak = f"drag is so weak (1/c = {1 / p.c:.3g} s, {steps:.2g} time steps) that motions take too long to settle"
+    return weak if protocol.waits and steps > MOST else ""

@@ -12,16 +12,20 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from compare.measure.lab import Lab, coarse_step, time_unit
+from compare.measure.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.measure.quantities import quantity
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
+from model.drag import STOKES
 
 SPAN = 40.0
 """Least length of a round in units of 1/c, the time in which the fluid stops a free ball."""
 ROUNDS = 4
+SOONER = (1 / 64, 1 / 8)
+"""Rounds before those, in parts of one, where the law isn't Stokes': of a ball that lags or sinks drag takes more than
+c. What has settled by then may drift only such a part of what it may in a whole one."""
 SHARES = (0.5, 0.125)
 """Lengths of the window over that of the run: a long one for what oscillates, a short one for what only decays."""
 TAPER = 8
@@ -82,7 +86,7 @@ def scale(name: str, p: Parameters) -> float:
     if name.startswith("force"):
         return p.m * p.g
     if name == "v_y":
-        return p.g / p.c
+        return dragged_speed(p)
     return rotation_scale(p) * (1.0 if name == "omega_c" else p.R / p.r)
 
 
@@ -130,9 +134,12 @@ def settle(
     """
     states: dict[int, Settled] = {}
     begin = dict(enumerate(starts))
-    for _ in range(ROUNDS):
-        tasks = {n: _task(lab, start, refine, span) for n, start in begin.items()}
+    left = [[*(SOONER if start.p.drag != STOKES else ()), *[1.0] * ROUNDS] for start in starts]
+    while begin:
+        parts = {n: left[n].pop(0) for n in begin}
+        tasks = {n: _task(lab, start, refine, span * parts[n]) for n, start in begin.items()}
         failed = {failure.task.key: failure.reason for failure in lab.complete(list(tasks.values()))}
+        begin = {}
         for n, task in tasks.items():
             if task.key in failed:
                 broken = f"the run {failed[task.key]}"
@@ -140,7 +147,9 @@ def settle(
                 continue
             (run,) = lab.run([task])
             states[n] = judged(starts[n], task, run, loose)
-        begin = {n: _onward(states[n]) for n in begin if states[n].excess > min(loose, sharp) and states[n].values}
+            if left[n] and states[n].excess > parts[n] * min(loose, sharp):
+                # A part of a round may end on the way to where the ball settles: it goes on as it is.
+                begin[n] = replace(starts[n], x0=run.x[-1]) if parts[n] < 1 else _onward(states[n])
     return [states[n] for n in range(len(starts))]
 
 
@@ -152,8 +161,8 @@ def duration(p: Parameters, span: float = SPAN) -> float:
 
 
 def high(p: Parameters) -> float:
-    """A height in m from which a ball that sinks at the speed of free sinking, g/c, doesn't land within a round."""
-    return 1.25 * p.g / p.c * duration(p)
+    """A height in m from which a ball that sinks as fast as it may freely doesn't land within a round."""
+    return 1.25 * dragged_speed(p) * duration(p)
 
 
 def _task(lab: Lab, start: Start, refine: int, span: float) -> Task:

@@ -13,7 +13,7 @@ import numpy as np
 from compare.measure import growth
 from compare.measure.field import random_state
 from compare.measure.growth import Push
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab, Level, dragged_speed
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.statistics import Measured
 from model import Case, Parameters, State
@@ -53,7 +53,7 @@ def _fans(name: str, p: Parameters, count: int) -> Iterator[list[Push]]:
     for _ in range(count):
         x = random_state(Case.NR, p, rng)
         pull = rng.choice([-1, 1]) * rng.uniform(*DRAGGED)
-        q = p.replace(omega_0=State.of(x).omega_c + pull * p.g / (p.c * p.R))
+        q = p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R)
         yield [Push(name, q, Case.NR, Case.NS, x, _along(beta)) for beta in _angles()]
 
 
