@@ -11,10 +11,13 @@ import pytest
 from compare import validation
 from compare.claims.claim import Bearing, Claim, Outcome
 from compare.commands import cli
+from compare.measure import programme
 from compare.measure.lab import Lab, Level
 from compare.measure.programme import UNDAMPED, Measure, Protocol
 from compare.measure.record import Measurement, Missing, Records
 from compare.report import results
+from compare.runs.campaign import Campaign
+from compare.runs.engines import MUJOCO
 from model import InputError, Parameters, SimulationError, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")
@@ -101,6 +104,24 @@ def test_a_set_that_never_settles_is_named(tmp_path: Path, counted: list[str]) -
     verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=SETS, workers=0)
     assert verdicts[0].missing == (f"undamped: {UNDAMPED}",)
     assert {check.measurement.set for check in verdicts[0].checks} == {"mine"}
+
+
+def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path: Path) -> None:
+    seen: list[str] = []
+
+    def measure(lab: Lab, sets: Mapping[str, Parameters], before: Records) -> Rows:
+        seen.extend(sets)
+        yield from ()
+
+    with Campaign(tmp_path / "runs", workers=0) as campaign:
+        lab = Lab(campaign, MUJOCO, Level.QUICK)
+        named = {name: Parameters.named(name) for name in ("air", "steel-in-water")}
+        for waits in (True, False):
+            protocol = Protocol(f"waits-{waits}", measure, waits=waits)
+            missing = programme.carry_out(protocol, lab, named, Records(), tmp_path / "kept").missing
+            assert [m.set for m in missing] == ["air"] * waits
+            assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in missing)
+    assert seen == ["steel-in-water", "air", "steel-in-water"]
 
 
 def test_other_sets_are_kept_apart(tmp_path: Path, counted: list[str]) -> None:
