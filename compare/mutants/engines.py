@@ -11,8 +11,7 @@ from unittest import mock
 import numpy as np
 
 import mjsim
-from compare.runs.engines import ENGINES, MUJOCO, Engine, mujoco
-from compare.runs.tasks import Task
+from compare.runs.engines import ENGINES, MUJOCO, Engine
 from mjsim import ContactSettings, contact_settings, scene
 from model import Parameters
 
@@ -37,16 +36,14 @@ def _wrong(
     fault: Stretch = nullcontext,
     **changes: Any,
 ) -> Engine:
-    def stream(tasks: Sequence[Task], journal: Any) -> mjsim.Run:
-        wrong = [
-            replace(task, parameters=ball(task.parameters), settings=replace(task.chosen_settings, **changes))
-            for task in tasks
-        ]
+    def stream(
+        parameters: Sequence[Parameters], x0s: Any, t_end: float, flows: Any, settings: ContactSettings, **more: Any
+    ) -> mjsim.Run:
         with fault():
-            run = mujoco(wrong, journal, _Disguised)
-        assert isinstance(run, _Disguised)
+            wrong = [ball(p) for p in parameters]
+            run = _Disguised(wrong, x0s, t_end, flows, replace(settings, **changes), **more)
         run.fault = fault
-        run.headers = [replace(h, parameters=t.parameters) for h, t in zip(run.headers, tasks, strict=True)]
+        run.headers = [replace(header, parameters=p) for header, p in zip(run.headers, parameters, strict=True)]
         return run
 
     return replace(MUJOCO, name=name, stream=stream)

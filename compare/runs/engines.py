@@ -6,28 +6,26 @@ To add an engine, add a record. It is named in tasks and files by `Engine.name`;
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import analytic
 import mjsim
 from compare.engines import drake, loop, pybullet, siconos
 from mjsim import ContactSettings
-from mjsim.journal import Journal
-from model import InputError, Parameters, SimulationError, Trajectory
+from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.errors import suggestion
 from model.trajectory import version
 
-if TYPE_CHECKING:  # a task names its engine
-    from compare.runs.tasks import Task
-
 Settings = ContactSettings | analytic.Settings | pybullet.Settings | drake.Settings | siconos.Settings
 """Numerical settings of any engine."""
-Simulate = Callable[["Task", Callable[[float], None]], Trajectory]
-"""One whole run; the function is called with the fraction done, from time to time."""
-Stream = Callable[[Sequence["Task"], Journal | None], mjsim.Run]
-"""Runs of one `Task.batch_key` that hand out their samples as they come."""
+Simulate = Callable[[Parameters, State, float, Flow, Any, float | None, Callable[[float], None]], Trajectory]
+"""One whole run from parameters, start, duration, flow, settings and sample interval; the function is called with the
+fraction done, from time to time."""
+Stream = Callable[..., mjsim.Run]
+"""Runs that hand out their samples as they come; called as `mjsim.Run`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,34 +102,27 @@ def newcomer(step: float) -> ContactSettings:
     )
 
 
-def mujoco(tasks: Sequence[Task], journal: Journal | None, kind: type[mjsim.Run] = mjsim.Run) -> mjsim.Run:
-    """The runs of tasks with MuJoCo, in a batch unless they are long."""
-    first = tasks[0]
-    parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
-    settings, interval = first.chosen_settings, first.sample_interval
-    assert isinstance(settings, ContactSettings)
-    return kind(
-        parameters, x0s, first.t_end, flows, settings, sample_interval=interval, batched=not first.long, journal=journal
-    )
-
-
-def _unwarned(tasks: Sequence[Task], journal: Journal | None) -> mjsim.Run:
+def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that contacts hover with these settings is what is shown
-        return mujoco(tasks, journal)
+        return mjsim.Run(*given, **more)
 
 
-def _theory(method: str) -> Simulate:
-    def simulate(task: Task, progress: Callable[[float], None]) -> Trajectory:
-        assert isinstance(task.chosen_settings, analytic.Settings)
-        settings, interval = replace(task.chosen_settings, method=method), task.sample_interval
-        given = task.parameters, task.x0, task.t_end, task.fluid, settings
-        try:
-            return analytic.simulate(*given, sample_interval=interval, progress=progress)
-        except SimulationError as error:
-            return error.trajectory
-
-    return simulate
+def _theory(
+    method: str,
+    p: Parameters,
+    x0: State,
+    t_end: float,
+    flow: Flow,
+    settings: analytic.Settings,
+    sample_interval: float | None,
+    progress: Callable[[float], None],
+) -> Trajectory:
+    given = p, x0, t_end, flow, replace(settings, method=method)
+    try:
+        return analytic.simulate(*given, sample_interval=sample_interval, progress=progress)
+    except SimulationError as error:
+        return error.trajectory
 
 
 def _adapted(
@@ -141,15 +132,6 @@ def _adapted(
 
     The adapter is a module of `compare.engines`, with `Settings`, `newcomer` and `scene`; each record has a mark.
     """
-
-    def named(name: str) -> Simulate:
-        def simulate(task: Task, progress: Callable[[float], None]) -> Trajectory:
-            settings: Any = task.chosen_settings
-            given = task.parameters, task.x0, task.t_end, task.fluid, settings, task.sample_interval, progress
-            return loop.simulate(name, library, adapter.scene, *given)
-
-        return simulate
-
     name, other = library.name, f"{library.name}-defaults"
     best = Engine(
         name=name,
@@ -157,7 +139,7 @@ def _adapted(
         options=("timestep",),
         configure=lambda given, p: adapter.Settings(**given),
         at=lambda step, p: adapter.Settings(timestep=step),
-        simulate=named(name),
+        simulate=partial(loop.simulate, name, library, adapter.scene),
         sources=("model", "mjsim", "compare.engines"),
         stands_on=("numpy",),
         needs=library,
@@ -170,7 +152,7 @@ def _adapted(
         name=other,
         configure=lambda given, p: adapter.newcomer(given.get("timestep", newcomer_step)),
         at=lambda step, p: adapter.newcomer(step),
-        simulate=named(other),
+        simulate=partial(loop.simulate, other, library, adapter.scene),
         mark=marks[1],
     )
 
@@ -186,7 +168,7 @@ MUJOCO = Engine(
     options=("timestep",),
     configure=lambda given, p: ContactSettings.at(given.get("timestep", ContactSettings.timestep)).suited(p),
     at=_mujoco_study,
-    stream=mujoco,
+    stream=mjsim.Run,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
     as_it_comes="mujoco-defaults",
@@ -208,7 +190,7 @@ EVENT = Engine(
     options=("rtol", "restitution"),
     configure=lambda given, p: analytic.Settings(**given),  # type: ignore[arg-type]
     at=lambda step, p: analytic.Settings(),
-    simulate=_theory("event"),
+    simulate=partial(_theory, "event"),
     sources=("model", "analytic"),
     stands_on=("numpy", "scipy"),
     mark="s",
@@ -220,7 +202,7 @@ MOREAU = replace(
     options=("timestep", "rtol", "restitution"),
     configure=lambda given, p: _time_stepping(given),
     at=lambda step, p: _time_stepping({"timestep": step}),
-    simulate=_theory("time-stepping"),
+    simulate=partial(_theory, "time-stepping"),
     mark="^",
     colour="#009E73",
 )

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+import mjsim
 from compare.runs import engines
 from compare.runs.engines import Engine, Settings
 from mjsim import ContactSettings
@@ -133,9 +134,9 @@ def carry_out(
 ) -> list[Trajectory]:
     """Run tasks of one `Task.batch_key`; a run that breaks down comes back with its failure in the header."""
     deadline = deadline or Deadline()
-    if not (stream := tasks[0].simulator.stream):
+    if not tasks[0].simulator.stream:
         return [_simulated(task, deadline, stop) for task in tasks]
-    run, blocks, stopped = stream(tasks, None), [], ""
+    run, blocks, stopped = _begun(tasks, None), [], ""
     for block in run:
         deadline.check()
         blocks.append(block)
@@ -195,12 +196,22 @@ def journal_path(task: Task, path: Path) -> Path | None:
     return path.with_name(f"{task.key}.journal") if task.long else None
 
 
+def _begun(tasks: Sequence[Task], journal: Journal | None) -> mjsim.Run:
+    """Runs that hand out their samples, in a batch unless they are long."""
+    first = tasks[0]
+    parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
+    given = parameters, x0s, first.t_end, flows, first.chosen_settings
+    assert first.simulator.stream
+    return first.simulator.stream(
+        *given, sample_interval=first.sample_interval, batched=not first.long, journal=journal
+    )
+
+
 def _stream(tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline, stop: Callable[[], bool]) -> list[str]:
     kept = journal_path(tasks[0], paths[0]) if len(tasks) == 1 else None
     journal = Journal(kept) if kept else None
-    assert tasks[0].simulator.stream
     try:
-        run = tasks[0].simulator.stream(tasks, journal)
+        run = _begun(tasks, journal)
     except InputError:  # there is nothing to go on with
         if journal:
             journal.discard()
@@ -233,7 +244,8 @@ def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool]) -> Traj
             raise KeyboardInterrupt
 
     assert task.simulator.simulate
-    return task.simulator.simulate(task, check)
+    given = task.parameters, State.one(task.x0), task.t_end, task.fluid, task.chosen_settings, task.sample_interval
+    return task.simulator.simulate(*given, check)
 
 
 @functools.cache
