@@ -2,6 +2,10 @@
 
 It has no wheel, and where a distribution packages it, it belongs to the system's Python. There it runs, a process for
 each run (`_siconos_worker.py`), which takes a step a line. `DUALBALL_SICONOS_PYTHON` names another Python that has it.
+
+Traps: a theta method keeps the forces at the end of the last step, so that of a force set between steps only the part
+theta would act; threads of BLAS take longer than matrices of six rows; setters of contact points crash where writing
+into the points works; warnings go to standard output.
 """
 
 from __future__ import annotations
@@ -49,7 +53,7 @@ class Settings:
     """`ConstraintTolUnilateral`, m, up to which `TimeSteppingDirectProjection` takes a ball out of an overlap. None for
     `TimeStepping`, which leaves it there: up to a step's way after an impact, for as long as the contact lasts."""
     newton: float = 1e-15
-    """`NewtonTolerance`, N s, of the iteration on the equations of motion; at 1e-10 a ball in flight gains spin."""
+    """`NewtonTolerance`, N s, of the iteration on the equations of motion; with 1e-10 spin changes in flight."""
     tolerance: float = 1e-14
     """Of `FrictionContact`'s solver, non-smooth Gauss-Seidel, relative."""
     iterations: int = 1000
@@ -87,11 +91,11 @@ class _Installation:
     @property
     def missing(self) -> str:
         """Why it can't be used here, and what to do about it; empty if it can."""
-        python, _ = _look(os.environ.get(_NAMED))
-        if python:
+        named = os.environ.get(_NAMED)
+        if _look(named)[0]:
             return ""
-        if _NAMED in os.environ:
-            return f"siconos is not installed for {os.environ[_NAMED]}, which {_NAMED} names"
+        if named:
+            return f"siconos is not installed for {named}, which {_NAMED} names"
         return "siconos is not installed: on Debian or Ubuntu, apt-get install python3-siconos"
 
     @property
