@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Measurement, Missing, Records, measurement
+from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
 from compare.runs.tasks import Task
 from compare.statistics import Measured
 from model import Flow, Parameters, Trajectory
@@ -58,6 +58,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             # Halving the step may by chance not show what it does: of all laws of a kind the largest change stands.
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[0] == quantity]
             sure = Measured(value, math.hypot(np.nanmax(changes), ROUNDING))
+            if not sure_enough(quantity, sure, 1.0):
+                yield Missing(PROTOCOL, name, f"the step changes what is seen at {contact}: {law}")
+                continue
             runs = tasks[name, REFINE[lab.level][1]]
             yield measurement(lab, PROTOCOL, name, p, quantity, sure, runs, law=law, contact=contact)
     for name in FLUIDS:
