@@ -122,7 +122,7 @@ def simulate_many(
     return Ensemble(times, case=case, landings=landings, end=end, failure=tuple(failure), **blank)
 
 
-def random_starts(p: Parameters, count: int, seed: int | Sequence[int] = 0) -> Array:
+def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
     """States (count, 8): at the wall, half of them on the floor, half up to R above it with speeds up to sqrt(g R).
 
     omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all evenly spread.

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from analytic import hopping
-from analytic.ensemble import interval, random_starts
+from analytic.ensemble import interval
 from compare.commands import cli
 from compare.runs import regions, search
-from compare.runs.search import BOX, Search, Searched, carry_out, parameters
+from compare.runs.search import BOX, Search, Searched, carry_out, parameters, random_starts
 from compare.runs.workers import processes
 from model import Parameters, StorageError
 
@@ -65,7 +65,7 @@ def test_a_chunk_is_the_same_whoever_computes_it(tmp_path):
 def test_screen_and_confirmation_tell_hopping_from_rest():
     """A ball hops on in a kept set; in the reference set it comes to rest whatever it starts with."""
     p, period = hopping_set()
-    x0s = random_starts(p, 20)
+    x0s = random_starts(p, 20, [0])
     hops, x, failed = hopping.screen(p, x0s)
     assert failed == 0
     assert hops.any()
@@ -74,7 +74,7 @@ def test_screen_and_confirmation_tell_hopping_from_rest():
     assert record.period == pytest.approx(period, rel=1e-3)
     assert 0 < (record.multiplier or 0) < 1
     still = Parameters.named("reference").replace(omega_0=25.0)
-    hops, x, _ = hopping.screen(still, random_starts(still, 3))
+    hops, x, _ = hopping.screen(still, random_starts(still, 3, [0]))
     assert not hops.any()
     assert hopping.confirm(still, x[0]) is None
 
