@@ -300,12 +300,9 @@ class ContactSettings:
             return settings
         # Softness in proportion; b_f stays what it is, so tc_f goes with 1/d.
         solimp = max(1 / (1 + settings.softness * hover / 0.05), 1e-4)
-        return cls.from_mapping(
-            settings.to_mapping()
-            | {
-                "solimp": solimp,
-                "solreffriction": settings.solreffriction * settings.solimp / solimp,
-                "impratio": settings.impratio * settings.solimp / solimp,
-            }
-            | changes
-        )
+        fitting = {
+            "solimp": solimp,
+            "solreffriction": settings.solreffriction * settings.solimp / solimp,
+            "impratio": settings.impratio * settings.solimp / solimp,
+        }
+        return dataclasses.replace(settings, **fitting | changes)

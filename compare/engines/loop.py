@@ -13,8 +13,6 @@ The engine is driven by -m c(|w|) w (9) alone, with the velocity w relative to t
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 import math
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -24,15 +22,16 @@ from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from compare.engines.library import Library
 from mjsim import limits, recorder
 from mjsim.classify import Classifier, Regularised
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
-from model import Flow, Header, InputError, Parameters, State, Trajectory
+from model import Flow, Header, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import Motion, frame, from_world, slip_speeds, to_world
 from model.parameters import Range, check_number
-from model.trajectory import SAMPLE, current_versions, version
+from model.trajectory import SAMPLE, current_versions
 
 _HUGE = 1e8
 """A coordinate, velocity or force beyond this, in SI units, has diverged."""
@@ -67,55 +66,6 @@ class Scene(Protocol):
 
     def close(self) -> None:
         """Give up what the engine holds."""
-
-
-class Library(Protocol):
-    """What an engine comes in."""
-
-    @property
-    def name(self) -> str:
-        """What it is called where it is installed."""
-
-    @property
-    def missing(self) -> str:
-        """Why it can't be used here, and what to do about it; empty if it can."""
-
-    @property
-    def version(self) -> str:
-        """Or that it isn't installed."""
-
-    def load(self) -> Any:
-        """What a scene is built with; `InputError` if it is missing."""
-
-
-@dataclass(frozen=True)
-class Package:
-    """A Python package of the extra ``engines``."""
-
-    name: str
-    module: str
-    """The module to import, which may be called otherwise."""
-
-    @property
-    def missing(self) -> str:
-        """As in `Library`."""
-        return "" if importlib.util.find_spec(self.module.split(".")[0]) else self._advice
-
-    @property
-    def version(self) -> str:
-        """As in `Library`."""
-        return version(self.name)
-
-    def load(self) -> Any:
-        """The module."""
-        try:
-            return importlib.import_module(self.module)
-        except ImportError as error:
-            raise InputError(self._advice) from error
-
-    @property
-    def _advice(self) -> str:
-        return f'{self.name} is not installed: pip install "dualball[engines]"'
 
 
 class BreakdownError(RuntimeError):

@@ -84,7 +84,7 @@ def newcomer(timestep: float) -> Settings:
 
 @dataclass(frozen=True)
 class _Installation:
-    """Siconos in another Python, a `loop.Library`."""
+    """Siconos in another Python, a `Library`."""
 
     name: str = "siconos"
 

@@ -53,7 +53,7 @@ ORDER = {Case.RS: 2, Case.SR: 1}
 """What is left of a push's size: its square, where up and down are subtracted."""
 FAR = 0.4
 """A record ends once a variable is so far from its settled value, in the `units`."""
-LEAST = {Case.SR: 32}
+LEAST = {Case.SR: 48}
 """Samples that a record must have, else 8: a floor that is about to carry nothing follows its load less exactly."""
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 """Most states of a case and set at the quick level, spread over the flows; beyond it, `MORE` times as many."""

@@ -14,6 +14,7 @@ from typing import Any
 import analytic
 import mjsim
 from compare.engines import drake, loop, pybullet, siconos
+from compare.engines.library import Library, Package
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.errors import suggestion
@@ -49,7 +50,7 @@ class Engine:
     """Packages whose sources determine the results."""
     stands_on: tuple[str, ...]
     """Packages whose versions do."""
-    needs: loop.Library | None = None
+    needs: Library | None = None
     """What it can't run without, and what not everybody has; its version counts, too."""
     as_it_comes: str = ""
     """Name of the same engine as a newcomer would use it."""
@@ -125,9 +126,7 @@ def _theory(
         return error.trajectory
 
 
-def _adapted(
-    adapter: Any, library: loop.Library, newcomer_step: float, marks: str, colour: str
-) -> tuple[Engine, Engine]:
+def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, colour: str) -> tuple[Engine, Engine]:
     """Records of an engine with the best settings of its adapter and with a newcomer's.
 
     The adapter is a module of `compare.engines`, with `Settings`, `newcomer` and `scene`; each record has a mark.
@@ -207,8 +206,8 @@ MOREAU = replace(
     colour="#009E73",
 )
 _OTHERS = (
-    _adapted(pybullet, loop.Package("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
-    _adapted(drake, loop.Package("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
+    _adapted(pybullet, Package("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
+    _adapted(drake, Package("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
     _adapted(siconos, siconos.LIBRARY, 1e-3, "p2", "#000000"),
 )
 ENGINES: dict[str, Engine] = {
