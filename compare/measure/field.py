@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.laws import PRESSES
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.statistics import COVERAGE, Measured
@@ -164,7 +165,7 @@ def constrained(case: Case, x: Array, p: Parameters) -> Array:
 def _seen(coarse: Trajectory, fine: Trajectory, centre: int) -> tuple[Sighting, Sighting, Sighting] | None:
     """A window's sighting extrapolated to a vanishing step, that of the finer run, and that by polynomials less high.
 
-    None if the case changes in or near the window, or a slip turns.
+    None if the case changes in or near the window, or a slip turns or hardly presses.
     """
     high, low = DEGREES
     one, two = _sight(coarse, centre, 1, high), _sight(fine, 2 * centre, 2, high)
@@ -193,12 +194,15 @@ def _sight(run: Trajectory, centre: int, refined: int, degree: int) -> Sighting 
 
 
 def _turns(case: Case, run: Trajectory, window: slice) -> bool:
-    """Whether the velocity of a contact that slips changes by more than `TURN` of it, or would by friction alone."""
+    """Whether a contact that slips hardly presses, or its velocity changes by more than `TURN` of it, or would by
+    friction alone.
+    """
     p, time = run.header.parameters, float(np.ptp(run.time[window]))
-    loads = p.mu * run.force_A[window, 1].max(), p.eta * run.force_B[window, 0].max()
-    for v, contact, load in zip(slip_velocities(run.x[window], p), (case.A, case.B), loads, strict=True):
-        change = max(float(np.linalg.norm(v[-1] - v[0])), load * (1 + p.j) / (p.j * p.m) * time)
-        if contact is Contact.S and change > TURN * np.linalg.norm(v, axis=1).min():
+    loads = (p.mu, run.force_A[window, 1]), (p.eta, run.force_B[window, 0])
+    for v, contact, (friction, load) in zip(slip_velocities(run.x[window], p), (case.A, case.B), loads, strict=True):
+        change = max(float(np.linalg.norm(v[-1] - v[0])), friction * load.max() * (1 + p.j) / (p.j * p.m) * time)
+        hovers = load.min() < PRESSES * p.m * p.g
+        if contact is Contact.S and (hovers or change > TURN * np.linalg.norm(v, axis=1).min()):
             return True
     return False
 

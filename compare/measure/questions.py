@@ -21,8 +21,8 @@ SLIPS = 3e-8
 time of a run by a ball whose friction falls short by a millionth."""
 STUCK = 1e-2
 """The same in units of `SLIPS` that counts as none: slip from the start of a run may have to die out before."""
-FALLS = 0.9
-"""Slip that is no more than this part of what it was before may yet die out."""
+FADES = 0.6
+"""Slip that has fallen to this part of what it was in the second half of a run may yet die out: it is given longer."""
 PRESSED = 1e-3
 """How much spin is taken off a lifted ball to press it to the floor, in parts of its spin on the wall."""
 
@@ -89,7 +89,7 @@ def stays_rolling(run: Trajectory) -> bool | None:
     middle = run.slip_speed_A[len(run.time) // 2 :]
     last, before = slip(run.slip_speed_A, run), slip(middle, run, share=1.0)
     if last >= 1:
-        return False if last > FALLS * before else None
+        return False if last > FADES * before else None
     return True if last < STUCK else None
 
 
