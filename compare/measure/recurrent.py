@@ -16,7 +16,7 @@ import numpy as np
 
 from compare.measure.field import constrained
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Measurement, Missing, Records, measurement, state_of
+from compare.measure.record import Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.runs.tasks import Task
 from compare.statistics import Measured, peaks, top
 from model import Case, Flow, Parameters, Trajectory
@@ -104,7 +104,10 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 shrinking(tops(run, k * HOLD + since, (k + 1) * HOLD - MEASURED).x, q) for run, since in parts
             )
             factor = Measured(fine, math.hypot(fine - coarse, fine - later))
-            yield measurement(lab, NAME, SET, q, "orbit_multiplier", factor, tasks, **conditions)
+            if sure_enough("orbit_multiplier", factor, 1.0):
+                yield measurement(lab, NAME, SET, q, "orbit_multiplier", factor, tasks, **conditions)
+            else:
+                yield Missing(NAME, SET, f"how disturbances shrink at omega_0 = {q.omega_0:.4g} rad/s is too uncertain")
     if len(births) >= 3:
         yield measurement(lab, NAME, SET, p, "orbit_birth", birth(births[-3:]), tasks)
 
