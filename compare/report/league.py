@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import base64
 from typing import Any
 
 from compare import pages
 from compare.figures import league as figure
-from compare.report.pictures import svg
+from compare.report.pictures import address, svg
 from compare.scorecard import league, standings
 
 
 def html(data: dict[str, Any]) -> str:
     """The page of `league.to_mapping`, which needs nothing but itself."""
     entries = league.from_mapping(data)
-    picture = base64.b64encode(svg(figure.draw(entries)).encode()).decode()
+    picture = address(svg(figure.draw(entries)))
     failures = [
         (f"{entry.name}, {1e3 * (entry.step or 0):g} ms, {name}", reason)
         for entry in entries
