@@ -31,7 +31,10 @@ PERIODS, ROUNDS, SETTLED = 3, 50, 1e-9
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
     """omega_c and omega_0 in rad s-1 of RR that has pulsated for long, at phases of the flow in rad, same shape."""
-    phase, lag = np.asarray(phase, dtype=float), _lag(p, amplitude, frequency)
+    return _swing(p, amplitude, _lag(p, amplitude, frequency), np.asarray(phase, dtype=float))
+
+
+def _swing(p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], phase: Array) -> tuple[Array, Array]:
     omega_0 = p.omega_0 + amplitude * np.sin(phase)
     return omega_0 + np.real(np.exp(1j * phase[..., None] * HARMONICS) @ lag), omega_0
 
@@ -76,9 +79,9 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
         return math.inf
 
     def slack(amplitude: float) -> float:
-        phases = np.linspace(0.0, 2 * math.pi, PHASES + 1)
+        phases, lag = np.linspace(0.0, 2 * math.pi, PHASES + 1), _lag(p, amplitude, frequency)
         for _ in range(2):
-            omega_c, omega_0 = swing(p, amplitude, frequency, phases)
+            omega_c, omega_0 = _swing(p, amplitude, lag, phases)
             margins = margin(omega_c, p, omega_0)
             k, cell = int(margins.argmin()), phases[1] - phases[0]
             phases = np.linspace(phases[k] - cell, phases[k] + cell, PHASES + 1)
