@@ -8,7 +8,7 @@ import numpy as np
 
 import analytic
 from analytic import orbits
-from analytic.orbits import NoOrbitError, Orbit
+from analytic.orbits import Orbit
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered
 from compare.measure.calm import hops
@@ -23,11 +23,8 @@ LASTS = 60.0
 
 @remembered
 def _orbit(p: Parameters, x: tuple[float, ...], period: float) -> Orbit:
-    """The closed orbit of theory near what was measured; LookupError if there is none."""
-    try:
-        return orbits.refine(p, x, period)
-    except NoOrbitError as error:
-        raise LookupError(str(error)) from error
+    """The closed orbit of theory near what was measured."""
+    return orbits.refine(p, x, period)
 
 
 def _of(m: Measurement) -> Orbit:

@@ -11,7 +11,7 @@ from compare.claims.claim import Bearing, Claim, Relation
 from compare.claims.judge import remembered
 from compare.measure.record import Measurement
 from compare.measure.unsteady import caught_up
-from model import Case, Flow, InputError, Parameters
+from model import Case, Flow, Parameters
 from model.drag import STOKES
 from model.kinematics import VARIABLES
 
@@ -39,11 +39,8 @@ def _mean_error(p: Parameters, amplitude: float, frequency: float) -> float:
 
 @remembered
 def _peak(p: Parameters) -> tuple[float, float]:
-    """Time and height of the peak after a jump in SS; LookupError if theory has no such state."""
-    try:
-        return response.peak(p, Case.SS)
-    except InputError as error:
-        raise LookupError(str(error)) from error
+    """Time and height of the peak after a jump in SS."""
+    return response.peak(p, Case.SS)
 
 
 @remembered
