@@ -189,7 +189,7 @@ THEORIES: tuple[WrongTheory, ...] = (
     WrongTheory("a rolling ball follows the flow at the rate c", "analytic.response", "rolling_rate",
                 lambda right: lambda p: p.c),
     WrongTheory("response to a pulsation 2 % large", "analytic.response", "transfer", scaled(1.02)),
-    WrongTheory("pulsation takes no friction", "analytic.pulsation", "swing", _without_lag),
+    WrongTheory("pulsation takes no friction", "analytic.pulsation", "_swing", _without_lag),
     WrongTheory("slip begins 3 % late in a pulsation", "analytic.pulsation", "slip_onset", scaled(1.03)),
     WrongTheory("slip begins 3 % early in a pulsation", "analytic.pulsation", "slip_onset", scaled(0.97)),
     WrongTheory("rolling follows a pulsation as under Stokes' drag", "analytic.pulsation", "_lag", given(_by_stokes)),

@@ -33,7 +33,7 @@ from compare.report import results
 Outcomes = Mapping[str, Outcome]
 PROVING = frozenset({"settled", "laws", "field", "impacts"})
 """Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in contact and landing."""
-PATIENCE = 8.0
+PATIENCE = 40.0
 """Processor time that the predictions of a claim may take under a wrong theory, s; several times what they need."""
 
 
