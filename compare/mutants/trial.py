@@ -11,9 +11,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from types import FrameType
 
@@ -29,6 +27,7 @@ from compare.mutants.engines import WRONG_ENGINES
 from compare.mutants.exchange import believed
 from compare.mutants.theories import THEORIES
 from compare.report import results
+from compare.runs.workers import processes
 
 Outcomes = Mapping[str, Outcome]
 PROVING = frozenset({"settled", "laws", "field", "impacts"})
@@ -46,23 +45,23 @@ class Trial:
     """Claims whose verdict is another than without the fault, and what it is."""
 
 
-def theories(directory: Path, processes: int = 2, whole: bool = True) -> list[Trial]:
+def theories(directory: Path, workers: int = 2, whole: bool = True) -> list[Trial]:
     """Every wrong theory, judged on the measurements stored in a results directory.
 
     By all claims; unless `whole`, by the quickest ones first and only until one notices it.
     """
-    return _tried(functools.partial(_theory, directory, whole), len(THEORIES), processes)
+    return _tried(functools.partial(_theory, directory, whole), len(THEORIES), workers)
 
 
-def wrong_engines(directory: Path, processes: int = 2) -> list[Trial]:
+def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
     """Every wrong engine, measured anew by the protocols of `PROVING`; runs are kept, each engine's apart."""
-    return _tried(functools.partial(_engine, directory), len(WRONG_ENGINES), processes)
+    return _tried(functools.partial(_engine, directory), len(WRONG_ENGINES), workers)
 
 
-def _tried(one: Callable[[int], Trial], count: int, processes: int) -> list[Trial]:
+def _tried(one: Callable[[int], Trial], count: int, workers: int) -> list[Trial]:
     """The trials by number, each shown on standard error as soon as it is there."""
     tried = []
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+    with processes(workers).start() as pool:
         for trial in pool.map(one, range(count)):
             print(f"{trial.what}: {_told(trial)}", file=sys.stderr, flush=True)
             tried.append(trial)
@@ -80,14 +79,14 @@ class Judged:
     """By quantity the relative error of a theory that every check of it notices."""
 
 
-def judged(directory: Path, processes: int = 2, whole: bool = True) -> Judged:
+def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
     """Every wrong theory judged on the measurements stored in a results directory, and their resolving power."""
     power: dict[str, float] = {}
     for each in judge(CLAIMS, _stored(directory)[0]):
         if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
             for name, value in each.resolving_power.items():
                 power[name] = max(power.get(name, 0.0), value)
-    return Judged(results.load(directory).level.lower(), theories(directory, processes, whole), power)
+    return Judged(results.load(directory).level.lower(), theories(directory, workers, whole), power)
 
 
 def page(levels: Sequence[Judged], measured: Sequence[Trial]) -> str:
