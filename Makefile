@@ -1,5 +1,5 @@
 # make validate   set everything up and run the main job: theory against MuJoCo, with a verdict
-# make mutants    which claims notice a wrong theory or a wrong engine? writes docs/mutants.md (a quarter of an hour)
+# make mutants    which claims notice a wrong theory or a wrong engine? writes docs/mutants.md (half an hour or more)
 # make test       set everything up and run the tests
 # make test-all   the slow tests, too
 # make docs       build the documentation, run its notebooks: docs/_build/html/index.html
