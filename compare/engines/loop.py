@@ -22,7 +22,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from compare.engines.library import Library
+from compare.engines.dependency import Library
 from mjsim import limits, recorder
 from mjsim.classify import Classifier, Regularised
 from mjsim.contact_settings import ContactSettings

@@ -14,7 +14,7 @@ from typing import Any
 import analytic
 import mjsim
 from compare.engines import drake, loop, pybullet, siconos
-from compare.engines.library import Library, Package
+from compare.engines.dependency import Library, Package
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.errors import suggestion
