@@ -31,7 +31,19 @@ from model import InputError, Parameters
 from model.arrays import Array
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
 
-CHOICES = {
+_NUMBERS = {
+    "timestep": ("s", POSITIVE),
+    "solreffriction": ("s", POSITIVE),
+    "solimp": ("1", Range(1e-4, 0.9999)),
+    "impratio": ("1", Range(0.1, 1e7)),
+    "servo": ("s", NOT_NEGATIVE),
+    "tolerance": ("1", NOT_NEGATIVE),
+    "iterations": ("1", Range(1, whole=True)),
+    "noslip_iterations": ("1", Range(0, whole=True)),
+    "facets": ("1", Range(3, 2000, whole=True)),
+}
+"""Unit and range of each number."""
+_CHOICES = {
     "cone": ("elliptic", "pyramidal"),
     "integrator": ("Euler", "implicit", "implicitfast", "discrete"),
     "coordinates": ("polar", "free"),
@@ -85,43 +97,38 @@ class ContactSettings:
     noslip_iterations: int = 0
 
     def __post_init__(self) -> None:
-        check_number("timestep", self.timestep, "s", POSITIVE)
         if len(self.solref) != 2:
             raise InputError(f"solref = {self.solref!r} must be two numbers, time constant (s) and damping ratio")
         check_number("solref time constant", self.solref[0], "s", POSITIVE)
         check_number("solref damping ratio", self.solref[1], "1", POSITIVE)
-        check_number("solreffriction", self.solreffriction, "s", POSITIVE)
-        check_number("solimp", self.solimp, "1", Range(1e-4, 0.9999))
-        check_number("impratio", self.impratio, "1", Range(0.1, 1e7))
-        check_number("servo", self.servo, "s", NOT_NEGATIVE)
-        check_number("tolerance", self.tolerance, "1", NOT_NEGATIVE)
-        check_number("iterations", self.iterations, "1", Range(1, whole=True))
-        check_number("noslip_iterations", self.noslip_iterations, "1", Range(0, whole=True))
-        check_number("facets", self.facets, "1", Range(3, 2000, whole=True))
-        for name, known in CHOICES.items():
+        for name, (unit, allowed) in _NUMBERS.items():
+            check_number(name, getattr(self, name), unit, allowed)
+        for name, known in _CHOICES.items():
             check_choice(name, getattr(self, name), known)
-        if self.order not in (1, 2):
-            raise InputError(f"order = {self.order!r} must be 1 or 2")
-        if self.wall == "prism" and self.coordinates != "free":
-            raise InputError("wall = 'prism' needs coordinates = 'free'")
-        if self.wall == "prism" and self.servo:
-            raise InputError(
-                f"wall = 'prism' needs servo = 0, not {self.servo:g} s: at an edge two facets share the ball"
-            )
-        if self.coordinates == "free" and (self.memory or self.order != 1):
-            raise InputError(
-                "coordinates = 'free' needs memory = False and order = 1: the corrections are for the joints"
-            )
-        if self.memory and self.cone != "elliptic":
-            raise InputError(
-                f"memory needs the elliptic cone, not cone = {self.cone!r}: its rows mix normal and friction"
-            )
-        if self.timestep > self.largest_timestep * (1 + 1e-12):
-            raise InputError(
+        for refused, why in (
+            (self.order not in (1, 2), f"order = {self.order!r} must be 1 or 2"),
+            (self.wall == "prism" and self.coordinates != "free", "wall = 'prism' needs coordinates = 'free'"),
+            (
+                self.wall == "prism" and self.servo,
+                f"wall = 'prism' needs servo = 0, not {self.servo:g} s: at an edge two facets share the ball",
+            ),
+            (
+                self.coordinates == "free" and (self.memory or self.order != 1),
+                "coordinates = 'free' needs memory = False and order = 1: the corrections are for the joints",
+            ),
+            (
+                self.memory and self.cone != "elliptic",
+                f"memory needs the elliptic cone, not cone = {self.cone!r}: its rows mix normal and friction",
+            ),
+            (
+                self.timestep > self.largest_timestep * (1 + 1e-12),
                 f"timestep = {self.timestep:g} s is too large for the contact settings: solref {self.solref[0]:g} s, "
                 f"solreffriction {self.solreffriction:g} s and servo {self.servo:g} s allow at most "
-                f"{self.largest_timestep:g} s"
-            )
+                f"{self.largest_timestep:g} s",
+            ),
+        ):
+            if refused:
+                raise InputError(why)
 
     @property
     def largest_timestep(self) -> float:
@@ -208,11 +215,6 @@ class ContactSettings:
         return 0.5 if self.order == 2 else 0.0
 
     @property
-    def lead(self) -> float:
-        """Time by which positions are ahead of velocities, s."""
-        return self.midpoint * self.timestep
-
-    @property
     def friction_lag(self) -> float:
         """How far in steps past the middle of a step friction takes its direction by itself, 1/(b_f h) - 1/2."""
         corrected = self.order == 2 and self.cone == "elliptic"
@@ -262,14 +264,9 @@ class ContactSettings:
     def at(cls, timestep: float, **changes: Any) -> Self:
         """The defaults with their times scaled to another step, and the given changes."""
         check_number("timestep", timestep, "s")
-        scale = timestep / 1e-3
-        scaled = {
-            "timestep": timestep,
-            "solref": (cls.solref[0] * scale, cls.solref[1]),
-            "solreffriction": cls.solreffriction * scale,
-            "servo": cls.servo * scale,
-        }
-        return cls.from_mapping(scaled | changes)
+        scale, (time, ratio) = timestep / 1e-3, cls.solref
+        scaled = {"solref": (time * scale, ratio), "solreffriction": cls.solreffriction * scale}
+        return cls.from_mapping({"timestep": timestep, "servo": cls.servo * scale} | scaled | changes)
 
     def suited(self, p: Parameters) -> Self:
         """With slower contacts if the friction of a ball would make these chatter, else as they are."""
@@ -292,17 +289,11 @@ class ContactSettings:
         settings = cls.at(timestep, **changes)
         if "solref" not in changes:
             settings = settings.suited(p)
-        speed = (
-            abs(p.R * p.omega_0) if max_slip_speed is None else check_number("max_slip_speed", max_slip_speed, "m/s")
-        )
-        hover = settings.hover_number(p.g, max(p.mu, p.eta), speed)
+        speed = abs(p.R * p.omega_0) if max_slip_speed is None else max_slip_speed
+        hover = settings.hover_number(p.g, max(p.mu, p.eta), check_number("max_slip_speed", speed, "m s-1"))
         if hover <= 0.05 or "solimp" in changes:
             return settings
         # Softness in proportion; b_f stays what it is, so tc_f goes with 1/d.
         solimp = max(1 / (1 + settings.softness * hover / 0.05), 1e-4)
-        fitting = {
-            "solimp": solimp,
-            "solreffriction": settings.solreffriction * settings.solimp / solimp,
-            "impratio": settings.impratio * settings.solimp / solimp,
-        }
-        return dataclasses.replace(settings, **fitting | changes)
+        fitting = {name: getattr(settings, name) * settings.solimp / solimp for name in ("solreffriction", "impratio")}
+        return dataclasses.replace(settings, **fitting | {"solimp": solimp} | changes)

@@ -39,7 +39,7 @@ def test_the_loop_is_that_of_a_simulation(reference: Parameters) -> None:
     assert steps == 500  # half a second: the first of the 33 pictures shows the start
     run = mjsim.simulate(p, x0, 0.5, flow, settings, sample_interval=0.5)
     qpos, qvel = np.array(stepper.data.qpos), np.array(stepper.data.qvel)
-    qpos[:3] -= settings.lead * qvel[:3]  # positions are ahead of velocities
+    qpos[:3] -= settings.midpoint * settings.timestep * qvel[:3]  # positions are ahead of velocities
     # Equal but for the round-off of turning one state into the paper's variables, or many at once.
     scale = np.maximum(np.abs(run.x[-1]), [p.r, 1, 1, 60, 60, 60, p.r, 1])
     np.testing.assert_array_less(np.abs(recorder.state(qpos, qvel, p) - run.x[-1]), 4 * np.finfo(float).eps * scale)
