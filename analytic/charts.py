@@ -4,14 +4,15 @@ On the wall these are the active variables of the case (Table 4), except that a 
 its speed q and direction (alpha at A, beta at B): the friction depends on the direction alone, so that the rates have
 limits as the slip vanishes and q simply crosses zero. In SS both pairs are kept, although they share
 slip_z = q_A cos alpha = q_B cos beta; what integration errors make of that bond is damped. The equations are those of
-`dynamics`; only rates are converted here. Away from the wall see `charts_off_wall`. The last coordinate is always the
-work of drag and friction, J.
+`dynamics`; only rates are converted here. Away from the wall see `charts_off_wall`. The first coordinate is always the
+azimuth, the last one the work of drag and friction, J.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from model.arrays import Array
 
 
 def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """The chart of a case (any but RR, which `rolling` solves in closed form) that starts at a moment.
+    """The chart of a case (any but RR, see `two_point_rolling`) that starts at a moment.
 
     `floor` is the slip in natural units below which its direction turns no faster any more: directions turn at a rate
     inverse to the slip, and settle before the slip vanishes.
@@ -40,77 +41,59 @@ def _power(x: State, f: Forces, p: Parameters, omega_0: float) -> float:
     return float(fluid + at_A + at_B)
 
 
-def _rs(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """RS: (theta, omega_c, speed of the slip along k, work); the slip keeps its sign."""
-    sign, (T, _, w, E), G = math.copysign(1.0, math.sin(at.beta)), natural_units(p), p.m * p.g
+def _rates(case: Case, x: State, p: Parameters, omega_0: float, *slips: dynamics.Direction) -> tuple[State, float]:
+    """Rates of a state with the slip directions given, A before B, and the power of drag and contacts, W."""
+    f = dynamics.FORCES[case](x, p, omega_0, *slips)
+    return dynamics.newton_euler(case, x, f, p, omega_0), _power(x, f, p, omega_0)
+
+
+def _one_slip(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
+    """RS and SR: (theta, omega_c, speed of the slip along k, work); the slip keeps its sign."""
+    slip, angle = ("slip_y", at.beta) if case is Case.RS else ("slip_x", at.alpha)
+    sign, (T, _, w, E), G = math.copysign(1.0, math.sin(angle)), natural_units(p), p.m * p.g
+
+    def state(z: Any) -> State:
+        return State(omega_c=z[1], **{slip: sign * z[2]})
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
-        _, omega_c, speed, _ = z
-        x, fluid = State(omega_c=omega_c, slip_y=sign * speed), omega_0(t)
-        f = dynamics.FORCES[case](x, p, fluid, (sign, 0.0))
-        dx = dynamics.newton_euler(case, x, f, p, fluid)
-        return [omega_c, dx.omega_c, sign * dx.slip_y, _power(x, f, p, fluid)]
+        dx, power = _rates(case, state(z), p, omega_0(t), (sign, 0.0))
+        return [z[1], dx.omega_c, sign * getattr(dx, slip), power]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        _, omega_c, speed, _ = z
-        f = dynamics.FORCES[case](State(omega_c=omega_c), p, omega_0(t), (sign, 0.0))
-        return speed / w, (p.mu * f.A_y - math.hypot(f.A_x, f.A_z)) / G
+        f = dynamics.FORCES[case](state(z), p, omega_0(t), (sign, 0.0))
+        if case is Case.RS:
+            return z[2] / w, (p.mu * f.A_y - math.hypot(f.A_x, f.A_z)) / G
+        return z[2] / w, (p.eta * f.B_x - math.hypot(f.B_y, f.B_z)) / G, f.A_y / G
 
     def path(t: Array, z: Array) -> Path:
-        theta, omega_c, speed, work = z
-        x = State(omega_c=omega_c, slip_y=sign * speed).stacked()
-        return Path(t, theta, x, np.full_like(t, math.nan), np.full_like(t, sign * math.pi / 2), work)
+        along, none = np.full_like(t, sign * math.pi / 2), np.full_like(t, math.nan)
+        alpha, beta = (none, along) if case is Case.RS else (along, none)
+        return Path(t, z[0], state(z).stacked(), alpha, beta, z[3])
 
-    start = [at.theta, at.x.omega_c, sign * at.x.slip_y, at.work]
-    return Chart(case, start, [1.0, 1 / T, w, E], rates, ("B sticks", "A slips"), guards, path)
-
-
-def _sr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """SR: (theta, omega_c, speed of the slip along k, work); the slip keeps its sign."""
-    sign, (T, _, w, E), G = math.copysign(1.0, math.sin(at.alpha)), natural_units(p), p.m * p.g
-
-    def rates(t: float, z: Sequence[float]) -> list[float]:
-        _, omega_c, speed, _ = z
-        x, fluid = State(omega_c=omega_c, slip_x=sign * speed), omega_0(t)
-        f = dynamics.FORCES[case](x, p, fluid, (sign, 0.0))
-        dx = dynamics.newton_euler(case, x, f, p, fluid)
-        return [omega_c, dx.omega_c, sign * dx.slip_x, _power(x, f, p, fluid)]
-
-    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        _, omega_c, speed, _ = z
-        f = dynamics.FORCES[case](State(omega_c=omega_c, slip_x=sign * speed), p, omega_0(t), (sign, 0.0))
-        return speed / w, (p.eta * f.B_x - math.hypot(f.B_y, f.B_z)) / G, f.A_y / G
-
-    def path(t: Array, z: Array) -> Path:
-        theta, omega_c, speed, work = z
-        x = State(omega_c=omega_c, slip_x=sign * speed).stacked()
-        return Path(t, theta, x, np.full_like(t, sign * math.pi / 2), np.full_like(t, math.nan), work)
-
-    start = [at.theta, at.x.omega_c, sign * at.x.slip_x, at.work]
-    return Chart(case, start, [1.0, 1 / T, w, E], rates, ("A sticks", "B slips", "A lifts"), guards, path)
+    start = [at.theta, at.x.omega_c, sign * getattr(at.x, slip), at.work]
+    ends = ("B sticks", "A slips") if case is Case.RS else ("A sticks", "B slips", "A lifts")
+    return Chart(case, start, [1.0, 1 / T, w, E], rates, ends, guards, path)
 
 
 def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """SS: (theta, omega_c, q_A, alpha, q_B, beta, work)."""
     T, _, w, E = natural_units(p)
-    forces, G, least, damping = dynamics.FORCES[case], p.m * p.g, floor * w, 1 / T
+    G, least, damping = p.m * p.g, floor * w, 1 / T
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         _, omega_c, q_A, alpha, q_B, beta, _ = z
         sA, cA, sB, cB = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
-        x, fluid = State(omega_c=omega_c, slip_x=q_A * sA, slip_y=q_B * sB, slip_z=q_A * cA), omega_0(t)
-        f = forces(x, p, fluid, (sA, cA), (sB, cB))
-        dx = dynamics.newton_euler(case, x, f, p, fluid)
+        x = State(omega_c=omega_c, slip_x=q_A * sA, slip_y=q_B * sB, slip_z=q_A * cA)
+        dx, power = _rates(case, x, p, omega_0(t), (sA, cA), (sB, cB))
         bond = damping * (q_B * cB - q_A * cA)
         dq_A, turn_A = dx.slip_x * sA + dx.slip_z * cA, dx.slip_x * cA - dx.slip_z * sA
         dq_B, turn_B = dx.slip_y * sB + dx.slip_z * cB - bond * cB, dx.slip_y * cB - dx.slip_z * sB
-        work = _power(x, f, p, fluid)
-        return [omega_c, dx.omega_c, dq_A, turn_A / max(q_A, least), dq_B, turn_B / max(q_B, least), work]
+        return [omega_c, dx.omega_c, dq_A, turn_A / max(q_A, least), dq_B, turn_B / max(q_B, least), power]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
         _, omega_c, q_A, alpha, q_B, beta, _ = z
         directions = (math.sin(alpha), math.cos(alpha)), (math.sin(beta), math.cos(beta))
-        f = forces((0.0, 0.0, omega_c), p, 0.0, *directions)  # depend on nothing else
+        f = dynamics.FORCES[case]((0.0, 0.0, omega_c), p, 0.0, *directions)  # depend on nothing else
         return q_A / w, q_B / w, f.A_y / G, f.B_x / G
 
     def path(t: Array, z: Array) -> Path:
@@ -130,24 +113,21 @@ def _nr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
     (T, v, w, E), G = natural_units(p), p.m * p.g
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
-        _, *active, _ = z
-        x, fluid = State(*active), omega_0(t)
-        f = dynamics.FORCES[case](x, p, fluid)
-        dx = dynamics.newton_euler(case, x, f, p, fluid)
-        return [x.omega_c, dx.y, dx.v_y, dx.omega_c, dx.slip_x, _power(x, f, p, fluid)]
+        dx, power = _rates(case, State(*z[1:5]), p, omega_0(t))
+        return [z[3], *dx[:4], power]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        _, *active, _ = z
-        x = State(*active)
+        x = State(*z[1:5])
         f = dynamics.FORCES[case](x, p, omega_0(t))
         return (p.eta * f.B_x - math.hypot(f.B_y, f.B_z)) / G, x.y / p.R
 
     def path(t: Array, z: Array) -> Path:
-        theta, *active, work = z
-        return Path(t, theta, State(*active).stacked(), np.full_like(t, math.nan), np.full_like(t, math.nan), work)
+        none = np.full_like(t, math.nan)
+        return Path(t, z[0], State(*z[1:5]).stacked(), none, none, z[5])
 
-    start = [at.theta, at.x.y, at.x.v_y, at.x.omega_c, at.x.slip_x, at.work]
-    return Chart(case, start, [1.0, p.R, v, 1 / T, w, E], rates, ("B slips", "A lands"), guards, path)
+    return Chart(
+        case, [at.theta, *at.x[:4], at.work], [1.0, p.R, v, 1 / T, w, E], rates, ("B slips", "A lands"), guards, path
+    )
 
 
 def _ns(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
@@ -157,31 +137,26 @@ def _ns(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         _, y, v_y, omega_c, slip_x, q, beta, _ = z
         s, c = math.sin(beta), math.cos(beta)
-        x, fluid = State(y, v_y, omega_c, slip_x, q * s, q * c), omega_0(t)
-        f = dynamics.FORCES[case](x, p, fluid, (s, c))
-        dx = dynamics.newton_euler(case, x, f, p, fluid)
+        dx, power = _rates(case, State(y, v_y, omega_c, slip_x, q * s, q * c), p, omega_0(t), (s, c))
         dq, turn = dx.slip_y * s + dx.slip_z * c, (dx.slip_y * c - dx.slip_z * s) / max(q, least)
-        return [omega_c, v_y, dx.v_y, dx.omega_c, dx.slip_x, dq, turn, _power(x, f, p, fluid)]
+        return [omega_c, *dx[:4], dq, turn, power]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        _, y, *_, q, _, _ = z
-        return q / w, y / p.R
+        return z[5] / w, z[1] / p.R
 
     def path(t: Array, z: Array) -> Path:
         theta, y, v_y, omega_c, slip_x, q, beta, work = z
         x = State(y, v_y, omega_c, slip_x, q * np.sin(beta), q * np.cos(beta)).stacked()
         return Path(t, theta, x, np.full_like(t, math.nan), beta, work)
 
-    x = at.x
-    q = math.hypot(x.slip_y, x.slip_z)
-    start = [at.theta, x.y, x.v_y, x.omega_c, x.slip_x, q, at.beta, at.work]
+    start = [at.theta, *at.x[:4], math.hypot(at.x.slip_y, at.x.slip_z), at.beta, at.work]
     scale = [1.0, p.R, v, 1 / T, w, w, 1.0, E]
     return Chart(case, start, scale, rates, ("B sticks", "A lands"), guards, path, slips=(5,))
 
 
 _CHARTS = {
-    Case.RS: _rs,
-    Case.SR: _sr,
+    Case.RS: _one_slip,
+    Case.SR: _one_slip,
     Case.SS: _ss,
     Case.NR: _nr,
     Case.NS: _ns,

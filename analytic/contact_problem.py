@@ -8,9 +8,13 @@ accelerations. A closed contact obeys
 
 No case is named: which contact sticks, slips or opens is part of the answer. At one contact of a sphere normal and
 tangential impulses do not influence each other, so that each contact alone is solved exactly by a projection, given
-the impulse at the other. To `sweep` is to do so at A and then at B (projected Gauss-Seidel); what is sought is an
-impulse at B that a sweep reproduces. Sweeps alone may approach it slowly, or swing about it for ever where
-mu eta > 1: `Continuation` then takes over, which ends as Newton's method.
+the impulse at the other. A sweep does so at A and then at B (projected Gauss-Seidel); what is sought is an impulse at
+B that a sweep f reproduces. Sweeps alone may approach it slowly, or swing about it for ever where mu eta > 1. After
+some of them, B = f(B) is taken for a place of rest of dB/dt = f(B) - B (pseudo-transient continuation, Kelley & Keyes,
+SIAM J. Numer. Anal. 35 (1998) 508). Its linearly implicit Euler steps, (1/span + 1 - f') dB = f(B) - B, are damped
+sweeps for small spans and those of the generalised Newton method for large ones: a success lengthens the span, a
+setback, a change that rises by more than the attempt allows (`WARY`, `BOLD`), shortens it and makes it grow more
+carefully from then on.
 
 A solution exists where mu < 1 or eta < 1 (Acary, Cadoux, Lemarechal & Malick, ZAMM 91 (2011) 155: the ball can
 move so that v_n - target > friction * |v_t| at both contacts). Where both are greater, floor and wall can
@@ -20,7 +24,6 @@ lock the ball in the corner, so that no impulses meet a target > 0; `unlocked` i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -69,7 +72,7 @@ def solve(
     ----------
     free : velocities (m s-1 and rad s-1) that the ball would have without any impulse
     A, B : the closed contacts; None for an open one
-    start : first guess of the impulses in N s
+    start : first guess of the impulses in N s; only those of B matter
     tolerance : the largest change in a sweep at which to stop, relative to the velocities of the problem, those that
         the impulses cause among them; a sweep rounds a dozen times, so that less than some eps may never be reached
 
@@ -78,84 +81,90 @@ def solve(
     NotConvergedError
         After `max_sweeps`.
     """
-    u, P = rigid_body.apply(free, start, p), start
+    a, b = _needs(free, A, B, p)
     if A is None or B is None:  # a contact alone is solved exactly
-        return sweep(u, P, A, B, p)
+        at_A, at_B = (
+            _project(need, friction, contact.slip) if contact else np.zeros(3)
+            for need, friction, contact in ((a, p.mu, A), (b, p.eta, B))
+        )
+        return _after(free, at_A, at_B, p)
+    # What an impulse (n, s, t) of a contact takes off the needs of the other: the same both ways.
+    k = 1 / (1 + p.j)
+    coupling = np.array([[0.0, 1.0, 0.0], [1 - k, -k, 0.0], [0.0, 0.0, 1 - k]])
     scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
-    pace, change, enough = Continuation(A, B, p), math.inf, math.inf
-    for _ in range(max_sweeps):
-        u, new = sweep(u, P, A, B, p)
-        change = max(abs(after - before) for after, before in zip(new[3:], P[3:], strict=True)) / p.m
-        enough = tolerance * max(scale, max(map(abs, new)) / p.m)
+    at_B, last, span, growth = np.array(start[3:]) / p.m, math.inf, 1.0, 8.0
+    for count in range(1, max_sweeps + 1):
+        at_A = _project(a - coupling @ at_B, p.mu, A.slip)
+        need_B = b - coupling @ at_A
+        swept = _project(need_B, p.eta, B.slip)
+        change = float(np.abs(swept - at_B).max())
+        enough = tolerance * max(scale, float(np.abs([at_A, swept]).max()))
         if change <= enough:
-            return rigid_body.apply(free, new, p), new
-        P = pace.next(u, P, new, change)
-        u = rigid_body.apply(free, P, p)
+            return _after(free, at_A, swept, p)
+        attempt, sweeps = divmod(count, ATTEMPT)
+        if count <= PLAIN_SWEEPS:
+            at_B = swept
+            continue
+        if sweeps == 0:
+            span, growth = 1.0, 8.0
+        if change <= last * (BOLD if attempt % 2 else WARY):
+            span = min(span * growth, 1e10)
+        else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
+            span, growth = max(span / 20, 1 / (10 + p.mu * p.eta)), max(growth**0.7, 1.1)
+        last = change
+        rate_A = _projection_rate(a - coupling @ swept, p.mu, A.slip)
+        rate = _projection_rate(need_B, p.eta, B.slip) @ coupling @ rate_A @ coupling
+        at_B = at_B + np.linalg.solve((1 + 1 / span) * np.eye(3) - rate, swept - at_B)
     raise NotConvergedError(
         f"contact problem: still a change of {change:g} m s-1 after {max_sweeps} sweeps, asked for {enough:g} m s-1"
     )
 
 
-def sweep(u: Velocities, P: Forces, A: Closed | None, B: Closed | None, p: Parameters) -> tuple[Velocities, Forces]:
-    """Solve A for the present impulse at B, then B for that at A; u already contains P, None is an open contact."""
-    v_h, v_y, v_k, o_x, o_y, o_z = u
-    A_x, A_y, A_z, B_x, B_y, B_z = P
-    m, jmr = p.m, p.j * p.m * p.r
-    if A is not None:
-        n, s, t = _project(*_unlimited_A(u, P, A, p), p.mu, A.slip)
-        v_h, v_y, v_k = v_h + (s - A_x) / m, v_y + (n - A_y) / m, v_k + (t - A_z) / m
-        o_x, o_z = o_x - (t - A_z) / jmr, o_z + (s - A_x) / jmr
-        A_x, A_y, A_z = s, n, t
-        u = Velocities(v_h, v_y, v_k, o_x, o_y, o_z)
-    if B is not None:
-        n, s, t = _project(*_unlimited_B(u, P, B, p), p.eta, B.slip)
-        v_h, v_y, v_k = v_h + (n - B_x) / m, v_y + (s - B_y) / m, v_k + (t - B_z) / m
-        o_y, o_z = o_y + (t - B_z) / jmr, o_z - (s - B_y) / jmr
-        B_x, B_y, B_z = n, s, t
-        u = Velocities(v_h, v_y, v_k, o_x, o_y, o_z)
-    return u, Forces(A_x, A_y, A_z, B_x, B_y, B_z)
+def _needs(free: Velocities, A: Closed | None, B: Closed | None, p: Parameters) -> tuple[Array, Array]:
+    """Impulses per mass, m s-1, that would bring A and B alone to their targets and to rest, were they not limited.
+
+    Each is (normal, tangential along the normal of the other contact, along z).
+    """
+    share = p.j / (1 + p.j)  # of the mass, that a tangential impulse feels at the contact point
+    (v_h, v_y, *_), slip_A, slip_B = free, rigid_body.slip_at_A(free, p), rigid_body.slip_at_B(free, p)
+    to_A, to_B = (contact.target if contact else 0.0 for contact in (A, B))
+    a, b = (np.array([n, -share * s, -share * t]) for n, (s, t) in ((to_A - v_y, slip_A), (to_B - v_h, slip_B)))
+    return a, b
 
 
-def _unlimited_A(u: Velocities, P: Forces, A: Closed, p: Parameters) -> tuple[float, float, float]:
-    """Impulses (normal, along x, along z) that would bring A to its target and to rest, were they not limited."""
-    m_t = p.m * p.j / (1 + p.j)  # mass that a tangential impulse feels at the contact point
-    (_, v_y, *_), (A_x, A_y, A_z, *_), (slip_x, slip_z) = u, P, rigid_body.slip_at_A(u, p)
-    return A_y - p.m * (v_y - A.target), A_x - m_t * slip_x, A_z - m_t * slip_z
+def _after(free: Velocities, at_A: Array, at_B: Array, p: Parameters) -> tuple[Velocities, Forces]:
+    """Velocities after impulses per mass, and these impulses."""
+    (A_y, A_x, A_z), (B_x, B_y, B_z) = (p.m * at_A).tolist(), (p.m * at_B).tolist()
+    P = Forces(A_x, A_y, A_z, B_x, B_y, B_z)
+    return rigid_body.apply(free, P, p), P
 
 
-def _unlimited_B(u: Velocities, P: Forces, B: Closed, p: Parameters) -> tuple[float, float, float]:
-    """The same at B: (normal, along y, along z)."""
-    m_t = p.m * p.j / (1 + p.j)
-    (v_h, *_), (*_, B_x, B_y, B_z), (slip_y, slip_z) = u, P, rigid_body.slip_at_B(u, p)
-    return B_x - p.m * (v_h - B.target), B_y - m_t * slip_y, B_z - m_t * slip_z
-
-
-def _project(
-    n: float, s: float, t: float, friction: float, slip: tuple[float, float] | None
-) -> tuple[float, float, float]:
-    """The impulses (n, s, t) that Coulomb's law allows: friction is the point of its disk next to (s, t), or opposes a
+def _project(need: Array, friction: float, slip: tuple[float, float] | None) -> Array:
+    """The impulse that Coulomb's law allows: friction is the point of its disk next to what is needed, or opposes a
     known slip."""
+    n, s, t = need.tolist()
     if n <= 0:
-        return 0.0, 0.0, 0.0
+        return np.zeros(3)
     limit = friction * n
     if slip is not None:
-        return n, -limit * slip[0], -limit * slip[1]
+        return np.array([n, -limit * slip[0], -limit * slip[1]])
     size = math.hypot(s, t)
-    return (n, s, t) if size <= limit else (n, s / size * limit, t / size * limit)
+    return need if size <= limit else np.array([n, s / size * limit, t / size * limit])
 
 
-def _projection_rate(n: float, s: float, t: float, friction: float, slip: tuple[float, float] | None) -> Array:
+def _projection_rate(need: Array, friction: float, slip: tuple[float, float] | None) -> Array:
     """Derivative of `_project` by (n, s, t), shape (3, 3)."""
+    n, s, t = need.tolist()
     if n <= 0:
         return np.zeros((3, 3))
     if slip is not None:
-        return np.array([[1.0, 0.0, 0.0], [-friction * slip[0], 0.0, 0.0], [-friction * slip[1], 0.0, 0.0]])
+        return np.outer([1.0, -friction * slip[0], -friction * slip[1]], [1.0, 0.0, 0.0])
     size = math.hypot(s, t)
     if size <= friction * n:
         return np.eye(3)
-    a, b, turn = s / size, t / size, friction * n / size
-    sideways = -turn * a * b
-    return np.array([[1.0, 0.0, 0.0], [friction * a, turn * b * b, sideways], [friction * b, sideways, turn * a * a]])
+    along = np.array([s, t]) / size
+    sideways = friction * n / size * (np.eye(2) - np.outer(along, along))
+    return np.block([[np.eye(1), np.zeros((1, 2))], [friction * along[:, None], sideways]])
 
 
 def unlocked(error: NotConvergedError, p: Parameters) -> Closed:
@@ -166,51 +175,3 @@ def unlocked(error: NotConvergedError, p: Parameters) -> Closed:
     if p.mu < 1 or p.eta < 1:
         raise error
     return Closed()
-
-
-@dataclass
-class Continuation:
-    """Pseudo-transient continuation (Kelley & Keyes, SIAM J. Numer. Anal. 35 (1998) 508) of sweeps.
-
-    A sweep takes the impulse b at B to f(b). The solution b = f(b) is a place of rest of db/dt = f(b) - b, whose
-    linearly implicit Euler steps, (1/span + 1 - f') db = f(b) - b, are damped sweeps for small spans and those
-    of the generalised Newton method for large ones. A success lengthens the span; a setback, a change that rises by
-    more than the attempt allows (`WARY`, `BOLD`), shortens it and makes its growth more careful from then on.
-    """
-
-    A: Closed
-    B: Closed
-    p: Parameters
-    _span: float = field(init=False, default=1.0)
-    _growth: float = field(init=False, default=8.0)
-    _last: float = field(init=False, default=math.inf)
-    _sweeps: int = field(init=False, default=0)
-
-    def next(self, u: Velocities, before: Forces, after: Forces, change: float) -> Forces:
-        """Impulses to start the next sweep from; the last took `before` to `after`, with velocities u."""
-        self._sweeps += 1
-        if self._sweeps <= PLAIN_SWEEPS:
-            return Forces(*after)
-        attempt, sweeps = divmod(self._sweeps, ATTEMPT)
-        if sweeps == 0:
-            self._span, self._growth = 1.0, 8.0
-        if change <= self._last * (BOLD if attempt % 2 else WARY):
-            self._span = min(self._span * self._growth, 1e10)
-        else:
-            # The rate of a sweep is of the order of mu eta at most: shorter spans damp no better.
-            least = 1 / (10 + self.p.mu * self.p.eta)
-            self._span, self._growth = max(self._span / 20, least), max(self._growth**0.7, 1.1)
-        self._last = change
-        matrix = (1 + 1 / self._span) * np.eye(3) - self._rate(u, after)
-        at_B = np.array(before[3:])
-        return Forces(*after[:3], *(at_B + np.linalg.solve(matrix, after[3:] - at_B)).tolist())
-
-    def _rate(self, u: Velocities, P: Forces) -> Array:
-        """f': how the impulse (n, s, t) at B after a sweep changes with that before it."""
-        p = self.p
-        # What a contact's unlimited impulses are changed by those (n, s, t) at the other: the same both ways.
-        k = 1 / (1 + p.j)
-        other = np.array([[0.0, -1.0, 0.0], [-p.j * k, k, 0.0], [0.0, 0.0, -p.j * k]])
-        at_A = _projection_rate(*_unlimited_A(u, P, self.A, p), p.mu, self.A.slip)
-        at_B = _projection_rate(*_unlimited_B(u, P, self.B, p), p.eta, self.B.slip)
-        return np.asarray(at_B @ other @ at_A @ other)
