@@ -60,7 +60,10 @@ class Classifier:
         count = min(len(A), len(B))
         if count:
             samples["case"][:count] = _CODES[A[:count], B[:count]]
-            self._note_changes(samples[:count])
+            time, case = samples["time"], samples["case"][:count].astype(int)
+            before = case[0] if self._states[0] == _UNKNOWN else _CODES[tuple(self._states)]
+            for k in np.flatnonzero(np.diff(case, prepend=before)):
+                self._changes.append((float(time[k]), int(case[k - 1] if k else before), int(case[k])))
             self._states = np.array([A[count - 1], B[count - 1]])
         self._samples, self._waiting = samples[count:], contacts[:, count:]
         return samples[:count]
@@ -93,12 +96,6 @@ class Classifier:
         rolls = (friction < (1 - _FREE) * limit) | (speed < band) | held
         contacts: npt.NDArray[np.intp] = np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
         return contacts
-
-    def _note_changes(self, done: npt.NDArray[np.void]) -> None:
-        case = done["case"].astype(int)
-        before = case[0] if self._states[0] == _UNKNOWN else _CODES[tuple(self._states)]
-        for k in np.flatnonzero(np.diff(case, prepend=before)):
-            self._changes.append((float(done["time"][k]), int(case[k - 1] if k else before), int(case[k])))
 
     @property
     def events(self) -> Events:

@@ -113,7 +113,10 @@ class Run:
 
     def __iter__(self) -> Iterator[Blocks]:
         done = 0
-        for raw in self._recalled():
+        blocks, state = self._journal.recall() if self._journal else (iter(()), {})
+        if state:
+            self._stepper.restore(state)
+        for raw in blocks:
             yield self._finish(done, raw)
             done += len(raw)
         size = max(1, min(BLOCK, BLOCK_STEPS // self._interval))
@@ -127,13 +130,6 @@ class Run:
                 self._journal.note(raw, self._stepper.state())
             yield self._finish(done, raw)
             done += len(raw)
-
-    def _recalled(self) -> Iterator[Array]:
-        """Raw samples (samples, runs, columns) that the journal knows; the simulations go on from there."""
-        blocks, state = self._journal.recall() if self._journal else (iter(()), {})
-        if state:
-            self._stepper.restore(state)
-        return blocks
 
     def _omega_0(self, first: int, stop: int) -> Iterator[Array]:
         """omega_0 (runs,) in the middle of each step."""

@@ -8,17 +8,13 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TypeVar
 
-import h5py
 import numpy as np
 
 from model.arrays import Array
 from model.files import WholeFile, make_directory, reading, remove_leftovers
-
-_T = TypeVar("_T")
 
 
 class Journal:
@@ -45,15 +41,12 @@ class Journal:
 
         Raises `StorageError`, the blocks when they are read, if a segment is damaged.
         """
-        blocks = (self._read(k, lambda file: file["samples"][...]) for k in range(self._count))
-        if self._count == 0:
-            return blocks, {}
-        state = self._read(self._count - 1, lambda file: {name: part[...] for name, part in file["state"].items()})
-        return blocks, state
+        return (self._read(k)[0] for k in range(self._count)), self._read(self._count - 1)[1] if self._count else {}
 
-    def _read(self, k: int, take: Callable[[h5py.File], _T]) -> _T:
+    def _read(self, k: int) -> tuple[Array, dict[str, Array]]:
+        """The samples of a segment, and the state after them."""
         with reading(self._path(k), f"remove {self._directory} to start anew") as file:
-            return take(file)
+            return file["samples"][...], {name: part[...] for name, part in file["state"].items()}
 
     def note(self, samples: Array, state: dict[str, Array]) -> None:
         """Keep a block of raw samples and the state after it; written once the interval has passed."""

@@ -54,14 +54,10 @@ def samples(time: Array, raw: Array, p: Parameters) -> npt.NDArray[np.void]:
     contacts = zip("AB", np.split(sensors, 2, axis=1), (x.y, x.h), slip_speeds(x.stacked(), p), strict=True)
     for contact, sensor, distance, speed in contacts:
         touches = sensor[:, _COUNT] > 0
-        block[f"force_{contact}"] = np.einsum("nab,nb->na", axes, _world_force(sensor))
+        force, normal, tangent = sensor[:, _FORCE, None], sensor[:, _NORMAL], sensor[:, _TANGENT]
+        in_world = force[:, 0] * normal + force[:, 1] * tangent + force[:, 2] * np.cross(normal, tangent)
+        block[f"force_{contact}"] = np.einsum("nab,nb->na", axes, in_world)
         # Apart, the engine has no contact to report on: the coordinates say how far, and how fast.
         block[f"gap_{contact}"] = np.where(touches, sensor[:, _DIST], distance)
         block[f"slip_speed_{contact}"] = np.where(touches, np.hypot(*sensor[:, _SLIP].T), speed)
     return block
-
-
-def _world_force(sensor: Array) -> Array:
-    normal, tangent = sensor[:, _NORMAL], sensor[:, _TANGENT]
-    force = sensor[:, _FORCE, None]
-    return force[:, 0] * normal + force[:, 1] * tangent + force[:, 2] * np.cross(normal, tangent)

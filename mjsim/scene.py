@@ -86,11 +86,8 @@ def _find(spec: Any, kind: str, name: str, scene: str | Path) -> Any:
 
 def _set_options(option: Any, p: Parameters, settings: ContactSettings) -> None:
     option.gravity = (0.0, 0.0, -p.g)
-    option.timestep = settings.timestep
-    option.impratio = settings.impratio
-    option.iterations = settings.iterations
-    option.tolerance = settings.tolerance
-    option.noslip_iterations = settings.noslip_iterations
+    for name in ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations"):
+        setattr(option, name, getattr(settings, name))
     option.cone = _CONES[settings.cone]
     option.integrator = _INTEGRATORS[settings.integrator]
 
