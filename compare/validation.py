@@ -13,13 +13,12 @@ from compare.claims.judge import judge, select
 from compare.figures.drawing import Material
 from compare.measure import programme, record
 from compare.measure.lab import Lab, Level
-from compare.measure.programme import Protocol
 from compare.measure.protocols import PROTOCOLS
 from compare.measure.record import Records
 from compare.measure.sets import sets as sets_of
 from compare.report import results
 from compare.report.results import Summary
-from compare.runs.campaign import Campaign, Progress
+from compare.runs.campaign import Campaign
 from compare.runs.engines import MUJOCO, Engine
 from compare.runs.progress import Show
 from compare.runs.workers import Workers
@@ -68,7 +67,7 @@ def validate(
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
     todo, verdicts, records = list(chosen), dict[str, Verdict](), Records()
     broken: dict[str, str] = {}
-    with Campaign(output / results.RUNS, workers, limit=limit, memory=HELD) as campaign:
+    with Campaign(output / results.RUNS, workers, limit=limit, memory=HELD, report=progress) as campaign:
         lab = Lab(campaign, engine, level)
         ahead = [p for p in programme.needed(PROTOCOLS, names) if p.level <= level]
         while True:
@@ -80,7 +79,7 @@ def validate(
             if not ahead:
                 break
             protocol = ahead.pop(0)
-            campaign.report = _progress(progress, protocol)
+            campaign.doing = f"measuring {protocol.name}"
             try:
                 records += programme.carry_out(protocol, lab, sets, records, kept)
             except StorageError:  # a full disk, or a file that was touched, is for the user to mend
@@ -88,7 +87,7 @@ def validate(
             except Exception as error:  # a protocol that breaks down takes its own claims with it, and no others
                 broken[protocol.name] = f"{protocol.name}: {type(error).__name__}: {error}"
         if level > Level.QUICK and claims is None:
-            progress("ladder of settings, error against cost", 0, 1, 0)
+            campaign.doing = "ladder of settings, error against cost"
             scores.write(campaign, output)
     files = [path for protocol in PROTOCOLS if (path := kept / f"{protocol.name}.h5").exists()]
     _write(output, level, files, report, verdicts)
@@ -141,7 +140,3 @@ def _verdict(judged: Verdict, broken: Mapping[str, str]) -> Verdict:
     """The verdict, or that one of the protocols of its claim broke down."""
     errors = [why for name, why in broken.items() if name in judged.claim.protocols]
     return replace(judged, outcome=Outcome.ERROR, error="; ".join(errors)) if errors else judged
-
-
-def _progress(show: Show, protocol: Protocol) -> Callable[[Progress], None]:
-    return lambda now: show(f"measuring {protocol.name}", now.done, now.total, now.failed)

@@ -19,8 +19,8 @@ from compare import pages
 from compare.commands import options, running
 from compare.runs.engines import EVENT
 from compare.runs.sweep import Axis, grid
-from compare.runs.tasks import Task, carry_out
-from model import InputError, Parameters, State, Trajectory
+from compare.runs.tasks import carry_out
+from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
 from model.kinematics import VARIABLES
@@ -42,61 +42,31 @@ def add(commands: options.Commands) -> None:
     command.add_argument(
         "--time", type=options.number, metavar="s", help=f"how long to follow a run at most (default {LASTING:g}/c)"
     )
-    command.add_argument(
-        "--vary",
-        action="append",
-        default=[],
-        metavar="NAME=FROM:TO:COUNT",
-        help="a range, or NAME=A,B,C; several: grid",
-    )
-    command.add_argument(
-        "--follow",
-        action="append",
-        default=[],
-        metavar="NAME=FROM:TO",
-        help="follow each periodic motion in a parameter, to where it is born and ends",
-    )
+    options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several: grid")
+    follow = "follow each periodic motion in a parameter, to where it is born and ends"
+    options.add_axes(command, "--follow", follow, "NAME=FROM:TO")
     command.add_argument("--page", type=Path, metavar="FILE", help="write the tables as Markdown, too")
-    command.add_argument("--json", action="store_true", help="print as JSON")
+    options.outputs(command, shown="print as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Find the attractors of every set of parameters, and show them."""
     axes, ways = ([Axis.parse(text) for text in texts] for texts in (args.vary, args.follow))
-    for way in ways:
-        if len(way.values) != 2:
-            raise InputError(f"a motion is followed over a range: write {way.name}=from:to")
+    ranges = {way.name: way.ends for way in ways}
     starts = np.array([running.start(args)]) if args.start else args.starts
 
     def simulate(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
-        task = Task(
-            engine=args.engine.name,
-            parameters=p,
-            x0=State.of(x0),
-            t_end=duration,
-            settings=running.settings(args, p),
-            sample_interval=interval,
-        )
-        return carry_out([task])[0]
+        return carry_out([running.task(args, p, x0=State.of(x0), t_end=duration, sample_interval=interval)])[0]
 
     rows = []
     for p in grid(options.parameters(args), axes):
         own = {} if args.engine is EVENT and running.settings(args, p) == EVENT.configure({}, p) else {"run": simulate}
         attractors = analytic.attractors(p, starts, seed=args.seed, lasting=args.time, **own)
-        branches = [
-            orbit_branch.follow(each.fate.orbit, way.name, way.values[0], way.values[1])
-            for each in attractors
-            if each.fate.orbit
-            for way in ways
-        ]
-        varied = {axis.name: getattr(p, axis.name) for axis in axes}
-        rows.append(
-            {
-                **varied,
-                "attractors": [attractor_data(each) for each in attractors],
-                "branches": [branch_data(each) for each in branches],
-            }
-        )
+        orbits = [each.fate.orbit for each in attractors if each.fate.orbit]
+        branches = [orbit_branch.follow(orbit, name, *ends) for orbit in orbits for name, ends in ranges.items()]
+        row: dict[str, Any] = {axis.name: getattr(p, axis.name) for axis in axes}
+        row |= {"attractors": list(map(attractor_data, attractors)), "branches": list(map(branch_data, branches))}
+        rows.append(row)
     data = {"engine": args.engine.name, "seed": args.seed, "sets": rows}
     if args.page:
         write_text(args.page, f"# {args.page.stem.capitalize()}: what balls come to\n\n{_page(data)}")

@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         check_writable(args.output)
     yours, others, described = _graded(args)
     with progress.shown(quiet=args.json) as show:
-        columns = grade.grade(yours, others, lambda name, done, total: show(f"grade {name}", done, total, 0))
+        columns = grade.grade(yours, others, show)
     if args.output:
         write_text(args.output, card.html(columns, described))
     if args.json:

@@ -5,13 +5,10 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from pathlib import Path
 
 from rich.console import Console
 
 from compare.commands import options, running
-from compare.runs import progress
-from compare.runs.campaign import Campaign
 from compare.runs.engines import ENGINES
 from model import InputError
 from model.files import make_directory, write_text
@@ -29,10 +26,8 @@ def add(commands: options.Commands) -> None:
     command.add_argument(
         "--engine", action="append", metavar="NAME", help=f"only this one (repeatable): {', '.join(ENGINES)}"
     )
-    command.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR")
     running.add_workers(command)
-    command.add_argument("--quiet", action="store_true", help="no progress")
-    command.add_argument("--json", action="store_true", help="print JSON")
+    options.outputs(command, "results")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -49,14 +44,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"dualball: {name} is left out: {why}", file=sys.stderr)
     make_directory(args.output)
     steps = league.QUICK if args.quick else league.STEPS
-    with (
-        progress.shown(quiet=args.quiet or args.json) as show,
-        Campaign(args.output / RUNS, running.workers(args), limit=args.limit) as campaign,
-    ):
-        campaign.report = lambda now: show("league", now.done, now.total, now.failed)
-        entries = league.measure(
-            campaign, those, steps, args.quick, lambda what, done, total: show(what, done, total, 0)
-        )
+    with running.campaign(args, "league", RUNS) as campaign:
+        entries = league.measure(campaign, those, steps, args.quick)
     data = league.to_mapping(those, entries)
     write_text(args.output / JSON, json.dumps(data, indent=1))
     write_text(args.output / PAGE, page.html(data))

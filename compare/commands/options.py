@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import json
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -22,6 +23,19 @@ def command(commands: Commands, name: str, run: Callable[[argparse.Namespace], i
     declared: Parser = commands.add_parser(name, help=summary, description=summary)
     declared.set_defaults(run=run)
     return declared
+
+
+def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any) -> None:
+    """An option, to be given once or more often, for `compare.runs.sweep.Axis`."""
+    parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})
+
+
+def outputs(parser: Parser, directory: str = "", shown: str = "print JSON") -> None:
+    """``--json``; and what all commands have that fill a directory: its name, workers' progress or none."""
+    if directory:
+        parser.add_argument("-o", "--output", type=Path, default=Path(directory), metavar="DIR")
+        parser.add_argument("--quiet", action="store_true", help="no progress")
+    parser.add_argument("--json", action="store_true", help=shown)
 
 
 def show(data: dict[str, Any], table: Callable[[dict[str, Any]], Any], as_json: bool) -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import argparse
 import math
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from compare.commands.options import given, number, parameters
-from compare.runs import engines
+from compare.commands.options import given, number
+from compare.runs import engines, progress
+from compare.runs.campaign import Campaign
 from compare.runs.engines import Settings
 from compare.runs.tasks import Task
 from compare.runs.workers import Workers, dask
@@ -78,10 +81,10 @@ def settings(args: argparse.Namespace, p: Parameters) -> Settings:
     return chosen.configured(given(args, ("timestep", "rtol", "restitution")), p)
 
 
-def task(args: argparse.Namespace, **more: Any) -> Task:
-    """The run that the options of `add_engine`, `add_start`, ``--time`` and the parameters describe."""
-    engine, p, x0 = args.engine.name, parameters(args), start(args)
-    return Task(engine=engine, parameters=p, x0=x0, t_end=args.time, settings=settings(args, p), **more)
+def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
+    """The run of a ball that the options of `add_engine`, `add_start` and ``--time`` describe."""
+    given = {"x0": start(args), "t_end": args.time, "settings": settings(args, p)} | more
+    return Task(engine=args.engine.name, parameters=p, **given)
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
@@ -92,6 +95,16 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     choice.add_argument("--workers", type=int, default=all_of_them, metavar="N", help=here)
     choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
     group.add_argument("--limit", type=number, default=math.inf, metavar="s", help="longest real time a run may take")
+
+
+@contextmanager
+def campaign(args: argparse.Namespace, doing: str, directory: str = "", **more: Any) -> Iterator[Campaign]:
+    """A campaign in a directory of ``--output`` by the workers that are named, whose progress is shown."""
+    with (
+        progress.shown(args.quiet or args.json) as show,
+        Campaign(args.output / directory, workers(args), limit=args.limit, report=show, doing=doing, **more) as made,
+    ):
+        yield made
 
 
 def workers(args: argparse.Namespace) -> int | Workers:

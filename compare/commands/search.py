@@ -13,31 +13,27 @@ from rich.markdown import Markdown
 from analytic.ensemble import interval
 from compare.commands import options, running
 from compare.runs import basins, progress, regions, search
-from compare.runs.campaign import Campaign
 from compare.runs.search import BOX, Search, Searched
+from compare.runs.sweep import Axis
 from compare.runs.workers import processes
 from model import InputError
 from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import POSITIVE, Range, check_names, check_number, parse_number
+from model.parameters import POSITIVE, Range, check_number
 
 
 def add(commands: options.Commands) -> None:
-    """Declare the command."""
+    """Declare the commands."""
     command = options.command(commands, "search", run, "where in parameter space the ball hops for ever, resumable")
     command.add_argument("--sets", type=int, default=500, metavar="N", help="parameter sets (default 500)")
     command.add_argument("--starts", type=int, default=5, metavar="N", help="random starts of each (default 5)")
     command.add_argument("--seed", type=int, default=0)
-    command.add_argument(
-        "--range", action="append", default=[], metavar="NAME=FROM:TO", help=f"part of the box; {', '.join(BOX)}"
-    )
-    command.add_argument("-o", "--output", type=Path, default=Path("search"), metavar="DIR")
+    options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
     running.add_workers(command)
     command.add_argument("--kept", action="store_true", help="show the results that come with the program instead")
     command.add_argument("--save", type=Path, metavar="FILE", help="write the sets with hopping as JSON")
     command.add_argument("--page", type=Path, metavar="FILE", help="write the table as Markdown")
-    command.add_argument("--json", action="store_true", help="print the sets with hopping as JSON")
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    options.outputs(command, "search", "print the sets with hopping as JSON")
 
     command = options.command(
         commands, "basins", plane, "what becomes of the ball from each start of a plane of states, resumable"
@@ -50,11 +46,9 @@ def add(commands: options.Commands) -> None:
         "--mujoco", type=int, default=0, metavar="N", help="MuJoCo, too, on every N-th point both ways"
     )
     command.add_argument("--timestep", type=options.number, default=2.5e-4, metavar="s", help="that of MuJoCo")
-    command.add_argument("-o", "--output", type=Path, default=Path("basins"), metavar="DIR")
     running.add_workers(command)
     command.add_argument("--save", type=Path, metavar="FILE", help="write the map as JSON")
-    command.add_argument("--json", action="store_true", help="print the shares as JSON")
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    options.outputs(command, "basins", "print the shares as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -74,39 +68,25 @@ def run(args: argparse.Namespace) -> int:
 def _searched(args: argparse.Namespace) -> Searched:
     count = int(check_number("sets", args.sets, "sets", Range(1, whole=True)))
     starts = int(check_number("starts", args.starts, "starts", Range(1, whole=True)))
-    box = dict(BOX) | dict(_range(text) for text in args.range)
+    units = dict.fromkeys(BOX, "1")
+    axes = [Axis.parse(text, units, "group", POSITIVE) for text in args.range]
     workers = running.workers(args)
     if workers == 0:
         raise InputError("workers = 0: a search needs processes; must be >= 1")
-    with progress.shown(quiet=args.quiet or args.json) as show:
-        pool = processes(workers) if isinstance(workers, int) else workers
-        searched = Search(box, starts, args.seed)
-        return search.run(args.output, searched, count, pool, lambda done, total: show("search", done, total, 0))
-
-
-def _range(text: str) -> tuple[str, tuple[float, float]]:
-    name, _, ends = text.partition("=")
-    check_names([name], list(BOX), "group")
-    low, separator, high = ends.partition(":")
-    if not separator:
-        raise InputError(f"{text!r} is no range: write {name}=from:to")
-    first, last = (parse_number(name, end, "1", POSITIVE) for end in (low, high))
-    if first >= last:
-        raise InputError(f"{name} = {first:g}:{last:g} is in the wrong order: a range runs from low to high")
-    return name, (first, last)
+    pool = processes(workers) if isinstance(workers, int) else workers
+    searched = Search(BOX | {axis.name: axis.ends for axis in axes}, starts, args.seed)
+    with progress.shown(args.quiet or args.json) as show:
+        return search.run(args.output, searched, count, pool, show)
 
 
 def plane(args: argparse.Namespace) -> int:
     """Map the basins and show their shares."""
     p = options.parameters(args)
     coarse = int(check_number("mujoco", args.mujoco, "points", Range(0, whole=True)))
-    given = p, running.start(args)._asdict(), _axis(args.across), _axis(args.up), coarse, args.timestep
-    with (
-        progress.shown(quiet=args.quiet or args.json) as show,
-        Campaign(args.output, running.workers(args), limit=args.limit) as campaign,
-    ):
-        campaign.report = lambda now: show("basins", now.done, now.total, now.failed)
-        mapped = basins.basins(campaign, *given)
+    units = dict(zip(VARIABLES, UNITS, strict=True))
+    across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
+    with running.campaign(args, "basins") as campaign:
+        mapped = basins.basins(campaign, p, running.start(args)._asdict(), across, up, coarse, args.timestep)
     if args.save:
         mapped.save(args.save)
     shares = {fate: mapped.share(fate) for fate in basins.FATES if mapped.share(fate)[0]}
@@ -122,12 +102,3 @@ def plane(args: argparse.Namespace) -> int:
             f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a boundary: {differ}"
         )
     return 0
-
-
-def _axis(text: str) -> tuple[str, float, float, int]:
-    name, _, rest = text.partition("=")
-    low, high, count = [*rest.split(":"), "", "", ""][:3]
-    check_names([name], VARIABLES, "state variable")
-    unit = UNITS[VARIABLES.index(name)]
-    points = parse_number(f"count of {name}", count, "points", Range(2, whole=True))
-    return name, parse_number(name, low, unit), parse_number(name, high, unit), int(points)

@@ -31,7 +31,7 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, keep what there is, and show it."""
-    task = running.task(args, flow=running.flow(args), sample_interval=args.sample_interval)
+    task = running.task(args, options.parameters(args), flow=running.flow(args), sample_interval=args.sample_interval)
     if args.output:
         check_writable(args.output)
     with tempfile.TemporaryDirectory() as scratch, interrupts() as interrupted:

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 from compare.commands import options, running
-from compare.runs import campaign, collection, progress, sweep
-from compare.runs.campaign import Campaign
+from compare.runs import campaign, collection, sweep
 from compare.runs.tasks import Task
+from model import Flow
 
 
 def add(commands: options.Commands) -> None:
@@ -18,18 +18,12 @@ def add(commands: options.Commands) -> None:
     command = options.command(commands, "sweep", run, "many runs over ranges of parameters, resumable")
     options.add_parameters(command)
     running.add_start(command)
-    command.add_argument(
-        "--vary",
-        action="append",
-        required=True,
-        metavar="NAME=FROM:TO:COUNT",
-        help="a range, or NAME=A,B,C; several make a grid",
-    )
+    options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
     command.add_argument("--random", type=int, metavar="N", help="N points that fill the ranges NAME=FROM:TO instead")
     command.add_argument("--seed", type=int, default=0)
     command.add_argument(
         "--direction",
-        choices=sweep.DIRECTIONS,
+        choices=("held", "up", "down", "both"),
         default="held",
         help="held: a run for each point; up, down, both: omega_0 in steps within one run (shows hysteresis)",
     )
@@ -38,11 +32,9 @@ def add(commands: options.Commands) -> None:
     )
     running.add_engine(command)
     command.add_argument("--time", type=options.number, default=30.0, metavar="s", help="duration (default 30)")
-    command.add_argument("-o", "--output", type=Path, default=Path("sweep"), metavar="DIR")
     running.add_workers(command)
     command.add_argument("--batch", type=int, default=campaign.BATCH, metavar="N", help="runs in one MuJoCo batch")
-    command.add_argument("--json", action="store_true", help="print a summary as JSON")
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    options.outputs(command, "sweep", "print a summary as JSON")
 
     command = options.command(commands, "collect", collect, "gather the runs of a directory into one file for xarray")
     command.add_argument("directory", type=Path, metavar="DIR")
@@ -52,11 +44,7 @@ def add(commands: options.Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out the runs that are not done yet and say which failed."""
     tasks = _tasks(args)
-    with (
-        progress.shown(quiet=args.quiet or args.json) as show,
-        Campaign(args.output, running.workers(args), args.batch, args.limit) as work,
-    ):
-        work.report = lambda now: show("sweep", now.done, now.total, now.failed)
+    with running.campaign(args, "sweep", batch=args.batch) as work:
         failures = work.complete(tasks)
     whole = len(tasks) - len(failures)
     if args.json:
@@ -71,13 +59,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _tasks(args: argparse.Namespace) -> list[Task]:
-    axes = [sweep.Axis.parse(text) for text in args.vary]
-    template = running.task(args)
+    """The runs, each with settings that suit its set."""
+    p, axes = options.parameters(args), [sweep.Axis.parse(text) for text in args.vary]
     if args.direction != "held":
-        return [sweep.staircase(template, sweep.levels(axes, args.direction), args.hold)]
-    if args.random is not None:
-        return sweep.held(template, sweep.random(template.parameters, axes, args.random, args.seed))
-    return sweep.held(template, sweep.grid(template.parameters, axes))
+        omegas = sweep.levels(axes, args.direction)
+        flow, lasts = Flow.staircase(omegas, args.hold), args.hold * len(omegas)
+        return [running.task(args, p.replace(omega_0=omegas[0]), flow=flow, t_end=lasts)]
+    sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
+    return [running.task(args, each) for each in sets]
 
 
 def collect(args: argparse.Namespace) -> int:

@@ -22,6 +22,7 @@ from analytic import Settings
 from analytic.simulation import start_state
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MOREAU, MUJOCO
+from compare.runs.sweep import Axis
 from compare.runs.tasks import Task
 from mjsim import ContactSettings
 from model import Case, Contact, InputError, Parameters, StorageError, Trajectory, storage
@@ -102,20 +103,25 @@ class Basins:
 
 
 def basins(
-    campaign: Campaign, p: Parameters, start: Mapping[str, float], across: tuple[str, float, float, int],
-    up: tuple[str, float, float, int], coarse: int = 0, timestep: float = 2.5e-4,
-) -> Basins:  # fmt: skip
-    """Fates of starts on a plane: two axes (variable, from, to, points), all other variables as in `start`, else zero.
+    campaign: Campaign,
+    p: Parameters,
+    start: Mapping[str, float],
+    across: Axis,
+    up: Axis,
+    coarse: int = 0,
+    timestep: float = 2.5e-4,
+) -> Basins:
+    """Fates of starts on a plane of two state variables, all others as in `start`, else zero.
 
     Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball can't start.
     """
-    check_names((*start, across[0], up[0]), VARIABLES, "state variable")
+    check_names((*start, across.name, up.name), VARIABLES, "state variable")
     if p.c == 0:
         raise InputError("c = 0 1/s: without drag a ball doesn't settle, and there are no basins")
-    x, y = np.linspace(*across[1:]), np.linspace(*up[1:])
+    x, y = np.array(across.values), np.array(up.values)
     base = np.array([start.get(name, 0.0) for name in VARIABLES])
     states = np.tile(base, (len(y), len(x), 1))
-    states[..., VARIABLES.index(across[0])], states[..., VARIABLES.index(up[0])] = x, y[:, None]
+    states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
     fine_settings = Settings(method=MOREAU.name, step=math.sqrt(p.R / p.g) / STEPS)
     fine = _tasks(states, MOREAU.name, p, fine_settings)
@@ -124,7 +130,7 @@ def basins(
     files = [None if task.key in broken else campaign.path(task) for task in tasks]
     fates = np.array([_fate(storage.load(file)) if file else FATES.index("undecided") for file in files])
     by_stepping, by_mujoco = fates[: len(fine)].reshape(states.shape[:2]), fates[len(fine) :].reshape(few.shape[:2])
-    return Basins(p, tuple(base.tolist()), across[0], up[0], x, y, by_stepping, coarse, by_mujoco, timestep)
+    return Basins(p, tuple(base.tolist()), across.name, up.name, x, y, by_stepping, coarse, by_mujoco, timestep)
 
 
 def _tasks(states: Array, engine: str, p: Parameters, settings: Settings | ContactSettings) -> Sequence[Task]:

@@ -11,13 +11,14 @@ import json
 import math
 import os
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from compare.runs.progress import Show
 from compare.runs.tasks import Outcome, OutOfTimeError, Task, failed_path, store
 from compare.runs.workers import Workers, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
@@ -39,15 +40,6 @@ class Failure:
     reason: str
 
 
-@dataclass(frozen=True)
-class Progress:
-    """Where a campaign stands, handed to the callback after every batch."""
-
-    done: int
-    total: int
-    failed: int
-
-
 @dataclass
 class Campaign:
     """A directory of runs and the workers that fill it; a context manager.
@@ -59,7 +51,8 @@ class Campaign:
     batch : most runs in one MuJoCo batch
     limit : longest time a run may take, s; a run that takes longer is reported as failed
     memory : most samples of new runs that are kept in memory, so that `run` needn't read them from their files
-    report : called with a `Progress` after every batch
+    report : called after every batch with `doing`, and how many runs are done, in all, and failed
+    doing : what the campaign is about
     """
 
     directory: Path
@@ -67,7 +60,8 @@ class Campaign:
     batch: int = BATCH
     limit: float = math.inf
     memory: int = 0
-    report: Callable[[Progress], None] = lambda progress: None
+    report: Show = lambda what, done, total, failed: None
+    doing: str = ""
 
     def __post_init__(self) -> None:
         if isinstance(self.workers, int):
@@ -128,11 +122,11 @@ class Campaign:
             elif self.path(task).name not in there:
                 todo.append(task)
         done = len(unique) - len(todo) - len(failures)
-        self.report(Progress(done, len(unique), len(failures)))
+        self.report(self.doing, done, len(unique), len(failures))
         for finished, failed in self._carry_out(_batches(todo, self.batch, self._workers)):
             done += finished
             failures += failed
-            self.report(Progress(done, len(unique), len(failures)))
+            self.report(self.doing, done, len(unique), len(failures))
         self._failed |= {failure.task.key: failure for failure in failures}
         if self._failed or (self.directory / FAILURES).exists():
             write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))

@@ -14,7 +14,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +24,8 @@ import numpy as np
 
 from analytic import hopping
 from compare.runs.engines import EVENT
+from compare.runs.progress import Show
+from compare.runs.sweep import sobol
 from compare.runs.tasks import sources
 from compare.runs.workers import Workers
 from model import Parameters, SimulationError, StorageError
@@ -60,15 +62,10 @@ class Search:
 
     def points(self, count: int) -> Array:
         """The first `count` points, shape (count, 6), in the order of `BOX`."""
-        from scipy.stats import qmc  # slow to import
-
-        unit = qmc.Sobol(len(BOX), rng=np.random.default_rng(self.seed)).random_base2(
-            max(1, math.ceil(math.log2(count)))
-        )[:count]
         low, high = np.array([self.box[name] for name in BOX]).T
         log = np.array([name in LOGARITHMIC for name in BOX])
         low, high = np.where(log, np.log(low), low), np.where(log, np.log(high), high)
-        spread = low + unit * (high - low)
+        spread = low + sobol(len(BOX), count, self.seed) * (high - low)
         return np.asarray(np.where(log, np.exp(spread), spread))
 
 
@@ -152,24 +149,21 @@ class Searched:
             raise StorageError(f"{path} holds no search: {error}") from error
 
 
-def run(directory: Path, search: Search, count: int, workers: Workers, report: Callable[[int, int], None]) -> Searched:
-    """Search `count` sets, rounded up to whole chunks; finished chunks are read.
-
-    `report` is called with the numbers of sets that are done and wanted.
-    """
+def run(directory: Path, search: Search, count: int, workers: Workers, show: Show) -> Searched:
+    """Search `count` sets, rounded up to whole chunks; finished chunks are read."""
     make_directory(directory)
     chunks = math.ceil(count / CHUNK)
     points = search.points(chunks * CHUNK).reshape(chunks, CHUNK, -1)
     paths = [directory / f"{search.key(chunk)}.json" for chunk in range(chunks)]
     todo = [chunk for chunk in range(chunks) if not paths[chunk].exists()]
     done = chunks - len(todo)
-    report(done * CHUNK, chunks * CHUNK)
+    show("search", done * CHUNK, chunks * CHUNK, 0)
     executor, at_once = workers.start(), True
     try:
         for future in as_completed(executor.submit(carry_out, search, k, points[k], paths[k]) for k in todo):
             future.result()
             done += 1
-            report(done * CHUNK, chunks * CHUNK)
+            show("search", done * CHUNK, chunks * CHUNK, 0)
         at_once = False
     finally:
         workers.stop(executor, at_once)

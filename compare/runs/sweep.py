@@ -1,51 +1,55 @@
-"""Designs: which parameters to vary, and the tasks that follow."""
+"""Designs: which parameters to vary, and the sets that follow."""
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from compare.runs.tasks import Task
-from model import Flow, InputError, Parameters
-from model.parameters import Range, check_names, check_number, parse_number
+from model import InputError, Parameters
+from model.arrays import Array
+from model.parameters import ANY, Range, check_names, check_number, parse_number
 
-FIELDS = tuple(field.name for field in Parameters.quantities())
-DIRECTIONS = ("held", "up", "down", "both")
+FIELDS = {field.name: field.metadata["unit"] for field in Parameters.quantities()}
+"""Units of the parameters."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A parameter and its values in order, or the two ends of its range where values are drawn at random."""
+    """A quantity and its values in order, or the two ends of its range."""
 
     name: str
     values: tuple[float, ...]
 
     @classmethod
-    def parse(cls, text: str) -> Axis:
+    def parse(cls, text: str, units: Mapping[str, str] = FIELDS, kind: str = "parameter", allowed: Range = ANY) -> Axis:
         """Read ``name=from:to:count``, ``name=from:to`` or ``name=a,b,c``; raises `InputError`."""
         name, _, rest = text.partition("=")
-        check_names([name], FIELDS, "parameter")
-        unit = Parameters.__dataclass_fields__[name].metadata["unit"]
+        check_names([name], list(units), kind)
         if ":" not in rest:
-            return cls(name, tuple(parse_number(name, part, unit) for part in rest.split(",")))
+            return cls(name, tuple(parse_number(name, part, units[name], allowed) for part in rest.split(",")))
         low, high, *count = rest.split(":")
         if len(count) > 1:
             raise InputError(f"{text!r} is no range: write {name}=from:to:count")
-        first, last = (parse_number(name, end, unit) for end in (low, high))
+        first, last = (parse_number(name, end, units[name], allowed) for end in (low, high))
         if first >= last:
             raise InputError(
-                f"{name} = {first:g}:{last:g} {unit} is in the wrong order: a range runs from low to high "
-                "(to sweep downwards choose --direction down)"
+                f"{name} = {first:g}:{last:g} {units[name]} is in the wrong order: a range runs from low to high"
             )
         if not count:
             return cls(name, (first, last))
         points = int(parse_number(f"count of {name}", count[0], "points", Range(2, whole=True)))
         return cls(name, tuple(np.linspace(first, last, points).tolist()))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Of the range; raises `InputError` if there is none."""
+        if len(self.values) != 2:
+            raise InputError(f"here {self.name} needs a range: write {self.name}=from:to")
+        return self.values[0], self.values[1]
 
 
 def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
@@ -55,17 +59,19 @@ def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
 
 
 def random(p: Parameters, axes: Sequence[Axis], count: int, seed: int) -> Iterator[Parameters]:
-    """`count` points that fill the box of the axes' ranges evenly (scrambled Sobol sequence)."""
-    from scipy.stats import qmc  # slow to import, and only needed here
-
+    """`count` points that fill the box of the axes' ranges evenly."""
     check_number("random", count, "points", Range(1, whole=True))
-    for axis in axes:
-        if len(axis.values) != 2:
-            raise InputError(f"a random design needs a range for {axis.name}: write {axis.name}=from:to")
-    low, high = (np.array(end) for end in zip(*(axis.values for axis in axes), strict=True))
-    unit = qmc.Sobol(len(axes), rng=np.random.default_rng(seed)).random(2 ** math.ceil(math.log2(count)))
-    for row in (low + unit[:count] * (high - low)).tolist():
+    low, high = np.array([axis.ends for axis in axes]).T
+    for row in (low + sobol(len(axes), count, seed) * (high - low)).tolist():
         yield p.replace(**dict(zip((axis.name for axis in axes), row, strict=True)))
+
+
+def sobol(dimensions: int, count: int, seed: int) -> Array:
+    """The first `count` points (count, dimensions) of a scrambled Sobol sequence in the unit cube."""
+    from scipy.stats import qmc  # slow to import
+
+    unit = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(2 ** math.ceil(math.log2(count)))
+    return np.asarray(unit[:count])
 
 
 def levels(axes: Sequence[Axis], direction: str) -> list[float]:
@@ -74,14 +80,3 @@ def levels(axes: Sequence[Axis], direction: str) -> list[float]:
         raise InputError(f"direction = {direction!r} sweeps omega_0 within one run: vary omega_0 and nothing else")
     up = sorted(axes[0].values)
     return {"up": up, "down": up[::-1], "both": up + up[-2::-1]}[direction]
-
-
-def held(template: Task, points: Iterator[Parameters]) -> list[Task]:
-    """A run of its own at every point."""
-    return [dataclasses.replace(template, parameters=p) for p in points]
-
-
-def staircase(template: Task, omegas: Sequence[float], hold: float) -> Task:
-    """One run that holds each omega_0 for `hold` seconds."""
-    p, flow = template.parameters.replace(omega_0=omegas[0]), Flow.staircase(omegas, hold)
-    return dataclasses.replace(template, parameters=p, flow=flow, t_end=hold * len(omegas))

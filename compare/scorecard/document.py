@@ -82,9 +82,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     check_choice("page", args.page.name, list(PAGES))
     runs, tables = PAGES[args.page.name]
     check_names(args.only or (), list(tables), "table")
-    with progress.shown() as show, Campaign(args.output / runs, args.workers) as campaign:
+    with progress.shown() as show, Campaign(args.output / runs, args.workers, report=show) as campaign:
         for name in args.only or tables:
-            campaign.report = lambda now, what=name: show(what, now.done, now.total, now.failed)  # type: ignore[misc]
+            campaign.doing = name
             write(args.page, name, tables[name](campaign))
     return 0
 

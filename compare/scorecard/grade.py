@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 import analytic
+from compare.runs.progress import Show
 from compare.runs.tasks import carry_out
 from compare.scorecard import trials
 from compare.scorecard.advice import advice
@@ -83,7 +84,7 @@ class Column:
 def grade(
     yours: Native | None,
     others: Sequence[Contender | Other] = (OURS, PLAIN, NEWCOMER),
-    progress: Callable[[str, int, int], None] = lambda name, done, total: None,
+    show: Show = lambda what, done, total, failed: None,
 ) -> list[Column]:
     """Columns of the score card: the given settings first, with advice, then the others.
 
@@ -93,7 +94,7 @@ def grade(
     contenders = [*given, *others]
     columns = []
     for k, (contender, cost) in enumerate(zip(contenders, costs(contenders), strict=True)):
-        progress(contender.name, k, len(contenders))
+        show(f"grade {contender.name}", k, len(contenders), 0)
         columns.append(_column(contender, cost))
     if yours:
         ours = columns[0]

@@ -37,8 +37,6 @@ REPEATS = 3
 """Cost is the median of as many timings."""
 CREEP, ROLLING_ENDS, WALL, CASES, COST = "creep (m/s)", "ω₀₁", "ω₀₂", "cases (of 9)", "cost"
 Runs = Sequence[Trajectory]
-Show = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
 
 
 @dataclass(frozen=True)
@@ -109,17 +107,13 @@ def _prism(step: float | None) -> Settings:
 
 
 def measure(
-    campaign: Campaign,
-    those: Sequence[Contestant],
-    steps: Sequence[float] = STEPS,
-    quick: bool = False,
-    show: Show = lambda what, done, total: None,
+    campaign: Campaign, those: Sequence[Contestant], steps: Sequence[float] = STEPS, quick: bool = False
 ) -> list[Entry]:
     """The entries of all contestants that are installed; runs that are there already aren't repeated."""
     asked = [discipline for discipline in DISCIPLINES if discipline.quick or not quick]
     those = [each for each in those if not each.engine.missing]
     starters = [(each, step) for each in those for step in (steps if "timestep" in each.engine.options else [None])]
-    return scored(campaign, starters, asked, cost, show)
+    return scored(campaign, starters, asked, cost)
 
 
 def scored(
@@ -127,7 +121,6 @@ def scored(
     starters: Sequence[tuple[Contestant, float | None]],
     asked: Sequence[Discipline],
     cost: Callable[[Task], float] | None = None,
-    show: Show = lambda what, done, total: None,
 ) -> list[Entry]:
     """What contestants reach with a time step each in some disciplines, and what a run takes by `cost`, if given."""
     tasks = {
@@ -140,7 +133,7 @@ def scored(
     }
     entries = []
     for number, (each, step) in enumerate(starters):
-        show(f"cost of {each.name}", number, len(starters))
+        campaign.report(f"cost of {each.name}", number, len(starters), 0)
         entry = Entry(each.name, step)
         for discipline in asked:
             row = tasks[each.name, step, discipline.name]

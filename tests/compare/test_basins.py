@@ -9,6 +9,7 @@ from analytic import stable_solutions
 from compare.commands import cli
 from compare.runs.basins import FATES, Basins, basins
 from compare.runs.campaign import Campaign
+from compare.runs.sweep import Axis
 from model import InputError, Parameters, StorageError
 
 BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
@@ -32,9 +33,10 @@ def made_up(fates, mujoco=((0, 0), (0, 0)), coarse=2) -> Basins:
 def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(tmp_path):
     """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both engines alike."""
     assert {s.case.name for s in stable_solutions(BISTABLE)} == {"SS", "SR", "NR"}
-    given, seen, maps = (BISTABLE, {"y": 0.002}, ("omega_c", 5.0, 45.0, 3), ("slip_x", -1.0, 1.0, 2), 2), [], []
+    given = BISTABLE, {"y": 0.002}, Axis("omega_c", (5.0, 25.0, 45.0)), Axis("slip_x", (-1.0, 1.0)), 2
+    seen, maps = [], []
     for _ in range(2):
-        with Campaign(tmp_path, workers=0, report=lambda now: seen.append(now.done)) as campaign:
+        with Campaign(tmp_path, workers=0, report=lambda what, done, total, failed: seen.append(done)) as campaign:
             maps.append(basins(campaign, *given))
         next(tmp_path.glob("*.h5")).unlink()  # as if it had been killed before the last run was whole
     assert (seen[0], seen[-2:]) == (0, [7, 8])
@@ -48,9 +50,8 @@ def test_a_ball_that_hops_on(tmp_path):
     """From states near the top of the hop."""
     p = Parameters.named("hopping")
     with Campaign(tmp_path, workers=0) as campaign:
-        basin = basins(
-            campaign, p, {"omega_c": 57.3, "slip_x": -106.0}, ("y", 6.36e-3, 6.4e-3, 2), ("v_y", 0.0, 1e-3, 2)
-        )
+        axes = Axis("y", (6.36e-3, 6.4e-3)), Axis("v_y", (0.0, 1e-3))
+        basin = basins(campaign, p, {"omega_c": 57.3, "slip_x": -106.0}, *axes)
     assert {FATES[k] for k in basin.fates.ravel()} == {"hops"}
 
 
@@ -88,7 +89,7 @@ def test_kept_as_a_file(tmp_path):
 )
 def test_bad_input(changes, start, message, tmp_path):
     with pytest.raises(InputError, match=message), Campaign(tmp_path, workers=0) as campaign:
-        basins(campaign, BISTABLE.replace(**changes), start, ("omega_c", 0.0, 1.0, 2), ("slip_x", 0.0, 1.0, 2))
+        basins(campaign, BISTABLE.replace(**changes), start, Axis("omega_c", (0, 1)), Axis("slip_x", (0, 1)))
 
 
 def test_command(capsys, tmp_path):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.runs.campaign import FAILURES, Campaign, Failure, Progress, run_batch
+from compare.runs.campaign import FAILURES, Campaign, Failure, run_batch
 from compare.runs.tasks import Task
 from compare.runs.workers import dask
 from model import InputError, Parameters, SimulationError, StorageError, storage
@@ -50,13 +50,13 @@ def test_workers_and_batches_change_no_bit(tmp_path: Path, undisturbed, workers:
 
 
 def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
-    seen: list[Progress] = []
-    with Campaign(tmp_path, workers=0, report=seen.append) as campaign:
+    seen: list[tuple[object, ...]] = []
+    with Campaign(tmp_path, workers=0, report=lambda *now: seen.append(now), doing="it") as campaign:
         campaign.complete(tasks(3))
         before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
         campaign.complete(tasks(4))
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}.items()
-    assert seen[-1] == Progress(4, 4, 0)
+    assert seen[-1] == ("it", 4, 4, 0)
 
 
 @pytest.mark.parametrize("workers", [0, 1])
@@ -120,8 +120,8 @@ def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path: Path) ->
 def test_a_killed_worker_costs_its_runs_in_flight_only(tmp_path: Path, undisturbed) -> None:
     killed = []
 
-    def kill_one(now: Progress) -> None:
-        if not killed and now.done:
+    def kill_one(doing: str, done: int, total: int, failed: int) -> None:
+        if not killed and done:
             processes = list(campaign._executor._processes)
             killed.append(processes[0])
             os.kill(processes[0], signal.SIGKILL)
@@ -248,8 +248,8 @@ def test_dask_gives_the_same_bits(tmp_path: Path, undisturbed, scheduler) -> Non
 def test_a_killed_dask_worker_does_not_stop_the_campaign(tmp_path: Path, undisturbed, scheduler) -> None:
     killed = []
 
-    def kill_one(now: Progress) -> None:
-        if not killed and now.done:
+    def kill_one(doing: str, done: int, total: int, failed: int) -> None:
+        if not killed and done:
             killed.append(next(iter(scheduler.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)
 

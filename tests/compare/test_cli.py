@@ -14,6 +14,7 @@ import xarray
 
 from compare.commands import cli
 from compare.runs.sweep import FIELDS
+from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
 from model.trajectory import columns
 
@@ -130,6 +131,18 @@ def test_sweep_and_collect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     capsys.readouterr()
     assert cli.main(["sweep", "--vary", "eta=0.1:0.5", "--random", "3", "--json", *where]) == 0
     assert json.loads(capsys.readouterr().out)["whole"] == 3
+
+
+@pytest.mark.parametrize("design", [["--vary", "eta=0.1,0.5"], ["--vary", "eta=0.1:0.5", "--random", "2"]])
+def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path: Path, design: list[str]) -> None:
+    """Fast contacts would chatter where mu eta is large; on the other set they are the defaults."""
+    given = ["--mu", "0.5", "--timestep", "0.002", "--time", "0.05", "--workers", "0", "-o", str(tmp_path)]
+    assert cli.main(["sweep", *design, *given]) == 0
+    headers = [storage.load(path).header for path in tmp_path.glob("*.h5")]
+    for header in headers:
+        suited = ContactSettings.at(0.002).suited(header.parameters)
+        assert tuple(header.settings["solref"]) == suited.solref
+    assert len({tuple(header.settings["solref"]) for header in headers}) == 2
 
 
 def test_a_run_that_diverges_is_kept_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -252,7 +265,7 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str], name: str) -> Non
         ("sweep --vary eta=0.1,0.2 --limit 0", "limit = 0 s is out of range: must be > 0"),
         ("sweep --vary omega_0=a:b:3", "omega_0 = 'a' must be a number in rad s-1"),
         ("sweep --vary eta=0.1:0.2:3 --direction up", "vary omega_0 and nothing else"),
-        ("sweep --vary eta=0.1,0.2,0.3 --random 4", "a random design needs a range for eta"),
+        ("sweep --vary eta=0.1,0.2,0.3 --random 4", "here eta needs a range: write eta=from:to"),
         ("collect absent", "cannot read absent: there is no such directory"),
         ("inspect absent.h5", "cannot read absent.h5: there is no such file"),
         ("inspect broken.toml", "cannot read broken.toml: it is not an HDF5 file"),
@@ -267,7 +280,7 @@ def test_mistakes(
     monkeypatch.chdir(tmp_path)
     Path("broken.toml").write_text("m = ")
     Path("unknown.toml").write_text("muu = 0.2")
-    Path("text.toml").write_text("m = 'heavy'\n" + "".join(f"{k} = 0.1\n" for k in FIELDS[1:]))
+    Path("text.toml").write_text("m = 'heavy'\n" + "".join(f"{k} = 0.1\n" for k in list(FIELDS)[1:]))
     before = sorted(Path().iterdir())
     assert says in refused(capsys, *argv.split())
     assert sorted(Path().iterdir()) == before  # and nothing is left half written

@@ -48,8 +48,8 @@ def test_a_search_goes_on_where_it_stopped(tmp_path):
     rows = [{"hops": 0, "failed": 0}] * (search.CHUNK - 1) + [{"hops": 1, "failed": 1, "x": [], "confirmed": None}]
     path.write_text(json.dumps({"chunk": 0, "rows": rows}), "utf-8")
     seen = []
-    record = search.run(tmp_path, QUICK, 10, processes(1), lambda done, total: seen.append((done, total)))
-    assert seen == [(search.CHUNK, search.CHUNK)]
+    record = search.run(tmp_path, QUICK, 10, processes(1), lambda *now: seen.append(now))
+    assert seen == [("search", search.CHUNK, search.CHUNK, 0)]
     assert (record.sets, record.failed, len(record.rows), record.confirmed) == (search.CHUNK, 1, 1, [])
     assert record.rows[0]["mu"] == points[-1, 0]
 
