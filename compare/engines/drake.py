@@ -13,17 +13,16 @@ boxes are less exact, but one among a dozen of other shapes crashes the engine.
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from compare.engines.loop import BreakdownError, Scene, Touch, tangents
+from compare.engines import adapter
+from compare.engines.adapter import BreakdownError, Floats, Scene, Touch, number, tangents
 from model import Parameters
 from model.arrays import Array
-from model.parameters import POSITIVE, Range, check_choice, check_number
+from model.parameters import Range, check_choice
 
 _APPROXIMATIONS = {"tamsi": "kTamsi", "sap": "kSap", "lagged": "kLagged", "similar": "kSimilar"}
 _SIZE = 100.0
@@ -31,14 +30,10 @@ _SIZE = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class Settings(adapter.Settings):
     """The engine's settings: by default the best known, massless joints, TAMSI, stiff contacts and a low v_s."""
 
-    timestep: float = 1e-3
-    """s"""
-    coordinates: str = "joints"
-    """``joints``, or ``free`` for a free ball."""
-    facets: int = 1
+    facets: int = number(1, "planes", Range(1, whole=True))
     """Planes that make up the wall."""
     approximation: str = "tamsi"
     """`discrete_contact_approximation`."""
@@ -47,25 +42,18 @@ class Settings:
     dissipation: float | None = 100.0
     """Of each of them, s/m; None for the engine's own. A ball that has landed comes out of its overlap at up to the
     reciprocal: with less it is thrown back, with more it stays sunk in for long."""
-    stiction: float = 1e-8
+    stiction: float = number(1e-8, "m s-1")
     """`stiction_tolerance` v_s, m s-1. With a hundredth of it TAMSI fails when a ball that rolls on both contacts lifts
     off the floor, and so it does at the first step with a ten times larger v_s and stiffness."""
 
     def __post_init__(self) -> None:
-        check_number("timestep", self.timestep, "s", POSITIVE)
-        check_choice("coordinates", self.coordinates, ("joints", "free"))
-        check_number("facets", self.facets, "planes", Range(1, whole=True))
+        super().__post_init__()
         check_choice("approximation", self.approximation, tuple(_APPROXIMATIONS))
-        check_number("stiction", self.stiction, "m s-1", POSITIVE)
 
     @property
-    def memory(self) -> bool:
-        """Nothing corrects for regularised friction."""
-        return False
-
-    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
-        """The stiction tolerance, and for round-off at least 1e-9 m s-1."""
-        return np.full(np.shape(load), max(self.stiction, 1e-9))
+    def resolution(self) -> float:
+        """The stiction tolerance."""
+        return self.stiction
 
 
 def newcomer(timestep: float) -> Settings:
@@ -124,8 +112,8 @@ class _Plant(Scene):
         size = _SIZE * (p.R + p.r)
         surface(ball, engine.RigidTransform(), engine.Sphere(p.r), "ball", most)
         self._floor = plane("floor", np.zeros(3), np.array([0.0, 0.0, 1.0]), p.mu)
-        for number, (place, normal) in enumerate(tangents(p, settings.facets)):
-            plane(f"wall{number}", place, normal, p.eta)
+        for k, (place, normal) in enumerate(tangents(p, settings.facets)):
+            plane(f"wall{k}", place, normal, p.eta)
         plant.Finalize()
         plant.set_stiction_tolerance(settings.stiction)
         self._diagram = builder.Build()
@@ -136,13 +124,13 @@ class _Plant(Scene):
         self._ball = ball.index()
         self._state: Array = np.empty(0)
 
-    def start(self, place: Sequence[float], velocity: Sequence[float]) -> None:
+    def start(self, place: Floats, velocity: Floats) -> None:
         if self._joints:
             self._state = np.array([*place, 0.0, 0.0, 0.0, *velocity])
         else:
             self._state = np.array([1.0, 0.0, 0.0, 0.0, *place, *velocity[3:], *velocity[:3]])
 
-    def advance(self, force: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+    def advance(self, force: Floats) -> tuple[Floats, Floats]:
         if self._joints:
             self._state[0], self._state[3:6], forces = 0.0, 0.0, [*force, 0.0, 0.0, 0.0]
         else:

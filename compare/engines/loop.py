@@ -14,17 +14,17 @@ The engine is driven by -m c(|w|) w (9) alone, with the velocity w relative to t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from compare.engines.dependency import Library
+from compare.engines.adapter import BreakdownError, Floats, Library, Scene, Settings
 from mjsim import limits, recorder
-from mjsim.classify import Classifier, Regularised
+from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
 from model import Flow, Header, Parameters, State, Trajectory
@@ -35,58 +35,6 @@ from model.trajectory import SAMPLE, current_versions
 
 _HUGE = 1e8
 """A coordinate, velocity or force beyond this, in SI units, has diverged."""
-_Floats = Sequence[float]
-
-
-class Touch(NamedTuple):
-    """What a contact point of the engine carried in the last step."""
-
-    contact: int
-    """0 for the floor (A), 1 for the wall (B)."""
-    force: Array
-    """On the ball, in the axes of the scene, shape (3,), N."""
-    gap: float
-    """m"""
-
-
-class Scene(Protocol):
-    """A ball in an engine. Its axes are the world's; on joints, those in which the azimuth is zero."""
-
-    def start(self, place: _Floats, velocity: _Floats) -> None:
-        """Put the ball somewhere: what the three and six numbers are, its `Coordinates` say."""
-
-    def advance(self, force: _Floats) -> tuple[_Floats, _Floats]:
-        """Take a step under a (generalised) force of three components; return place and velocity after it.
-
-        On joints the azimuth in `place` is that of this step alone. Raises `BreakdownError`.
-        """
-
-    def touches(self) -> list[Touch]:
-        """The contact points of the last step."""
-
-    def close(self) -> None:
-        """Give up what the engine holds."""
-
-
-class BreakdownError(RuntimeError):
-    """The engine can't take the next step."""
-
-
-class Numbers(Regularised, Protocol):
-    """What the loop needs of any engine's settings, a dataclass."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    def timestep(self) -> float:
-        """s"""
-
-    @property
-    def coordinates(self) -> str:
-        """A name of `COORDINATES`."""
-
-
-N = TypeVar("N", bound=Numbers)
 
 
 @dataclass(frozen=True)
@@ -94,9 +42,9 @@ class Coordinates:
     """What place and velocity of a scene are."""
 
     start: Callable[[State, Parameters], tuple[Array, Array]]
-    drag: Callable[[_Floats, _Floats, float, Ball], _Floats]
+    drag: Callable[[Floats, Floats, float, Ball], Floats]
     """The force of the fluid at a place, a velocity and an omega_0."""
-    azimuth: Callable[[float, _Floats], float]
+    azimuth: Callable[[float, Floats], float]
     """The azimuth, not wrapped, from that before the step."""
     states: Callable[[Array, Array, Parameters], State]
     """States of places (n, 3) and velocities (n, 6)."""
@@ -109,7 +57,7 @@ def _joint_start(x: State, p: Parameters) -> tuple[Array, Array]:
     return qpos[:3], qvel @ _SPIN.T
 
 
-def _joint_drag(place: _Floats, velocity: _Floats, omega_0: float, ball: Ball) -> _Floats:
+def _joint_drag(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
     rho, (omega_c, v_h, v_y, *_) = ball.R - place[1], velocity
     along = rho * (omega_c - omega_0)
     mc = resistance(along, v_h, v_y, ball)
@@ -126,7 +74,7 @@ def _free_start(x: State, p: Parameters) -> tuple[Array, Array]:
     return motion.position, np.concatenate([motion.velocity, motion.spin])
 
 
-def _free_drag(place: _Floats, velocity: _Floats, omega_0: float, ball: Ball) -> _Floats:
+def _free_drag(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
     (x, y, _), (v_x, v_y, v_z, *_) = place, velocity
     w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
     mc = resistance(w_x, w_y, v_z, ball)
@@ -156,12 +104,12 @@ COORDINATES = {"joints": JOINTS, "free": FREE}
 def simulate(
     engine: str,
     library: Library,
-    build: Callable[[Any, Parameters, N], Scene],
+    build: Callable[[Any, Parameters, Any], Scene],
     p: Parameters,
     x0: npt.ArrayLike,
     t_end: float,
     flow: Flow,
-    settings: N,
+    settings: Settings,
     sample_interval: float | None,
     progress: Callable[[float], None],
 ) -> Trajectory:
@@ -217,8 +165,8 @@ class _Run:
     scene: Scene
     coordinates: Coordinates
     ball: Ball
-    place: _Floats
-    velocity: _Floats
+    place: Floats
+    velocity: Floats
     theta: float = 0.0
 
     def sample(self, row: Array, omega_0: list[float]) -> None:
@@ -254,9 +202,3 @@ def _samples(time: Array, rows: Array, coordinates: Coordinates, p: Parameters) 
         block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], distance)
         block[f"slip_speed_{name}"] = speed
     return block
-
-
-def tangents(p: Parameters, facets: int) -> list[tuple[Array, Array]]:
-    """Places and inward normals, each (3,), of planes tangent to the vessel's wall, from azimuth 0 round."""
-    normals = [-np.array([math.cos(a), math.sin(a), 0.0]) for a in math.tau * np.arange(facets) / facets]
-    return [(-(p.R + p.r) * normal, normal) for normal in normals]

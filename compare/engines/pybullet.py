@@ -8,30 +8,24 @@ a man; joints have damping, motors and a velocity limit unless told otherwise; f
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from compare.engines.loop import BreakdownError, Scene, Touch, tangents
+from compare.engines import adapter
+from compare.engines.adapter import BreakdownError, Floats, Scene, Touch, number, tangents
 from model import Parameters
-from model.arrays import Array
-from model.parameters import POSITIVE, Range, check_choice, check_number
+from model.parameters import Range
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class Settings(adapter.Settings):
     """The engine's settings: by default the best known, massless joints and contacts solved to round-off."""
 
-    timestep: float = 1e-3
-    """s"""
-    coordinates: str = "joints"
-    """``joints``, or ``free`` for a free ball."""
-    facets: int = 1
+    facets: int = number(1, "planes", Range(1, whole=True))
     """Planes that make up the wall."""
-    scale: float = 100.0
+    scale: float = number(100.0, "m-1")
     """Length unit of the engine, in 1/m: its tolerances are absolute lengths."""
     iterations: int = 200
     """Most iterations of the contact solver."""
@@ -44,20 +38,10 @@ class Settings:
     breaking: float = 0.2
     """`contactBreakingThreshold`, distance up to which contacts are prepared for, in the engine's length unit."""
 
-    def __post_init__(self) -> None:
-        check_number("timestep", self.timestep, "s", POSITIVE)
-        check_choice("coordinates", self.coordinates, ("joints", "free"))
-        check_number("facets", self.facets, "planes", Range(1, whole=True))
-        check_number("scale", self.scale, "m-1", POSITIVE)
-
     @property
-    def memory(self) -> bool:
-        """Friction is not regularised."""
-        return False
-
-    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
-        """The speed to which the solver goes, and for round-off at least 1e-9 m s-1."""
-        return np.full(np.shape(load), max(math.sqrt(self.residual) / self.scale, 1e-9))
+    def resolution(self) -> float:
+        """The speed to which the solver goes."""
+        return math.sqrt(self.residual) / self.scale
 
 
 def newcomer(timestep: float) -> Settings:
@@ -104,7 +88,7 @@ class _Ball(Scene):
         sphere = engine.createCollisionShape(engine.GEOM_SPHERE, radius=p.r * self._scale, **self._here)
         self._body = self._make(sphere)
 
-    def _plane(self, place: Sequence[float], normal: Sequence[float], friction: float) -> int:
+    def _plane(self, place: Floats, normal: Floats, friction: float) -> int:
         shape = self._engine.createCollisionShape(self._engine.GEOM_PLANE, planeNormal=normal, **self._here)
         body: int = self._engine.createMultiBody(0, shape, basePosition=place, **self._here)
         self._engine.changeDynamics(body, -1, lateralFriction=friction, restitution=0, **self._here)
@@ -166,17 +150,17 @@ class _OnJoints(_Ball):
         engine.setJointMotorControlMultiDof(body, 3, engine.POSITION_CONTROL, **still, **self._here)
         return body
 
-    def start(self, place: Sequence[float], velocity: Sequence[float]) -> None:
+    def start(self, place: Floats, velocity: Floats) -> None:
         _, *gaps = place
         for joint, gap, rate in zip((1, 2), gaps, velocity[1:3], strict=True):
             self._engine.resetJointState(self._body, joint, gap * self._scale, rate * self._scale, **self._here)
         self._turn_back(velocity[0], velocity[3:])
 
-    def _turn_back(self, rate: float, spin: Sequence[float]) -> None:
+    def _turn_back(self, rate: float, spin: Floats) -> None:
         self._engine.resetJointState(self._body, 0, 0.0, rate, **self._here)
         self._engine.resetJointStateMultiDof(self._body, 3, _UPRIGHT, spin, **self._here)
 
-    def advance(self, force: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+    def advance(self, force: Floats) -> tuple[Floats, Floats]:
         engine, body, scale = self._engine, self._body, self._scale
         forces = [force[0] * scale * scale, force[1] * scale, force[2] * scale]
         engine.setJointMotorControlArray(body, (0, 1, 2), engine.TORQUE_CONTROL, forces=forces, **self._here)
@@ -195,13 +179,13 @@ class _Free(_Ball):
         self._dress(body, -1, self._p.m)
         return body
 
-    def start(self, place: Sequence[float], velocity: Sequence[float]) -> None:
+    def start(self, place: Floats, velocity: Floats) -> None:
         centre, linear = ([value * self._scale for value in part] for part in (place, velocity[:3]))
         self._engine.resetBasePositionAndOrientation(self._body, centre, _UPRIGHT, **self._here)
         self._engine.resetBaseVelocity(self._body, linear, velocity[3:], **self._here)
         self._place = centre
 
-    def advance(self, force: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+    def advance(self, force: Floats) -> tuple[Floats, Floats]:
         engine, body, scale = self._engine, self._body, self._scale
         pull = [each * scale for each in force]
         engine.applyExternalForce(body, -1, pull, self._place, engine.WORLD_FRAME, **self._here)

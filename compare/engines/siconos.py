@@ -18,18 +18,16 @@ import select
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from compare.engines.loop import BreakdownError, Scene, Touch
+from compare.engines import adapter
+from compare.engines.adapter import BreakdownError, Floats, Library, Scene, Touch, number
 from model import InputError, Parameters
-from model.arrays import Array
-from model.parameters import POSITIVE, Range, check_choice, check_number
+from model.parameters import Range
 
 PROGRAM = Path(__file__).with_name("_siconos_worker.py")
 PATIENCE = 60.0
@@ -37,14 +35,13 @@ PATIENCE = 60.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
-    """The engine's settings: by default the best known, a ball in turning axes and contacts solved to round-off."""
+class Settings(adapter.Settings):
+    """The engine's settings: by default the best known, a ball in turning axes and contacts solved to round-off.
 
-    timestep: float = 1e-3
-    """s"""
-    coordinates: str = "joints"
-    """``joints`` for a ball in axes that turn with it, or ``free`` for a free ball in a true cylinder."""
-    theta: float = 0.5
+    A free ball is in a true cylinder.
+    """
+
+    theta: float = number(0.5, "1", Range(0.5, 1))
     """Of `MoreauJeanOSI`: the share of forces that is taken at the end of a step."""
     activation: float = 1e-9
     """`ConstraintActivationThreshold`, m: a contact counts as closed if half a step further its gap is less than that.
@@ -52,29 +49,12 @@ class Settings:
     projection: float | None = 1e-12
     """`ConstraintTolUnilateral`, m, up to which `TimeSteppingDirectProjection` takes a ball out of an overlap. None for
     `TimeStepping`, which leaves it there: up to a step's way after an impact, for as long as the contact lasts."""
-    newton: float = 1e-15
+    newton: float = number(1e-15, "N s")
     """`NewtonTolerance`, N s, of the iteration on the equations of motion; with 1e-10 spin changes in flight."""
-    tolerance: float = 1e-14
+    tolerance: float = number(1e-14, "1")
     """Of `FrictionContact`'s solver, non-smooth Gauss-Seidel, relative."""
-    iterations: int = 1000
+    iterations: int = number(1000, "iterations", Range(1, whole=True))
     """Most iterations of that solver."""
-
-    def __post_init__(self) -> None:
-        check_number("timestep", self.timestep, "s", POSITIVE)
-        check_choice("coordinates", self.coordinates, ("joints", "free"))
-        check_number("theta", self.theta, "1", Range(0.5, 1))
-        check_number("newton", self.newton, "N s", POSITIVE)
-        check_number("tolerance", self.tolerance, "1", POSITIVE)
-        check_number("iterations", self.iterations, "iterations", Range(1, whole=True))
-
-    @property
-    def memory(self) -> bool:
-        """Friction is not regularised."""
-        return False
-
-    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
-        """For round-off, 1e-9 m s-1."""
-        return np.full(np.shape(load), 1e-9)
 
 
 def newcomer(timestep: float) -> Settings:
@@ -82,15 +62,12 @@ def newcomer(timestep: float) -> Settings:
     return Settings(timestep=timestep, coordinates="free", activation=0.0, projection=None, newton=1e-6, tolerance=1e-4)
 
 
-@dataclass(frozen=True)
-class _Installation:
-    """Siconos in another Python, a `Library`."""
-
-    name: str = "siconos"
+class _Installation(Library):
+    """Siconos in another Python."""
 
     @property
     def missing(self) -> str:
-        """Why it can't be used here, and what to do about it; empty if it can."""
+        """As in `Library`."""
         named = os.environ.get(_NAMED)
         if _look(named)[0]:
             return ""
@@ -100,7 +77,7 @@ class _Installation:
 
     @property
     def version(self) -> str:
-        """Or that it isn't installed."""
+        """As in `Library`."""
         return _look(os.environ.get(_NAMED))[1]
 
     def load(self) -> str:
@@ -110,7 +87,7 @@ class _Installation:
         return _look(os.environ.get(_NAMED))[0]
 
 
-LIBRARY = _Installation()
+LIBRARY = _Installation("siconos")
 _NAMED = "DUALBALL_SICONOS_PYTHON"
 
 
@@ -171,10 +148,10 @@ class _Remote(Scene):
         words = self._process.stderr.read().strip().splitlines()
         return words[-1] if words else f"exit code {self._process.wait()}"
 
-    def start(self, place: Sequence[float], velocity: Sequence[float]) -> None:
+    def start(self, place: Floats, velocity: Floats) -> None:
         self._ask([*place, *velocity])
 
-    def advance(self, force: Sequence[float]) -> tuple[Sequence[float], Sequence[float]]:
+    def advance(self, force: Floats) -> tuple[Floats, Floats]:
         place, velocity = self._ask(list(force))
         return place, velocity
 

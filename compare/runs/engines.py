@@ -13,14 +13,14 @@ from typing import Any
 
 import analytic
 import mjsim
-from compare.engines import drake, loop, pybullet, siconos
-from compare.engines.dependency import Library, Package
+from compare.engines import adapter, drake, loop, pybullet, siconos
+from compare.engines.adapter import Library
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.errors import suggestion
 from model.trajectory import version
 
-Settings = ContactSettings | analytic.Settings | pybullet.Settings | drake.Settings | siconos.Settings
+Settings = ContactSettings | analytic.Settings | adapter.Settings
 """Numerical settings of any engine."""
 Simulate = Callable[[Parameters, State, float, Flow, Any, float | None, Callable[[float], None]], Trajectory]
 """One whole run from parameters, start, duration, flow, settings and sample interval; the function is called with the
@@ -206,8 +206,8 @@ MOREAU = replace(
     colour="#009E73",
 )
 _OTHERS = (
-    _adapted(pybullet, Package("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
-    _adapted(drake, Package("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
+    _adapted(pybullet, Library("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
+    _adapted(drake, Library("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
     _adapted(siconos, siconos.LIBRARY, 1e-3, "p2", "#000000"),
 )
 ENGINES: dict[str, Engine] = {
