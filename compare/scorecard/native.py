@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,19 +19,24 @@ from mjsim import ContactSettings, scene
 from model import InputError, Parameters, StorageError
 from model.parameters import NOT_NEGATIVE, POSITIVE, check_choice, check_number
 
-INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
-CONES = ("pyramidal", "elliptic")
-SOLVERS = ("PGS", "CG", "Newton")
 _NUMBERS = ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations")
-_CHOICES = {
-    "integrator": (INTEGRATORS, "mjtIntegrator.mjINT_"),
-    "cone": (CONES, "mjtCone.mjCONE_"),
-    "solver": (SOLVERS, "mjtSolver.mjSOL_"),
+
+
+def _constants(kind: Any, prefix: str, *names: str) -> dict[str, int]:
+    return {name: int(getattr(kind, prefix + name.upper())) for name in names}
+
+
+CHOICES = {
+    "integrator": _constants(mujoco.mjtIntegrator, "mjINT_", "Euler", "RK4", "implicit", "implicitfast", "discrete"),
+    "cone": _constants(mujoco.mjtCone, "mjCONE_", "pyramidal", "elliptic"),
+    "solver": _constants(mujoco.mjtSolver, "mjSOL_", "PGS", "CG", "Newton"),
 }
-"""Options of the engine by what is known of them and what their constants are called."""
+"""What the engine can be told by name, and its numbers for it."""
 _NOTE = "{}: there is no {} that the ball can touch; the contact with its {} stands for both"
 _DOWN = 0.7
 """Least share of down in the way from the ball to its floor."""
+_FAR = 1024.0
+"""A margin within which the ball touches everything that it can, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +48,6 @@ class Touch:
     """Zeros: as `solref`."""
     solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
     margin: float = 0.0
-    gap: float = 0.0
 
     def impedance(self, depth: float) -> float:
         """d at a depth in m: from solimp[0] at none to solimp[1] at solimp[2] and beyond."""
@@ -83,8 +86,8 @@ class Native:
         check_number("impratio", self.impratio, "1", POSITIVE)
         for name in ("iterations", "noslip_iterations", "tolerance"):
             check_number(name, getattr(self, name), "1", NOT_NEGATIVE)
-        for name, (known, _) in _CHOICES.items():
-            check_choice(name, getattr(self, name), known)
+        for name, known in CHOICES.items():
+            check_choice(name, getattr(self, name), list(known))
 
     def with_contacts(self, **changes: Any) -> Native:
         """A copy with the given fields of both contacts changed."""
@@ -102,8 +105,8 @@ class Native:
         option = spec.option
         for name in _NUMBERS:
             setattr(option, name, getattr(self, name))
-        for name, (_, prefix) in _CHOICES.items():
-            setattr(option, name, _value(prefix, getattr(self, name)))
+        for name, known in CHOICES.items():
+            setattr(option, name, known[getattr(self, name)])
         for pair in spec.pairs:
             touch = self.A if pair.name == "A" else self.B
             for field in dataclasses.fields(Touch):
@@ -142,10 +145,6 @@ class Native:
         first = max(first, 2 * self.timestep)
         return 2 / (highest * first), d / (highest * first * second) ** 2
 
-    def to_mapping(self) -> dict[str, Any]:
-        """All values, JSON-able."""
-        return dataclasses.asdict(self)
-
 
 def read(path: Path) -> Native:
     """Settings of a ball's contacts in an MJCF file: its option, and the attributes of pairs or geoms.
@@ -168,101 +167,48 @@ def read(path: Path) -> Native:
     except ValueError as error:
         raise InputError(f"{path} is not valid MJCF: {' '.join(str(error).split())}") from error
     ball = _ball(model, path)
-    touches = _touches(model, ball)
-    if not touches or model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
+    floors, walls = _touches(model, ball)
+    if not floors + walls:
         raise InputError(
             f"{path}: the ball has no contacts: it needs a <pair> with something, or a geom whose contype and "
             "conaffinity meet its own, and contacts switched on"
         )
-    floor = {geom for geom in touches if _is_below(model, ball, geom)}
-    floors = [touch for geom, touch in touches.items() if geom in floor]
-    walls = [touch for geom, touch in touches.items() if geom not in floor]
     note = "" if floors and walls else _NOTE.format(path, *(("floor", "wall") if walls else ("wall", "floor")))
-    opt = model.opt
-    same: dict[str, Any] = {name: getattr(opt, name) for name in _NUMBERS}
-    same |= {name: _name(known, kind, getattr(opt, name)) for name, (known, kind) in _CHOICES.items()}
+    same: dict[str, Any] = {name: getattr(model.opt, name) for name in _NUMBERS}
+    for name, known in CHOICES.items():
+        same[name] = next(key for key, value in known.items() if value == getattr(model.opt, name))
     return Native(**same, A=(floors or walls)[0], B=(walls or floors)[0], note=note)
-
-
-def _name(known: Sequence[str], prefix: str, value: int) -> str:
-    return next(name for name in known if _value(prefix, name) == value)
-
-
-def _value(prefix: str, name: str) -> int:
-    """The engine's number of a choice: prefix "mjtCone.mjCONE_" and name "elliptic" are one of its constants."""
-    kind, start = prefix.split(".")
-    return int(getattr(getattr(mujoco, kind), start + name.upper()))
 
 
 def _ball(model: Any, path: Path) -> int:
     """Number of the ball's geom."""
-    spheres = [
-        geom
-        for geom in range(model.ngeom)
-        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE and model.body_weldid[model.geom_bodyid[geom]] > 0
-    ]
+    moves = model.body_weldid[model.geom_bodyid] > 0
+    spheres = np.flatnonzero(moves & (model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE)).tolist()
     named = [geom for geom in spheres if model.geom(geom).name == "ball"]
     if not spheres:
         raise InputError(f"{path}: there is no ball: it needs a geom of type sphere in a body with a joint")
     if len(spheres) > 1 and not named:
         raise InputError(f"{path}: there are {len(spheres)} spheres that move; name the one to be graded 'ball'")
-    return (named or spheres)[0]
+    return int((named or spheres)[0])
 
 
-def _touches(model: Any, ball: int) -> dict[int, Touch]:
-    """How the ball touches each geom that it can: by explicit pairs, and for the others by the masks of the geoms."""
-    touches = {}
-    for pair in range(model.npair):
-        geoms = {int(model.pair_geom1[pair]), int(model.pair_geom2[pair])}
-        if ball in geoms:
-            (other,) = geoms - {ball}
-            touches[other] = Touch(
-                solref=_numbers(model.pair_solref[pair]),
-                solreffriction=_numbers(model.pair_solreffriction[pair]),
-                solimp=_numbers(model.pair_solimp[pair]),
-                margin=float(model.pair_margin[pair]),
-                gap=float(model.pair_gap[pair]),
-            )
-    welded = model.body_weldid[model.geom_bodyid]
-    for geom in range(model.ngeom):
-        masks = (model.geom_contype, model.geom_conaffinity)
-        meets = any(one[ball] & other[geom] for one, other in (masks, masks[::-1]))
-        if geom not in touches and meets and welded[geom] != welded[ball]:
-            touches[geom] = _mixed(model, ball, geom)
-    if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_OVERRIDE:
-        o = model.opt
-        all_alike = Touch(solref=_numbers(o.o_solref), solimp=_numbers(o.o_solimp), margin=float(o.o_margin))
-        return dict.fromkeys(touches, all_alike)
-    return touches
+def _touches(model: Any, ball: int) -> tuple[list[Touch], list[Touch]]:
+    """The contacts that the engine makes of the ball with what is below it and with what is beside it.
 
-
-def _is_below(model: Any, ball: int, geom: int) -> bool:
-    """Whether the ball's own point nearest to a geom, or deepest in it, is rather at its bottom than at its side."""
+    The ball is given a margin that reaches everything, so that the engine itself says what it can touch and how the
+    parameters of both are combined.
+    """
+    model.geom_margin[ball] += _FAR
+    model.pair_margin[:] += _FAR
+    model.opt.o_margin += _FAR
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # which knows of the margins in the file alone
     data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    ends = np.zeros(6)
-    mujoco.mj_geomDistance(model, data, ball, geom, 1e6, ends)
-    way = ends[:3] - data.geom_xpos[ball]
-    return bool(way[2] < -_DOWN * np.linalg.norm(way))
-
-
-def _mixed(model: Any, ball: int, geom: int) -> Touch:
-    """Contact parameters of two geoms, combined as the engine does: by priority, or weighted with solmix."""
-    pair = [ball, geom]
-    weights, priority = model.geom_solmix[pair], model.geom_priority[pair]
-    if priority[0] != priority[1]:
-        weights = (priority == priority.max()).astype(float)
-    share = weights / weights.sum() if weights.sum() > 0 else np.full(2, 0.5)
-    refs = model.geom_solref[pair]
-    # A negative one holds stiffness and damping, which are not averaged.
-    direct = np.any(refs <= 0) and priority[0] == priority[1]
-    return Touch(
-        solref=_numbers(refs.min(axis=0) if direct else share @ refs),
-        solimp=_numbers(share @ model.geom_solimp[pair]),
-        margin=float(model.geom_margin[pair].sum()),
-        gap=float(model.geom_gap[pair].sum()),
-    )
-
-
-def _numbers(values: Any) -> Any:
-    return tuple(float(value) for value in values)
+    mujoco.mj_fwdPosition(model, data)
+    touches: tuple[list[Touch], list[Touch]] = [], []
+    for contact in data.contact:
+        if ball in contact.geom:
+            given = {name: tuple(getattr(contact, name).tolist()) for name in ("solref", "solreffriction", "solimp")}
+            down = -contact.frame[2] if contact.geom[0] == ball else contact.frame[2]
+            # The margin is taken apart to the digits that it had in the sum.
+            touches[int(down < _DOWN)].append(Touch(**given, margin=round(contact.includemargin - _FAR, 12)))
+    return touches
