@@ -15,8 +15,9 @@ from compare.commands import options, running
 from compare.runs import engines, progress
 from compare.runs.engines import Engine
 from compare.scorecard import native
-from compare.scorecard.contenders import NEWCOMER, OURS, PLAIN, Contender, Other
+from compare.scorecard.contenders import NEWCOMER, OURS, PLAIN, Contender, Contestant
 from compare.scorecard.native import Native
+from compare.scorecard.trials import SLIPPING
 from mjsim import ContactSettings
 from model import InputError
 from model.files import check_writable, write_text
@@ -57,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _graded(args: argparse.Namespace) -> tuple[Native | None, Sequence[Contender | Other], str]:
+def _graded(args: argparse.Namespace) -> tuple[Native | None, Sequence[Contender | Contestant], str]:
     """MuJoCo's settings that the options name, whom they are compared with, and what they are in words."""
     engine: Engine = args.engine
     if engine is engines.MUJOCO:
@@ -72,9 +73,12 @@ def _graded(args: argparse.Namespace) -> tuple[Native | None, Sequence[Contender
     given = options.given(args, ("timestep",))
     if args.file or len(options.given(args, (*_NATIVE, *_CONTACT))) > len(given):
         raise InputError(f"a file and contact settings are MuJoCo's; of {engine.name} only --timestep can be given")
-    names = dict.fromkeys(name for name in (engine.name, engine.as_it_comes) if name)
     step = given.get("timestep", ContactSettings.timestep)
-    others = [Other(engines.engine(name), step) for name in names]
+    names = dict.fromkeys(name for name in (engine.name, engine.as_it_comes) if name)
+    others = [
+        Contestant(each.name, each, step, each.configure({"timestep": step}, SLIPPING.p))
+        for each in map(engines.engine, names)
+    ]
     return None, (*others, OURS), f"{engine.name} in its best known settings and as it comes, step {1e3 * step:g} ms."
 
 

@@ -36,16 +36,15 @@ def run(args: argparse.Namespace) -> int:
     from compare.scorecard import league, standings
 
     check_names(args.engine or (), list(ENGINES), "engine")
-    those = league.contestants(args.engine)
+    those = league.contestants(args.engine, league.QUICK if args.quick else league.STEPS)
     missing = {each.name: each.engine.missing for each in those if each.engine.missing}
-    if len(missing) == len(those):
+    if all(each.name in missing for each in those):
         raise InputError(f"there is nothing to compare: {'; '.join(missing.values())}")
     for name, why in missing.items():
         print(f"dualball: {name} is left out: {why}", file=sys.stderr)
     make_directory(args.output)
-    steps = league.QUICK if args.quick else league.STEPS
     with running.campaign(args, "league", RUNS) as campaign:
-        entries = league.measure(campaign, those, steps, args.quick)
+        entries = league.measure(campaign, those, args.quick)
     data = league.to_mapping(those, entries)
     write_text(args.output / JSON, json.dumps(data, indent=1))
     write_text(args.output / PAGE, page.html(data))

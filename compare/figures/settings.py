@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 
 from compare.figures import league, style
 from compare.figures.drawing import GapError, Material
-from compare.scorecard.league import Entry
-from compare.scorecard.scores import OPEN
+from compare.scorecard.league import OPEN, Entry
 
 _MARKS = "os^vDP*X"
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B")

@@ -13,8 +13,8 @@ from rich.text import Text
 
 from compare import pages
 from compare.scorecard.contenders import OURS
-from compare.scorecard.grade import AGREES, GOOD, GOOD_SPEED, Column
-from compare.scorecard.trials import ROLLING, STATES, TRANSIENT
+from compare.scorecard.grade import GOOD, GOOD_SPEED, Column
+from compare.scorecard.trials import AGREES, APPROACH, ROLLING, STATES
 from model import Case
 
 CAPTION = (
@@ -49,7 +49,7 @@ def lines(columns: Sequence[Column]) -> list[Line]:
         *[line("steps that lose contact", s.name, (_open(c.of(s).open) for c in columns)) for s in slipping],
         line("other errors", f"creep in {ROLLING.name} (m/s)", (_speed(c.of(ROLLING).creep) for c in columns)),
         line("other errors", "ω₀₁, end of rolling", (_relative(c.omega_01) for c in columns)),
-        line("other errors", f"{TRANSIENT}, rms", (_relative(c.transient, "") for c in columns)),
+        line("other errors", f"{APPROACH.name}, rms", (_relative(c.transient, "") for c in columns)),
         line("cost", "time step (ms)", ((f"{1e3 * c.timestep:g}", None) for c in columns)),
         line("cost", f"a step ({OURS.name} 1)", ((f"{c.cost:.2f}", None) for c in columns)),
         line("cost", f"a second ({OURS.name} 1)", ((f"{c.cost_of_a_second:.2f}", None) for c in columns)),

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from compare.runs.engines import Engine
+from compare.runs.engines import Engine, Settings
 from compare.runs.tasks import Task, carry_out
 from compare.scorecard.native import Native
-from compare.scorecard.trials import KICKED, SLIPPING
+from compare.scorecard.trials import APPROACH
 from mjsim import ContactSettings, recorder, scene
 from mjsim.engine import start
 from mjsim.stepping import Stepper
@@ -38,7 +38,7 @@ class Contender:
     """Settings of the engine where they are not those of `loop`."""
 
     @property
-    def timestep(self) -> float:
+    def step(self) -> float:
         """s"""
         return self.loop.timestep
 
@@ -67,7 +67,7 @@ class Contender:
 
     def clock(self, steps: int) -> Callable[[], float]:
         """A function that goes on by so many steps and returns the processor time in s."""
-        stepper, omega_0 = self.start(SLIPPING.p, KICKED), np.full((steps, 1), SLIPPING.p.omega_0)
+        stepper, omega_0 = self.start(APPROACH.p, APPROACH.x0), np.full((steps, 1), APPROACH.p.omega_0)
 
         def spend() -> float:
             begin = time.process_time()
@@ -78,21 +78,21 @@ class Contender:
 
 
 @dataclass(frozen=True)
-class Other:
-    """Another engine, in settings that a time step in s leads to."""
+class Contestant:
+    """An engine in its own loop."""
 
+    name: str
     engine: Engine
-    timestep: float
+    step: float | None
+    """s; None for one that chooses its own."""
+    settings: Settings
 
-    @property
-    def name(self) -> str:
-        """The engine's."""
-        return self.engine.name
-
-    def task(self, p: Parameters, x0: npt.ArrayLike, t_end: float, interval: float) -> Task:
-        """A run of the engine."""
-        settings = self.engine.configure({"timestep": self.timestep}, p)
-        return Task(engine=self.name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval)
+    def task(self, p: Parameters, x0: npt.ArrayLike, lasts: float, interval: float) -> Task:
+        """A run; it samples no more often than it steps."""
+        every = max(interval, self.step or 0.0)
+        return Task(
+            engine=self.engine.name, parameters=p, x0=x0, t_end=lasts, settings=self.settings, sample_interval=every
+        )
 
     def run(self, p: Parameters, x0: npt.ArrayLike, t_end: float, interval: float, skip: float = 0.0) -> Trajectory:
         """As `Contender.run`; of what follows `skip`, fifty samples."""
@@ -102,15 +102,12 @@ class Other:
 
     def clock(self, steps: int) -> Callable[[], float]:
         """As `Contender.clock`, always from the start, without what it takes to begin."""
-        times = [count * steps * self.timestep for count in (1, 2)]
+        lasts = steps * (self.step or 0.0)
+        tasks = [self.task(APPROACH.p, APPROACH.x0, t_end, t_end) for t_end in (lasts, 2 * lasts)]
 
         def spend() -> float:
-            spent = []
-            for t_end in times:
-                begin = processor_time()
-                carry_out([self.task(SLIPPING.p, KICKED, t_end, t_end)])
-                spent.append(processor_time() - begin)
-            return spent[1] - spent[0]
+            one, both = map(seconds, tasks)
+            return both - one
 
         return spend
 
@@ -121,13 +118,19 @@ NEWCOMER = Contender("newcomer", Native().loop(coordinates="free", wall="prism")
 """What a newcomer might write: MuJoCo's defaults, a free ball, and a wall of flat facets."""
 
 
-def processor_time() -> float:
-    """Of this process and of those that it started and that ended, s."""
+def seconds(task: Task) -> float:
+    """Processor time of a run, of this process and of those that it started and that ended."""
+    begin = _processor_time()
+    carry_out([task])
+    return _processor_time() - begin
+
+
+def _processor_time() -> float:
     ended = os.times()
     return time.process_time() + ended.children_user + ended.children_system
 
 
-def costs(contenders: Sequence[Contender | Other]) -> list[float]:
+def costs(contenders: Sequence[Contender | Contestant]) -> list[float]:
     """Medians of time per step over that of our defaults, measured in turn."""
     clocks = [contender.clock(_TIMED) for contender in (OURS, *contenders)]
     times: list[list[float]] = [[] for _ in clocks]

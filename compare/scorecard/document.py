@@ -49,9 +49,9 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "transient": accuracy.transient,
     "events": accuracy.event_times,
     "split": accuracy.force_split,
-    "ablation": lambda campaign: _of_settings(scores.ladder(campaign)),
+    "ablation": lambda campaign: _of_settings(scores.reached(campaign, scores.rungs(scores.STEP))),
     "frontier": lambda campaign: standings.rows(scores.frontier(campaign, STEPS)),
-    "variants": lambda campaign: _of_settings(scores.variants(campaign)),
+    "variants": lambda campaign: _of_settings(scores.reached(campaign, scores.others(scores.STEP))),
 }
 """The tables by name."""
 

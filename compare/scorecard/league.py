@@ -1,30 +1,44 @@
 """The league: every engine that is installed on the same tasks, over the time step, against theory.
 
-Each discipline is a set of tasks and what its runs are off by. Stationary states start at rest and are judged once that
+Each discipline is a set of runs and what they are off by. Stationary states start at rest and are judged once that
 start is forgotten, as in `trials`; the approach to SS and the motions through landings are held against the
 event-driven simulation, thresholds and cases against closed-form theory.
 """
 
 from __future__ import annotations
 
-import functools
+import json
 import math
 import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 import analytic
-from compare.runs import engines
 from compare.runs.campaign import Campaign
-from compare.runs.engines import Engine, Settings
-from compare.runs.tasks import Task, carry_out
-from compare.scorecard import grade, kept, trials
-from compare.scorecard.accuracy import LASTS, MOTIONS
-from compare.scorecard.contenders import processor_time
-from compare.scorecard.trials import AT_REST, KICKED, PASSES, ROLLING, ROUGH, SLIPPING, SMOOTH, STATES, WINDOW, State
+from compare.runs.engines import ENGINES, NEWCOMER, Engine, Settings, newcomer
+from compare.runs.tasks import Task
+from compare.scorecard import trials
+from compare.scorecard.contenders import Contestant, seconds
+from compare.scorecard.trials import (
+    APPROACH,
+    AT_REST,
+    HITTING,
+    LANDING,
+    ROLLING,
+    ROUGH,
+    SLIPPING,
+    STATES,
+    WINDOW,
+    Held,
+    Motion,
+    State,
+)
 from compare.statistics import plain
-from model import Case, Trajectory
+from model import Case, Parameters, Trajectory, storage
+from model.files import write_text
 
 STEPS = (4e-3, 2e-3, 1e-3)
 """Time steps, s."""
@@ -36,30 +50,10 @@ RIDES = 4.0
 REPEATS = 3
 """Cost is the median of as many timings."""
 CREEP, ROLLING_ENDS, WALL, CASES, COST = "creep (m/s)", "ω₀₁", "ω₀₂", "cases (of 9)", "cost"
+OPEN = "open"
 Runs = Sequence[Trajectory]
-
-
-@dataclass(frozen=True)
-class Contestant:
-    """An engine in one of its two settings."""
-
-    name: str
-    engine: Engine
-    settings: Callable[[float | None], Settings]
-    """For a time step in s; None for an engine that chooses its own."""
-
-    def task(self, step: float | None, state: State, x0: Sequence[float], lasts: float, interval: float) -> Task:
-        """A run; it samples no more often than it steps."""
-        p, settings = state.p, self.settings(step)
-        interval = max(interval, step or 0.0)
-        return Task(
-            engine=self.engine.name,
-            parameters=p,
-            x0=tuple(x0),
-            t_end=lasts,
-            settings=settings,
-            sample_interval=interval,
-        )
+Asked = tuple[Parameters, Sequence[float], float, float]
+"""A run: its parameters, start, duration and interval of the samples in s."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +61,7 @@ class Discipline:
     """What is asked of every contestant."""
 
     name: str
-    runs: tuple[tuple[State, Sequence[float], float, float], ...]
-    """Problem, start, duration and interval of the samples in s of each run."""
+    runs: tuple[Asked, ...]
     score: Callable[[Runs], float]
     """Made of whole runs, one for each of `runs`; nan for what doesn't show."""
     quick: bool = False
@@ -81,81 +74,76 @@ class Entry:
 
     name: str
     step: float | None
-    """s; None for one that chooses its own."""
     scores: dict[str, float] = field(default_factory=dict)
     """By discipline; nan where it broke down, and for what doesn't show."""
     failures: dict[str, str] = field(default_factory=dict)
     """By discipline, why."""
 
 
-def contestants(chosen: Sequence[str] | None = None) -> list[Contestant]:
-    """Those of the engines chosen by name, or all, whether installed or not."""
-    listed = [Contestant(engine.name, engine, _settings(engine)) for engine in engines.ENGINES.values()]
-    prism = Contestant(engines.NEWCOMER.name, engines.NEWCOMER, _prism)
-    listed = [prism if each.engine is engines.NEWCOMER else each for each in listed]
-    return [each for each in listed if chosen is None or each.name in chosen]
+def contestants(chosen: Sequence[str] | None = None, steps: Sequence[float] = STEPS) -> list[Contestant]:
+    """The engines chosen by name, or all, whether installed or not, with each time step that they don't choose."""
+    those = [engine for engine in ENGINES.values() if chosen is None or engine.name in chosen]
+    return [
+        Contestant(engine.name, engine, step, _settings(engine, step))
+        for engine in those
+        for step in (steps if "timestep" in engine.options else [None])
+    ]
 
 
-def _settings(engine: Engine) -> Callable[[float | None], Settings]:
-    return lambda step: engine.configure({} if step is None else {"timestep": step}, SLIPPING.p)
+def _settings(engine: Engine, step: float | None) -> Settings:
+    """Those of a person's run, but MuJoCo as it comes has a free ball in flat facets, as the others' newcomers have."""
+    if engine is NEWCOMER and step:
+        return replace(newcomer(step), coordinates="free", wall="prism", cone="pyramidal")
+    return engine.configure({"timestep": step} if step else {}, SLIPPING.p)
 
 
-def _prism(step: float | None) -> Settings:
-    """MuJoCo as it comes, with a free ball in flat facets, as the others' newcomers have it."""
-    assert step
-    return replace(engines.newcomer(step), coordinates="free", wall="prism", cone="pyramidal")
-
-
-def measure(
-    campaign: Campaign, those: Sequence[Contestant], steps: Sequence[float] = STEPS, quick: bool = False
-) -> list[Entry]:
+def measure(campaign: Campaign, those: Sequence[Contestant], quick: bool = False) -> list[Entry]:
     """The entries of all contestants that are installed; runs that are there already aren't repeated."""
     asked = [discipline for discipline in DISCIPLINES if discipline.quick or not quick]
-    those = [each for each in those if not each.engine.missing]
-    starters = [(each, step) for each in those for step in (steps if "timestep" in each.engine.options else [None])]
-    return scored(campaign, starters, asked, cost)
+    return scored(campaign, [each for each in those if not each.engine.missing], asked, cost)
 
 
 def scored(
     campaign: Campaign,
-    starters: Sequence[tuple[Contestant, float | None]],
+    those: Sequence[Contestant],
     asked: Sequence[Discipline],
     cost: Callable[[Task], float] | None = None,
 ) -> list[Entry]:
-    """What contestants reach with a time step each in some disciplines, and what a run takes by `cost`, if given."""
-    tasks = {
-        (each.name, step, discipline.name): [each.task(step, *run) for run in discipline.runs]
-        for each, step in starters
-        for discipline in asked
-    }
-    failed = {
-        failure.task.key: failure.reason for failure in campaign.complete(t for row in tasks.values() for t in row)
-    }
+    """What contestants reach in some disciplines, and what a run takes by `cost`, if given."""
+    rows = [[[each.task(*run) for run in discipline.runs] for discipline in asked] for each in those]
+    failed = {f.task.key: f.reason for f in campaign.complete(task for row in rows for tasks in row for task in tasks)}
     entries = []
-    for number, (each, step) in enumerate(starters):
-        campaign.report(f"cost of {each.name}", number, len(starters), 0)
-        entry = Entry(each.name, step)
-        for discipline in asked:
-            row = tasks[each.name, step, discipline.name]
-            reasons = [failed[task.key] for task in row if task.key in failed]
+    for number, (each, row) in enumerate(zip(those, rows, strict=True)):
+        entry = Entry(each.name, each.step)
+        for discipline, tasks in zip(asked, row, strict=True):
+            reasons = [failed[task.key] for task in tasks if task.key in failed]
             entry.failures.update({discipline.name: reasons[0]} if reasons else {})
-            score = math.nan if reasons else discipline.score([kept.run(campaign, task) for task in row])
-            entry.scores[discipline.name] = score
+            runs = [] if reasons else [storage.load(campaign.path(task)) for task in tasks]
+            entry.scores[discipline.name] = discipline.score(runs) if runs else math.nan
         if cost:
-            passing = each.task(step, *APPROACH.runs[0])
-            entry.scores[COST] = kept.cost(campaign, passing, functools.partial(cost, passing))
+            campaign.report(f"cost of {each.name}", number, len(those), 0)
+            entry.scores[COST] = _kept(campaign, each.task(*APPROACHING.runs[0]), cost)
         entries.append(entry)
     return entries
 
 
+def _kept(campaign: Campaign, task: Task, cost: Callable[[Task], float]) -> float:
+    """What a run costs, measured once and kept beside it."""
+    path = campaign.path(task).with_suffix(".cost.json")
+    if not path.exists():
+        write_text(path, json.dumps(cost(task)))
+    return float(json.loads(path.read_text("utf-8")))
+
+
 def to_mapping(those: Sequence[Contestant], entries: Sequence[Entry]) -> dict[str, Any]:
     """JSON-able data: contestants with versions and settings, those that are missing with the reason, and entries."""
-    about = []
-    for each in those:
-        steps = [entry.step for entry in entries if entry.name == each.name]
-        settings = {"settings": asdict(each.settings(steps[0]))} if steps else {}
-        about.append({"name": each.name, "missing": each.engine.missing, "versions": each.engine.versions, **settings})
-    data: dict[str, Any] = plain({"contestants": about, "entries": [asdict(entry) for entry in entries]})
+    about = {}
+    for each in reversed(those):  # the settings are those of the first step
+        settings = {} if each.engine.missing else {"settings": asdict(each.settings)}
+        about[each.name] = {"name": each.name, "missing": each.engine.missing, "versions": each.engine.versions}
+        about[each.name] |= settings
+    listed = [about[name] for name in dict.fromkeys(each.name for each in those)]
+    data: dict[str, Any] = plain({"contestants": listed, "entries": [asdict(entry) for entry in entries]})
     return data
 
 
@@ -171,68 +159,49 @@ def from_mapping(data: dict[str, Any]) -> list[Entry]:
 def cost(task: Task) -> float:
     """Processor time over simulated time of one run by itself, without what it takes to begin."""
     half = replace(task, t_end=task.t_end / 2)
-    return statistics.median(_seconds(task) - _seconds(half) for _ in range(REPEATS)) / half.t_end
+    return statistics.median(seconds(task) - seconds(half) for _ in range(REPEATS)) / half.t_end
 
 
-def _seconds(task: Task) -> float:
-    begin = processor_time()
-    carry_out([task])
-    return processor_time() - begin
+def _held(run: Trajectory, state: State) -> Held:
+    """How far the end of a run from rest is from the state that it settles in."""
+    return trials.held(run, state, (1 - WINDOW) * state.settles)
 
 
-def stationary(state: State) -> Discipline:
+def _stationary(state: State) -> Discipline:
     """Relative error of omega_c in a state that is settled in from rest."""
-    lasts = math.ceil(state.forgets / (1 - WINDOW))
-
-    def score(runs: Runs) -> float:
-        return abs(trials.held(runs[0], state, (1 - WINDOW) * lasts).omega_c)
-
-    return Discipline(state.name, ((state, AT_REST, lasts, lasts / 1000),), score, quick=state in (ROLLING, SLIPPING))
+    runs, quick = ((state.p, AT_REST, state.settles, state.settles / 1000),), state in (ROLLING, SLIPPING)
+    return Discipline(state.name, runs, lambda runs: abs(_held(runs[0], state).omega_c), quick)
 
 
-def _creep() -> Discipline:
-    """Of the rolling state, from the same run."""
-    lasts = math.ceil(ROLLING.forgets / (1 - WINDOW))
-    rolling = stationary(ROLLING)
-    return replace(rolling, name=CREEP, score=lambda runs: trials.held(runs[0], ROLLING, (1 - WINDOW) * lasts).creep)
-
-
-def _motion(name: str, state: State, x0: Sequence[float], lasts: float) -> Discipline:
+def _motion(of: Motion) -> Discipline:
     """Rms error of omega_c over a motion."""
-
-    @functools.cache
-    def exact() -> Trajectory:
-        sharp = analytic.Settings(rtol=1e-12)
-        return analytic.simulate(state.p, x0, lasts, settings=sharp, sample_interval=lasts / 2000)
-
-    def score(runs: Runs) -> float:
-        return trials.deviation(runs[0].time, runs[0].x, exact())[0]
-
-    return Discipline(name, ((state, x0, lasts, lasts / 100),), score, quick=True)
+    runs = ((of.p, of.x0, of.lasts, of.lasts / 100),)
+    return Discipline(of.name, runs, lambda runs: of.errors(runs[0].time, runs[0].x)[0], quick=True)
 
 
 def _end_of_rolling() -> Discipline:
     """Relative error of omega_01, where slip measured above it would begin by the same extrapolation as theory's."""
-    omega_01 = analytic.thresholds(SMOOTH).omega_01
-    states = [State(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in grade.ONSET]
+    states = trials.beyond_rolling()
 
     def score(runs: Runs) -> float:
-        extrapolated = grade.onset([float(run.slip_z[-100:].mean()) for run in runs], states)
-        return abs(extrapolated - grade.onset([float(state.solution.x[5]) for state in states], states))
+        extrapolated = trials.onset([float(run.slip_z[-100:].mean()) for run in runs])
+        return abs(extrapolated - trials.onset([float(state.solution.x[5]) for state in states]))
 
-    return Discipline(ROLLING_ENDS, tuple((s, AT_REST, math.ceil(s.forgets), s.forgets / 1000) for s in states), score)
+    return Discipline(
+        ROLLING_ENDS, tuple((s.p, AT_REST, math.ceil(s.forgets), s.forgets / 1000) for s in states), score
+    )
 
 
 def _wall_holds() -> Discipline:
     """The least margin from which on the wall holds a ball above omega_02 and lets it slide down below; nan if none."""
     omega_02 = analytic.thresholds(ROUGH).omega_02
-    runs = []
+    runs: list[Asked] = []
     for margin in MARGINS:
         for sign in (1, -1):
             p = ROUGH.replace(omega_0=omega_02 * (1 + sign * margin))
             riding = State(ROUGH.replace(omega_0=omega_02 * (1 + margin)), Case.NR).solution.x.copy()
             riding[[0, 2]] = p.R, p.omega_0
-            runs.append((State(p, Case.NR), riding.tolist(), RIDES, RIDES / 100))
+            runs.append((p, riding.tolist(), RIDES, RIDES / 100))
 
     def score(runs: Runs) -> float:
         holds = [bool(run.y[-1] > 0.9 * ROUGH.R) for run in runs]
@@ -244,26 +213,37 @@ def _wall_holds() -> Discipline:
 
 def _cases() -> Discipline:
     """How many of the nine cases a run is in where the event-driven simulation is."""
-    runs = []
-    for case, (p, x0) in grade.SCENARIOS.items():
-        begin, end = grade.phase(case)
-        runs.append((State(p, case), x0, end, (end - begin) / 200))
+    runs: list[Asked] = []
+    for case, (p, x0) in trials.SCENARIOS.items():
+        begin, end = trials.phase(case)
+        runs.append((p, x0, end, (end - begin) / 200))
 
     def score(runs: Runs) -> float:
-        shares = [grade.share(run, case) for run, case in zip(runs, grade.SCENARIOS, strict=True)]
-        return float(sum(share >= grade.AGREES for share in shares))
+        shares = [trials.share(run, case) for run, case in zip(runs, trials.SCENARIOS, strict=True)]
+        return float(sum(share >= trials.AGREES for share in shares))
 
     return Discipline(CASES, tuple(runs), score, quick=True)
 
 
-_SLIDES, _HITS = MOTIONS.values()
-APPROACH = _motion(trials.TRANSIENT, SLIPPING, KICKED, PASSES)
+def _open(runs: Runs) -> float:
+    """Largest share of samples in which a contact that should carry a force carries none."""
+    *ended, passing = runs
+    shares = [_held(run, state).open for run, state in zip(ended, STATES, strict=True)]
+    # In the first sample the ball has yet to sink into a soft contact.
+    carries = np.stack([passing.force_A[1:, 1], passing.force_B[1:, 0]]) > 0
+    return max(*shares, 1 - float(carries.mean(axis=1).min()))
+
+
+APPROACHING = _motion(APPROACH)
+ERRORS = (*map(_stationary, STATES), APPROACHING)
+"""Of ways of setting MuJoCo, and, beside them, how often contact is lost."""
+CONTACT = Discipline(OPEN, tuple(run for each in ERRORS for run in each.runs), _open)
 DISCIPLINES = (
-    *(stationary(state) for state in STATES[:3]),
-    _creep(),
-    APPROACH,
-    _motion("lands on the floor", State(SMOOTH, Case.RR), _SLIDES, LASTS),
-    _motion("hits the wall", State(SMOOTH, Case.RR), _HITS, LASTS),
+    *ERRORS[:3],
+    replace(ERRORS[0], name=CREEP, score=lambda runs: _held(runs[0], ROLLING).creep),
+    APPROACHING,
+    _motion(LANDING),
+    _motion(HITTING),
     _end_of_rolling(),
     _wall_holds(),
     _cases(),

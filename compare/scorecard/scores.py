@@ -1,6 +1,6 @@
 """Ladder of settings, and error against cost: what ways of setting MuJoCo, and other methods, reach and take.
 
-Each is a contestant of a small league: the stationary states and the transient of `trials`.
+Each is a contestant of a small league: the stationary states and the approach to one of `trials`.
 """
 
 from __future__ import annotations
@@ -9,19 +9,17 @@ import json
 import statistics
 import time
 import warnings
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from compare.runs.campaign import BATCH, Campaign
-from compare.runs.engines import EVENT, MOREAU, NEWCOMER
+from compare.runs.engines import EVENT, MOREAU, NEWCOMER, newcomer
 from compare.runs.tasks import Task
-from compare.scorecard import league, trials
-from compare.scorecard import settings as ways
-from compare.scorecard.league import Contestant, Discipline, Entry, Runs
-from compare.scorecard.trials import STATES, WINDOW
+from compare.scorecard import league
+from compare.scorecard.contenders import Contestant
+from compare.scorecard.league import CONTACT, ERRORS, Entry
 from compare.statistics import plain
 from mjsim import ContactSettings, Run
 from model import StorageError
@@ -32,42 +30,86 @@ STEP = 1e-3
 """Time step of the ladder and the variants, s."""
 STEPS = (4e-3, 2e-3, 1e-3)
 """Time steps of error against cost that figures show, s."""
-OPEN = "open"
+BASES: dict[str, Callable[[float], ContactSettings]] = {"ours": ContactSettings.at, "MuJoCo's defaults": newcomer}
+"""Settings for a time step in s, beside which others are named."""
 
 
-def ladder(campaign: Campaign, step: float = STEP) -> list[Entry]:
-    """Entries of settings that each have one thing more than the one before."""
-    return league.scored(campaign, [_way(each) for each in ways.ladder(step)], ASKED)
+def name(settings: ContactSettings) -> str:
+    """The base from which settings differ least, and in what they differ."""
+    changes = {base: _changes(at(settings.timestep), settings) for base, at in BASES.items()}
+    base = min(changes, key=lambda each: len(changes[each]))
+    return ", ".join([base, *changes[base]])
 
 
-def variants(campaign: Campaign) -> list[Entry]:
-    """Entries of other ways to set MuJoCo."""
-    return league.scored(campaign, [_way(each) for each in ways.variants(STEP)], ASKED)
+def _changes(base: ContactSettings, settings: ContactSettings) -> list[str]:
+    values = {f.name: getattr(settings, f.name) for f in fields(settings)}
+    return [f"{each} {_text(value)}" for each, value in values.items() if value != getattr(base, each)]
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if isinstance(value, tuple):
+        return " ".join(_text(part) for part in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def rungs(step: float) -> list[ContactSettings]:
+    """From what a newcomer writes to ours, each with one thing more than the one before."""
+    return [
+        replace(newcomer(step), cone="pyramidal", coordinates="free", wall="prism"),
+        replace(newcomer(step), cone="pyramidal", coordinates="free"),
+        replace(newcomer(step), coordinates="free"),
+        newcomer(step),
+        ContactSettings.at(step, memory=False, servo=0.0, order=1),
+        ContactSettings.at(step, memory=False, order=1),
+        ContactSettings.at(step, order=1),
+        ContactSettings.at(step),
+    ]
+
+
+def rivals(step: float) -> list[ContactSettings]:
+    """Settings whose error is compared with their cost."""
+    return [
+        ContactSettings.at(step),
+        ContactSettings.at(step, order=1),
+        ContactSettings.at(step, order=1, memory=False, servo=0.0),
+        newcomer(step),
+        ContactSettings.at(step, coordinates="free", memory=False, order=1),
+    ]
+
+
+def others(step: float) -> list[ContactSettings]:
+    """Other ways to set MuJoCo; a firmer impedance keeps the damping b_f h = 1 of the friction rows."""
+    firm = {"solimp": 0.1, "solreffriction": 2 * step / 0.1}
+    return [
+        replace(newcomer(step), cone="pyramidal"),
+        ContactSettings.at(step, **firm, cone="pyramidal", memory=False, order=1),
+        ContactSettings.at(step, integrator="implicit"),
+        ContactSettings.at(step, integrator="implicitfast"),
+        ContactSettings.at(step, **firm, integrator="discrete"),
+        ContactSettings.at(step, integrator="discrete"),
+        ContactSettings.at(step, memory=False, noslip_iterations=10),
+        ContactSettings.at(step, memory=False),
+        ContactSettings.at(step),
+    ]
+
+
+def reached(campaign: Campaign, ways: Sequence[ContactSettings]) -> list[Entry]:
+    """Errors of ways to set MuJoCo, and how often contact is lost."""
+    return league.scored(campaign, [_way(each) for each in ways], [*ERRORS, CONTACT])
 
 
 def frontier(campaign: Campaign, steps: Sequence[float]) -> list[Entry]:
     """Entries, with their cost, of MuJoCo under several settings and of the two simulators of theory, over the step."""
-    methods = [_way(each) for alike in zip(*map(ways.rivals, steps), strict=True) for each in alike]
-    event, moreau = league.contestants([EVENT.name, MOREAU.name])
-    return league.scored(campaign, [*methods, *((moreau, step) for step in steps), (event, None)], ERRORS, _cost)
+    ways = [_way(each) for alike in zip(*map(rivals, steps), strict=True) for each in alike]
+    theory = [each for name in (MOREAU.name, EVENT.name) for each in league.contestants([name], steps)]
+    return league.scored(campaign, [*ways, *theory], ERRORS, _cost)
 
 
-def _way(settings: ContactSettings) -> tuple[Contestant, float]:
+def _way(settings: ContactSettings) -> Contestant:
     """MuJoCo set in some way, without a warning where contacts hover: what poor settings do is the question here."""
-    return Contestant(ways.name(settings), NEWCOMER, lambda step: settings), settings.timestep
-
-
-def _open(runs: Runs) -> float:
-    """Largest share of samples in which a contact that should carry a force carries none."""
-    *settled, passing = runs
-    shares = [trials.held(r, s, (1 - WINDOW) * r.time[-1]).open for r, s in zip(settled, STATES, strict=True)]
-    # In the first sample the ball has yet to sink into a soft contact.
-    carries = np.stack([passing.force_A[1:, 1], passing.force_B[1:, 0]]) > 0
-    return max(*shares, 1 - float(carries.mean(axis=1).min()))
-
-
-ERRORS = (*(league.stationary(state) for state in STATES), league.APPROACH)
-ASKED = (*ERRORS, Discipline(OPEN, tuple(run for each in ERRORS for run in each.runs), _open))
+    return Contestant(name(settings), NEWCOMER, settings.timestep, settings)
 
 
 def _cost(task: Task) -> float:
@@ -96,7 +138,7 @@ def _share_of_batch(task: Task, settings: ContactSettings) -> float:
 def write(campaign: Campaign, directory: Path) -> None:
     """Measure ladder and error against cost for figures, and keep them beside the results, unless they are there."""
     if not (directory / FILE).exists():
-        measured = {"ladder": ladder(campaign), "frontier": frontier(campaign, STEPS)}
+        measured = {"ladder": reached(campaign, rungs(STEP)), "frontier": frontier(campaign, STEPS)}
         content = plain({name: [asdict(entry) for entry in row] for name, row in measured.items()})
         write_text(directory / FILE, json.dumps(content, indent=1))
 

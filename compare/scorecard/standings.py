@@ -10,9 +10,7 @@ from rich.table import Table
 
 from compare import pages
 from compare.pages import Rows
-from compare.scorecard.accuracy import number
-from compare.scorecard.league import CASES, COST, WALL, Entry
-from compare.scorecard.scores import OPEN
+from compare.scorecard.league import CASES, COST, OPEN, WALL, Entry
 
 
 def rows(entries: Sequence[Entry]) -> Rows:
@@ -32,15 +30,15 @@ def cell(discipline: str, score: float | None) -> str:
         return ""
     if math.isnan(score):
         return "not seen"
-    if discipline == CASES:
-        return f"{score:.0f}"
-    if discipline == COST:
-        return f"{score:.2g}"
-    if discipline == OPEN:
-        return f"{score:.0%}"
-    if discipline == WALL:
-        return f"≤ {score:g}"
-    return number(score)
+    return _FORMS.get(discipline, number)(score)
+
+
+def number(value: float) -> str:
+    """An error: round-off is shown as such, a run without one as diverged."""
+    return "diverged" if math.isnan(value) else "< 1e-14" if value < 1e-14 else f"{value:.1e}"
+
+
+_FORMS = {CASES: "{:.0f}".format, COST: "{:.2g}".format, OPEN: "{:.0%}".format, WALL: "≤ {:g}".format}
 
 
 def tables(entries: Sequence[Entry]) -> Iterator[Table]:

@@ -1,4 +1,4 @@
-"""The stationary states and the transient on which settings are tried, and how far a run is from them.
+"""What settings are tried on: stationary states, motions, and the nine cases; and how far a run is from them.
 
 A run of a state starts at rest against the wall, which is no solution of the problem, and is judged only once that
 start is forgotten: a run that began in the state would stay there whatever it would have converged to.
@@ -6,15 +6,17 @@ start is forgotten: a run that began in the state would stay there whatever it w
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 import analytic
 from analytic import StationarySolution
-from compare.runs.tasks import Task
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 
@@ -50,6 +52,11 @@ class State:
         That takes ln(1/eps) = 36 time constants: the slowest of the state, or that of spinning up before, (1 + 2j)/c.
         """
         return -math.log(EPS) * max(analytic.slowest_time_constant(self.solution), (1 + 2 * self.p.j) / self.p.c)
+
+    @property
+    def settles(self) -> float:
+        """How long a run lasts, s, in whose last part, a `WINDOW` of it, the start is forgotten."""
+        return math.ceil(self.forgets / (1 - WINDOW))
 
 
 ROLLING = State(SMOOTH.replace(omega_0=12.0), Case.RR)
@@ -92,18 +99,116 @@ def held(run: Trajectory, state: State, since: float) -> Held:
     )
 
 
-TRANSIENT = "approach to " + SLIPPING.name
+@dataclass(frozen=True)
+class Motion:
+    """A motion from a start, s, of which theory knows the course."""
+
+    name: str
+    p: Parameters
+    x0: tuple[float, ...]
+    lasts: float
+    course: str = ""
+    """What happens, in words."""
+
+    @cached_property
+    def exact(self) -> Trajectory:
+        """By the event-driven simulation."""
+        sharp = analytic.Settings(rtol=1e-12)
+        return analytic.simulate(self.p, self.x0, self.lasts, settings=sharp, sample_interval=self.lasts / 2000)
+
+    def errors(self, time: Array, x: Array) -> tuple[float, float]:
+        """Relative rms errors of omega_c and of the slip, in units of its largest component, of states x (n, 8)."""
+        truth = np.stack([np.interp(time, self.exact.time, column) for column in self.exact.x.T], axis=-1)
+        slip = np.sqrt(np.mean(np.sum((x - truth)[:, 3:6] ** 2, axis=-1))) / np.abs(truth[:, 3:6]).max()
+        return float(np.sqrt(np.mean((x[:, 2] / truth[:, 2] - 1) ** 2))), float(slip)
+
+
 KICKED = (0.0, 0.0, 14.35, -1.0, 2.0, 7.0, 0.0, 0.0)
-"""Start of the transient, in which the ball slips at both points all the time."""
-PASSES = 2.0
-"""Duration of the transient, s."""
-_SHARP = analytic.Settings(rtol=1e-12)
-EXACT = Task(engine="event", parameters=SLIPPING.p, x0=KICKED, t_end=PASSES, settings=_SHARP, sample_interval=1e-3)
-"""The transient by the event-driven simulation."""
+"""From here the ball slips at both points all the time."""
+APPROACH = Motion("approach to " + SLIPPING.name, SLIPPING.p, KICKED, 2.0)
+LANDING = Motion(
+    "lands on the floor",
+    SMOOTH,
+    (0.02, -0.2, 12.0, 30.0, -10.0, 20.0, 0.0, 0.0),
+    0.7,
+    "slides down the wall, lands, slips at both points, sticks",
+)
+HITTING = Motion(
+    "hits the wall",
+    SMOOTH,
+    (0.0, 0.0, 10.0, 1.0, 2.0, 3.0, 0.002, -0.3),
+    0.7,
+    "slides on the floor, hits the wall, is lifted, lands, sticks",
+)
+
+ONSET = (1.02, 1.05, 1.1)
+"""omega_0 at which slip is measured, in units of omega_01, to find by extrapolation where it begins."""
 
 
-def deviation(time: Array, x: Array, exact: Trajectory) -> tuple[float, float]:
-    """Relative rms errors of omega_c and of the slip, in units of its largest component, of states x (n, 8)."""
-    truth = np.stack([np.interp(time, exact.time, column) for column in exact.x.T], axis=-1)
-    slip = np.sqrt(np.mean(np.sum((x - truth)[:, 3:6] ** 2, axis=-1))) / np.abs(truth[:, 3:6]).max()
-    return float(np.sqrt(np.mean((x[:, 2] / truth[:, 2] - 1) ** 2))), float(slip)
+@functools.cache
+def beyond_rolling() -> tuple[State, ...]:
+    """The states at `ONSET`."""
+    omega_01 = analytic.thresholds(SMOOTH).omega_01
+    return tuple(State(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in ONSET)
+
+
+def onset(slips: Sequence[float]) -> float:
+    """Relative error of omega_01, from settled slip_z in the states at `ONSET` extrapolated to zero along a parabola.
+
+    It is nan if slip doesn't begin near omega_01.
+    """
+    states = beyond_rolling()
+    if not all(abs(slip / s.solution.state.slip_z - 1) < 0.5 for slip, s in zip(slips, states, strict=True)):
+        return math.nan
+    # omega_0 as a function of slip, at no slip.
+    return float(np.polynomial.Polynomial.fit(slips, ONSET, 2)(0.0)) - 1
+
+
+AGREES = 0.9
+"""Share of samples in the right case from which a case counts as reproduced."""
+SLIDES = 0.01
+"""Slip speed, in units of sqrt(g R), from which a contact counts as slipping."""
+CARRIES = 0.01
+"""Normal force, in units of m g, from which it counts as closed."""
+SCENARIOS: dict[Case, tuple[Parameters, tuple[float, ...]]] = {
+    Case.RR: (SMOOTH.replace(omega_0=12.0), (0, 0, 12.0, 0, 0, 0)),
+    Case.RS: (SMOOTH.replace(omega_0=12.0), (0, 0, 6.0, 0, -30.0, 0)),
+    Case.RN: (SMOOTH.replace(omega_0=12.0), (0, 0, 4.0, 0, 0, 0, 0.4 * SMOOTH.R, 0)),
+    Case.SR: (ROUGH, (0, 0, 8.0, -40.0, 0, 0)),
+    Case.SS: (SLIPPING.p, KICKED),
+    Case.SN: (SMOOTH.replace(omega_0=12.0), (0, 0, 4.0, 40.0, 0, 40.0, 0.4 * SMOOTH.R, 0)),
+    Case.NR: (ROUGH.replace(omega_0=25.0), (ROUGH.R, 0, 25.0, -27.0, 0, 0)),
+    Case.NS: (SMOOTH.replace(omega_0=12.0), (SMOOTH.R, 0, 12.0, 0, 0, -10.0)),
+    Case.NN: (SMOOTH.replace(omega_0=12.0), (0.5 * SMOOTH.R, 0, 4.0, 5.0, 5.0, 5.0, 0.4 * SMOOTH.R, 0)),
+}
+"""For each case parameters and a state from which the ball is in it for a while."""
+
+
+@functools.cache
+def phase(case: Case) -> tuple[float, float]:
+    """Times (s) between which the event-driven simulation of a scenario is in its case, 1 s at most."""
+    stretches = analytic.simulate(*SCENARIOS[case], 1.0, sample_interval=1e-3).phases()
+    return next((first, last) for each, first, last in stretches if each is case)
+
+
+def share(run: Trajectory, case: Case) -> float:
+    """Share of the samples of a run of a scenario that are in its case, where the event-driven simulation is in it."""
+    begin, end = phase(case)
+    # The first steps press the ball into a soft contact, and the end may come early: a tenth is left out each.
+    margin = 0.1 * (end - begin)
+    judged = (run.time >= begin + margin) & (run.time < end - margin)
+    return float(_in_case(run, case)[judged].mean()) if run.complete and judged.any() else 0.0
+
+
+def _in_case(run: Trajectory, case: Case) -> npt.NDArray[np.bool_]:
+    """Which samples are in a case, by what moves and what carries; a contact that chatters carries its mean."""
+    p, right = run.header.parameters, np.ones(len(run.time), dtype=bool)
+    for contact, normal, speed in (
+        (case.A, run.force_A[:, 1], run.slip_speed_A),
+        (case.B, run.force_B[:, 0], run.slip_speed_B),
+    ):
+        mean = np.convolve(normal, np.ones(9) / 9, mode="same") if len(normal) >= 9 else normal
+        closed = mean > CARRIES * p.m * p.g
+        slips = speed > SLIDES * math.sqrt(p.g * p.R)
+        right &= ~closed if contact is Contact.N else closed & (slips == (contact is Contact.S))
+    return right

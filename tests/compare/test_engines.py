@@ -19,10 +19,9 @@ from compare.runs.campaign import Campaign
 from compare.runs.engines import ENGINES
 from compare.runs.tasks import Task, carry_out
 from compare.scorecard import league, standings
-from compare.scorecard.accuracy import MOTIONS
-from compare.scorecard.contenders import Other
+from compare.scorecard.contenders import Contestant
 from compare.scorecard.league import CASES, COST, Entry
-from compare.scorecard.trials import ROLLING, STATES
+from compare.scorecard.trials import HITTING, LANDING, ROLLING, STATES
 from model import InputError, Parameters
 from model.drag import LAWS
 from model.kinematics import Motion as World
@@ -82,7 +81,7 @@ def test_stationary_states_are_those_of_theory(name, state):
 
 @engines(*BEST)
 def test_a_ball_lands_slips_and_sticks_when_it_should(name):
-    step, (x0, *_) = 1e-3, MOTIONS.values()
+    step, x0 = 1e-3, LANDING.x0
     truth = analytic.simulate(REFERENCE, x0, 0.3)
     seen = run(name, REFERENCE, x0, 0.3, step)
     assert seen.events.to_case.tolist() == truth.events.to_case.tolist()
@@ -142,8 +141,7 @@ def test_polar_coordinates_end_at_the_axis(name):
 @engines("drake")
 def test_a_step_that_cannot_be_solved_is_the_run_s_failure(name):
     settings = ENGINES[name].settings(timestep=1e-3, stiffness=1e12, stiction=1e-12, dissipation=10.0)
-    _, x0 = MOTIONS.values()
-    (seen,) = carry_out([Task(engine=name, parameters=REFERENCE, x0=x0, t_end=0.1, settings=settings)])
+    (seen,) = carry_out([Task(engine=name, parameters=REFERENCE, x0=HITTING.x0, t_end=0.1, settings=settings)])
     assert "converge" in seen.header.failure
 
 
@@ -191,7 +189,7 @@ def test_the_league_of_theory_alone(tmp_path, capsys):
 
 def test_the_league_leaves_out_what_is_missing_and_says_so(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert [bool(each.engine.missing) for each in league.contestants(["event", "drake"])] == [False, True]
+    assert [bool(each.engine.missing) for each in league.contestants(["event", "drake"], [1e-3])] == [False, True]
     data = league.to_mapping(league.contestants(["drake"]), [])
     assert data["contestants"][0]["missing"] == 'drake is not installed: pip install "dualball[engines]"'
     assert cli.main(["league", "--engine", "drake", "-o", str(tmp_path)]) == 2
@@ -211,8 +209,8 @@ def test_a_run_that_breaks_down_is_in_the_table_as_such():
 def test_the_wall_holds_above_its_threshold_and_not_below(name):
     """Within 3 %; the protocol itself asks for less."""
     (discipline,) = [each for each in league.DISCIPLINES if each.name == league.WALL]
-    (contestant,) = league.contestants([name])
-    tasks = [contestant.task(2e-3, *each) for each in discipline.runs]
+    (contestant,) = league.contestants([name], [2e-3])
+    tasks = [contestant.task(*each) for each in discipline.runs]
     assert discipline.score([run for task in tasks for run in carry_out([task])]) <= 0.03
 
 
@@ -232,7 +230,7 @@ def test_only_settings_can_be_graded(options, says, monkeypatch, capsys):
 
 @engines(*BEST)
 def test_an_engine_under_grading_runs_on_from_where_it_is_judged(name):
-    contender = Other(ENGINES[name], 4e-3)
+    contender = Contestant(name, ENGINES[name], 4e-3, ENGINES[name].at(4e-3, ROLLING.p))
     seen = contender.run(ROLLING.p, ROLLING.solution.x, 1.0, 4e-3, skip=0.5)
     assert 0.5 <= seen.time[0] < 0.52
     assert 30 < len(seen.time) == len(seen.force_A) < 70

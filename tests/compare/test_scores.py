@@ -10,21 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import analytic
 from compare.runs.campaign import Campaign
-from compare.runs.tasks import carry_out
-from compare.scorecard import scores, settings, trials
-from compare.scorecard.league import COST
-from compare.scorecard.trials import ROLLING, SLIPPING, STATES
+from compare.scorecard import scores, trials
+from compare.scorecard.league import COST, ERRORS, OPEN
+from compare.scorecard.trials import APPROACH, ROLLING, SLIPPING, STATES
 from mjsim import ContactSettings
-from model import Trajectory
 
 STEP = 4e-3
-
-
-@pytest.fixture(scope="module")
-def exact() -> Trajectory:
-    (run,) = carry_out([trials.EXACT])
-    return run
 
 
 @pytest.fixture
@@ -33,9 +26,9 @@ def campaign(tmp_path: Path) -> Campaign:
 
 
 def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time() -> None:
-    rungs = settings.ladder(1e-3)
+    rungs = scores.rungs(1e-3)
     assert rungs[-1] == ContactSettings()
-    names = [settings.name(each) for each in rungs]
+    names = [scores.name(each) for each in rungs]
     assert len(set(names)) == len(names)
     contact = {"solref", "solreffriction", "solimp", "impratio"}  # one thing: what makes it stiff and continuous
     for low, high in itertools.pairwise(rungs):
@@ -45,24 +38,23 @@ def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time() -> None:
 
 @pytest.mark.parametrize("step", [1e-3, STEP])
 def test_settings_are_named_after_what_they_are(step: float) -> None:
-    assert settings.name(ContactSettings.at(step)) == "ours"
-    assert settings.name(ContactSettings.at(step, memory=False, impratio=10.0)) == "ours, impratio 10, memory off"
-    assert settings.name(settings.newcomer(step)) == "MuJoCo's defaults"
-    for ways in (settings.rivals(step), settings.variants(step)):
-        assert len({settings.name(each) for each in ways}) == len(ways)
+    assert scores.name(ContactSettings.at(step)) == "ours"
+    assert scores.name(ContactSettings.at(step, memory=False, impratio=10.0)) == "ours, impratio 10, memory off"
+    assert scores.name(scores.newcomer(step)) == "MuJoCo's defaults"
+    for ways in (scores.rivals(step), scores.others(step)):
+        assert len({scores.name(each) for each in ways}) == len(ways)
 
 
 def test_no_run_begins_where_it_should_end() -> None:
-    for state, discipline in zip(STATES, scores.ERRORS, strict=False):
+    for state, discipline in zip(STATES, ERRORS, strict=False):
         ((asked, x0, *_),) = discipline.runs
-        assert asked is state
+        assert asked is state.p
         assert abs(x0[2] / state.solution.x[2] - 1) > 0.01
 
 
-def test_errors_are_those_of_the_run(exact: Trajectory) -> None:
+def test_errors_are_those_of_the_run() -> None:
     """A run of the slipping state, with known errors put in."""
-    task = dataclasses.replace(trials.EXACT, x0=tuple(SLIPPING.solution.x.tolist()), t_end=0.1)
-    (run,) = carry_out([task])
+    run, exact = analytic.simulate(SLIPPING.p, SLIPPING.solution.x, 0.1), APPROACH.exact
     off = dataclasses.replace(run, omega_c=1.01 * run.omega_c, slip_z=run.slip_z + 2.0, force_B=0 * run.force_B)
     held = trials.held(off, SLIPPING, 0.05)
     assert held.omega_c == pytest.approx(0.01)
@@ -71,20 +63,19 @@ def test_errors_are_those_of_the_run(exact: Trajectory) -> None:
     broken = dataclasses.replace(run, header=dataclasses.replace(run.header, failure="diverged"))
     assert math.isnan(trials.held(broken, SLIPPING, 0.05).omega_c)
     scaled = exact.x * np.where(np.arange(8) == 2, 1.001, 1.0)
-    omega_c, slip = trials.deviation(exact.time, scaled, exact)
+    omega_c, slip = APPROACH.errors(exact.time, scaled)
     assert omega_c == pytest.approx(1e-3)
     assert slip == 0
 
 
 def test_ladder_as_records(tmp_path: Path, campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    rungs = settings.ladder(STEP)
-    monkeypatch.setattr(settings, "ladder", lambda step: [rungs[3], rungs[-1]])
-    poor, ours = scores.ladder(campaign)
-    assert poor.name == settings.name(rungs[3])
-    assert list(ours.scores) == [*(state.name for state in STATES), trials.TRANSIENT, scores.OPEN]
+    rungs = scores.rungs(STEP)
+    poor, ours = scores.reached(campaign, [rungs[3], rungs[-1]])
+    assert poor.name == scores.name(rungs[3])
+    assert list(ours.scores) == [*(state.name for state in STATES), APPROACH.name, OPEN]
     assert all(ours.scores[name] < poor.scores[name] for name in ours.scores)
-    assert ours.scores[scores.OPEN] == 0
-    monkeypatch.setattr(scores, "ladder", lambda _: [poor])
+    assert ours.scores[OPEN] == 0
+    monkeypatch.setattr(scores, "reached", lambda *_: [poor])
     monkeypatch.setattr(scores, "frontier", lambda *_: [ours])
     scores.write(campaign, tmp_path)
     assert scores.read(tmp_path) == {"ladder": (poor,), "frontier": (ours,)}
@@ -94,15 +85,15 @@ def test_ladder_as_records(tmp_path: Path, campaign: Campaign, monkeypatch: pyte
 def test_a_run_that_breaks_down_has_no_error(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     """Known to diverge: a pyramidal cone with a low impedance."""
     wild = ContactSettings.at(STEP, solimp=0.1, solreffriction=20 * STEP, cone="pyramidal", memory=False, order=1)
-    monkeypatch.setattr(settings, "variants", lambda step: [wild])
-    monkeypatch.setattr(scores, "ASKED", scores.ASKED[:1])
-    (entry,) = scores.variants(campaign)
+    monkeypatch.setattr(scores, "ERRORS", ERRORS[:1])
+    monkeypatch.setattr(scores, "CONTACT", ERRORS[0])
+    (entry,) = scores.reached(campaign, [wild])
     assert math.isnan(entry.scores[ROLLING.name])
     assert entry.failures.keys() == {ROLLING.name}
 
 
 def test_frontier_has_a_cost_that_is_measured_once(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(settings, "rivals", lambda step: [ContactSettings.at(step)])
+    monkeypatch.setattr(scores, "rivals", lambda step: [ContactSettings.at(step)])
     monkeypatch.setattr(scores, "BATCH", 2)
     entries = scores.frontier(campaign, [STEP])
     assert [(e.name, e.step) for e in entries] == [("ours", STEP), ("time-stepping", STEP), ("event", None)]
