@@ -4,14 +4,16 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from compare.claims.claim import Check, Claim, Outcome, Verdict
+    from compare.claims.claim import Claim, Outcome, Verdict
+    from compare.measure.check import Check
     from compare.measure.lab import Level
     from compare.validation import validate
 
 __all__ = ["Check", "Claim", "Level", "Outcome", "Verdict", "validate"]
 
 _CLAIM = "compare.claims.claim"
-_MODULES = dict.fromkeys(("Check", "Claim", "Outcome", "Verdict"), _CLAIM) | {
+_MODULES = dict.fromkeys(("Claim", "Outcome", "Verdict"), _CLAIM) | {
+    "Check": "compare.measure.check",
     "Level": "compare.measure.lab",
     "validate": "compare.validation",
 }

@@ -1,19 +1,38 @@
-"""Claims about cases and impacts: which case it is (Fig. 2), and what a landing leaves."""
+"""What holds at every instant, which case it is (Fig. 2), what a landing leaves, and the drag of the fluid, (10)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 import analytic
+from analytic import stokes
 from analytic.rolling_forces import margin, slip_margin
-from compare.claims.claim import Bearing, Claim
+from compare.claims.claim import Bearing, Claim, Text
 from compare.claims.judge import remembered
 from compare.measure.impacts import NAMES
+from compare.measure.laws import FLUIDS
 from compare.measure.record import Measurement, state
 from model import Parameters, State, Trajectory
+
+
+def _one(m: Measurement) -> float:
+    return 1.0
+
+
+def _none(m: Measurement) -> float:
+    return 0.0
+
+
+def _friction(m: Measurement) -> float:
+    """The friction coefficient of the contact."""
+    return m.parameters.mu if m.conditions["contact"] == "A" else m.parameters.eta
+
+
+def _sinking(m: Measurement) -> float:
+    """v_y in m/s by Stokes' drag, from the properties of fluid and ball."""
+    return -stokes.sinking_speed(**{name: float(m.conditions[name]) for name in FLUIDS[m.set]})
 
 
 @remembered
@@ -36,41 +55,54 @@ def _decides(m: Measurement) -> bool:
     return not rolls or float(margin(x.omega_c, p)) < 0 or float(slip_margin(x.omega_c, p)) >= 0
 
 
-_SPEEDS: dict[str, Callable[[Parameters], float]] = {
-    "v_y": lambda p: math.sqrt(p.g * p.R),
-    "v_h": lambda p: math.sqrt(p.g * p.R),
-    "omega_c": lambda p: math.sqrt(p.g / p.R),
-    **{f"slip_{axis}": lambda p: math.sqrt(p.g * p.R) / p.r for axis in "xyz"},
-}
+def _speed(name: str, p: Parameters) -> float:
+    """The natural size of a velocity, or of a rate of rotation."""
+    falling = math.sqrt(p.g * p.R)
+    return falling if name in ("v_y", "v_h") else falling / (p.R if name == "omega_c" else p.r)
 
 
-def _impact(name: str) -> Bearing:
+def _landed(name: str) -> Bearing:
     return Bearing(
         "impacts",
         f"after_{name}",
         lambda m: float(getattr(_simulated(m), name)[-1]),
-        scale=_SPEEDS[name],
+        size=lambda m: _speed(name, m.parameters),
         by="analytic.simulate",
     )
 
 
 CLAIMS = (
     Claim(
-        id="cases",
-        source="Fig. 2, Table 3",
-        statement=(
-            "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
-            "equations of motion say."
-        ),
-        bearings=(
-            Bearing("motions", "case", lambda m: float(_simulated(m).case[-1]), when=_decides, by="analytic.simulate"),
+        "table-3",
+        "Table 3, (12)-(17)",
+        "A contact that rolls doesn't slip; contacts press and never pull; friction stays within mu or eta times "
+        "the normal force, has that size where the contact slips, and opposes the slip.",
+        (
+            Bearing("laws", "law", _none, size=_one, by="(12), (13)"),
+            Bearing("laws", "law_in_motion", _none, size=_one, by="Table 3, (14)-(17)"),
+            Bearing("laws", "friction_ratio", _friction, by="(14), (15)"),
         ),
     ),
     Claim(
-        id="impacts",
-        source="extension",
-        statement="A ball that lands does not rebound, and friction takes its share of the impulse.",
-        bearings=tuple(_impact(name) for name in NAMES),
+        "eq-10",
+        "(9), (10)",
+        "A ball sinks freely at the speed at which Stokes' drag balances its weight less buoyancy.",
+        (Bearing("laws", "v_y", _sinking, by="analytic.stokes.sinking_speed"),),
+        text=Text.CORRECTED,
+        reason="Table 1 gives the unit of m·c as kg m/s; it is kg/s.",
+    ),
+    Claim(
+        "cases",
+        "Fig. 2, Table 3",
+        "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
+        "equations of motion say.",
+        (Bearing("motions", "case", lambda m: float(_simulated(m).case[-1]), when=_decides, by="analytic.simulate"),),
+    ),
+    Claim(
+        "impacts",
+        "extension",
+        "A ball that lands does not rebound, and friction takes its share of the impulse.",
+        tuple(_landed(name) for name in NAMES),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
     ),
 )

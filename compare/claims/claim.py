@@ -9,14 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
 
+from compare.measure.check import Check, Relation
 from compare.measure.lab import Level
 from compare.measure.quantities import quantity
-from compare.measure.record import Measurement
+from compare.measure.record import Condition, Measurement
 from compare.statistics import Measured
-from model import Parameters
+
+When = Callable[[Measurement], bool]
+Prediction = float | Measured
+"""A predicted value, with its own uncertainty where it comes from an integrator."""
 
 
 class Outcome(StrEnum):
@@ -41,16 +45,9 @@ class Text(StrEnum):
     """Outside the physical model: algebra is all there is."""
 
 
-class Relation(StrEnum):
-    """How a measured value should stand to the predicted one."""
-
-    EQUAL = "="
-    AT_MOST = "≤"
-    AT_LEAST = "≥"
-
-
-Prediction = float | Measured
-"""A predicted value, with its own uncertainty where it comes from an integrator."""
+def given(**conditions: Condition) -> When:
+    """Chooses the measurements that were made under these conditions."""
+    return lambda m: conditions.items() <= m.conditions.items()
 
 
 @dataclass(frozen=True)
@@ -62,11 +59,9 @@ class Bearing:
     predict: Callable[[Measurement], Prediction]
     """Raises one of `judge.UNKNOWN` where theory knows no such state."""
     _: KW_ONLY
-    when: Callable[[Measurement], bool] = lambda m: True
-    scale: Callable[[Parameters], float] | None = None
-    """Natural size of the quantity, over which errors are counted; None for the predicted value itself."""
+    when: When = lambda m: True
     size: Callable[[Measurement], float] | None = None
-    """The same where it depends on more than the parameters, such as a rate that is one part of an eigenvalue."""
+    """Natural size of the quantity, over which errors are counted; None for the predicted value itself."""
     relation: Relation = Relation.EQUAL
     by: str = ""
     """The function or equation that predicts, for the reader."""
@@ -75,43 +70,7 @@ class Bearing:
         quantity(self.quantity)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Check:
-    """A measured number beside its prediction."""
-
-    measurement: Measurement
-    predicted: float
-    """nan where theory knows no such state."""
-    tolerance: float
-    """Largest deviation that still agrees."""
-    scale: float
-    relation: Relation = Relation.EQUAL
-
-    @property
-    def deviation(self) -> float:
-        """Measured less predicted, as far as it goes against the relation."""
-        error = self.measurement.value - self.predicted
-        if self.relation is Relation.AT_MOST:
-            return max(error, 0.0)
-        return min(error, 0.0) if self.relation is Relation.AT_LEAST else error
-
-    @property
-    def resolves(self) -> float:
-        """Resolving power: the smallest relative error of the prediction that this check would notice."""
-        return self.tolerance / self.scale if self.scale else math.inf
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the deviation is within the tolerance; not for nan."""
-        return abs(self.deviation) <= self.tolerance
-
-    @property
-    def conclusive(self) -> bool:
-        """Whether the check resolves as much as its quantity asks for."""
-        return self.resolves <= quantity(self.measurement.quantity).resolves
-
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Claim:
     """One checkable statement."""
 
@@ -120,6 +79,7 @@ class Claim:
     """Proposition, equation, figure or table."""
     statement: str
     bearings: tuple[Bearing, ...] = ()
+    _: KW_ONLY
     algebra: Callable[[], Iterable[Check]] | None = None
     """For a claim that is formal only: theory against theory."""
     text: Text = Text.PRINTED
@@ -150,7 +110,7 @@ class Verdict:
     checks: tuple[Check, ...] = ()
     error: str = ""
     """Why it could not be judged."""
-    missing: tuple[str, ...] = field(default=())
+    missing: tuple[str, ...] = ()
     """What could not be measured, and why."""
 
     @property
@@ -163,21 +123,12 @@ class Verdict:
         """By quantity, the relative error of theory that every single check would notice: the largest of all."""
         power: dict[str, float] = {}
         for check in self.checks:
-            if check.measurement.quantity not in ("case", "cases"):
-                name = check.measurement.quantity
+            name = check.measurement.quantity
+            if name not in ("case", "cases"):
                 power[name] = max(power.get(name, 0.0), check.resolves)
         return power
 
     @property
     def worst(self) -> float:
         """Largest deviation over tolerance of all checks; inf where theory knows no such state."""
-        ratios = [_ratio(abs(check.deviation), check.tolerance) for check in self.checks]
-        return max(ratios, default=math.nan)
-
-
-def _ratio(deviation: float, tolerance: float) -> float:
-    if math.isnan(deviation):
-        return math.inf
-    if tolerance == 0:
-        return 0.0 if deviation == 0 else math.inf
-    return deviation / tolerance
+        return max((check.share for check in self.checks), default=math.nan)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import numpy as np
-
 import analytic
-from compare.claims.claim import Bearing, Claim, Text
+from compare.claims.claim import Bearing, Claim, Text, given
 from compare.claims.judge import remembered
-from compare.measure.record import state
+from compare.claims.stationary import force
+from compare.measure.record import Measurement, state
 from model import Case, Parameters
 from model.arrays import Array
 from model.cases import TRAITS
@@ -27,16 +24,9 @@ _CORRECTED = {
     Case.SS: "The last row of (26) has the wrong sign before w̃_z A_z/(w̃_x jmr), and A_z and B_z of (29) are damaged.",
     Case.NS: "(28) divides by w̃_x where it should by w̃_y, and its last row has -(c v_y + g)/r for +(c v_y + g)/r.",
 }
-_COMPONENTS = ("Ax", "Ay", "Az", "Bx", "By", "Bz")
-_COMBINED = ("Ax-By", "Ay+By", "Bx+By")
-"""What is determined where both contacts roll, besides A_z and B_z."""
-_RATES: dict[str, Callable[[Parameters], float]] = {
-    "v_y": lambda p: p.g,
-    "omega_c": lambda p: p.g / p.R,
-    **{f"slip_{axis}": lambda p: p.g / p.r for axis in "xyz"},
-    "v_h": lambda p: p.g,
-}
-"""The natural size of each rate."""
+_OWN = "The paper has no equations away from the wall: (20), with a drag on radial motion, is this project's extension."
+_FORCES = ("Ax", "Ay", "Az", "Bx", "By", "Bz", "Ax-By", "Ay+By", "Bx+By")
+"""Where both contacts roll only A_z, B_z and the sums are determined, and measured."""
 
 
 @remembered
@@ -45,21 +35,23 @@ def _rates(case: Case, x: tuple[float, ...], p: Parameters) -> Array:
 
 
 @remembered
-def _forces(case: Case, x: tuple[float, ...], p: Parameters) -> dict[str, float]:
-    A, B = analytic.contact_forces(case, x, p)
-    force = dict(zip(_COMPONENTS, np.concatenate([A, B]).tolist(), strict=True))
-    combined = {"Ax-By": force["Ax"] - force["By"]} | {n: force[n[:2]] + force["By"] for n in ("Ay+By", "Bx+By")}
-    return force | combined
+def _forces(case: Case, x: tuple[float, ...], p: Parameters) -> tuple[Array, Array]:
+    return analytic.contact_forces(case, x, p)
 
 
 def _rate(case: Case, name: str) -> Bearing:
     k = VARIABLES.index(name)
+
+    def size(m: Measurement) -> float:
+        p = m.parameters
+        return p.g / {"v_y": 1.0, "v_h": 1.0, "omega_c": p.R}.get(name, p.r)
+
     return Bearing(
         "field",
         f"rate_{name}",
         lambda m: float(_rates(case, state(m), m.parameters)[k]),
-        when=lambda m: m.conditions["case"] == case.name,
-        scale=_RATES[name],
+        when=given(case=case.name),
+        size=size,
         by="analytic.vector_field",
     )
 
@@ -68,27 +60,24 @@ def _force(case: Case, name: str) -> Bearing:
     return Bearing(
         "field",
         f"moving_force_{name}",
-        lambda m: _forces(case, state(m), m.parameters)[name],
-        when=lambda m: m.conditions["case"] == case.name,
-        scale=lambda p: p.m * p.g,
+        lambda m: force(name, *_forces(case, state(m), m.parameters)),
+        when=given(case=case.name),
+        size=lambda m: m.parameters.m * m.parameters.g,
         by="analytic.contact_forces",
     )
 
 
-def _claim(case: Case) -> Claim:
-    own = case not in _SOURCES
-    return Claim(
-        id=f"motion-{case.name}",
-        source=_SOURCES.get(case, "(20)"),
-        statement=f"In case {case.name} the ball moves, its contacts press and rub, as the equations say.",
-        bearings=(
-            *(_rate(case, name) for name in _RATES if name in TRAITS[case].active),
-            *(_force(case, name) for name in (*_COMPONENTS, *_COMBINED)),
+CLAIMS = tuple(
+    Claim(
+        f"motion-{case.name}",
+        _SOURCES.get(case, "(20)"),
+        f"In case {case.name} the ball moves, its contacts press and rub, as the equations say.",
+        (
+            *(_rate(case, name) for name in TRAITS[case].active if name not in ("y", "h")),
+            *(_force(case, name) for name in _FORCES),
         ),
         text=Text.CORRECTED if case in _CORRECTED else Text.PRINTED,
-        reason=_OWN if own else _CORRECTED.get(case, ""),
+        reason=_CORRECTED.get(case, "" if case in _SOURCES else _OWN),
     )
-
-
-_OWN = "The paper has no equations away from the wall: (20), with a drag on radial motion, is this project's extension."
-CLAIMS = tuple(_claim(case) for case in Case)
+    for case in Case
+)

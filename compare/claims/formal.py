@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 
 import analytic
 from analytic import bifurcation, branch_stability, dynamics, jacobian, slip_bounds, slipping_branch
-from compare.claims.claim import Check, Claim, Text
+from compare.claims.claim import Claim, Text
+from compare.measure.check import Check
 from compare.measure.record import Measurement
 from compare.statistics import COVERAGE
 from model import Case, Parameters, State
@@ -51,7 +52,7 @@ def _figure_12() -> Iterator[Check]:
 def _pulling() -> Iterator[Check]:
     """The normal forces of slip at its onset, on either bound and a grid of friction coefficients."""
     grid = [FORMAL.replace(mu=mu, eta=eta) for mu in np.geomspace(0.05, 3.0, 13) for eta in np.geomspace(0.05, 3.0, 13)]
-    presses = {side: [(p.eta, *_normal_forces(p, side)) for p in grid if _reached(p, side)] for side in (1, -1)}
+    presses = {side: [each for p in grid for each in _at_onset(p, side)] for side in (1, -1)}
     yield _check("law", "(83): friction at which the wall presses", sum(B_x >= 0 for _, _, B_x in presses[-1]), 0.0)
     wrong = sum((A_y > 0) != (eta < FORMAL.j) for eta, A_y, _ in presses[1])
     yield _check("law", "(82): friction at which the floor presses and η > j, or pulls and η < j", wrong, 0.0)
@@ -59,15 +60,14 @@ def _pulling() -> Iterator[Check]:
     yield _check("law", "(83): friction with a bound and η ≤ 1", smooth, 0.0)
 
 
-def _reached(p: Parameters, side: int) -> bool:
-    return 0 < slip_bounds.rr_to_ss(p, side).zero < math.inf
-
-
-def _normal_forces(p: Parameters, side: int) -> tuple[float, float]:
-    """A_y and B_x in N of slip along (0, 0), side 1, or (pi, pi) at its onset by (82) or (83)."""
-    omega, direction = math.sqrt(slip_bounds.rr_to_ss(p, side).zero), (0.0, float(side))
-    forces = dynamics.forces(Case.SS, State(omega_c=omega), p, omega, direction, direction)
-    return float(forces.A_y), float(forces.B_x)
+def _at_onset(p: Parameters, side: int) -> Iterator[tuple[float, float, float]]:
+    """Friction of the wall, A_y and B_x in N of slip along (0, 0), side 1, or (pi, pi) where (82) or (83) has it begin;
+    nothing where it doesn't."""
+    square, direction = slip_bounds.rr_to_ss(p, side).zero, (0.0, float(side))
+    if 0 < square < math.inf:
+        omega = math.sqrt(square)
+        forces = dynamics.forces(Case.SS, State(omega_c=omega), p, omega, direction, direction)
+        yield p.eta, float(forces.A_y), float(forces.B_x)
 
 
 def _check(quantity: str, what: str, value: float, predicted: float, uncertainty: float = 0.0) -> Check:
@@ -98,17 +98,17 @@ def _second_rate(p: Parameters) -> float:
 
 CLAIMS = (
     Claim(
-        id="fig-12",
-        source="Fig. 12",
-        statement="With (12) released all bifurcations of Table 5 appear for η > j as well.",
+        "fig-12",
+        "Fig. 12",
+        "With (12) released all bifurcations of Table 5 appear for η > j as well.",
         algebra=_figure_12,
         text=Text.FORMAL,
         reason="The floor would have to pull: no ball and no engine does this.",
     ),
     Claim(
-        id="eq-83-rough",
-        source="(82), (83), end of section 4.3",
-        statement="(83) is a bound for η > 1 only, and contradicts (12) there; (82) does so unless η < j.",
+        "eq-83-rough",
+        "(82), (83), end of section 4.3",
+        "(83) is a bound for η > 1 only, and contradicts (12) there; (82) does so unless η < j.",
         algebra=_pulling,
         text=Text.FORMAL,
         reason="At (83) the wall would have to pull, and at (82) for η > j the floor.",

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from analytic.orbits import NoOrbitError
-from compare.claims.claim import Bearing, Check, Claim, Outcome, Verdict
+from compare.claims.claim import Bearing, Claim, Outcome, Verdict
+from compare.measure.check import Check
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Records
 from compare.statistics import COVERAGE, Measured
@@ -79,17 +80,11 @@ def check(bearing: Bearing, m: Measurement) -> Check:
         prediction = math.nan
     own = prediction if isinstance(prediction, Measured) else Measured(float(prediction), 0.0)
     exact = quantity(m.quantity).resolves == 0
-    if exact:
-        scale = 1.0
-    elif bearing.size:
-        scale = bearing.size(m)
-    else:
-        scale = bearing.scale(m.parameters) if bearing.scale else abs(own.value)
     return Check(
         measurement=m,
         predicted=own.value,
         tolerance=COVERAGE * math.hypot(m.uncertainty, own.uncertainty),
-        scale=scale,
+        scale=1.0 if exact else bearing.size(m) if bearing.size else abs(own.value),
         relation=bearing.relation,
     )
 

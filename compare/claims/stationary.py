@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import partial
 
 import analytic
 from analytic import StationarySolution, bifurcation
-from compare.claims.claim import Bearing, Claim, Text
+from compare.claims.claim import Bearing, Claim, Text, When, given
 from compare.claims.judge import remembered
 from compare.measure.record import Measurement
 from compare.measure.settling import FORCES, SUMS, family, scale
 from model import Case, Parameters
+from model.arrays import Array
 from model.kinematics import VARIABLES
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
-_SUMS = {"force_Ax-By": ("Ax", -1, "By"), "force_Ay+By": ("Ay", 1, "By"), "force_Bx+By": ("Bx", 1, "By")}
-When = Callable[[Measurement], bool]
 
 
 @remembered
@@ -63,13 +61,17 @@ def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
     """A quantity of a stationary solution by its name in the measurements."""
     if quantity == "wall_spin":
         return bifurcation.wall_spin(s, p)
-    if not quantity.startswith("force_"):
-        return float(s.x[VARIABLES.index(quantity)])
-    if quantity in _SUMS:
-        one, sign, other = _SUMS[quantity]
-        return number(f"force_{one}", s, p) + sign * number(f"force_{other}", s, p)
-    axis = "xyz".index(quantity[-1])
-    return float(s.force_A[axis] if quantity[-2] == "A" else s.force_B[axis])
+    if quantity.startswith("force_"):
+        return force(quantity.removeprefix("force_"), s.force_A, s.force_B)
+    return float(s.x[VARIABLES.index(quantity)])
+
+
+def force(name: str, A: Array, B: Array) -> float:
+    """A component of the contact forces (3,), such as "Ax", or the sum or difference of two, such as "Ax-By"."""
+    one = float((A if name[0] == "A" else B)["xyz".index(name[1])])
+    if len(name) == 2:
+        return one
+    return one + float(f"{name[2]}1") * force(name[3:], A, B)
 
 
 def case(m: Measurement) -> float:
@@ -114,27 +116,36 @@ def bearings(
     def predict(m: Measurement) -> float:
         return number(m.quantity, state(m), m.parameters)
 
-    return tuple(Bearing("settled", q, predict, when=when, scale=partial(scale, q), by=by) for q in quantities)
+    return tuple(Bearing("settled", q, predict, when=when, size=natural_size, by=by) for q in quantities)
+
+
+def natural_size(m: Measurement) -> float:
+    """Over which errors of a settled state are counted."""
+    return scale(m.quantity, m.parameters)
 
 
 def is_in(*cases: Case) -> When:
-    """Whether the state that was measured is of one of these cases."""
+    """Chooses the settled states of these cases."""
     return lambda m: detected(m) in cases
 
 
-def _both(one: When, other: When) -> When:
+def both(one: When, other: When) -> When:
+    """Chooses what both choose."""
     return lambda m: one(m) and other(m)
 
 
-def _below(m: Measurement) -> bool:
+def slips_first(m: Measurement) -> bool:
+    """Whether eta < j: slip ends rolling."""
     return m.parameters.eta < m.parameters.j
 
 
-def _above(m: Measurement) -> bool:
+def lifts_first(m: Measurement) -> bool:
+    """Whether eta > j: the floor is lost before slip begins."""
     return m.parameters.eta > m.parameters.j
 
 
-def _from_floor(m: Measurement) -> bool:
+def from_floor(m: Measurement) -> bool:
+    """Whether the ball started on the floor."""
     return m.conditions["start"] in ("rest", "with the fluid")
 
 
@@ -143,56 +154,42 @@ def _cases(when: When) -> Bearing:
 
 
 def _with_fluid(when: When = lambda m: True) -> Bearing:
-    def begins(m: Measurement) -> bool:
-        return m.conditions["start"] == "with the fluid" and when(m)
-
-    return Bearing("settled", "case", rolling, when=begins, by="analytic.thresholds")
+    return Bearing("settled", "case", rolling, when=both(given(start="with the fluid"), when), by="analytic.thresholds")
 
 
 def _plane(figure: str, source: str, axis: str) -> Claim:
     return Claim(
-        id=figure,
-        source=source,
-        statement=(
-            f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
-            "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR)."
-        ),
-        bearings=(
-            Bearing(
-                "plane",
-                "cases",
-                reachable,
-                when=lambda m: m.conditions["figure"] == figure,
-                by="analytic.stable_solutions",
-            ),
-        ),
+        figure,
+        source,
+        f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
+        "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR).",
+        (Bearing("plane", "cases", reachable, when=given(figure=figure), by="analytic.stable_solutions"),),
     )
 
 
-_MISPRINT_35 = "(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it."
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
+_LEANS = both(_LIFTED, from_floor)
+_STATE = (*MOTION, *FORCES)
 
 CLAIMS = (
     Claim(
-        id="prop-1",
-        source="Prop. 1, (30)-(32)",
-        statement=(
-            "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
-            "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j)."
-        ),
-        bearings=(*bearings((*MOTION, *SUMS), _ROLLS, by="(31), (32)"), _cases(_ROLLS), _with_fluid()),
+        "prop-1",
+        "Prop. 1, (30)-(32)",
+        "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
+        "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j).",
+        (*bearings((*MOTION, *SUMS), _ROLLS, by="(31), (32)"), _cases(_ROLLS), _with_fluid()),
     ),
     Claim(
-        id="prop-1-rough",
-        source="Prop. 1, (83), (86)",
-        statement="With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
-        bearings=(*bearings(("omega_c",), _both(_above, _ROLLS), by="(32)"), _with_fluid(_above)),
+        "prop-1-rough",
+        "Prop. 1, (83), (86)",
+        "With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
+        (*bearings(("omega_c",), both(lifts_first, _ROLLS), by="(32)"), _with_fluid(lifts_first)),
     ),
     Claim(
-        id="prop-2-forces",
-        source="Prop. 2, (33), (34)",
-        statement="In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
-        bearings=bearings(
+        "prop-2-forces",
+        "Prop. 2, (33), (34)",
+        "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
+        bearings(
             ("omega_c", "slip_x", "slip_z", "v_y", *FORCES),
             is_in(Case.RS),
             lambda m: solution(m.parameters, Case.RS),
@@ -200,37 +197,31 @@ CLAIMS = (
         ),
     ),
     Claim(
-        id="prop-3-5",
-        source="Props. 3 and 5, (35), (36), (46), (47)",
-        statement=(
-            "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
-            "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR."
-        ),
-        bearings=(
-            *bearings((*MOTION, *FORCES), _LIFTED, by="(46), (47)"),
-            *bearings((*MOTION, *FORCES), _both(_LIFTED, _from_floor), leaning, by="(35), (36)"),
+        "prop-3-5",
+        "Props. 3 and 5, (35), (36), (46), (47)",
+        "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
+        "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR.",
+        (
+            *bearings(_STATE, _LIFTED, by="(46), (47)"),
+            *bearings(_STATE, _LEANS, leaning, by="(35), (36)"),
             _cases(_LIFTED),
         ),
         text=Text.CORRECTED,
-        reason=_MISPRINT_35,
+        reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it.",
     ),
     Claim(
-        id="prop-4",
-        source="Prop. 4, (37)-(42)",
-        statement=(
-            "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
-            "its contact forces are (42)-(44)."
-        ),
-        bearings=(*bearings((*MOTION, *FORCES), _SLIPS, by="(37)-(44)"), _cases(_SLIPS)),
+        "prop-4",
+        "Prop. 4, (37)-(42)",
+        "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
+        "its contact forces are (42)-(44).",
+        (*bearings(_STATE, _SLIPS, by="(37)-(44)"), _cases(_SLIPS)),
     ),
     Claim(
-        id="prop-6",
-        source="Prop. 6, (49), (50)",
-        statement=(
-            "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
-            "with the fluid; B_x = mRω₀², B_y = ηmRω₀²."
-        ),
-        bearings=(*bearings((*MOTION, *FORCES), _SINKS, by="(49), (50)"), _cases(_SINKS)),
+        "prop-6",
+        "Prop. 6, (49), (50)",
+        "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
+        "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
+        (*bearings(_STATE, _SINKS, by="(49), (50)"), _cases(_SINKS)),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
     ),
@@ -238,28 +229,28 @@ CLAIMS = (
 
 DIAGRAMS = (
     Claim(
-        id="fig-9",
-        source="Fig. 9",
-        statement="Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
-        bearings=bearings(("wall_spin",), is_in(Case.NS, Case.NR), by="(91)"),
+        "fig-9",
+        "Fig. 9",
+        "Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
+        bearings(("wall_spin",), is_in(Case.NS, Case.NR), by="(91)"),
     ),
     Claim(
-        id="fig-10",
-        source="Fig. 10",
-        statement="For η < j the spins on the wall in rolling, slipping and in the lifted state join as drawn.",
-        bearings=(
-            *bearings(("wall_spin",), _both(_below, is_in(Case.RR, Case.SS)), by="(91)"),
-            *bearings(("wall_spin",), _both(_below, _both(_LIFTED, _from_floor)), leaning, by="(91)"),
+        "fig-10",
+        "Fig. 10",
+        "For η < j the spins on the wall in rolling, slipping and in the lifted state join as drawn.",
+        (
+            *bearings(("wall_spin",), both(slips_first, is_in(Case.RR, Case.SS)), by="(91)"),
+            *bearings(("wall_spin",), both(slips_first, _LEANS), leaning, by="(91)"),
         ),
     ),
     Claim(
-        id="fig-11",
-        source="Fig. 11",
-        statement="For η > j rolling ends at ω₀₃ upon the state whose spin on the wall falls like 1/ω₀.",
-        bearings=(
-            *bearings(("wall_spin",), _both(_above, _ROLLS), by="(91)"),
-            *bearings(("wall_spin",), _both(_above, _both(_LIFTED, _from_floor)), leaning, by="(91)"),
-            _with_fluid(_above),
+        "fig-11",
+        "Fig. 11",
+        "For η > j rolling ends at ω₀₃ upon the state whose spin on the wall falls like 1/ω₀.",
+        (
+            *bearings(("wall_spin",), both(lifts_first, _ROLLS), by="(91)"),
+            *bearings(("wall_spin",), both(lifts_first, _LEANS), leaning, by="(91)"),
+            _with_fluid(lifts_first),
         ),
     ),
     _plane("fig-7", "Fig. 7", "η"),

@@ -16,7 +16,6 @@ from compare.measure.unloading import first_top
 from compare.statistics import Measured
 from model import Case, Contact, Parameters, Trajectory
 
-PROTOCOL = "unloading"
 SAMPLES = 2000
 STEPS = 100
 """Steps of the integrator up to an event, about, whose errors may be of one sign."""
@@ -25,14 +24,6 @@ STEPS = 100
 @remembered
 def _motion(p: Parameters, x0: tuple[float, ...], t_end: float) -> Trajectory:
     return analytic.simulate(p, x0, t_end, sample_interval=t_end / SAMPLES)
-
-
-def _run(m: Measurement) -> Trajectory:
-    return _motion(m.parameters, state(m), float(m.conditions["duration"]))
-
-
-def _case(m: Measurement) -> float:
-    return float(family(Case(_run(m).case[-1])))
 
 
 def _event(run: Trajectory, happens: Callable[[Case, Case], bool]) -> int:
@@ -44,77 +35,73 @@ def _event(run: Trajectory, happens: Callable[[Case, Case], bool]) -> int:
     raise LookupError("theory has no such event")
 
 
-def _landing(m: Measurement) -> tuple[Trajectory, int]:
-    run = _run(m)
-    return run, _event(run, lambda before, after: before.A is Contact.N and after.A is not Contact.N)
+def _landing(run: Trajectory) -> int:
+    return _event(run, lambda before, after: before.A is Contact.N and after.A is not Contact.N)
 
 
-def _onset(m: Measurement) -> float:
-    run = _run(m)
-    return float(run.events.time[_event(run, lambda before, after: after.B is Contact.S)])
-
-
-def _time_of_landing(m: Measurement) -> float:
-    run, k = _landing(m)
+def _time(run: Trajectory, m: Measurement) -> float:
+    lands = m.conditions["event"] == "landing"
+    k = _landing(run) if lands else _event(run, lambda before, after: after.B is Contact.S)
     return float(run.events.time[k])
 
 
-def _impulse(m: Measurement) -> float:
+def _impulse(run: Trajectory, m: Measurement) -> float:
     """Vertical impulse of both contacts, N s; what they do at one moment may be several events."""
-    run, k = _landing(m)
-    now = np.isclose(run.events.time, run.events.time[k], rtol=0.0, atol=math.ulp(1.0) * 1e3)
+    now = np.isclose(run.events.time, run.events.time[_landing(run)], rtol=0.0, atol=math.ulp(1.0) * 1e3)
     return float((run.events.impulse_A[now, 1] + run.events.impulse_B[now, 1]).sum())
 
 
-def _landing_speed(m: Measurement) -> float:
+def _landing_speed(run: Trajectory, m: Measurement) -> float:
     """The impulse is all that a landing without restitution takes away."""
-    return -_impulse(m) / m.parameters.m
+    return -_impulse(run, m) / m.parameters.m
 
 
-def _lift(m: Measurement) -> float:
-    run = _run(m)
+def _lift(run: Trajectory, m: Measurement) -> float:
     return float(run.y[-1]) if m.conditions["event"] == "end" else first_top(run)
 
 
-def _sure(predict: Callable[[Measurement], float]) -> Callable[[Measurement], Measured]:
-    """A predicted number with the uncertainty of the integrator; a case has none."""
-
-    def predicted(m: Measurement) -> Measured:
-        value = predict(m)
-        sure = 0.0 if predict is _case else STEPS * analytic.Settings().rtol * abs(value)
-        return Measured(value, sure)
-
-    return predicted
+def _case(m: Measurement) -> float:
+    return float(family(Case(_run(m).case[-1])))
 
 
-def _bearing(quantity: str, predict: Callable[[Measurement], float], event: str = "", start: str = "") -> Bearing:
-    def when(m: Measurement) -> bool:
-        begun, conditions = str(m.conditions["start"]), m.conditions
-        return begun.startswith(start) and (not event or conditions["event"] == event)
+def _run(m: Measurement) -> Trajectory:
+    return _motion(m.parameters, state(m), float(m.conditions["duration"]))
 
-    return Bearing(PROTOCOL, quantity, _sure(predict), when=when, by="analytic.simulate")
+
+def _ends(start: str) -> Bearing:
+    """The case in which a motion ends that starts so."""
+    return Bearing(
+        "unloading", "case", _case, when=lambda m: str(m.conditions["start"]).startswith(start), by="analytic.simulate"
+    )
+
+
+def _bearing(quantity: str, read: Callable[[Trajectory, Measurement], float]) -> Bearing:
+    """A number read off theory's motion, with the uncertainty of the integrator."""
+
+    def predict(m: Measurement) -> Measured:
+        value = read(_run(m), m)
+        return Measured(value, STEPS * analytic.Settings().rtol * abs(value))
+
+    return Bearing("unloading", quantity, predict, by="analytic.simulate")
 
 
 CLAIMS = (
     Claim(
-        id="fig-13-right",
-        source="Fig. 13, right; section 5.3",
-        statement=(
-            "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
-            "rolling at both points."
-        ),
-        bearings=(
-            _bearing("case", _case, start="unloading"),
-            _bearing("time", _onset, "slip at B"),
-            _bearing("time", _time_of_landing, "landing"),
-            _bearing("landing_speed", _landing_speed, "landing"),
-            _bearing("landing_impulse", _impulse, "landing"),
+        "fig-13-right",
+        "Fig. 13, right; section 5.3",
+        "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
+        "rolling at both points.",
+        (
+            _ends("unloading"),
+            _bearing("time", _time),
+            _bearing("landing_speed", _landing_speed),
+            _bearing("landing_impulse", _impulse),
         ),
     ),
     Claim(
-        id="push",
-        source="section 5.3",
-        statement="A small push lifts the ball from SR to NR, where it stays off the floor.",
-        bearings=(_bearing("case", _case, start="push"), _bearing("lift", _lift)),
+        "push",
+        "section 5.3",
+        "A small push lifts the ball from SR to NR, where it stays off the floor.",
+        (_ends("push"), _bearing("lift", _lift)),
     ),
 )

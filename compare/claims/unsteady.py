@@ -7,8 +7,9 @@ from collections.abc import Callable
 
 import analytic
 from analytic import pulsation, response
-from compare.claims.claim import Bearing, Claim, Relation
+from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered
+from compare.measure.check import Relation
 from compare.measure.record import Measurement
 from compare.measure.unsteady import caught_up
 from model import Case, Flow, Parameters

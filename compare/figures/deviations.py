@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from compare.claims.claim import Check
 from compare.figures import style
 from compare.figures.drawing import Drawing, GapError, Material
+from compare.measure.check import Check
 from compare.measure.quantities import quantity
 from compare.statistics import COVERAGE
 

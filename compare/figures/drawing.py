@@ -8,7 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from compare.claims.claim import Check, Verdict
+from compare.claims.claim import Verdict
+from compare.measure.check import Check
 from compare.measure.record import Measurement, Records
 from model import Trajectory, storage
 

@@ -15,9 +15,9 @@ from scipy import ndimage
 
 from analytic import bifurcation
 from analytic.bifurcation import Exists
-from compare.claims.claim import Check
 from compare.figures import style
 from compare.figures.drawing import Material
+from compare.measure.check import Check
 from model import Parameters
 from model.arrays import Array
 

@@ -13,9 +13,10 @@ from typing import Any
 from markdown_it import MarkdownIt
 
 from compare import pages
-from compare.claims.claim import Check, Outcome, Verdict
+from compare.claims.claim import Outcome, Verdict
 from compare.figures.drawing import Drawing, GapError, Material
 from compare.figures.registry import FIGURES, figures_of
+from compare.measure.check import Check
 from compare.measure.lab import Level
 from compare.measure.record import Records
 from compare.report import pictures, results, wording

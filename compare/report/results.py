@@ -12,8 +12,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from compare.claims.claim import Check, Verdict
+from compare.claims.claim import Verdict
 from compare.measure import record
+from compare.measure.check import Check
 from compare.measure.lab import Level
 from compare.measure.record import Records
 from compare.statistics import plain

@@ -6,7 +6,8 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from compare.claims.claim import Check, Outcome, Verdict
+from compare.claims.claim import Outcome, Verdict
+from compare.measure.check import Check
 from compare.measure.quantities import QUANTITIES, quantity
 from compare.measure.record import Condition, Measurement
 from model import Case

@@ -15,10 +15,11 @@ import analytic
 import mjsim
 from analytic import thresholds
 from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Bearing, Check, Claim, Outcome, Verdict
+from compare.claims.claim import Bearing, Claim, Outcome, Verdict
 from compare.figures import bifurcation_diagrams, deviations, gallery, periodic, slipping, style, unloading, unsteady
 from compare.figures.drawing import GapError, Material
 from compare.figures.registry import FIGURES, figures_of
+from compare.measure.check import Check
 from compare.measure.record import Measurement, Records
 from compare.runs.engines import ENGINES
 from compare.scorecard.league import COST, Entry

@@ -8,8 +8,9 @@ from dataclasses import replace
 import pytest
 
 import compare.claims.judge
-from compare.claims.claim import Bearing, Claim, Outcome, Relation, Text
+from compare.claims.claim import Bearing, Claim, Outcome, Text
 from compare.claims.judge import judge, remembered, select
+from compare.measure.check import Relation
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records
 from compare.statistics import COVERAGE, Measured

@@ -19,9 +19,10 @@ from xml.etree import ElementTree
 import pytest
 from matplotlib.figure import Figure
 
-from compare.claims.claim import Bearing, Check, Claim, Outcome, Relation, Text, Verdict
+from compare.claims.claim import Bearing, Claim, Outcome, Text, Verdict
 from compare.figures.drawing import Drawing, GapError, Material
 from compare.measure import record
+from compare.measure.check import Check, Relation
 from compare.measure.lab import Level
 from compare.measure.record import Measurement, Records
 from compare.report import pictures, report, results, wording

@@ -11,7 +11,7 @@ import pytest
 
 import analytic
 from analytic import bifurcation, slip_bounds, slip_stability
-from compare.claims import cases, equations, formal, lifting, slipping
+from compare.claims import cases, equations, formal, slipping
 from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import judge
 from compare.measure import birth, bounds, field, growth, impacts, lift, motions, watched
@@ -142,7 +142,7 @@ def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest
         lift.measure(lab, {name: sets(Level.QUICK)[name] for name in ("rubber-wall", "rough-floor")}, Records())
     )
     ids = [f"lift-{inner.name}-{outer.name}" for inner, outer in slip_stability.LIFT_ARROWS]
-    verdicts = outcomes(lifting.CLAIMS, measured)
+    verdicts = outcomes(slipping.CLAIMS, measured)
     assert {verdicts[name].outcome for name in ids} == {Outcome.CONFIRMED}
     right = slip_stability.lift_acceleration
     monkeypatch.setattr(
@@ -150,7 +150,7 @@ def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest
         "lift_acceleration",
         lambda a, b, x, p: right(a, b, x, p.replace(j=1.03 * p.j, eta=1.03 * p.eta)),
     )
-    verdicts = outcomes(lifting.CLAIMS, measured)
+    verdicts = outcomes(slipping.CLAIMS, measured)
     assert [verdicts[name].outcome for name in ids if "RS" not in name] == [Outcome.REFUTED] * 3
 
 
