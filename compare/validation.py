@@ -13,7 +13,7 @@ from compare.claims.judge import judge, select
 from compare.figures.drawing import Material
 from compare.measure import programme, record
 from compare.measure.lab import Lab, Level
-from compare.measure.protocols import PROTOCOLS
+from compare.measure.programme import PROTOCOLS
 from compare.measure.record import Records
 from compare.measure.sets import sets as sets_of
 from compare.report import results

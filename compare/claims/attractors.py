@@ -11,7 +11,7 @@ from analytic import orbits
 from analytic.orbits import Orbit
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered
-from compare.measure.calm import hops
+from compare.measure.attractors import hops
 from compare.measure.lab import Level
 from compare.measure.record import Measurement, state
 from model import Parameters, Trajectory

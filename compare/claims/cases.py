@@ -11,8 +11,8 @@ from analytic import stokes
 from analytic.rolling_forces import margin, slip_margin
 from compare.claims.claim import Bearing, Claim, Text
 from compare.claims.judge import remembered
-from compare.measure.impacts import NAMES
 from compare.measure.laws import FLUIDS
+from compare.measure.motions import NAMES
 from compare.measure.record import Measurement, state
 from model import Parameters, State, Trajectory
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from compare.runs.campaign import Campaign, Failure
-from compare.runs.engines import Engine, Settings
+from compare.runs.engines import Engine
 from compare.runs.tasks import Task
 from model import Flow, Parameters, Trajectory
 from model.arrays import Array
@@ -43,16 +43,15 @@ class Lab:
         *,
         flow: Flow | None = None,
         samples: int = 100,
-        settings: Settings | None = None,
     ) -> Task:
-        """A run of the engine on trial with a time step in s, in the studies' settings unless others are given."""
+        """A run of the engine on trial with a time step in s, in the studies' settings."""
         return Task(
             engine=self.engine.name,
             parameters=p,
             x0=x0,
             t_end=t_end,
             flow=flow,
-            settings=settings or self.engine.at(step, p),
+            settings=self.engine.at(step, p),
             sample_interval=max(step, t_end / samples),
         )
 
@@ -63,6 +62,23 @@ class Lab:
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """The trajectories of the tasks, in order; raises for one that failed."""
         return self.campaign.run(tasks)
+
+    def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory]]:
+        """The same group by group: all are carried out together, but not held in memory together."""
+        self.complete([task for group in groups for task in group])
+        for group in groups:
+            yield self.run(group)
+
+    def attempt(self, tasks: Sequence[Task]) -> list[Trajectory] | str:
+        """The trajectories of the tasks, or why one of them failed."""
+        failures = self.complete(tasks)
+        return failures[0].reason if failures else self.run(tasks)
+
+    def each(self, tasks: Sequence[Task]) -> Iterator[Trajectory | str]:
+        """The trajectory of every task, one after the other, or why it failed."""
+        failed = {failure.task.key: failure.reason for failure in self.complete(tasks)}
+        for task in tasks:
+            yield failed.get(task.key) or self.run([task])[0]
 
     def complete(self, tasks: Sequence[Task]) -> list[Failure]:
         """Carry out the tasks and return those that failed."""

@@ -1,11 +1,14 @@
-"""Motions through all nine cases: which is it, some milliseconds after a state that the engine itself went through?
+"""Motions through all nine cases, and landings: which is it, or how fast, some milliseconds later?
 
 Fixed starts, in natural units, are followed and cut into short pieces. A piece begins and ends away from changes of
-case, at each of which friction has to build up or die out; in between there may be any number of them.
+case, at each of which friction has to build up or die out; in between there may be any number of them. A landing, steep
+or at a slant, with slip or none, is looked at a few steps after the engine's own contact has closed, at the same moment
+with two time steps.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -13,11 +16,12 @@ import numpy.typing as npt
 
 from compare.measure.field import constrained
 from compare.measure.lab import Lab, Level, coarse_step, state_units, time_unit
-from compare.measure.record import Measurement, Missing, Records, measurement, state_of
-from model import Case, Parameters, State, Trajectory
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.statistics import Measured
+from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
+from model.kinematics import VARIABLES
 
-NAME = "motions"
 STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
     # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
     (0.86, (0.44, 0.06, 2.36, 0.68, 0.15, 0.03, 0.6, 0.25)),
@@ -33,10 +37,10 @@ STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
     (1.20, (0.0, 0.0, 0.40, 0.6, 0.1, -0.5, 0.5, 0.0)),
 )
 """omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
+REFINED = 16
+"""Steps in one of `coarse_step`, each sampled; the second run of a landing has twice as many."""
 LASTS = 6.0
 """Duration of a motion in units of sqrt(R/g)."""
-REFINED = 16
-"""Steps in one of `coarse_step`, each sampled."""
 PIECES = {Level.QUICK: 6, Level.DEFAULT: 20, Level.FULL: 32}
 """Pieces of a motion."""
 LENGTH = 40
@@ -55,33 +59,47 @@ LEFT = 0.01
 what the limit changes, as fast as a slip that has just begun or is about to end.
 """
 
+LANDINGS: dict[str, tuple[float, ...]] = {
+    "floor, with slip": (0.05, -0.5, 0.5, 0.6, 0.2, -0.9, 0.4, 0.0),
+    "floor, no slip": (0.05, -0.5, 0.3, 0.0, 0.1, 0.5, 0.5, 0.0),
+    "floor, at a slant": (0.04, -0.4, 0.8, -0.3, 0.3, 0.2, 0.6, -0.5),
+    "wall, with slip": (0.5, 0.2, 0.6, 0.3, 0.8, -0.7, 0.04, -0.5),
+    "wall, no slip": (0.4, 0.0, 0.5, 0.2, 0.0, 0.0, 0.04, -0.5),
+    "wall, at a slant": (0.6, -0.5, 0.9, -0.4, -0.2, 0.1, 0.05, -0.3),
+}
+"""States in the units of `STARTS`."""
+FLOW, LANDED = 0.8, 0.4
+"""omega_0 sqrt(R/g), and the duration in units of sqrt(R/g)."""
+AFTER = 6
+"""Steps of the coarser run after contact at which the ball is looked at: then friction has built up."""
+NAMES = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
+"""Variables that a landing changes."""
+
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The case at the end of every piece, with the state at its beginning."""
-    starts = [(name, *_start(p, *start)) for name, p in sets.items() for start in STARTS]
-    tasks = []
-    for _, p, x in starts:
+    protocol, names, tasks = "motions", [name for name in sets for _ in STARTS], []
+    for p in sets.values():
         step = coarse_step(p) / REFINED
         count = round(LASTS * time_unit(p) / step)
-        tasks.append(lab.task(p, x, count * step, step, samples=count))
-    failed = {failure.task.key: failure.reason for failure in lab.complete(tasks)}
+        tasks += [lab.task(*_start(p, *start), count * step, step, samples=count) for start in STARTS]
     seen = set[tuple[str, Case]]()
-    for (name, p, _), task in zip(starts, tasks, strict=True):
-        if task.key in failed:
-            yield Missing(NAME, name, f"a motion {failed[task.key]}")
+    for name, task, run in zip(names, tasks, lab.each(tasks), strict=True):
+        if isinstance(run, str):
+            yield Missing(protocol, name, f"a motion {run}")
             continue
-        (run,) = lab.run([task])
+        p = task.parameters
         for first in pieces(run, PIECES[lab.level]):
             last = first + LENGTH
             case = Case(int(run.case[last]))
             seen.add((name, case))
-            x = constrained(Case(int(run.case[first])), run.x[first], p)
+            at = state_of(constrained(Case(int(run.case[first])), run.x[first], p))
             time = float(run.time[last] - run.time[first])
-            yield measurement(lab, NAME, name, p, "case", case, [task], case=case.name, time=time, **state_of(x))
+            yield measurement(lab, protocol, name, p, "case", case, [task], case=case.name, time=time, **at)
     for name in sets:
         unseen = [case.name for case in Case if (name, case) not in seen]
         if unseen:
-            yield Missing(NAME, name, f"no piece of a motion ended in {', '.join(unseen)}")
+            yield Missing(protocol, name, f"no piece of a motion ended in {', '.join(unseen)}")
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
@@ -89,8 +107,9 @@ def pieces(run: Trajectory, count: int) -> list[int]:
     plain = _plain(run)
     changes = np.flatnonzero(np.diff(run.case)) + 1
     firsts = np.arange(APART, len(run.time) - LENGTH - APART)
-    near = [np.min(np.abs((firsts + shift)[:, None] - changes), axis=1, initial=len(run.time)) for shift in (0, LENGTH)]
-    firsts = firsts[(near[0] >= APART) & (near[1] >= APART) & plain[firsts] & plain[firsts + LENGTH]]
+    for end in (0, LENGTH):
+        near = np.min(np.abs((firsts + end)[:, None] - changes), axis=1, initial=len(run.time))
+        firsts = firsts[(near >= APART) & plain[firsts + end]]
     if len(firsts) == 0:
         return []
     # As many pieces with a change of case in them as without, as far as there are.
@@ -121,7 +140,33 @@ def _plain(run: Trajectory) -> npt.NDArray[np.bool_]:
 
 
 def _start(p: Parameters, Omega_0: float, state: tuple[float, ...]) -> tuple[Parameters, Array]:
+    """Parameters with the flow, and a state (8,), from natural units."""
     x = State.of(np.array(state) * state_units(p))
     if x.y == x.v_y == x.slip_x == 0 and x.h > 0:  # it rolls on the floor
         x = x._replace(slip_z=-x.v_h / p.r)
     return p.replace(omega_0=Omega_0 / time_unit(p)), x.stacked()
+
+
+def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The state shortly after every landing."""
+    landings = [(name, how, *_start(p, FLOW, x)) for name, p in sets.items() for how, x in LANDINGS.items()]
+    pairs = []
+    for _, _, p, x in landings:
+        step = coarse_step(p) / REFINED
+        pairs.append(lab.pair(p, x, round(LANDED * time_unit(p) / step), step))
+    for (name, how, p, x), pair, (coarse, fine) in zip(landings, pairs, lab.groups(pairs), strict=True):
+        contact = [case.A if how.startswith("floor") else case.B for case in coarse.cases]
+        at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + AFTER
+        if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
+            why = f"{how}: the contact did not close for good within {LANDED:g} sqrt(R/g)"
+            yield Missing("impacts", name, why)
+            continue
+        units = state_units(p)
+        change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[[VARIABLES.index(n) for n in NAMES]]))
+        # The contact closes at a step, up to one late: for so long weight and friction act otherwise than they should.
+        late = coarse_step(p) / REFINED / time_unit(p) / 2
+        conditions: dict[str, Condition] = {"start": how, "time": float(coarse.time[at]), **state_of(x)}
+        for quantity in NAMES:
+            k = VARIABLES.index(quantity)
+            value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
+            yield measurement(lab, "impacts", name, p, f"after_{quantity}", value, pair, **conditions)

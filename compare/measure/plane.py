@@ -15,13 +15,13 @@ from scipy.stats import qmc
 
 from compare.measure.lab import Lab, Level, time_unit
 from compare.measure.record import Measurement, Missing, Records, measurement
-from compare.measure.settled import state
-from compare.measure.settling import Settled, Start, family, high, settle
+from compare.measure.settling import Settled, begin, family, settle_groups
 from model import Parameters
 from model.arrays import Array
 
 PROTOCOL = "plane"
-SET = "reference"
+STARTS = ("rest", "half as fast", "with the fluid", "on the wall")
+"""From where the ball starts at every point."""
 DRAG = 1.25
 """Drag c, s-1: states settle within seconds, and slipping still lasts beyond the flow at which the wall can carry."""
 FIGURES = ("fig-7", "fig-8")
@@ -43,26 +43,21 @@ LOOSE = 1000.0
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is left out."""
-    if SET not in sets:
-        yield Missing(PROTOCOL, next(iter(sets), ""), f"the planes of Figs. 7 and 8 are those of {SET} only")
-        return
-    plane = sets[SET].replace(c=DRAG)
+    plane = sets["reference"].replace(c=DRAG)
     points = {figure: spread(SPREAD[lab.level], SEED + k) for k, figure in enumerate(FIGURES)}
     seen: dict[str, list[tuple[Array, int]]] = {figure: [] for figure in FIGURES}
     tried: dict[str, set[tuple[float, ...]]] = {figure: set() for figure in FIGURES}
     out: Counter[str] = Counter()
     for count in (*ADDED[lab.level], 0):
         chosen = [(figure, u) for figure in FIGURES for u in points[figure]]
-        starts = [list(_starts(_at(plane, figure, u), figure)) for figure, u in chosen]
-        ended = iter(settle(lab, [each for row in starts for each in row], span=SPAN, loose=LOOSE))
-        for (figure, u), row in zip(chosen, starts, strict=True):
-            states = [next(ended) for _ in row]
+        starts = [[begin(figure, _at(plane, figure, u), how) for how in STARTS] for figure, u in chosen]
+        for (figure, u), states in zip(chosen, settle_groups(lab, starts, span=SPAN, loose=LOOSE), strict=True):
             if any(each.failure for each in states):
                 out[figure] += 1
                 continue
             seen[figure].append((u, mask(states)))
-            p, tasks = row[0].p, [each.task for each in states]
-            yield measurement(lab, PROTOCOL, SET, p, "cases", mask(states), tasks, figure=figure)
+            p, tasks = states[0].start.p, [each.task for each in states]
+            yield measurement(lab, PROTOCOL, "reference", p, "cases", mask(states), tasks, figure=figure)
         for figure in FIGURES:
             tried[figure] |= {tuple(u.tolist()) for u in points[figure]}
             fresh = (u for u in added(seen[figure]) if tuple(u.tolist()) not in tried[figure])
@@ -70,7 +65,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for figure, number in out.items():
         total = number + len(seen[figure])
         reason = f"{figure}: {number} of {total} points are left out, too close to a change of case to settle"
-        yield Missing(PROTOCOL, SET, reason)
+        yield Missing(PROTOCOL, "reference", reason)
 
 
 def mask(states: Sequence[Settled]) -> int:
@@ -104,11 +99,3 @@ def _at(plane: Parameters, figure: str, u: Array) -> Parameters:
     eta, Omega_0 = (low + float(share) * (high - low) for share, (low, high) in zip(u, (ETA, OMEGA), strict=True))
     p = plane.replace(eta=eta, omega_0=Omega_0 / time_unit(plane))
     return p.replace(mu=eta) if figure == "fig-8" else p
-
-
-def _starts(p: Parameters, figure: str) -> Iterator[Start]:
-    """The blind starts of settled states, and going round at half the speed of the fluid."""
-    yield Start(figure, p, "rest", state())
-    yield Start(figure, p, "half as fast", state(omega_c=p.omega_0 / 2))
-    yield Start(figure, p, "with the fluid", state(omega_c=p.omega_0))
-    yield Start(figure, p, "on the wall", state(y=high(p), omega_c=p.omega_0))

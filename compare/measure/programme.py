@@ -1,7 +1,7 @@
 """Which protocols there are, in what order they measure, and where their measurements are kept.
 
 A protocol is a function of a lab, the parameter sets, and what was measured before it; it yields measurements, and what
-it could not measure. To add one, write a module and add a record here.
+it could not measure. To add one, write such a function and add a line to `PROTOCOLS`.
 """
 
 from __future__ import annotations
@@ -9,11 +9,32 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass
 from functools import cache
 from pathlib import Path
 
-from compare.measure import record
+from compare.measure import (
+    attractors,
+    birth,
+    bounds,
+    characteristic,
+    edge,
+    field,
+    growth,
+    laws,
+    lift,
+    motions,
+    plane,
+    pulsation,
+    rates,
+    record,
+    settled,
+    steepest,
+    thresholds,
+    unloading,
+    unsteady,
+    watched,
+)
 from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.record import Measurement, Missing, Records
 from compare.runs.engines import Engine
@@ -38,10 +59,48 @@ class Protocol:
     measure: Measure
     needs: tuple[str, ...] = ()
     """Protocols whose measurements it goes out from."""
+    _: KW_ONLY
     level: Level = Level.QUICK
     """The least level of which it is a part."""
     waits: bool = True
     """Whether it waits for motions to settle."""
+    reference: str = ""
+    """Why it needs the set `reference`, and no other; empty if it takes all sets."""
+
+
+PROTOCOLS = (
+    Protocol("settled", settled.measure),
+    Protocol("newcomer", settled.newcomer, reference="the engine's own settings are measured on reference only"),
+    Protocol("plane", plane.measure, reference="the planes of Figs. 7 and 8 are those of reference only"),
+    Protocol("hysteresis", characteristic.hysteresis, ("settled",)),
+    Protocol("rates", rates.measure, ("settled",)),
+    Protocol("laws", laws.measure, waits=False),
+    Protocol("thresholds", thresholds.measure),
+    Protocol("edge", edge.measure, ("thresholds",)),
+    Protocol("birth", birth.measure, ("thresholds",)),
+    Protocol("unloading", unloading.measure, ("thresholds",)),
+    Protocol("field", field.measure, waits=False),
+    Protocol("growth", growth.measure, waits=False),
+    Protocol("steepest", steepest.measure, waits=False),
+    Protocol("lift", lift.measure, waits=False),
+    Protocol("bounds", bounds.measure, ("thresholds",)),
+    Protocol("watched", watched.measure, ("thresholds",)),
+    Protocol("motions", motions.measure, waits=False),
+    Protocol("impacts", motions.impacts, waits=False),
+    Protocol("recurrent", attractors.hopping, reference="hops that last are those of the set hopping"),
+    Protocol(
+        "swing",
+        attractors.swing,
+        level=Level.DEFAULT,
+        reference="swings that last are those of reference on a very rough floor",
+    ),
+    Protocol("calm", attractors.calm, level=Level.DEFAULT, reference="strong drag is tried on sets of its own"),
+    Protocol("choice", attractors.choice, reference="the choice is that of sets of its own with mu > 1"),
+    Protocol("pulsation", pulsation.measure, ("thresholds",)),
+    Protocol("unsteady", unsteady.measure, ("thresholds",)),
+    Protocol("slope", characteristic.slope, ("settled", "thresholds")),
+)
+"""Every protocol there is, in the order in which they measure; each goes out only from those before it."""
 
 
 def directory(results: Path, engine: Engine, level: Level, sets: Mapping[str, Parameters]) -> Path:
@@ -76,10 +135,12 @@ def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], befo
     path = kept / f"{protocol.name}.h5"
     if not path.exists():
         weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
-        rows = [
-            *protocol.measure(lab, {name: p for name, p in sets.items() if name not in weak}, before),
-            *(Missing(protocol.name, name, why) for name, why in weak.items()),
-        ]
+        strong = {name: p for name, p in sets.items() if name not in weak}
+        rows: list[Measurement | Missing] = [Missing(protocol.name, name, why) for name, why in weak.items()]
+        if protocol.reference and "reference" not in strong:
+            rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.reference))
+        else:
+            rows = [*protocol.measure(lab, strong, before), *rows]
         make_directory(kept)
         about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
         record.save(Records.of(rows), path, about)

@@ -38,7 +38,7 @@ class Measurement:
     """One measured number."""
 
     protocol: str
-    """The module of `compare.measure` that measured it."""
+    """The name of the `compare.measure.programme.Protocol` that measured it."""
     quantity: str
     """A name of `compare.measure.quantities`."""
     value: float
@@ -93,6 +93,12 @@ def measurement(
 def sure_enough(name: str, value: Measured, scale: float) -> bool:
     """Whether a check of a measured quantity can resolve what it should, over a scale that is natural to it."""
     return COVERAGE * value.uncertainty <= quantity(name).resolves * scale
+
+
+def if_sure(row: Measurement, scale: float, why: str) -> Measurement | Missing:
+    """A measurement that is `sure_enough`, or else why it is missing."""
+    sure = sure_enough(row.quantity, Measured(row.value, row.uncertainty), scale)
+    return row if sure else Missing(row.protocol, row.set, why)
 
 
 def state_of(x: Array) -> dict[str, float]:

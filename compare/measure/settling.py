@@ -76,6 +76,12 @@ class Settled:
     failure: str = ""
 
 
+def begin(set: str, p: Parameters, how: str) -> Start:
+    """At the flow of p from rest, going round with the fluid or half as fast, or with it and so high up on the wall."""
+    orbit = {"rest": 0.0, "half as fast": p.omega_0 / 2}.get(how, p.omega_0)
+    return Start(set, p, how, State(y=high(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked())
+
+
 def rotation_scale(p: Parameters) -> float:
     """Natural size of a rate of rotation, rad s-1: omega_0, in a fluid at rest 1/`time_unit`."""
     return abs(p.omega_0) or 1 / time_unit(p)
@@ -133,25 +139,30 @@ def settle(
     height, and one that sinks must not land.
     """
     states: dict[int, Settled] = {}
-    begin = dict(enumerate(starts))
+    todo = dict(enumerate(starts))
     left = [[*(SOONER if start.p.drag != STOKES else ()), *[1.0] * ROUNDS] for start in starts]
-    while begin:
-        parts = {n: left[n].pop(0) for n in begin}
-        tasks = {n: _task(lab, start, refine, span * parts[n]) for n, start in begin.items()}
+    while todo:
+        parts = {n: left[n].pop(0) for n in todo}
+        tasks = {n: _task(lab, start, refine, span * parts[n]) for n, start in todo.items()}
         parts = {n: task.t_end / duration(task.parameters, span) for n, task in tasks.items()}
-        failed = {failure.task.key: failure.reason for failure in lab.complete(list(tasks.values()))}
-        begin = {}
-        for n, task in tasks.items():
-            if task.key in failed:
-                broken = f"the run {failed[task.key]}"
-                states[n] = Settled(starts[n], Case.NN, {}, starts[n].x0, task, failure=broken)
+        todo = {}
+        for (n, task), run in zip(tasks.items(), lab.each(list(tasks.values())), strict=True):
+            if isinstance(run, str):
+                states[n] = Settled(starts[n], Case.NN, {}, starts[n].x0, task, failure=f"the run {run}")
                 continue
-            (run,) = lab.run([task])
             states[n] = judged(starts[n], task, run, loose)
             if left[n] and states[n].excess > parts[n] * min(loose, sharp):
                 # A part of a round may end on the way to where the ball settles: it goes on as it is.
-                begin[n] = replace(starts[n], x0=run.x[-1]) if parts[n] < 1 else _onward(states[n])
+                todo[n] = replace(starts[n], x0=run.x[-1]) if parts[n] < 1 else _onward(states[n])
     return [states[n] for n in range(len(starts))]
+
+
+def settle_groups(
+    lab: Lab, groups: Sequence[Sequence[Start]], *, span: float = SPAN, loose: float = 1.0, sharp: float = math.inf
+) -> list[list[Settled]]:
+    """The same for groups of starts, all of them together."""
+    states = iter(settle(lab, [start for group in groups for start in group], span=span, loose=loose, sharp=sharp))
+    return [[next(states) for _ in group] for group in groups]
 
 
 def duration(p: Parameters, span: float = SPAN) -> float:

@@ -12,7 +12,7 @@ import pytest
 import analytic
 from analytic import orbits
 from compare.commands.cli import main
-from compare.measure import recurrent
+from compare.measure import attractors
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.arrays import Array
 from model.trajectory import SAMPLE
@@ -57,12 +57,12 @@ def test_tops_of_known_hops() -> None:
     time = np.arange(0, 5, 1e-3)
     phase = np.mod(time, period) / period - 0.5
     run = _run(time, height * (1 - 4 * phase**2), 57.0 * time)
-    hops = recurrent.tops(run, 1.0, 4.0)
+    hops = attractors.tops(run, 1.0, 4.0)
     # The parabola through three samples is the hop itself.
-    assert hops.values["orbit_period"] == pytest.approx(period, rel=1e-9)
-    assert hops.values["orbit_height"] == pytest.approx(height, rel=1e-9)
-    assert max(hops.spread.values()) < 1e-9
-    assert len(recurrent.tops(_run(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
+    assert hops.values["orbit_period"].value == pytest.approx(period, rel=1e-9)
+    assert hops.values["orbit_height"].value == pytest.approx(height, rel=1e-9)
+    assert max(value.uncertainty for value in hops.values.values()) < 1e-9
+    assert len(attractors.tops(_run(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
 
 
 def test_shrinking_is_the_modulus_of_the_eigenvalue() -> None:
@@ -75,12 +75,12 @@ def test_shrinking_is_the_modulus_of_the_eigenvalue() -> None:
     for state in states:
         state[[0, 2, 3]] = np.array([5e-3, 57.0, -100.0]) + mixed @ z * np.array([0.05, 14.0, 31.0])
         z = turn @ z
-    assert recurrent.shrinking(states, HOPPING) == pytest.approx(size, rel=1e-6)
+    assert attractors.shrinking(states, HOPPING) == pytest.approx(size, rel=1e-6)
 
 
 def test_birth_is_where_the_height_vanishes() -> None:
     rows = [(w, 4e-4 * (w - 52) - 1e-6 * (w - 52) ** 2, 4e-4 * (w - 52)) for w in (58.0, 56.0, 54.0)]
-    place = recurrent.birth(rows)
+    place = attractors.birth(rows)
     assert place.value == pytest.approx(52.0, abs=1e-9)
     assert 0 < place.uncertainty < 0.1
 
@@ -98,7 +98,7 @@ def test_time_stepping_comes_to_the_orbit_of_theory() -> None:
     orbit = orbits.refine(HOPPING, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.223)
     theory = np.array([orbit.period, orbit.turn / orbit.period, orbit.cycle.y.max()])
     coarse, fine = (
-        np.array(list(recurrent.tops(run, 12.0, 16.0).values.values()))
+        np.array([each.value for each in attractors.tops(run, 12.0, 16.0).values.values()])
         for run in (
             analytic.simulate(HOPPING, orbit.loop.x, 16.0, method="time-stepping", step=step, sample_interval=1e-3)
             for step in (4e-6, 2e-6)

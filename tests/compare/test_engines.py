@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import analytic
 from compare.commands import cli
-from compare.measure import newcomer
+from compare.measure import settled
 from compare.measure.lab import Lab, Level
 from compare.measure.record import Records
 from compare.runs.campaign import Campaign
@@ -240,7 +240,7 @@ def test_an_engine_under_grading_runs_on_from_where_it_is_judged(name):
 def test_an_engine_without_defaults_of_its_own_says_so(tmp_path):
     with Campaign(tmp_path, workers=0) as campaign:
         lab = Lab(campaign, ENGINES["event"], Level.QUICK)
-        (missing,) = newcomer.measure(lab, {"reference": REFERENCE}, Records())
+        (missing,) = settled.newcomer(lab, {"reference": REFERENCE}, Records())
     assert missing.reason == "event has no settings of its own to be compared with"
 
 

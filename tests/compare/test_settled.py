@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import analytic
-from compare.measure import hysteresis, newcomer, plane, settled, settling, slope
+from compare.measure import characteristic, plane, settled, settling
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records
@@ -124,7 +124,7 @@ class TestSteadyMean:
 
 class TestOthers:
     def test_slopes_are_one_for_what_follows_the_fluid(self, lab: Lab, records: Records) -> None:
-        measured = Records.of(slope.measure(lab, {"thick": THICK}, records))
+        measured = Records.of(characteristic.slope(lab, {"thick": THICK}, records))
         by_case = {str(m.conditions["case"]): m for m in measured.measurements}
         assert set(by_case) == {"RR", "SS", "NR"}
         for name in ("RR", "NR"):
@@ -141,12 +141,12 @@ class TestOthers:
             set="thick",
             parameters=THICK,
         )
-        (only,) = slope.measure(lab, {"thick": THICK}, Records((onset,)))
+        (only,) = characteristic.slope(lab, {"thick": THICK}, Records((onset,)))
         assert isinstance(only, Measurement)
         assert only.value == pytest.approx(-1.0, abs=3 * only.uncertainty)
 
     def test_the_flow_is_raised_and_lowered(self, lab: Lab, records: Records) -> None:
-        measured = Records.of(hysteresis.measure(lab, {"thick": THICK}, records))
+        measured = Records.of(characteristic.hysteresis(lab, {"thick": THICK}, records))
         sides = {str(m.conditions["side"]) for m in measured.select("hysteresis", "case")}
         assert sides == {"up", "down"}
         first, *_, last = measured.select("hysteresis", "case")
@@ -155,15 +155,13 @@ class TestOthers:
         assert Case.NR in {Case(int(m.value)) for m in measured.select("hysteresis", "case")}
 
     def test_no_loop_without_a_change_from_slipping_to_riding(self, lab: Lab) -> None:
-        (only,) = hysteresis.measure(lab, {"thick": THICK}, Records())
+        (only,) = characteristic.hysteresis(lab, {"thick": THICK}, Records())
         assert isinstance(only, Missing)
 
     def test_the_newcomer_is_another_engine(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(settled, "QUICK", (0.6,))
-        rows = list(newcomer.measure(lab, {"reference": THICK}, Records()))
+        rows = list(settled.newcomer(lab, {"reference": THICK}, Records()))
         assert {row.engine for row in rows if isinstance(row, Measurement)} == {engines.NEWCOMER.name}
-        (only,) = newcomer.measure(lab, {"mine": THICK}, Records())
-        assert isinstance(only, Missing)
 
 
 class TestPlane:

@@ -14,7 +14,7 @@ from analytic import bifurcation, slip_bounds, slip_stability
 from compare.claims import cases, equations, formal, slipping
 from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import judge
-from compare.measure import birth, bounds, field, growth, impacts, lift, motions, watched
+from compare.measure import birth, bounds, field, growth, lift, motions, watched
 from compare.measure.lab import Lab, Level
 from compare.measure.record import Measurement, Records
 from compare.measure.sets import sets
@@ -188,7 +188,7 @@ def test_pieces_keep_away_from_changes_of_case(lab: Lab) -> None:
 
 
 def test_landings_do_not_rebound(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    measured = Records.of(impacts.measure(lab, SETS, Records()))
+    measured = Records.of(motions.impacts(lab, SETS, Records()))
     assert outcomes(cases.CLAIMS, measured)["impacts"].outcome is Outcome.CONFIRMED
     right = analytic.simulate
     monkeypatch.setattr(analytic, "simulate", lambda *given, **more: right(*given, restitution=0.25, **more))

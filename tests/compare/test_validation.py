@@ -124,6 +124,15 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path: Path) -> None:
     assert seen == ["steel-in-water", "air", "steel-in-water"]
 
 
+def test_what_only_the_reference_shows_is_missing_without_it(tmp_path: Path) -> None:
+    with Campaign(tmp_path / "runs", workers=0) as campaign:
+        lab = Lab(campaign, MUJOCO, Level.QUICK)
+        for name, count in (("mine", 1), ("reference", 0)):
+            protocol = Protocol(f"of-{name}", lambda lab, sets, records: (), reference="it is that of the reference")
+            missing = programme.carry_out(protocol, lab, {name: SETS["mine"]}, Records(), tmp_path / "kept").missing
+            assert missing == (Missing(f"of-{name}", name, "it is that of the reference"),) * count
+
+
 def test_other_sets_are_kept_apart(tmp_path: Path, counted: list[str]) -> None:
     run(tmp_path)
     validation.validate(tmp_path, level=Level.QUICK, sets={"mine": SETS["mine"].replace(mu=0.3)}, workers=0)
