@@ -97,8 +97,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     starts = [(name, *start) for name, p in sets.items() for start in _starts(p, STARTS[lab.level], name)]
     lasts = CENTRES[-1] + HALF + APART
     tasks = [lab.pair(p, x, lasts, coarse_step(p) / REFINED) for _, p, x in starts]
-    lab.complete([task for pair in tasks for task in pair])
-    runs = [lab.run(pair) for pair in tasks]
+    runs = list(lab.groups(tasks))
     kept = Counter[tuple[str, Case]]()
     for centre in CENTRES:
         for (name, p, _), pair, (coarse, fine) in zip(starts, tasks, runs, strict=True):

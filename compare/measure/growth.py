@@ -3,6 +3,10 @@
 gamma, the initial rate of change of the slip along its direction, is taken to a vanishing size of the slip by runs of
 several sizes. A record counts only if, by the engine's own contacts, all of it is in the case in which the ball was to
 slip. States are at random in natural units, and away from stationary ones.
+
+Out of rolling on the wall alone, growths along directions all round make a curve; where its first harmonic is greatest,
+slip grows the most. That other harmonics are small is measured, not assumed: what they may turn the direction by is its
+uncertainty.
 """
 
 from __future__ import annotations
@@ -18,14 +22,13 @@ from compare.measure import field
 from compare.measure.field import DOUBT, LIMIT, polynomial, random_state, slope_weights
 from compare.measure.lab import Lab, Level, coarse_step, dragged_speed, time_unit
 from compare.measure.quantities import quantity
-from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
+from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 
-NAME = "growth"
-SEED = 61
+SEED, FAN_SEED = 61, 58
 PUSHES = {
     (Case.RR, Case.RS): 1,
     (Case.RR, Case.SR): 1,
@@ -62,6 +65,14 @@ SINKING = 0.5
 """Speed over `dragged_speed` at which a ball sinks on which the fluid also pulls along the wall at that speed."""
 SIDEWAYS = (0.3, 1.0, 0.3)
 """A direction of slip that is almost that of the wall's contact alone."""
+FANS = {Level.QUICK: 1, Level.DEFAULT: 3, Level.FULL: 12}
+"""Random states of every set out of which slip is pushed all round."""
+DIRECTIONS = 8
+DRAGGED = (0.5, 3.0)
+"""How hard the fluid then pulls along the orbit over the weight, least and most, either way: it turns the direction."""
+AHEAD = 3.0
+"""Largest angle of the greatest growth from the vertical, rad, that is recorded: one beyond may come out on either side
+of pi."""
 
 
 @dataclass(frozen=True)
@@ -80,12 +91,23 @@ class Push:
     """``sideways`` for the direction `SIDEWAYS`, ``dragged`` where the fluid pulls hard, ``rest`` out of rest in a
     fluid at rest; empty for one at random."""
 
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """Sizes of slip, in units of `start_unit`, each half of the one before."""
+        if self.inner in (Case.RS, Case.SR):
+            return BESIDE
+        return SMALL if self.outer in (Case.RS, Case.SR) else LARGE
+
     def task(self, lab: Lab, size: float, times: int = 1) -> Task:
         """The run with one size of slip, in units of `start_unit`, and `times` as many steps."""
         p, step = self.p, coarse_step(self.p) / REFINED
         x = self.x.copy()
         x[3:6] += size * start_unit(p, x) * self.n
         return lab.task(p, x, STEPS * step, step / times, samples=STEPS * times)
+
+    def tasks(self, lab: Lab) -> list[Task]:
+        """Every size, with either step."""
+        return [self.task(lab, size, times) for times in (1, 2) for size in self.sizes]
 
     def rate(self, run: Trajectory, times: int = 1) -> Array:
         """Initial rates of the slip along n by polynomials of degrees 4 and 3, rad s-2; nan if the case was another."""
@@ -99,41 +121,37 @@ class Push:
     @property
     def conditions(self) -> dict[str, Condition]:
         """What the growth belongs to."""
-        n_x, n_y, n_z = self.n.tolist()
         along: dict[str, Condition] = {"inner": self.inner.name, "outer": self.outer.name, "by": self.by}
-        return along | state_of(self.x) | {"n_x": n_x, "n_y": n_y, "n_z": n_z}
+        return along | state_of(self.x) | direction(self.n)
+
+
+def direction(n: Array) -> dict[str, float]:
+    """A unit vector (3,) over slip_x, slip_y, slip_z as conditions."""
+    return dict(zip(("n_x", "n_y", "n_z"), n.tolist(), strict=True))
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """gamma out of random states, along every arrow; where one contact slips to either side, how they share rolling."""
-    rough = {name: p for name, p in sets.items() if p.mu and p.eta}
-    yield from (Missing(NAME, name, SMOOTH) for name in sets if name not in rough)
+    protocol, rough = "growth", {name: p for name, p in sets.items() if p.mu and p.eta}
+    yield from (Missing(protocol, name, SMOOTH) for name in sets if name not in rough)
     pushes = [push for name, p in rough.items() for push in _pushes(name, p, MORE[lab.level])]
-    planned = [tasks_of(lab, push) for push in pushes]
-    lab.complete([task for tasks in planned for task in tasks])
+    planned = [push.tasks(lab) for push in pushes]
     left = Counter[tuple[str, Case, Case]]()
     before: tuple[Push, Measured] | None = None
-    for push, tasks in zip(pushes, planned, strict=True):
-        value = growth(push, lab.run(tasks))
+    for push, tasks, runs in zip(pushes, planned, lab.groups(planned), strict=True):
+        value = growth(push, runs)
         if value is None:
             left[push.set, push.inner, push.outer] += 1
             continue
-        yield _measurement(lab, push, tasks, "gamma", value)
+        yield measurement(lab, protocol, push.set, push.p, "gamma", value, tasks, **push.conditions)
         if before and before[0].x is push.x:
             share = _share(*before, push, value)
             if sure_enough("filippov_share", share, 1.0):
-                yield _measurement(lab, push, tasks, "filippov_share", share)
+                yield measurement(lab, protocol, push.set, push.p, "filippov_share", share, tasks, **push.conditions)
         before = push, value
     for (name, inner, outer), count in left.items():
-        yield Missing(
-            NAME,
-            name,
-            f"{count} slips from {inner.name} to {outer.name} did not stay in {outer.name}, or turned too fast",
-        )
-
-
-def _measurement(lab: Lab, push: Push, tasks: Sequence[Task], quantity: str, value: Measured) -> Measurement:
-    return measurement(lab, NAME, push.set, push.p, quantity, value, tasks, **push.conditions)
+        slips = f"{count} slips from {inner.name} to {outer.name}"
+        yield Missing(protocol, name, f"{slips} did not stay in {outer.name}, or turned too fast")
 
 
 def _share(one: Push, its: Measured, other: Push, value: Measured) -> Measured:
@@ -142,17 +160,6 @@ def _share(one: Push, its: Measured, other: Push, value: Measured) -> Measured:
     both = plus.value + minus.value
     uncertainty = math.hypot(plus.uncertainty * minus.value, minus.uncertainty * plus.value) / both**2
     return Measured(plus.value / both, uncertainty)
-
-
-def _sizes(push: Push) -> tuple[float, ...]:
-    if push.inner in (Case.RS, Case.SR):
-        return BESIDE
-    return SMALL if push.outer in (Case.RS, Case.SR) else LARGE
-
-
-def tasks_of(lab: Lab, push: Push) -> list[Task]:
-    """Every size, with either step."""
-    return [push.task(lab, size, times) for times in (1, 2) for size in _sizes(push)]
 
 
 def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
@@ -198,7 +205,7 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[Push]:
     for (inner, outer), count in PUSHES.items():
         for _ in range(count * more):
             begin = State.of(random_state(inner, p, rng))
-            begin = begin._replace(omega_c=_orbit(inner, outer, p, rng) or begin.omega_c)
+            begin = begin._replace(omega_c=_orbit(outer, p, rng) or begin.omega_c)
             slides = {Case.RS: 1, Case.SR: 0}.get(inner)
             # A slip that is there already is so fast that a slower one beside it hardly turns it.
             if inner is Case.RS:
@@ -214,12 +221,12 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[Push]:
                 yield Push(name, p.replace(omega_0=omega_0), inner, outer, x, side * n / np.linalg.norm(n))
 
 
-def _orbit(inner: Case, outer: Case, p: Parameters, rng: np.random.Generator) -> float | None:
+def _orbit(outer: Case, p: Parameters, rng: np.random.Generator) -> float | None:
     """An omega_c at which both contacts press, in whatever way they rub; None where that of `random_state` will do."""
     if outer is Case.SR:  # the spin axis turns with the orbit, and the wall alone turns it
         return float(math.sqrt(rng.uniform(0.4, 0.8) * p.g / (p.j * p.R)))
     if outer is Case.SS:
-        least, most = p.mu, min(1 / p.eta, 3.0) if p.eta else 3.0
+        least, most = p.mu, min(1 / p.eta, 3.0)
         return float(math.sqrt((least + rng.uniform(0.3, 0.7) * (most - least)) * p.g / p.R))
     return None
 
@@ -227,3 +234,42 @@ def _orbit(inner: Case, outer: Case, p: Parameters, rng: np.random.Generator) ->
 def start_unit(p: Parameters, x: Array) -> float:
     """The slip that the weight, and at the wall the centrifugal force, makes in the unit of time, rad s-1."""
     return (p.g + p.R * float(State.of(x).omega_c) ** 2) / 2 / p.r * time_unit(p)
+
+
+def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The direction in which slip out of NR grows the most, for every state."""
+    protocol, rough = "steepest", {name: p for name, p in sets.items() if p.eta and p.c}
+    why = "without friction at the wall, or drag, no direction stands out"
+    yield from (Missing(protocol, name, why) for name in sets if name not in rough)
+    fans = [fan for name, p in rough.items() for fan in _fans(name, p, FANS[lab.level])]
+    runs = lab.groups([push.tasks(lab) for fan in fans for push in fan])
+    for fan in fans:
+        first, growths = fan[0], [growth(push, next(runs)) for push in fan]
+        beta = _greatest([g for g in growths if g])
+        why = "slip along some direction did not last, or no direction stands out"
+        if beta and abs(beta.value) < AHEAD:
+            tasks, at = [task for push in fan for task in push.tasks(lab)], state_of(first.x)
+            yield if_sure(measurement(lab, protocol, first.set, first.p, "steepest", beta, tasks, **at), 1.0, why)
+        else:
+            yield Missing(protocol, first.set, why)
+
+
+def _fans(name: str, p: Parameters, count: int) -> Iterator[list[Push]]:
+    """Random states, each pushed at angles all round from slip_z to slip_y of the wall's contact (8)."""
+    rng = np.random.default_rng([FAN_SEED, *name.encode()])
+    for _ in range(count):
+        x = random_state(Case.NR, p, rng)
+        pull = rng.choice([-1, 1]) * rng.uniform(*DRAGGED)
+        q = p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R)
+        angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+        yield [Push(name, q, Case.NR, Case.NS, x, np.array([0.0, np.sin(b), np.cos(b)])) for b in angles]
+
+
+def _greatest(growths: Sequence[Measured]) -> Measured | None:
+    """Direction of the first harmonic; None without growths in all directions."""
+    if len(growths) < DIRECTIONS:
+        return None
+    harmonics = np.fft.rfft([g.value for g in growths]) * 2 / DIRECTIONS
+    scatter = np.sqrt(2.0 / DIRECTIONS) * max(g.uncertainty for g in growths)
+    others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
+    return Measured(float(-np.angle(harmonics[1])), float(np.hypot(scatter, others) / np.abs(harmonics[1])))

@@ -7,8 +7,7 @@ of them the settled case changes. Each change is bracketed and bisected.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from compare.measure.brackets import Bracket, Care, Search, narrow
 from compare.measure.lab import Lab, Level, time_unit
 from compare.measure.laws import PRESSES
 from compare.measure.questions import (
+    Answer,
     From,
     falls,
     held,
@@ -30,7 +30,7 @@ from compare.measure.questions import (
     stays_rolling,
     wall,
 )
-from compare.measure.settling import Settled, Start, family, high, settle
+from compare.measure.settling import Settled, Start, family, high, settle_groups
 from compare.runs.tasks import Task
 from compare.statistics import Measured, settled_case, tail
 from model import Case, Parameters
@@ -63,65 +63,50 @@ Brackets = Mapping[Key, Bracket]
 States = Mapping[Key, Sequence[Settled]]
 
 
-@dataclass(frozen=True, eq=False)
-class Map:
-    """What became of the ball of one set at every flow of the grid, by where it started."""
-
-    omegas: Array
-    rest: list[Case]
-    rolling: list[Case]
-    wall: list[Case]
-
-
-def look(lab: Lab, sets: Mapping[str, Parameters]) -> dict[str, Map]:
-    """Run every set at every flow of the grid from each kind of start."""
+def look(lab: Lab, sets: Mapping[str, Parameters]) -> dict[Key, list[Case]]:
+    """The cases to which the ball comes along the grid, by set and by where it starts."""
     begin: dict[str, tuple[From, float]] = {"rest": (rest, 20), "rolling": (rolling, 5), "wall": (wall, 12)}
     tasks = {
-        (name, kind, k): held(lab, p, omega, start(p, omega), units)
+        (name, kind): [held(lab, p, omega, start(p, omega), units) for omega in GRID / time_unit(p)]
         for name, p in sets.items()
         for kind, (start, units) in begin.items()
-        for k, omega in enumerate(GRID / time_unit(p))
     }
-    ends = (family(settled_case(run)) for run in lab.run(list(tasks.values())))
-    cases = dict(zip(tasks, ends, strict=True))
-    return {
-        name: Map(GRID / time_unit(p), *([cases[name, kind, k] for k in range(len(GRID))] for kind in begin))
-        for name, p in sets.items()
-    }
+    rows = lab.groups(list(tasks.values()))
+    return {key: [family(settled_case(run)) for run in runs] for key, runs in zip(tasks, rows, strict=True)}
 
 
-def change(omegas: Array, yes: Sequence[bool]) -> Bracket | None:
-    """Between the last flow of an unbroken row of yes, and the first no; None without such a change."""
+def _change(p: Parameters, yes: Sequence[bool]) -> Bracket | None:
+    """Between the last flow of an unbroken row of yes along the grid, and the first no; None without such a change."""
     if not yes[0] or all(yes):
         return None
     k = list(yes).index(False)
-    return Bracket(float(omegas[k - 1]), float(omegas[k]))
+    return Bracket(*(GRID / time_unit(p))[k - 1 : k + 1].tolist())
 
 
-def ends_of_rolling(lab: Lab, sets: Mapping[str, Parameters], maps: Mapping[str, Map]) -> dict[Key, Bracket]:
+def ends_of_rolling(lab: Lab, sets: Mapping[str, Parameters], cases: Mapping[Key, list[Case]]) -> dict[Key, Bracket]:
     """The largest flow at which a ball that rolls on both goes on so, bisected."""
-    searches: dict[Key, Search] = {}
-    for name, p in sets.items():
-        begin = change(maps[name].omegas, [case is Case.RR for case in maps[name].rolling])
-        if begin is not None:
-            width = WIDTH[lab.level] * begin.high
-            searches[name, "rolling"] = Search(begin, _asker(lab, p, rolling, 5), stays_rolling, width)
+    searches = {
+        (name, "rolling"): _search(lab, p, begin, (rolling, 5, stays_rolling), WIDTH[lab.level] * begin.high)
+        for name, p in sets.items()
+        if (begin := _change(p, [case is Case.RR for case in cases[name, "rolling"]]))
+    }
     return _narrowed(lab, searches)
 
 
 def neighbourhoods(
-    lab: Lab, sets: Mapping[str, Parameters], maps: Mapping[str, Map], rolling: Brackets
+    lab: Lab, sets: Mapping[str, Parameters], cases: Mapping[Key, list[Case]], rolling: Brackets
 ) -> dict[Key, Bracket]:
     """Roughly, where the wall begins to carry the ball, and where slipping on the floor ends."""
     searches: dict[Key, Search] = {}
     for name, p in sets.items():
-        seen = maps[name]
-        if (begin := change(seen.omegas, [case is not Case.NR for case in seen.wall])) is not None:
-            searches[name, "riding"] = Search(begin, _asker(lab, p, wall, 20), falls, ROUGH_WIDTH * begin.high)
-        end, begin = rolling.get((name, "rolling")), change(seen.omegas, [case is not Case.NR for case in seen.rest])
-        if end is not None and begin is not None and not lifts(end) and end.high < begin.high:
+        up, begin = (_change(p, [case is not Case.NR for case in cases[name, kind]]) for kind in ("wall", "rest"))
+        if up:
+            searches[name, "riding"] = _search(lab, p, up, (wall, 20, falls), ROUGH_WIDTH * up.high)
+        end = rolling.get((name, "rolling"))
+        if end and begin and not lifts(end) and end.high < begin.high:
             around = Bracket(max(begin.low, end.high), begin.high)
-            searches[name, "slipping"] = Search(around, _follower(lab, p, rest), keeps_on, ROUGH_WIDTH * around.high)
+            width = ROUGH_WIDTH * around.high
+            searches[name, "slipping"] = _search(lab, p, around, (rest, 40, keeps_on), width, follow=True)
     return _narrowed(lab, searches, careful=False)
 
 
@@ -137,33 +122,31 @@ def lifts(end: Bracket) -> bool:
 def settled_beside(lab: Lab, sets: Mapping[str, Parameters], brackets: Brackets) -> dict[Key, list[Settled]]:
     """Settled states beside every change, the nearest first; only those that did settle in the case that belongs."""
     begin = {
-        (name, kind): [Start(name, q, kind, start(q, q.omega_0)) for q in (p.replace(omega_0=float(w)) for w in omegas)]
+        (name, kind): [Start(name, q, kind, start(q, q.omega_0)) for q in (p.replace(omega_0=w) for w in omegas)]
         for name, p in sets.items()
         for kind, (omegas, start) in _places(name, brackets).items()
     }
-    states = iter(settle(lab, [start for some in begin.values() for start in some], loose=LOOSE[lab.level]))
     belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
+    rows = settle_groups(lab, list(begin.values()), loose=LOOSE[lab.level])
     return {
-        key: [
-            s for s in [next(states) for _ in some] if not s.failure and family(s.case) is belongs.get(key[1], Case.NR)
-        ]
-        for key, some in begin.items()
+        key: [s for s in states if not s.failure and family(s.case) is belongs.get(key[1], Case.NR)]
+        for key, states in zip(begin, rows, strict=True)
     }
 
 
-def _places(name: str, brackets: Brackets) -> dict[str, tuple[Array, From]]:
+def _places(name: str, brackets: Brackets) -> dict[str, tuple[list[float], From]]:
     """Flows at which states of a set are settled, and from where, by what they are for."""
     places: dict[str, tuple[Array, From]] = {}
-    if (carried := brackets.get((name, "riding"))) is not None:
+    if carried := brackets.get((name, "riding")):
         places["riding"] = carried.high * (1 + RIDES), wall
         places["sinking"] = carried.low * (1 - NEAR), wall
-    if (end := brackets.get((name, "rolling"))) is not None and lifts(end):
+    if (end := brackets.get((name, "rolling"))) and lifts(end):
         places["lifted"] = end.high * (1 + RIDES), wall
-    elif end is not None and (last := brackets.get((name, "slipping"))) is not None:
+    elif end and (last := brackets.get((name, "slipping"))):
         span = last.low - end.high
         places["slipping"] = end.high + NEAR * min(span, end.high), rest
         places["turning"] = last.low - TURNS * span, rest
-    return places
+    return {kind: (omegas.tolist(), start) for kind, (omegas, start) in places.items()}
 
 
 def refined(lab: Lab, sets: Mapping[str, Parameters], brackets: Brackets, states: States) -> dict[Key, Bracket]:
@@ -173,49 +156,46 @@ def refined(lab: Lab, sets: Mapping[str, Parameters], brackets: Brackets, states
     for name, p in sets.items():
         if len(riding := states.get((name, "riding"), [])) == len(RIDES):
             begin = brackets[name, "riding"]
-            searches[name, "riding"] = Search(
-                begin, _asker(lab, p, rider(riding, high(p)), 5), slides, width * begin.high
-            )
+            ride = rider(riding, high(p)), 5, slides
+            searches[name, "riding"] = _search(lab, p, begin, ride, width * begin.high)
         if len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
             end = brackets[name, "rolling"]
             around = Bracket(end.low * (1 - ROUGH_WIDTH), end.high * (1 + ROUGH_WIDTH))
-            searches[name, "leaning"] = Search(
-                around, _asker(lab, p, leaning(lifted), 20), rolls_again, width * end.high
-            )
+            lean = leaning(lifted), 20, rolls_again
+            searches[name, "leaning"] = _search(lab, p, around, lean, width * end.high)
     return _narrowed(lab, searches)
 
 
 def folded(
     lab: Lab, sets: Mapping[str, Parameters], tops: Mapping[str, Measured], states: States
-) -> dict[str, Bracket]:
+) -> dict[Key, Bracket]:
     """The largest flow at which a ball on the floor settles, about the maximum of the branch on which it comes up."""
-    searches: dict[str, Search] = {}
+    searches: dict[Key, Search] = {}
+    units = FOLD_TIME / math.sqrt(FOLD_WIDTH[lab.level])
     for name, top in tops.items():
         width = max(FOLD_WIDTH[lab.level], MARGIN * top.uncertainty / top.value)
         x = states[name, "turning"][0].mean
         around = Bracket(top.value * (1 - width), top.value * (1 + width))
-        asker = _asker(lab, sets[name], lambda p, omega, x=x: x, FOLD_TIME / math.sqrt(FOLD_WIDTH[lab.level]))  # type: ignore[misc]
-        searches[name] = Search(around, asker, settles, width * top.value)
-    return dict(zip(searches, narrow(lab, list(searches.values()), careful=False), strict=True))
+        stay = (lambda p, omega, x=x: x), units, settles  # type: ignore[misc]
+        searches[name, "fold"] = _search(lab, sets[name], around, stay, width * top.value)
+    return _narrowed(lab, searches, careful=False)
 
 
 def _narrowed(lab: Lab, searches: Mapping[Key, Search], careful: bool = True) -> dict[Key, Bracket]:
     return dict(zip(searches, narrow(lab, list(searches.values()), careful), strict=True))
 
 
-def _asker(lab: Lab, p: Parameters, start: From, units: float) -> Callable[[float, Bracket, Care], Task]:
+def _search(
+    lab: Lab, p: Parameters, begin: Bracket, ask: tuple[From, float, Answer], width: float, follow: bool = False
+) -> Search:
+    """Narrow a bracket by runs from a state, for some units of 1/c, that give an answer.
+
+    To `follow`, a run goes out from where the ball has come to at the largest flow that it has settled at so far.
+    """
+    start, units, answer = ask
+
     def task(omega: float, bracket: Bracket, care: Care) -> Task:
-        return held(lab, p, omega, start(p, omega), units * care.time, care.refine)
+        last = bracket.runs[0] if follow else None
+        return held(lab, p, omega, last.x[-1] if last else start(p, omega), units * care.time, care.refine)
 
-    return task
-
-
-def _follower(lab: Lab, p: Parameters, start: From) -> Callable[[float, Bracket, Care], Task]:
-    """From where the ball has come to at the largest flow that it has settled at so far."""
-
-    def task(omega: float, bracket: Bracket, care: Care) -> Task:
-        run = bracket.runs[0]
-        x0 = start(p, omega) if run is None else run.x[-1]
-        return held(lab, p, omega, x0, 40 * care.time, care.refine)
-
-    return task
+    return Search(begin, task, answer, width)

@@ -29,11 +29,9 @@ from compare.measure import (
     rates,
     record,
     settled,
-    steepest,
     thresholds,
     unloading,
     unsteady,
-    watched,
 )
 from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.record import Measurement, Missing, Records
@@ -81,10 +79,10 @@ PROTOCOLS = (
     Protocol("unloading", unloading.measure, ("thresholds",)),
     Protocol("field", field.measure, waits=False),
     Protocol("growth", growth.measure, waits=False),
-    Protocol("steepest", steepest.measure, waits=False),
+    Protocol("steepest", growth.steepest, waits=False),
     Protocol("lift", lift.measure, waits=False),
     Protocol("bounds", bounds.measure, ("thresholds",)),
-    Protocol("watched", watched.measure, ("thresholds",)),
+    Protocol("watched", bounds.watched, ("thresholds",)),
     Protocol("motions", motions.measure, waits=False),
     Protocol("impacts", motions.impacts, waits=False),
     Protocol("recurrent", attractors.hopping, reference="hops that last are those of the set hopping"),

@@ -14,7 +14,7 @@ from analytic import bifurcation, slip_bounds, slip_stability
 from compare.claims import cases, equations, formal, slipping
 from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import judge
-from compare.measure import birth, bounds, field, growth, lift, motions, watched
+from compare.measure import birth, bounds, field, growth, lift, motions
 from compare.measure.lab import Lab, Level
 from compare.measure.record import Measurement, Records
 from compare.measure.sets import sets
@@ -103,7 +103,7 @@ def test_a_wrong_growth_is_noticed(
 
 def test_growth_passes_through_zero_where_it_should(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     known = Records(tuple(_end(quantity) for quantity in ("omega_01", "omega_02")))
-    measured = Records.of([*bounds.measure(lab, SETS, known), *watched.measure(lab, SETS, known)])
+    measured = Records.of([*bounds.measure(lab, SETS, known), *bounds.watched(lab, SETS, known)])
     ids = ("eq-61", "eq-66", "eq-67", "eq-82", "eq-83", "fig-4-5")
     verdicts = outcomes(slipping.CLAIMS, measured)
     assert {name: verdicts[name].outcome for name in ids} == dict.fromkeys(ids, Outcome.CONFIRMED)
