@@ -13,6 +13,8 @@ from compare.runs.tasks import Task
 from compare.statistics import Measured
 from model import Trajectory
 
+Answer = Callable[[Trajectory], bool | None]
+"""Yes, no, or None where the run doesn't show it, and is done again for longer."""
 SECTIONS = 7
 """Flows inside a bracket in each round, by which it shrinks to an eighth."""
 
@@ -52,8 +54,7 @@ class Search:
     begin: Bracket
     task: Callable[[float, Bracket, Care], Task]
     """The run to ask at a value, given the bracket so far."""
-    answer: Callable[[Trajectory], bool | None]
-    """Yes, no, or None where the run doesn't show it, and is done again for longer."""
+    answer: Answer
     width: float
     """Width at which it is narrow enough."""
 

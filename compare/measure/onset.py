@@ -11,11 +11,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from compare.measure.brackets import Bracket, Care, Search, narrow
+from compare.measure.brackets import Answer, Bracket, Care, Search, narrow
 from compare.measure.lab import Lab, Level, time_unit
 from compare.measure.laws import PRESSES
 from compare.measure.questions import (
-    Answer,
     From,
     falls,
     held,
@@ -176,7 +175,7 @@ def folded(
         width = max(FOLD_WIDTH[lab.level], MARGIN * top.uncertainty / top.value)
         x = states[name, "turning"][0].mean
         around = Bracket(top.value * (1 - width), top.value * (1 + width))
-        stay = (lambda p, omega, x=x: x), units, settles  # type: ignore[misc]
+        stay = (lambda p, omega, x=x: x), units, settles
         searches[name, "fold"] = _search(lab, sets[name], around, stay, width * top.value)
     return _narrowed(lab, searches, careful=False)
 

@@ -15,7 +15,6 @@ from pathlib import Path
 
 from compare.measure import (
     attractors,
-    birth,
     bounds,
     characteristic,
     edge,
@@ -75,7 +74,7 @@ PROTOCOLS = (
     Protocol("laws", laws.measure, waits=False),
     Protocol("thresholds", thresholds.measure),
     Protocol("edge", edge.measure, ("thresholds",)),
-    Protocol("birth", birth.measure, ("thresholds",)),
+    Protocol("birth", thresholds.birth, ("thresholds",)),
     Protocol("unloading", unloading.measure, ("thresholds",)),
     Protocol("field", field.measure, waits=False),
     Protocol("growth", growth.measure, waits=False),

@@ -14,7 +14,7 @@ from analytic import bifurcation, slip_bounds, slip_stability
 from compare.claims import cases, equations, formal, slipping
 from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import judge
-from compare.measure import birth, bounds, field, growth, lift, motions
+from compare.measure import bounds, field, growth, lift, motions, thresholds
 from compare.measure.lab import Lab, Level
 from compare.measure.record import Measurement, Records
 from compare.measure.sets import sets
@@ -157,7 +157,7 @@ def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest
 def test_the_fold_is_born_at_the_critical_drag(lab: Lab) -> None:
     name = "thick-fluid"
     known = Records(tuple(_end(quantity, name) for quantity in ("omega_01", "omega_02")))
-    measured = Records.of(birth.measure(lab, {name: sets(Level.QUICK)[name]}, known))
+    measured = Records.of(thresholds.birth(lab, {name: sets(Level.QUICK)[name]}, known))
     (m,) = measured.measurements
     assert abs(m.value - bifurcation.critical_drag(m.parameters)) < 3 * m.uncertainty < 5e-3 * m.value
 
