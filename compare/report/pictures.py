@@ -19,8 +19,8 @@ from model.files import write_text
 
 _PROGRAM = ("model", "analytic", "compare", "compare.runs", "compare.measure", "compare.claims", "compare.figures")
 """Packages whose constants and functions a picture may show."""
-_KEPT = " !$()*+,-./:;=?@_~"
-"""What needs no escape in an address between quotes."""
+_KEPT = " !$'()*+,-./:;<=>?@_~"
+"""What needs no escape in an address between double quotes."""
 
 
 def kept(path: Path, drawing: Drawing, data: Any) -> str:
@@ -39,8 +39,9 @@ def kept(path: Path, drawing: Drawing, data: Any) -> str:
 
 
 def address(picture: str) -> str:
-    """An SVG picture as an address; in words it is shorter than in base64."""
-    return f"data:image/svg+xml,{urllib.parse.quote(picture, safe=_KEPT)}"
+    """An SVG picture as an address, to stand between double quotes as it is; in words it is shorter than in base64."""
+    single = picture.replace("'", "&apos;").replace('"', "'")
+    return f"data:image/svg+xml,{urllib.parse.quote(single, safe=_KEPT)}"
 
 
 def svg(figure: Figure) -> str:
@@ -50,6 +51,6 @@ def svg(figure: Figure) -> str:
         figure.draw_without_rendering()
     canvas: Any = FigureCanvasSVG(figure)  # draws once; `Figure.savefig` would do so twice, for the layout
     canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
-    text = re.sub(r"<!--.*?-->|\n\s*(?=\n)|(?<=\n) +", "", out.getvalue().decode(), flags=re.DOTALL)
+    text = re.sub(r"\s+", " ", re.sub(r"<!--.*?-->", "", out.getvalue().decode(), flags=re.DOTALL))
     # Hundredths of a point are fine enough, and half as long.
     return re.sub(r' (?:d|x|y)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), text)
