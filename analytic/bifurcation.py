@@ -74,10 +74,11 @@ def curves_without_drag(j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, release
 def number_of_folds(p: Parameters) -> int:
     """Folds along the branch of SS, counted: after Proposition 7 one for eta_cr < eta < j, and none for less eta.
 
-    `InputError` unless 0 < eta < j, mu > 0 and c > 0.
+    By the changes of sign of `slope`, a search that assumes nothing. `InputError` as `check_branch`.
     """
     check_branch(p)
-    return slipping_branch.sign_changes(p)
+    values = slipping_branch.slope(np.linspace(-slipping_branch.END, slipping_branch.END, 20_001), p)
+    return int(np.sum(np.sign(values[1:]) != np.sign(values[:-1])))
 
 
 def critical_drag(p: Parameters) -> float:

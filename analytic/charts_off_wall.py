@@ -11,8 +11,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,24 +23,10 @@ from model.arrays import Array
 from model.drag import STOKES
 
 
-class _Start(NamedTuple):
-    """A moment in the resting frame."""
-
-    Z: complex
-    """Position of the centre, m."""
-    V: complex
-    """Its velocity, m s-1."""
-    spin: complex
-    """Horizontal spin of the ball, rad s-1."""
-    upright: float
-    """Spin about the vertical, rad s-1."""
-    turn: complex
-    """e^(i theta)."""
-
-
 def rolling(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """RN: (Z, dZ/dt, work); the spin follows."""
-    start, unit, energy = _start(at, p), *_units(p)
+    Z_0, V_0, _, upright = _start(at, p)
+    unit, energy = _units(p)
 
     def lag_and_share(t: float, Z: complex, V: complex) -> tuple[complex, float]:
         lag = _lag(Z, V, omega_0(t))
@@ -59,16 +44,17 @@ def rolling(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
 
     def path(t: Array, z: Array) -> Path:
         _, V = _centre(z)
-        rolled = _path(t, z, at, p, start.upright, 1j * V / p.r)
+        rolled = _path(t, z, at, p, upright, 1j * V / p.r)
         x = State.of(rolled.x)  # slip_x = 0 and v_h + r slip_z = 0 hold exactly
-        return replace(rolled, x=x._replace(slip_x=0.0, slip_z=-x.v_h / p.r).stacked())
+        return rolled._replace(x=x._replace(slip_x=0.0, slip_z=-x.v_h / p.r).stacked())
 
-    return Chart(case, [*_pairs(start), at.work], [*unit, energy], rates, ("A slips", "B lands"), guards, path)
+    return Chart(case, [*_pairs(Z_0, V_0), at.work], [*unit, energy], rates, ("A slips", "B lands"), guards, path)
 
 
 def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """SN: (Z, dZ/dt, sliding speed at A, its direction in the resting frame, work)."""
-    start, unit, energy = _start(at, p), *_units(p)
+    Z_0, V_0, spin, upright = _start(at, p)
+    unit, energy = _units(p)
     (*_, v), lever = unit, 1 + 1 / p.j
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
@@ -89,69 +75,55 @@ def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float
         (Z, V), slide = _centre(z), speed * np.exp(1j * phase)
         # e^(i theta)(-a + i b) with a, b along the cosine and minus the sine of alpha (6), (8).
         back = slide * np.conj(Z) / np.abs(Z)
-        slid = _path(t, z, at, p, start.upright, (slide - V) / (1j * p.r))
-        return replace(slid, alpha=np.arctan2(-back.imag, -back.real))
+        slid = _path(t, z, at, p, upright, (slide - V) / (1j * p.r))
+        return slid._replace(alpha=np.arctan2(-back.imag, -back.real))
 
     # The velocity of the lowest point; at the onset it is zero and only alpha tells its direction.
-    speed = abs(start.V + 1j * p.r * start.spin)
-    phase = cmath.phase(start.turn * complex(-math.cos(at.alpha), -math.sin(at.alpha)))
-    first, scale = [*_pairs(start), speed, phase, at.work], [*unit, v, 1.0, energy]
+    speed = abs(V_0 + 1j * p.r * spin)
+    phase = cmath.phase(cmath.exp(1j * at.theta) * complex(-math.cos(at.alpha), -math.sin(at.alpha)))
+    first, scale = [*_pairs(Z_0, V_0), speed, phase, at.work], [*unit, v, 1.0, energy]
     return Chart(case, first, scale, rates, ("A sticks", "B lands"), guards, path, slips=(4,))
 
 
 def flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """NN, where the whole spin rests."""
-    return (_flying_by_stokes if p.drag == STOKES else _flying)(case, at, p, omega_0)
+    """NN, where the whole spin rests: (Z, dZ/dt, work) with Stokes' drag, where height and fall are known (`flight`).
 
-
-def _flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid) -> Chart:
-    """(Z, dZ/dt, y, v_y, work): c depends on all components of the velocity."""
-    start, (unit, energy) = _start(at, p), _units(p)
-
-    def rates(t: float, z: Sequence[float]) -> list[float]:
-        (Z, V), v_y = _centre(z), z[5]
-        lag = _lag(Z, V, omega_0(t))
-        c = _coefficient(lag, p, v_y)
-        work = _power(lag, V, p, v_y)
-        return [V.real, V.imag, -c * lag.real, -c * lag.imag, v_y, -p.g - c * v_y, work]
-
-    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        return _gap(_centre(z)[0], p), z[4] / p.R
-
-    def path(t: Array, z: Array) -> Path:
-        return _path(t, z, at, p, start.upright, np.full(len(t), start.spin), (z[4], z[5]))
-
-    first, scale = [*_pairs(start), at.x.y, at.x.v_y, at.work], [*unit, p.R, unit[-1], energy]
-    return Chart(case, first, scale, rates, ("B lands", "A lands"), guards, path)
-
-
-def _flying_by_stokes(case: Case, at: Moment, p: Parameters, omega_0: Fluid) -> Chart:
-    """(Z, dZ/dt, work); height and fall are known (`flight`)."""
-    start, unit, energy = _start(at, p), *_units(p)
-    y, v_y = at.x.y, at.x.v_y
+    Else c depends on all components of the velocity: (Z, dZ/dt, y, v_y, work).
+    """
+    Z_0, V_0, spin, upright = _start(at, p)
+    (unit, energy), y, v_y, known = _units(p), at.x.y, at.x.v_y, p.drag == STOKES
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         Z, V = _centre(z)
-        lag, rise = _lag(Z, V, omega_0(t)), v_y - (p.c * v_y + p.g) * flight.decay(t - at.time, p.c)
-        return [V.real, V.imag, -p.c * lag.real, -p.c * lag.imag, _power(lag, V, p, rise)]
+        lag, rise = _lag(Z, V, omega_0(t)), flight.speed(t - at.time, v_y, p) if known else z[5]
+        c = _coefficient(lag, p, rise)
+        fall = [] if known else [rise, -p.g - c * rise]
+        return [V.real, V.imag, -c * lag.real, -c * lag.imag, *fall, _power(lag, V, p, rise)]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        return (_gap(_centre(z)[0], p),)
+        gap = _gap(_centre(z)[0], p)
+        return (gap,) if known else (gap, z[4] / p.R)
 
     def path(t: Array, z: Array) -> Path:
-        return _path(t, z, at, p, start.upright, np.full(len(t), start.spin), flight.fall(t - at.time, y, v_y, p))
+        fall = flight.fall(t - at.time, y, v_y, p) if known else (z[4], z[5])
+        return _path(t, z, at, p, upright, np.full(len(t), spin), fall)
 
-    first, scale, landing = [*_pairs(start), at.work], [*unit, energy], at.time + flight.fall_time(y, v_y, p)
-    return Chart(case, first, scale, rates, ("B lands",), guards, path, landing=landing)
+    if known:
+        landing, start, scale = at.time + flight.fall_time(y, v_y, p), [at.work], [energy]
+    else:
+        landing, start, scale = math.inf, [y, v_y, at.work], [p.R, unit[-1], energy]
+    ends = ("B lands",) if known else ("B lands", "A lands")
+    return Chart(case, [*_pairs(Z_0, V_0), *start], [*unit, *scale], rates, ends, guards, path, landing=landing)
 
 
-def _start(at: Moment, p: Parameters) -> _Start:
+def _start(at: Moment, p: Parameters) -> tuple[complex, complex, complex, float]:
+    """A moment in the resting frame: Z, dZ/dt, the horizontal spin, and that about the vertical."""
     turn, u = cmath.exp(1j * at.theta), velocities(at.x, p)
-    return _Start((p.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k), turn * complex(-u.o_x, u.o_z), u.o_y, turn)
+    return (p.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k), turn * complex(-u.o_x, u.o_z), u.o_y
 
 
-def _pairs(start: _Start) -> list[float]:
-    return [start.Z.real, start.Z.imag, start.V.real, start.V.imag]
+def _pairs(Z: complex, V: complex) -> list[float]:
+    return [Z.real, Z.imag, V.real, V.imag]
 
 
 def _units(p: Parameters) -> tuple[list[float], float]:

@@ -44,6 +44,10 @@ until one of them finds the limit of friction."""
 MAX_SWEEPS = 2000
 
 
+Impulse = tuple[float, float, float]
+"""Of one contact per mass, m s-1: normal, tangential along the normal of the other contact, tangential along z."""
+
+
 class Closed(NamedTuple):
     """A contact that takes part in the problem."""
 
@@ -57,6 +61,7 @@ class NotConvergedError(ArithmeticError):
     """The sweeps did not settle; the message gives the last change."""
 
 
+@np.errstate(invalid="ignore", over="ignore")  # sweeps that run away don't settle, which is an error of its own
 def solve(
     free: Velocities,
     A: Closed | None,
@@ -84,22 +89,23 @@ def solve(
     a, b = _needs(free, A, B, p)
     if A is None or B is None:  # a contact alone is solved exactly
         at_A, at_B = (
-            _project(need, friction, contact.slip) if contact else np.zeros(3)
+            _project(need, friction, contact.slip) if contact else (0.0, 0.0, 0.0)
             for need, friction, contact in ((a, p.mu, A), (b, p.eta, B))
         )
         return _after(free, at_A, at_B, p)
-    # What an impulse (n, s, t) of a contact takes off the needs of the other: the same both ways.
     k = 1 / (1 + p.j)
-    coupling = np.array([[0.0, 1.0, 0.0], [1 - k, -k, 0.0], [0.0, 0.0, 1 - k]])
+    coupling = np.array([[0.0, 1.0, 0.0], [1 - k, -k, 0.0], [0.0, 0.0, 1 - k]])  # of `_left`
     scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
-    at_B, last, span, growth = np.array(start[3:]) / p.m, math.inf, 1.0, 8.0
+    *_, n, s, t = start
+    at_B = n / p.m, s / p.m, t / p.m
+    last, span, growth = math.inf, 1.0, 8.0
     for count in range(1, max_sweeps + 1):
-        at_A = _project(a - coupling @ at_B, p.mu, A.slip)
-        need_B = b - coupling @ at_A
+        at_A = _project(_left(a, at_B, k), p.mu, A.slip)
+        need_B = _left(b, at_A, k)
         swept = _project(need_B, p.eta, B.slip)
-        change = float(np.abs(swept - at_B).max())
-        enough = tolerance * max(scale, float(np.abs([at_A, swept]).max()))
-        if change <= enough:
+        change = max(abs(after - before) for after, before in zip(swept, at_B, strict=True))
+        enough = tolerance * max(scale, *map(abs, at_A), *map(abs, swept))
+        if change <= enough < math.inf:
             return _after(free, at_A, swept, p)
         attempt, sweeps = divmod(count, ATTEMPT)
         if count <= PLAIN_SWEEPS:
@@ -112,49 +118,53 @@ def solve(
         else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
             span, growth = max(span / 20, 1 / (10 + p.mu * p.eta)), max(growth**0.7, 1.1)
         last = change
-        rate_A = _projection_rate(a - coupling @ swept, p.mu, A.slip)
+        rate_A = _projection_rate(_left(a, swept, k), p.mu, A.slip)
         rate = _projection_rate(need_B, p.eta, B.slip) @ coupling @ rate_A @ coupling
-        at_B = at_B + np.linalg.solve((1 + 1 / span) * np.eye(3) - rate, swept - at_B)
+        step = np.linalg.solve((1 + 1 / span) * np.eye(3) - rate, np.subtract(swept, at_B))
+        n, s, t = (at_B + step).tolist()
+        at_B = n, s, t
     raise NotConvergedError(
         f"contact problem: still a change of {change:g} m s-1 after {max_sweeps} sweeps, asked for {enough:g} m s-1"
     )
 
 
-def _needs(free: Velocities, A: Closed | None, B: Closed | None, p: Parameters) -> tuple[Array, Array]:
-    """Impulses per mass, m s-1, that would bring A and B alone to their targets and to rest, were they not limited.
-
-    Each is (normal, tangential along the normal of the other contact, along z).
-    """
+def _needs(free: Velocities, A: Closed | None, B: Closed | None, p: Parameters) -> tuple[Impulse, Impulse]:
+    """Impulses that would bring A and B alone to their targets and to rest, were they not limited."""
     share = p.j / (1 + p.j)  # of the mass, that a tangential impulse feels at the contact point
-    (v_h, v_y, *_), slip_A, slip_B = free, rigid_body.slip_at_A(free, p), rigid_body.slip_at_B(free, p)
-    to_A, to_B = (contact.target if contact else 0.0 for contact in (A, B))
-    a, b = (np.array([n, -share * s, -share * t]) for n, (s, t) in ((to_A - v_y, slip_A), (to_B - v_h, slip_B)))
-    return a, b
+    (v_h, v_y, *_), (s_A, t_A), (s_B, t_B) = free, rigid_body.slip_at_A(free, p), rigid_body.slip_at_B(free, p)
+    to_A, to_B = A.target if A else 0.0, B.target if B else 0.0
+    return (to_A - v_y, -share * s_A, -share * t_A), (to_B - v_h, -share * s_B, -share * t_B)
 
 
-def _after(free: Velocities, at_A: Array, at_B: Array, p: Parameters) -> tuple[Velocities, Forces]:
+def _left(need: Impulse, other: Impulse, k: float) -> Impulse:
+    """What a contact still needs if the other one gives an impulse: the same both ways."""
+    n, s, t = other
+    return need[0] - s, need[1] - (1 - k) * n + k * s, need[2] - (1 - k) * t
+
+
+def _after(free: Velocities, at_A: Impulse, at_B: Impulse, p: Parameters) -> tuple[Velocities, Forces]:
     """Velocities after impulses per mass, and these impulses."""
-    (A_y, A_x, A_z), (B_x, B_y, B_z) = (p.m * at_A).tolist(), (p.m * at_B).tolist()
-    P = Forces(A_x, A_y, A_z, B_x, B_y, B_z)
+    (A_y, A_x, A_z), (B_x, B_y, B_z) = at_A, at_B
+    P = Forces(*(p.m * each for each in (A_x, A_y, A_z, B_x, B_y, B_z)))
     return rigid_body.apply(free, P, p), P
 
 
-def _project(need: Array, friction: float, slip: tuple[float, float] | None) -> Array:
+def _project(need: Impulse, friction: float, slip: tuple[float, float] | None) -> Impulse:
     """The impulse that Coulomb's law allows: friction is the point of its disk next to what is needed, or opposes a
     known slip."""
-    n, s, t = need.tolist()
+    n, s, t = need
     if n <= 0:
-        return np.zeros(3)
+        return 0.0, 0.0, 0.0
     limit = friction * n
     if slip is not None:
-        return np.array([n, -limit * slip[0], -limit * slip[1]])
+        return n, -limit * slip[0], -limit * slip[1]
     size = math.hypot(s, t)
-    return need if size <= limit else np.array([n, s / size * limit, t / size * limit])
+    return need if size <= limit else (n, s / size * limit, t / size * limit)
 
 
-def _projection_rate(need: Array, friction: float, slip: tuple[float, float] | None) -> Array:
+def _projection_rate(need: Impulse, friction: float, slip: tuple[float, float] | None) -> Array:
     """Derivative of `_project` by (n, s, t), shape (3, 3)."""
-    n, s, t = need.tolist()
+    n, s, t = need
     if n <= 0:
         return np.zeros((3, 3))
     if slip is not None:
@@ -162,9 +172,9 @@ def _projection_rate(need: Array, friction: float, slip: tuple[float, float] | N
     size = math.hypot(s, t)
     if size <= friction * n:
         return np.eye(3)
-    along = np.array([s, t]) / size
-    sideways = friction * n / size * (np.eye(2) - np.outer(along, along))
-    return np.block([[np.eye(1), np.zeros((1, 2))], [friction * along[:, None], sideways]])
+    a, b, turn = s / size, t / size, friction * n / size
+    sideways = -turn * a * b
+    return np.array([[1.0, 0.0, 0.0], [friction * a, turn * b * b, sideways], [friction * b, sideways, turn * a * a]])
 
 
 def unlocked(error: NotConvergedError, p: Parameters) -> Closed:

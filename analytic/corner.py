@@ -11,7 +11,7 @@ A from B and B from that. Newton's method on the change of a sweep settles most 
 the impulses of the step before; while the ball rolls at both points B is undetermined along one direction, and a little
 damping keeps it from drifting there. Where a contact begins to stick, slide or open, Newton's method may end in another
 solution than sweeps do: then, and where sweeps may lead away from a solution (mu eta > 1), plain sweeps are taken.
-Where these approach slowly or swing, pseudo-transient continuation takes over (see `contact_problem.Continuation`);
+Where these approach slowly or swing, pseudo-transient continuation takes over (see `contact_problem`);
 where that fails, it starts again from nothing and from damped sweeps.
 
 **Which solution.** Where mu > 1, sticking and slipping may both obey the law. Taken is the one that continues the last

@@ -270,6 +270,7 @@ def design(request: Request, seed: int = 0) -> Design:
     chosen = choices[material]
     meters = [chosen.p, *corners(request.make, chosen.values, request.tolerances)]
     at = {name: x for name, x in {**request.fluid, **chosen.values}.items() if name != "drag"}
+    with_inertia = map(fluid_inertia.thresholds, meters)
     return Design(
         request=request,
         material=material,
@@ -279,13 +280,8 @@ def design(request: Request, seed: int = 0) -> Design:
         spread=threshold_spread(meters),
         sensitivities=sensitivities(request.make, at),
         curve=characteristic(meters, 1.5 * max(request.fastest, chosen.limit.omega_0)),
-        with_inertia=min(map(_limit_with_inertia, meters)),
+        with_inertia=min(t["omega_02"] if math.isnan(t["omega_01"]) else t["omega_01"] for t in with_inertia),
     )
-
-
-def _limit_with_inertia(p: Parameters) -> float:
-    t = fluid_inertia.thresholds(p)
-    return t["omega_02"] if math.isnan(t["omega_01"]) else t["omega_01"]
 
 
 def characteristic(meters: Sequence[Parameters], top: float, count: int = 61) -> Curve:

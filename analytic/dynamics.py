@@ -154,12 +154,9 @@ def forces(
     Sine and cosine of the slip directions alpha, beta (8) are taken from x; give `slip_A`, `slip_B` for the limit
     of vanishing slip in a direction (53).
     """
-    slide_A, slide_B = slides(x, p)
-    if case.A is Contact.S and slip_A is None:
-        slip_A = _direction(*slide_A)
-    if case.B is Contact.S and slip_B is None:
-        slip_B = _direction(*slide_B)
-    return FORCES[case](x, p, omega_0, *(s for s in (slip_A, slip_B) if s is not None))
+    given = zip((case.A, case.B), (slip_A, slip_B), slides(x, p), strict=True)
+    slips = (slip or direction(*slide) for contact, slip, slide in given if contact is Contact.S)
+    return FORCES[case](x, p, omega_0, *slips)
 
 
 def rolling_family(omega_c: Real, p: Parameters, omega_0: Real, B_y: Real) -> Forces:
@@ -235,11 +232,6 @@ def _sn(x: Sequence[Real], p: Parameters, omega_0: Real, slip_A: Direction) -> F
     return Forces(-p.mu * G * cosine, G, p.mu * G * sine)
 
 
-def _nn(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
-    """In flight."""
-    return Forces()
-
-
 FORCES: dict[Case, Callable[..., Forces]] = {
     Case.RS: _rs,
     Case.SR: _sr,
@@ -248,7 +240,7 @@ FORCES: dict[Case, Callable[..., Forces]] = {
     Case.NS: _ns,
     Case.RN: _rn,
     Case.SN: _sn,
-    Case.NN: _nn,
+    Case.NN: lambda x, p, omega_0: Forces(),
 }
 """The forces of each case but RR, as `forces`, from x, p, omega_0 and the directions of its slips, A before B."""
 
@@ -264,9 +256,13 @@ def slides(x: Sequence[Real], p: Parameters) -> tuple[Direction, Direction]:
     return (p.r * w_x, v_h + v_y + p.r * w_z), (p.r * w_y, p.r * w_z)
 
 
-def _direction(along_sine: Real, along_cosine: Real) -> Direction:
-    hypot = math.hypot if isinstance(along_sine, float) else np.hypot
-    speed = hypot(along_sine, along_cosine)
+def direction(along_sine: Real, along_cosine: Real) -> Direction:
+    """Sine and cosine of the direction of a slip; analytic in complex components."""
+    if np.iscomplexobj(along_sine):
+        size = np.maximum(np.abs(along_sine), np.abs(along_cosine))
+        speed = size * np.sqrt((along_sine / size) ** 2 + (along_cosine / size) ** 2)
+    else:
+        speed = (math.hypot if isinstance(along_sine, float) else np.hypot)(along_sine, along_cosine)
     return along_sine / speed, along_cosine / speed
 
 

@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +21,7 @@ from model.parameters import POSITIVE, Range, check_number
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """States of many runs at the same times, and what they went through since the time before."""
+    """States of many runs at the same times, and their landings in between."""
 
     time: Array
     """Shape (samples,), s; the first is the start."""
@@ -30,10 +29,6 @@ class Ensemble:
     """States in the order of `model.State`, shape (runs, samples, 8)."""
     case: npt.NDArray[np.int8]
     """Codes of the cases, shape (runs, samples)."""
-    low: Array
-    """Least, largest and mean value over all steps since the sample before, shape (runs, samples, 8)."""
-    high: Array
-    mean: Array
     landings: npt.NDArray[np.int64]
     """Landings on floor or wall since the sample before, faster than sqrt(g R)/1000, shape (runs, samples)."""
     end: Array
@@ -86,31 +81,22 @@ def simulate_many(
             f"every run needs parameters, a start and a flow: there are {len(sets)} parameter sets, {len(starts)} "
             f"starts and {len(flows)} flows; each must be one, or as many as the others"
         )
+    sets, flows = sets * (count // len(sets)), flows * (count // len(flows))
     states = [
-        start_state(x, sets[k % len(sets)], settings) for k, x in enumerate(np.resize(starts, (count, starts.shape[1])))
+        start_state(x, p, settings) for x, p in zip(np.resize(starts, (count, starts.shape[1])), sets, strict=True)
     ]
     times = sample_times(t_end, sample_interval)
     still = np.inf if quiet is None else check_number("quiet", quiet, "s", POSITIVE)
     workers = int(check_number("threads", threads or os.cpu_count() or 1, "threads", Range(1, whole=True)))
 
     shape = (count, len(times))
-    blank: dict[str, Any] = {name: np.full((*shape, 8), np.nan) for name in ("x", "low", "high", "mean")}
-    case, landings = np.full(shape, -1, np.int8), np.zeros(shape, np.int64)
-    end, failure = np.zeros(count), [""] * count
+    x, case, landings = np.full((*shape, 8), np.nan), np.full(shape, -1, np.int8), np.zeros(shape, np.int64)
+    x[:, 0], end, failure = states, np.zeros(count), [""] * count
 
     def carry_out(k: int) -> None:
-        p = sets[k % len(sets)]
-        fluid = flows[k % len(flows)] or Flow.steady(p.omega_0)
-        stretches = time_stepping.Stretches.of(times, fluid, time_stepping.longest_step(p, settings))
-        for name in blank:
-            blank[name][k, 0] = states[k]
-        omega_0, p_k = (
-            marching.Flow(fluid.start, fluid.value, fluid.slope, fluid.waves),
-            time_stepping.constants(p, settings),
-        )
-        low, high, mean = blank["low"][k], blank["high"][k], blank["mean"][k]
-        kept = blank["x"][k], case[k], low, high, mean, landings[k]
-        end[k] = marching.follow(time_stepping.ball(states[k], 0.0, p), *stretches, still, omega_0, p_k, *kept)
+        fluid = flows[k] or Flow.steady(sets[k].omega_0)
+        ball, stretches, omega_0, given = time_stepping.prepared(states[k], 0.0, sets[k], fluid, settings, times)
+        end[k] = marching.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k])
         if end[k] < 0:
             end[k] *= -1
             failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"
@@ -119,7 +105,7 @@ def simulate_many(
         for done, _ in enumerate(pool.map(carry_out, range(count)), 1):
             if progress:
                 progress(done / count)
-    return Ensemble(times, case=case, landings=landings, end=end, failure=tuple(failure), **blank)
+    return Ensemble(times, x, case, landings, end, tuple(failure))
 
 
 def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:

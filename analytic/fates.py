@@ -135,22 +135,17 @@ def attractors(
     InputError
         If a start is outside of the vessel, a number out of range, or c = 0 without `lasting`.
     """
-    if isinstance(starts, int):
-        states = random_starts(p, starts, seed)
-    else:
-        states = np.atleast_2d(full_state(np.asarray(starts, dtype=float)))
+    states = random_starts(p, starts, seed) if isinstance(starts, int) else np.atleast_2d(full_state(starts))
     if lasting is None and p.c == 0:
         raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")
     duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
     groups: list[list[Fate]] = []
     for x in states:
         fate = settle(p, x, duration, run, [group[0] for group in groups])
-        for group in groups:
-            if group[0].same(fate):
-                group.append(fate)
-                break
-        else:
-            groups.append([fate])
+        group = next((group for group in groups if group[0].same(fate)), None)
+        if group is None:
+            groups.append(group := [])
+        group.append(fate)
     groups.sort(key=len, reverse=True)
     return [Attractor(group[0], len(group), len(states)) for group in groups]
 
@@ -161,7 +156,7 @@ def settle(
     """What the motion from x0 comes to within `lasting` seconds; `known` fates are recognised without a closer look."""
     solutions, seen = stable_solutions(p), list[Trajectory]()
     try:
-        for now in windows(p, full_state(np.asarray(x0, dtype=float)), lasting, run):
+        for now in windows(p, full_state(x0), lasting, run):
             if seen and (fate := _decided(seen[-1], now, solutions, known)):
                 return fate
             seen = [*seen[-1:], now]
@@ -269,15 +264,15 @@ def lyapunov(p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, s
     distance every `renewed` seconds, as soon as both are in one case; the mean growth between is the exponent
     (Benettin's method). The error is that of the mean of ten parts of the duration.
     """
-    first = full_state(np.asarray(x, dtype=float))
-    case = simulate(p, first, renewed, sample_interval=renewed, initial_impact=True).cases[0]
+    first = full_state(x)
+    case = event_driven(p, first, renewed, renewed).cases[0]
     active = [VARIABLES.index(name) for name in TRAITS[case].active]
     push = np.zeros(8)
     push[active] = np.random.default_rng(seed).normal(size=len(active))
     second = first + push * scale(p) * APART / np.linalg.norm(push)
     growth, before = [], APART
     for _ in range(math.ceil(duration / renewed)):
-        runs = [simulate(p, each, renewed, sample_interval=renewed, initial_impact=True) for each in (first, second)]
+        runs = [event_driven(p, each, renewed, renewed) for each in (first, second)]
         first, second = (run.x[-1] for run in runs)
         apart = second - first
         distance = float(np.linalg.norm(apart / scale(p)))

@@ -13,10 +13,15 @@ from model import Parameters
 
 def fall(t: Any, y: float, v_y: float, p: Parameters) -> tuple[Any, Any]:
     """Height and vertical velocity after a time t (a float or an array) of flight with drag."""
-    return y + v_y * decay(t, p.c) - p.g * t**2 * second(p.c * t), v_y - (p.c * v_y + p.g) * decay(t, p.c)
+    return y + v_y * _decay(t, p.c) - p.g * t**2 * second(p.c * t), speed(t, v_y, p)
 
 
-def decay(t: Any, c: float) -> Any:
+def speed(t: Any, v_y: float, p: Parameters) -> Any:
+    """Vertical velocity alone."""
+    return v_y - (p.c * v_y + p.g) * _decay(t, p.c)
+
+
+def _decay(t: Any, c: float) -> Any:
     """(1 - exp(-c t))/c."""
     if c == 0:
         return t
@@ -32,15 +37,12 @@ def fall_time(y: float, v_y: float, p: Parameters) -> float:
     def height(t: float) -> float:
         return float(fall(t, y, v_y, p)[0])
 
-    low, high = _rise_time(v_y, p) if v_y > 0 else 0.0, free
+    low, high = 0.0, free
+    if v_y > 0:  # from the top on
+        low = math.log1p(p.c * v_y / p.g) / p.c if p.c > 0 else v_y / p.g
     while height(high) > 0:
         low, high = high, 2 * high
     return float(brentq(height, low, high, xtol=4 * math.ulp(1.0) * high, rtol=4 * math.ulp(1.0)))
-
-
-def _rise_time(v_y: float, p: Parameters) -> float:
-    """Time until the top of a flight."""
-    return math.log1p(p.c * v_y / p.g) / p.c if p.c > 0 else v_y / p.g
 
 
 def second(s: Any) -> Any:

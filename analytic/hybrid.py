@@ -7,7 +7,7 @@ drag RR is known in closed form), and `transitions` says how to go on.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -61,7 +61,7 @@ class _Simulator:
     @property
     def absolute(self) -> float:
         """Absolute tolerance in natural units."""
-        return self.settings.rtol / 1e3 if self.settings.atol is None else self.settings.atol
+        return self.settings.rtol / 1e3
 
     @property
     def shortest(self) -> Shortest:
@@ -90,8 +90,7 @@ class _Simulator:
         """Collide if the ball moves into something it touches, then find the case."""
         x, omega_0, impulse = at.x, fluid(at.time), NOTHING
         if (x.y == 0 and x.v_y < 0) or (x.h == 0 and x.v_h < 0):
-            impact = transitions.collide(at, self.p, omega_0, self.settings.restitution, self.shortest)
-            at, impulse = impact.after, impact.impulse
+            at, impulse = transitions.collide(at, self.p, omega_0, self.settings.restitution, self.shortest)
         return *transitions.choose(at, self.p, omega_0, self.settings.leave_rolling), impulse
 
     def _react(self, guard: str, case: Case, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
@@ -100,14 +99,14 @@ class _Simulator:
         match guard:
             case "A slips":
                 f = self._forces_at(case, at, fluid)
-                return Case.of(Contact.S, case.B), replace(at, alpha=math.atan2(f.A_z, -f.A_x)), NOTHING
+                return Case.of(Contact.S, case.B), at._replace(alpha=math.atan2(f.A_z, -f.A_x)), NOTHING
             case "B slips":
                 f = self._forces_at(case, at, fluid)
-                return Case.of(case.A, Contact.S), replace(at, beta=math.atan2(-f.B_z, f.B_y)), NOTHING
+                return Case.of(case.A, Contact.S), at._replace(beta=math.atan2(-f.B_z, f.B_y)), NOTHING
             case "A lifts":
-                return Case.of(Contact.N, case.B), replace(at, alpha=math.nan), NOTHING
+                return Case.of(Contact.N, case.B), at._replace(alpha=math.nan), NOTHING
             case "B opens":
-                return Case.of(case.A, Contact.N), replace(at, beta=math.nan), NOTHING
+                return Case.of(case.A, Contact.N), at._replace(beta=math.nan), NOTHING
             case "RR ends":
                 return *transitions.leave(at, self.p, fluid(at.time)), NOTHING
             case "A sticks":
@@ -122,7 +121,7 @@ class _Simulator:
                 x = x._replace(y=0.0)
             case "B lands":
                 x = x._replace(h=0.0)
-        return self.settle(replace(at, x=x), fluid)
+        return self.settle(at._replace(x=x), fluid)
 
     @property
     def _still(self) -> float:
@@ -130,7 +129,7 @@ class _Simulator:
         return 10 * self.settings.rtol * math.sqrt(self.p.g * self.p.R) / self.p.r
 
     def _forces_at(self, case: Case, at: Moment, fluid: Fluid) -> Forces:
-        path = Path(*(np.array([v]) for v in (at.time, at.theta, at.x, at.alpha, at.beta, at.work)))
+        path = Path(*(np.array([value]) for value in at))
         return Forces(*path_forces(case, path, self.p, np.array([fluid(at.time)]))[0].tolist())
 
     def _roll(self, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
@@ -187,7 +186,7 @@ class _Simulator:
         if not np.any(wanted):
             self.recorder.reached(float(path.time[-1]))
             return
-        path = Path(*(getattr(path, f.name)[wanted] for f in fields(Path)))
+        path = Path(*(column[wanted] for column in path))
         omega_0 = np.array([fluid(t) for t in path.time.tolist()])
         forces = path_forces(case, path, self.p, omega_0)
         self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
@@ -208,5 +207,5 @@ def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:
 
 
 def _moment(path: Path, k: int) -> Moment:
-    at = Moment(*(getattr(path, f.name)[k].tolist() for f in fields(Path)))
-    return replace(at, x=State(*at.x))
+    at = Moment(*(column[k].tolist() for column in path))
+    return at._replace(x=State(*at.x))

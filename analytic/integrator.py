@@ -68,33 +68,29 @@ class Stretch:
     def steps(self, first_step: float | None) -> Iterator[Step]:
         """Steps with the samples in them, the last of them ending at a guard or at `until`.
 
-        `first_step` in s for a motion that may soon end. A solver whose steps become shorter than its time can resolve
-        gives way to the other one, whose time starts from zero again. Raises `StalledError` after `MAX_RESTARTS`.
+        BDF while the slip is small, LSODA while it isn't. `first_step` in s for a motion that may soon end. A solver
+        whose steps become shorter than its time can resolve gives way to the other one, whose time starts from zero
+        again. Raises `StalledError` after `MAX_RESTARTS`.
         """
         t, z, small = self.start, self.motion.start, self.motion.least_slip(self.motion.start) < ONSET_SLIP
         watch, failures = Watch(self.motion, t, self.absolute, self.relative), 0
         while t < self.until:
             try:
-                for step in self._suited(small, self._solve(BDF if small else LSODA, t, z, first_step, watch)):
+                slow = 0
+                for step in self._solve(BDF if small else LSODA, t, z, first_step, watch):
                     yield step
                     t, z, first_step = step.time, step.z, None
                     if step.guard:
                         return
+                    grown = self.motion.least_slip(z) > SMALL_SLIP
+                    slow = 0 if grown else slow + 1
+                    if grown if small else slow > PATIENCE:
+                        break
             except _SolverError as error:
                 failures += 1
                 if failures > MAX_RESTARTS:
                     raise StalledError(str(error)) from error
             small = not small
-
-    def _suited(self, small: bool, steps: Iterator[Step]) -> Iterator[Step]:
-        """Steps of a solver until the other one is better: BDF while the slip is small, LSODA while it isn't."""
-        slow = 0
-        for step in steps:
-            yield step
-            grown = self.motion.least_slip(step.z) > SMALL_SLIP
-            slow = 0 if grown else slow + 1
-            if grown if small else slow > PATIENCE:
-                return
 
     def _solve(
         self, method: Any, start: float, z: list[float], first_step: float | None, watch: Watch

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import dynamics
-from model import Case, Contact, Parameters, State
-from model.arrays import Array, Real
+from model import Case, Parameters, State
+from model.arrays import Array
 from model.cases import TRAITS
 
 STEP = 1e-100
@@ -27,7 +27,7 @@ def jacobian(case: Case, x: npt.ArrayLike, p: Parameters) -> Array:
         z = z._replace(**{name: getattr(z, name) + 1j * STEP})
         if case is Case.RN:
             z = z._replace(slip_z=-z.v_h / p.r)
-        rates = _complex_rates(case, z, p, p.omega_0)
+        rates = dynamics.rates(case, z, p, p.omega_0)
         rows = (np.imag(getattr(rates, row)) / STEP for row in active)
         columns.append(np.stack(np.broadcast_arrays(*rows), axis=-1))
     return np.stack(np.broadcast_arrays(*columns), axis=-1)
@@ -39,18 +39,3 @@ def eigenvalues(matrix: Array) -> npt.NDArray[np.complex128]:
     values: npt.NDArray[np.complex128] = np.linalg.eigvals(matrix[..., ::-1, ::-1].astype(complex))
     order = np.lexsort((values.imag, -values.real), axis=-1)
     return np.take_along_axis(values, order, axis=-1)
-
-
-def _complex_rates(case: Case, x: State, p: Parameters, fluid: Real) -> State:
-    """`dynamics.rates` with slip directions that are analytic in x."""
-    if case is Case.RR:
-        return dynamics.rates(case, x, p, fluid)
-    directions = {}
-    for name, contact, (sine, cosine) in zip(
-        ("slip_A", "slip_B"), (case.A, case.B), dynamics.slides(x, p), strict=True
-    ):
-        if contact is Contact.S:
-            size = np.maximum(np.abs(sine), np.abs(cosine))
-            speed = size * np.sqrt((sine / size) ** 2 + (cosine / size) ** 2)
-            directions[name] = (sine / speed, cosine / speed)
-    return dynamics.newton_euler(case, x, dynamics.forces(case, x, p, fluid, **directions), p, fluid)

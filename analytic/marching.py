@@ -64,40 +64,29 @@ def follow(
     p: Constants,
     x: Array,
     case: npt.NDArray[np.int8],
-    low: Array,
-    high: Array,
-    mean: Array,
     landings: npt.NDArray[np.int64],
 ) -> float:
     """One run through stretches of steps, into the rows of an `Ensemble`; return its end, less than 0 if it failed.
 
     Rows beyond the end of a run that has been quiet for long repeat its last state.
     """
-    row, now, landed, steps, known = 1, 0.0, 0.0, 0, 0
-    low[1:], high[1:], mean[1:] = math.inf, -math.inf, 0.0
+    row, now, landed, known = 1, 0.0, 0.0, 0
     for s in range(len(starts)):
         for k in range(counts[s]):
             now = float(starts[s] + (k + 1) * dts[s])
             ball = step(ball, dts[s], _fluid(flow, now - dts[s] / 2), p)
             if ball.residual != 0:
                 return -now
-            z = _state(ball.at, p)
-            for i in range(8):
-                low[row, i], high[row, i] = min(low[row, i], z[i]), max(high[row, i], z[i])
-                mean[row, i] += z[i]
-            steps += 1
             if ball.landings > known:
                 landings[row] += ball.landings - known
                 known, landed = ball.landings, now
         if sampled[s]:
-            mean[row] /= steps
             x[row, 0], x[row, 1], x[row, 2], x[row, 3], x[row, 4], x[row, 5], x[row, 6], x[row, 7] = _state(ball.at, p)
             case[row] = ball.case
-            row, steps = row + 1, 0
+            row += 1
             if now - landed > quiet:
-                for later in range(row, len(x)):
-                    x[later], low[later], high[later], mean[later] = x[row - 1], x[row - 1], x[row - 1], x[row - 1]
-                    case[later] = case[row - 1]
+                x[row:] = x[row - 1]
+                case[row:] = case[row - 1]
                 return now
     return now
 

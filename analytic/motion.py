@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -44,8 +44,7 @@ GAPS = ("A lands", "B lands")
 """Names of the guards that are distances."""
 
 
-@dataclass(frozen=True)
-class Moment:
+class Moment(NamedTuple):
     """A state together with what the state alone does not tell."""
 
     time: float
@@ -59,9 +58,8 @@ class Moment:
     """Work of drag, friction and impacts so far, J."""
 
 
-@dataclass(frozen=True)
-class Path:
-    """States along a stretch of one case: arrays of shape (n,), and x (n, 8)."""
+class Path(NamedTuple):
+    """Moments along a stretch of one case: arrays of shape (n,), and x (n, 8)."""
 
     time: Array
     theta: Array

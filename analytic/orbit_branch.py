@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -100,8 +101,7 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
     InputError
         If there is no such parameter, or the orbit isn't within the range.
     """
-    names = [field.name for field in Parameters.quantities()]
-    check_names([name], names, "parameter")
+    check_names([name], [field.name for field in Parameters.quantities()], "parameter")
     low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
     if not low <= (value := getattr(start.p, name)) <= high or value == 0:
         raise InputError(f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, not 0")
@@ -120,7 +120,8 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
     along = np.append(np.zeros(len(start.loop.free)), sign)
     for _ in range(most):
         matrix = jacobian(here.loop, name)
-        along = _tangent(matrix, along)
+        tangent = np.linalg.svd(matrix)[2][-1]
+        along = tangent if tangent @ along >= 0 else -tangent
         there = None
         while there is None and step > SMALLEST:
             try:
@@ -153,12 +154,6 @@ def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
     return orbit
 
 
-def _tangent(matrix: Array, along: Array) -> Array:
-    """Unit vector along the branch, not against `along`."""
-    tangent = np.linalg.svd(matrix)[2][-1]
-    return np.asarray(tangent * (1.0 if tangent @ along >= 0 else -1.0))
-
-
 def _renewed(orbit: Orbit, along: Array) -> tuple[Orbit, Array]:
     """The same orbit through a section anew: on the floor orbits may shrink away from one.
 
@@ -185,12 +180,12 @@ def _at_edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) ->
 
 def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:
     """What happens between an orbit and the next, a step away."""
-    for kind, changed in _TESTS.items():
-        if _outside(here) == _outside(there) or (changed(here) > 0) == (changed(there) > 0):
+    for kind, sign in _TESTS.items():
+        if _outside(here) == _outside(there) or (sign(here.multipliers) > 0) == (sign(there.multipliers) > 0):
             continue
 
-        def test(share: float, changed: Callable[[Orbit], float] = changed) -> float:
-            return changed(_beside(here, share * step, name, matrix))
+        def test(share: float, sign: Callable[[Any], float] = sign) -> float:
+            return sign(_beside(here, share * step, name, matrix).multipliers)
 
         try:
             orbit = _beside(here, brentq(test, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix)
@@ -237,24 +232,13 @@ def _outside(orbit: Orbit) -> int:
     return int(np.sum(np.abs(orbit.multipliers) > 1))
 
 
-def _real(orbit: Orbit) -> Array:
-    return np.real(orbit.multipliers[np.isreal(orbit.multipliers)])
+def _reals(multipliers: npt.NDArray[np.complex128]) -> Array:
+    return np.real(multipliers[np.isreal(multipliers)])
 
 
-def _beyond(orbit: Orbit) -> float:
-    """Positive if an odd number of real multipliers is beyond 1."""
-    return -float(np.prod(1 - _real(orbit)))
-
-
-def _doubled(orbit: Orbit) -> float:
-    """Positive if an odd number of real multipliers is beyond -1."""
-    return -float(np.prod(1 + _real(orbit)))
-
-
-def _turned(orbit: Orbit) -> float:
-    """Positive if a complex pair of multipliers is outside the unit circle."""
-    pairs = orbit.multipliers[np.imag(orbit.multipliers) != 0]
-    return float(np.abs(pairs).max(initial=0.0)) - 1
-
-
-_TESTS = {Bifurcation.FOLD: _beyond, Bifurcation.DOUBLING: _doubled, Bifurcation.TORUS: _turned}
+_TESTS: dict[Bifurcation, Callable[[npt.NDArray[np.complex128]], float]] = {
+    Bifurcation.FOLD: lambda m: -float(np.prod(1 - _reals(m))),
+    Bifurcation.DOUBLING: lambda m: -float(np.prod(1 + _reals(m))),
+    Bifurcation.TORUS: lambda m: float(np.abs(m[np.imag(m) != 0]).max(initial=0.0)) - 1,
+}
+"""What is positive of multipliers of which an odd number is real and beyond 1 or -1, or a pair outside the circle."""

@@ -145,18 +145,13 @@ class Loop:
         tolerance = RTOL * scale(self.p)
         return np.asarray(solve_ivp(rates, (0.0, duration), x, "DOP853", rtol=RTOL, atol=tolerance).y[:, -1])
 
-    def derivative(self) -> Array:
-        """Derivative (d - 1, d - 1) of the return map."""
-        return np.stack([self._difference(unit) for unit in np.eye(len(self.free))], axis=-1)
-
-    def sensitivity(self, varied: str) -> Array:
-        """Derivative (d - 1,) of the return map by the logarithm of a parameter."""
-        return self._difference(np.eye(len(self.free) + 1)[-1], varied)
-
-    def _difference(self, by: Array, varied: str | None = None) -> Array:
-        shift = SHIFT * self.extent
-        high, low = (self.moved(sign * shift * by, varied).back().x for sign in (1, -1))
-        return self.coordinates(high - low) / (2 * shift)
+    def derivative(self, varied: str | None = None) -> Array:
+        """Derivative (d - 1, d - 1) of the return map; with one more column by the logarithm of a parameter."""
+        shift, columns = SHIFT * self.extent, []
+        for unit in np.eye(len(self.free) + bool(varied)):
+            high, low = (self.moved(sign * shift * unit, varied).back().x for sign in (1, -1))
+            columns.append(self.coordinates(high - low) / (2 * shift))
+        return np.stack(columns, axis=-1)
 
 
 class Return(NamedTuple):
@@ -265,8 +260,8 @@ def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None)
 
 def jacobian(loop: Loop, varied: str | None = None) -> Array:
     """Derivative (d - 1, d - 1) of the defect of a loop; with one more column if a parameter is varied."""
-    by_state = loop.derivative() - np.eye(len(loop.free))
-    return np.column_stack([by_state, loop.sensitivity(varied)]) if varied else by_state
+    derivative = loop.derivative(varied)
+    return np.asarray(derivative - np.eye(*derivative.shape))
 
 
 def extent(run: Trajectory) -> float:

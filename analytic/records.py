@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -87,16 +87,12 @@ class Recorder:
         The residual is the largest |change of energy - work of drag, friction and impacts| at a sample.
         """
         settings = {**header.settings, "energy_residual": self._residual, "energy_scale": self._scale}
-        return Trajectory.from_blocks(replace(header, settings=settings), self._blocks, event_columns(self.events))
-
-
-def event_columns(events: Sequence[Event]) -> Events:
-    """Events as columns."""
-    impulse = np.array([event.impulse for event in events], dtype=float).reshape(-1, 6)
-    return Events(
-        time=np.array([event.time for event in events], dtype=float),
-        from_case=np.array([event.from_case for event in events], dtype=np.int8),
-        to_case=np.array([event.to_case for event in events], dtype=np.int8),
-        impulse_A=impulse[:, :3],
-        impulse_B=impulse[:, 3:],
-    )
+        impulse = np.array([event.impulse for event in self.events], dtype=float).reshape(-1, 6)
+        events = Events(
+            time=np.array([event.time for event in self.events], dtype=float),
+            from_case=np.array([event.from_case for event in self.events], dtype=np.int8),
+            to_case=np.array([event.to_case for event in self.events], dtype=np.int8),
+            impulse_A=impulse[:, :3],
+            impulse_B=impulse[:, 3:],
+        )
+        return Trajectory.from_blocks(replace(header, settings=settings), self._blocks, events)

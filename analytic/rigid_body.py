@@ -39,14 +39,6 @@ class Forces(NamedTuple):
 NOTHING = Forces()
 
 
-class Place(NamedTuple):
-    """Where the ball's centre is along i and k, and how fast these axes turn about j."""
-
-    x_i: float
-    x_k: float
-    spin: float
-
-
 def velocities(x: Sequence[Real], p: Parameters) -> Velocities:
     """Velocities of a state, (2) and (4)."""
     _, v_y, omega_c, w_x, w_y, w_z, h, v_h = x
@@ -80,13 +72,12 @@ def apply(u: Velocities, P: Forces, p: Parameters) -> Velocities:
     return Velocities(v_h, v_y, v_k, o_x - A_z / jmr, o_y + B_z / jmr, o_z + (A_x - B_y) / jmr)
 
 
-def smooth_rates(u: Velocities, at: Place, omega_0: float, p: Parameters) -> Velocities:
-    """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact."""
+def smooth_rates(u: Velocities, h: float, omega_0: float, p: Parameters) -> Velocities:
+    """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact; h is the gap at B."""
     v_h, v_y, v_k, o_x, _, o_z = u
-    w_h, w_k = v_h - omega_0 * at.x_k, v_k + omega_0 * at.x_i
-    c = drag.of_velocity(w_h, v_y, w_k, p)
-    dv_h, dv_k = -at.spin * v_k - c * w_h, at.spin * v_h - c * w_k
-    return Velocities(dv_h, -p.g - c * v_y, dv_k, -at.spin * o_z, 0.0, at.spin * o_x)
+    turn, w_k = v_k / (p.R - h), v_k - omega_0 * (p.R - h)
+    c = drag.of_velocity(v_h, v_y, w_k, p)
+    return Velocities(-turn * v_k - c * v_h, -p.g - c * v_y, turn * v_h - c * w_k, -turn * o_z, 0.0, turn * o_x)
 
 
 def contact_work(u: Velocities, P: Forces, p: Parameters) -> Real:

@@ -11,7 +11,6 @@ from model.parameters import POSITIVE, Range, check_choice, check_number
 
 METHODS = ("event", "time-stepping")
 LEAVING = ("slip-stability", "infeasible")
-_EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,10 +26,8 @@ class Settings:
     method: str = "event"
     """``event``: integrate case by case and locate every change of case. ``time-stepping``: Moreau-Jean, see there."""
     rtol: float = 1e-9
-    """Relative tolerance of the integrator (event)."""
-    atol: float | None = None
-    """Absolute tolerance of the integrator in natural units: lengths in R, times in sqrt(R/g), the ball's spin in
-    that of a ball that rolls at sqrt(g R); rtol/1000 if None (event)."""
+    """Relative tolerance of the integrator (event); the absolute one is a thousandth of it in natural units: lengths in
+    R, times in sqrt(R/g), the ball's spin in that of a ball that rolls at sqrt(g R)."""
     step: float | None = None
     """Longest time step, s; sqrt(R/g)/500 if None (time-stepping)."""
     restitution: float = 0.0
@@ -49,9 +46,7 @@ class Settings:
         check_choice("leave_rolling", self.leave_rolling, LEAVING)
         if not isinstance(self.initial_impact, bool):
             raise InputError(f"initial_impact = {self.initial_impact!r} must be true or false")
-        check_number("rtol", self.rtol, "1", Range(100 * _EPS, 1e-2))
+        check_number("rtol", self.rtol, "1", Range(100 * float(np.finfo(float).eps), 1e-2))
         check_number("restitution", self.restitution, "1", Range(0.0, 1.0))
-        if self.atol is not None:
-            check_number("atol", self.atol, "1", Range(_EPS**2, 1e-2))
         if self.step is not None:
             check_number("step", self.step, "s", POSITIVE)

@@ -58,7 +58,8 @@ def simulate(
     SimulationError
         If the run can't go on; it carries the samples so far.
     """
-    settings = _settings(settings, changes)
+    check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
+    settings = dataclasses.replace(settings or Settings(), **changes)
     if settings.method == "event":
         from analytic.hybrid import run  # here, because the integrators of scipy take half a second to load
     else:
@@ -81,11 +82,6 @@ def simulate(
     if cause:
         raise SimulationError(failure, trajectory) from cause
     return trajectory
-
-
-def _settings(settings: Settings | None, changes: dict[str, Any]) -> Settings:
-    check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
-    return dataclasses.replace(settings or Settings(), **changes)
 
 
 def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:

@@ -48,17 +48,6 @@ def normals(inner: Case, outer: Case) -> tuple[str, ...]:
     return tuple(name for name in _SLIPS if name in TRAITS[outer].active and name not in TRAITS[inner].active)
 
 
-def direction(alpha: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
-    """Unit vectors (slip_x, slip_y, slip_z) with slip directions alpha, beta: (75), shape (..., 3).
-
-    Both angles must lie in [-pi/2, pi/2] or both in [pi/2, 3 pi/2] (76); the quarter turns themselves are singular.
-    """
-    tan_a, tan_b = np.tan(alpha), np.tan(beta)
-    sign = np.sign(np.pi / 2 - np.asarray(alpha, dtype=float))
-    n = np.stack(np.broadcast_arrays(tan_a, tan_b, 1.0), axis=-1)
-    return np.asarray(sign[..., None] * n / np.linalg.norm(n, axis=-1, keepdims=True))
-
-
 def slip_rates(
     inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters
 ) -> tuple[Array, Array, Array]:
@@ -69,20 +58,14 @@ def slip_rates(
     """
     state, names, n = dynamics.check_state(inner, x, p), normals(inner, outer), np.asarray(n, dtype=float)
     push = State(**dict(zip(names, np.moveaxis(n, -1, 0), strict=True)))
-    directions = {}
-    for name, before, after, old, new in zip(
-        ("slip_A", "slip_B"),
-        (inner.A, inner.B),
-        (outer.A, outer.B),
-        dynamics.slides(state, p),
-        dynamics.slides(push, p),
-        strict=True,
-    ):
-        if after is Contact.S:
-            sine, cosine = old if before is Contact.S else new
-            speed = np.hypot(sine, cosine)
-            directions[name] = (sine / speed, cosine / speed)
-    force = dynamics.forces(outer, state, p, p.omega_0, **directions)
+    slides = zip(
+        (inner.A, inner.B), (outer.A, outer.B), dynamics.slides(state, p), dynamics.slides(push, p), strict=True
+    )
+    slip_A, slip_B = (
+        dynamics.direction(*(old if before is Contact.S else new)) if after is Contact.S else None
+        for before, after, old, new in slides
+    )
+    force = dynamics.forces(outer, state, p, p.omega_0, slip_A, slip_B)
     rates = dynamics.newton_euler(outer, state, force, p, p.omega_0)
     slips = (getattr(rates, name) for name in names)
     *along, A_y, B_x = (np.broadcast_to(value, n.shape[:-1]) for value in (*slips, force.A_y, force.B_x))

@@ -59,8 +59,8 @@ def branch(
     For eta > j the branch has A_y < 0: it solves the equations once (12) is released (Fig. 12). It is nan where
     not even then a solution exists.
     """
-    cos, sin = _cos_sin(s)
-    mu, eta = np.asarray(p.mu if mu is None else mu), np.asarray(p.eta if eta is None else eta)
+    s, mu, eta = np.asarray(s, dtype=float), *_friction(p, mu, eta)
+    cos, sin = 1 / np.hypot(1.0, np.exp(s)), 1 / np.hypot(1.0, np.exp(-s))  # each to full relative accuracy
     den = _denominator(cos, p.j, mu, eta)
     den = np.where(den > 0, den, np.nan)
     Omega_c = np.sqrt(mu * (1 + eta * cos**2) / den)
@@ -94,7 +94,7 @@ def _slopes(
 ) -> tuple[Array, Array]:
     """d Omega_c/d|alpha|, and that of the lag Omega_0 - Omega_c, both without the factor that `slope` leaves out."""
     at = branch(s, p, mu, eta)
-    mu, eta = np.asarray(p.mu if mu is None else mu), np.asarray(p.eta if eta is None else eta)
+    mu, eta = _friction(p, mu, eta)
     turned = 1 + 2 * mu * eta * at.cos - eta * at.cos**2
     orbit = np.sign(p.j - eta) * at.stiffness * turned / (2 * at.Omega_c * at.sin)
     den = _denominator(at.cos, p.j, mu, eta)
@@ -125,9 +125,7 @@ def fold(
     with the lag, as those of `model.drag` do (docs/theory.md); with (12) `released` also for eta > j, as long as the
     whole branch exists.
     """
-    mu, eta = np.broadcast_arrays(
-        np.asarray(p.mu if mu is None else mu, dtype=float), np.asarray(p.eta if eta is None else eta, dtype=float)
-    )
+    mu, eta = np.broadcast_arrays(*_friction(p, mu, eta))
     exists = (eta > eta_critical(mu, p)) & (eta < p.j) & (p.c > 0)
     if released:
         lowest = np.clip((eta - p.j) / np.where(mu * eta > 0, 2 * p.j * mu * eta, 1.0), 0.0, 1.0)
@@ -138,12 +136,6 @@ def fold(
     safe_mu, safe_eta = np.where(exists, mu, 1.0), np.where(exists, eta, p.j / 2)
     places = roots.bisected(lambda s: slope(s, p, safe_mu, safe_eta), -END, END)
     return np.where(exists, places, np.nan)
-
-
-def sign_changes(p: Parameters, points: int = 20_001) -> int:
-    """How often `slope` changes sign along the whole branch: the number of folds, by a search that assumes nothing."""
-    values = slope(np.linspace(-END, END, points), p)
-    return int(np.sum(np.sign(values[1:]) != np.sign(values[:-1])))
 
 
 def points_at(p: Parameters) -> list[float]:
@@ -167,10 +159,9 @@ def points_at(p: Parameters) -> list[float]:
     return places
 
 
-def _cos_sin(s: npt.ArrayLike) -> tuple[Array, Array]:
-    """cos alpha and |sin alpha| from s = ln|tan alpha|, each to full relative accuracy."""
-    s = np.asarray(s, dtype=float)
-    return 1 / np.hypot(1.0, np.exp(s)), 1 / np.hypot(1.0, np.exp(-s))
+def _friction(p: Parameters, mu: npt.ArrayLike | None, eta: npt.ArrayLike | None) -> tuple[Array, Array]:
+    """The given coefficients, or those of p."""
+    return np.asarray(p.mu if mu is None else mu, dtype=float), np.asarray(p.eta if eta is None else eta, dtype=float)
 
 
 def _denominator(cos: Array, j: float, mu: Array, eta: Array) -> Array:

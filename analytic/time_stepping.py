@@ -63,9 +63,8 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     The first sample, before any step, carries the forces and the case of the first step. Raises
     `NotConvergedError`.
     """
-    given, fluid = constants(p, settings), marching.Flow(flow.start, flow.value, flow.slope, flow.waves)
-    stretches = Stretches.of(recorder.times, flow, longest_step(p, settings))
-    now, dt = ball(x0, theta_0, p), float(stretches.dt[0])
+    now, stretches, fluid, given = prepared(x0, theta_0, p, flow, settings, recorder.times)
+    dt = float(stretches.dt[0])
     first = stepping.step(now, dt, float(flow(dt / 2)), given)
     now = now._replace(case=first.case)
     samples = [(0.0, now._replace(P=first.P), dt)]
@@ -93,21 +92,18 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
             _record(samples, p, recorder)
 
 
-def longest_step(p: Parameters, settings: Settings) -> float:
-    """The longest step the settings allow, s."""
-    return settings.step or math.sqrt(p.R / p.g) / 500
-
-
-def constants(p: Parameters, settings: Settings) -> stepping.Constants:
-    """What a step needs of parameters and settings."""
-    given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution
-    return stepping.Constants(drag.law(p), *map(float, given))  # an integer would be compiled for itself
-
-
-def ball(x: State, theta: float, p: Parameters) -> stepping.Ball:
-    """The ball in a state that no step has led to."""
+def prepared(
+    x: State, theta: float, p: Parameters, flow: Flow, settings: Settings, times: Array
+) -> tuple[stepping.Ball, Stretches, marching.Flow, stepping.Constants]:
+    """What the compiled loops take: the ball in a state that no step has led to, its steps, the flow, and constants."""
     at = stepping.At(theta, x.y, x.h, rigid_body.velocities(x, p))
-    return stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0)
+    given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution
+    return (
+        stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),
+        Stretches.of(times, flow, settings.step or math.sqrt(p.R / p.g) / 500),
+        marching.Flow(flow.start, flow.value, flow.slope, flow.waves),
+        stepping.Constants(drag.law(p), *map(float, given)),  # an integer would be compiled for itself
+    )
 
 
 def _record(samples: list[tuple[float, stepping.Ball, float]], p: Parameters, recorder: Recorder) -> None:

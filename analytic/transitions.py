@@ -9,13 +9,13 @@ the accelerations.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from analytic import contact_problem, rigid_body, rolling_forces, two_point_rolling
 from analytic.contact_problem import Closed, NotConvergedError
 from analytic.motion import Moment
-from analytic.rigid_body import NOTHING, Forces, Place, Velocities
-from model import Case, Contact, Parameters, State
+from analytic.rigid_body import NOTHING, Forces
+from model import Case, Contact, Parameters
 
 STILL = 1e-9
 """Acceleration in units of g below which a contact point is at rest, well above what the contact problem leaves."""
@@ -41,7 +41,7 @@ def choose(at: Moment, p: Parameters, omega_0: float, leave_rolling: str = "slip
     if not (A == B == Closed()):
         return _by_accelerations(at, A, B, p, omega_0)
     if two_point_rolling.MARGINS[leave_rolling](x.omega_c, p, omega_0) >= 0:
-        return Case.RR, replace(at, alpha=math.nan, beta=math.nan)
+        return Case.RR, at._replace(alpha=math.nan, beta=math.nan)
     return leave(at, p, omega_0)
 
 
@@ -66,19 +66,13 @@ def _by_accelerations(
     at: Moment, A: Closed | None, B: Closed | None, p: Parameters, omega_0: float, start: Forces = NOTHING
 ) -> tuple[Case, Moment]:
     """Case and slip directions by the contact problem of the accelerations, solved from the forces `start`."""
-    free = _free_rates(at.x, rigid_body.velocities(at.x, p), p, omega_0)
+    free = rigid_body.smooth_rates(rigid_body.velocities(at.x, p), at.x.h, omega_0, p)
     rates, force = contact_problem.solve(free, A, B, p, start, tolerance=STILL / 1e4)
     contact_A, along_A = _contact(A, force.A_y, rates.v_y, rigid_body.slip_at_A(rates, p), p)
     contact_B, along_B = _contact(B, force.B_x, rates.v_h, rigid_body.slip_at_B(rates, p), p)
     alpha = math.atan2(-along_A[1], along_A[0]) if contact_A is Contact.S else math.nan
     beta = math.atan2(along_B[1], -along_B[0]) if contact_B is Contact.S else math.nan
-    return Case.of(contact_A, contact_B), replace(at, alpha=alpha, beta=beta)
-
-
-def _free_rates(x: State, u: Velocities, p: Parameters, omega_0: float) -> Velocities:
-    """Accelerations without any contact, at the place of x with velocities u."""
-    rho = p.R - x.h
-    return rigid_body.smooth_rates(u, Place(-rho, 0.0, u.v_k / rho), omega_0, p)
+    return Case.of(contact_A, contact_B), at._replace(alpha=alpha, beta=beta)
 
 
 def _contact(
@@ -93,16 +87,7 @@ def _contact(
     return (Contact.S, slip_rate) if math.hypot(*slip_rate) > still else (Contact.R, (0.0, 0.0))
 
 
-@dataclass(frozen=True)
-class Impact:
-    """What an impact makes of a moment."""
-
-    after: Moment
-    impulse: Forces
-
-
-@dataclass(frozen=True)
-class Shortest:
+class Shortest(NamedTuple):
     """Hops that last no longer count as contact, s."""
 
     on_floor: float
@@ -110,13 +95,13 @@ class Shortest:
     elsewhere: float
 
 
-def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, shortest: Shortest) -> Impact:
-    """Impact of all contacts that touch, at once, with Newton's restitution; friction opposes the slip that is left.
+def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, shortest: Shortest) -> tuple[Moment, Forces]:
+    """What an impact makes of a moment, and its impulses: all contacts that touch at once, by Newton's restitution.
 
-    A single contact of a sphere obeys p_n = (1+e) m |v_n| and p_t = min(friction p_n, m_t |slip|) against the slip;
-    two contacts are solved together, without a rebound if friction locks the ball (`contact_problem`). Bounces
-    accumulate: a rebound whose hops would come to rest within `shortest` (by the geometric series 2 v_n/a/(1 - e))
-    stays in contact.
+    Friction opposes the slip that is left. A single contact of a sphere obeys p_n = (1+e) m |v_n| and
+    p_t = min(friction p_n, m_t |slip|) against the slip; two contacts are solved together, without a rebound if
+    friction locks the ball (`contact_problem`). Bounces accumulate: a rebound whose hops would come to rest within
+    `shortest` (by the geometric series 2 v_n/a/(1 - e)) stays in contact.
     """
     x, before = at.x, rigid_body.velocities(at.x, p)
     A = Closed(max(0.0, -restitution * x.v_y)) if x.y == 0 else None
@@ -128,10 +113,13 @@ def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, short
         u, P = contact_problem.solve(before, A, B, p)
     work = at.work + rigid_body.contact_work(rigid_body.mean(before, u), P, p)
     v_h, v_y = B.target if B and P.B_x > 0 else u.v_h, A.target if A and P.A_y > 0 else u.v_y
-    fall, fly_in = _returns(x, u, A is not None, B is not None, p, omega_0)
-    if A and 2 * v_y <= (shortest.elsewhere if B else shortest.on_floor) * fall * (1 - restitution):
+    # Accelerations that bring it back to floor and wall if it leaves them, each while it stays on the other.
+    free = rigid_body.smooth_rates(u, x.h, omega_0, p)
+    on_B, _ = contact_problem.solve(free, None, Closed() if B and u.v_h <= 0 else None, p)
+    on_A, _ = contact_problem.solve(free, Closed() if A and u.v_y <= 0 else None, None, p)
+    if A and 2 * v_y <= (shortest.elsewhere if B else shortest.on_floor) * -on_B.v_y * (1 - restitution):
         v_y = 0.0
-    if B and 2 * v_h <= shortest.elsewhere * fly_in * (1 - restitution):
+    if B and 2 * v_h <= shortest.elsewhere * -on_A.v_h * (1 - restitution):
         v_h = 0.0
     y = rigid_body.state(x.y, x.h, u._replace(v_h=v_h, v_y=v_y), p)
     still = AT_REST * math.hypot(*before[:3], *(p.r * o for o in before[3:]))
@@ -139,14 +127,4 @@ def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, short
         y = y._replace(slip_x=0.0, slip_z=-(v_h + v_y) / p.r)
     if B and P.B_x > 0 and math.hypot(*rigid_body.slip_at_B(u, p)) <= still:
         y = y._replace(slip_y=0.0, slip_z=0.0)
-    return Impact(replace(at, x=y, alpha=math.nan, beta=math.nan, work=work), P)
-
-
-def _returns(
-    x: State, u: Velocities, touches_A: bool, touches_B: bool, p: Parameters, omega_0: float
-) -> tuple[float, float]:
-    """Accelerations that bring a ball back to floor and wall if it leaves them, each while it stays on the other."""
-    free = _free_rates(x, u, p, omega_0)
-    on_B, _ = contact_problem.solve(free, None, Closed() if touches_B and u.v_h <= 0 else None, p)
-    on_A, _ = contact_problem.solve(free, Closed() if touches_A and u.v_y <= 0 else None, None, p)
-    return -on_B.v_y, -on_A.v_h
+    return at._replace(x=y, alpha=math.nan, beta=math.nan, work=work), P

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +18,7 @@ from scipy.optimize import brentq
 from analytic import drag, dynamics, flight, rolling_forces
 from analytic.motion import Chart, Fluid, Moment, Path, natural_units
 from analytic.rigid_body import Forces
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.arrays import Array
 
 _SCAN = 256
@@ -61,10 +60,12 @@ def path(t: Array, at: Moment, p: Parameters, omega_0: Fluid) -> Path:
     power = -p.m * p.c * p.R**2 * w * (w - omega_0(nodes))
     theta, work = (np.append(0.0, np.cumsum(half * (f @ _WEIGHTS))) for f in (w, power))
     here = np.searchsorted(ends, t)
-    x = np.zeros((len(t), 8))
-    x[:, 2] = omega_c(t, at, p, omega_0)
+    return _path(t, at.theta + theta[here], omega_c(t, at, p, omega_0), at.work + work[here])
+
+
+def _path(t: Array, theta: Array, omega_c: Array, work: Array) -> Path:
     none = np.full_like(t, np.nan)
-    return Path(t, at.theta + theta[here], x, none, none, at.work + work[here])
+    return Path(t, theta, State(omega_c=omega_c).stacked(), none, none, work)
 
 
 def end(at: Moment, until: float, p: Parameters, omega_0: Fluid, leave_rolling: str) -> float | None:
@@ -99,13 +100,8 @@ def chart(at: Moment, p: Parameters, omega_0: Fluid, leave_rolling: str) -> Char
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
         return (float(margin(z[1], p, omega_0(t))),)
 
-    def path(t: Array, z: Array) -> Path:
-        x, none = np.zeros((len(t), 8)), np.full_like(t, np.nan)
-        x[:, 2] = z[1]
-        return Path(t, z[0], x, none, none, z[2])
-
     start = [at.theta, at.x.omega_c, at.work]
-    return Chart(Case.RR, start, [1.0, 1 / T, E], rates, ("RR ends",), guards, path)
+    return Chart(Case.RR, start, [1.0, 1 / T, E], rates, ("RR ends",), guards, lambda t, z: _path(t, *z))
 
 
 def last_forces(omega_c: float, p: Parameters, omega_0: float) -> Forces:
@@ -123,7 +119,7 @@ def onset(at: Moment, p: Parameters, omega_0: float) -> tuple[Case, Moment]:
     alpha, beta = math.atan2(A_z, -A_x), math.atan2(-B_z, B_y)
     wall_alone = p.eta * (B_x + B_y) - abs(B_z)  # what its cone has left where it carries no weight
     if wall_alone < p.mu * A_y - math.hypot(A_x, A_z):
-        return Case.RS, replace(at, alpha=math.nan, beta=beta)
+        return Case.RS, at._replace(alpha=math.nan, beta=beta)
     if abs(A_x) <= 16 * math.ulp(1.0) * B_y:
-        return Case.SR, replace(at, alpha=alpha, beta=math.nan)
-    return Case.SS, replace(at, alpha=alpha, beta=beta)
+        return Case.SR, at._replace(alpha=alpha, beta=math.nan)
+    return Case.SS, at._replace(alpha=alpha, beta=beta)

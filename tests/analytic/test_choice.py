@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from analytic import dynamics, rolling_forces, simulate, solution, thresholds, transitions, two_point_rolling
 from analytic.contact_problem import Closed, solve
 from analytic.motion import Moment
-from analytic.rigid_body import Place, slip_at_A, slip_at_B, smooth_rates, velocities
+from analytic.rigid_body import slip_at_A, slip_at_B, smooth_rates, velocities
 from model import Case, Contact, SimulationError, State
 from tests.random_motions import UNIT, P, random_start
 
@@ -208,7 +208,7 @@ def test_a_single_rolling_contact_holds_or_gives_way(rolls):
         f = dynamics.forces(case, x, p, p.omega_0)
         if f.A_y <= 0:
             continue
-        free = smooth_rates(velocities(x, p), Place(-p.R, 0.0, omega_c), p.omega_0, p)
+        free = smooth_rates(velocities(x, p), 0.0, p.omega_0, p)
         known = Closed(0.0, (0.0, -sense)) if rolls == "B" else Closed(0.0, (0.0, sense))
         A, B = (Closed(), known) if rolls == "A" else (known, Closed())
         load, friction = (p.mu * f.A_y, (f.A_x, f.A_z)) if rolls == "A" else (p.eta * f.B_x, (f.B_y, f.B_z))

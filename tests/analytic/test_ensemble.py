@@ -38,15 +38,6 @@ def test_the_same_runs_as_one_by_one():
         np.testing.assert_array_equal(many.case[k, 1:], one.case[1:])
 
 
-def test_low_high_and_mean_are_over_every_step():
-    many = simulate_many(P, [0.02, 0, 20, 1, 2, 3], 0.2, settings=STEPPING, sample_interval=0.1)
-    every = simulate(P, [0.02, 0, 20, 1, 2, 3], 0.2, settings=STEPPING, sample_interval=1e-3).x
-    for row, steps in ((1, slice(1, 101)), (2, slice(101, 201))):
-        np.testing.assert_allclose(many.low[0, row], every[steps].min(axis=0), atol=1e-12)
-        np.testing.assert_allclose(many.high[0, row], every[steps].max(axis=0), atol=1e-12)
-        np.testing.assert_allclose(many.mean[0, row], every[steps].mean(axis=0), atol=1e-12)
-
-
 def test_landings_and_quiet():
     """A ball that falls once has landed once, and a run ends when nothing has landed for the time asked for."""
     p = P.replace(omega_0=0.0, c=0.0)

@@ -9,7 +9,7 @@ import pytest
 
 from analytic import Settings, simulate, stationary_solutions, thresholds
 from analytic.stepping import TOLERANCE, step
-from analytic.time_stepping import ball, constants
+from analytic.time_stepping import prepared
 from model import Case, Flow, Parameters, SimulationError, State
 
 P = Parameters.named("reference")
@@ -198,7 +198,8 @@ def test_a_step_too_long_for_the_drag_is_named():
 def test_one_step_of_free_rolling_by_hand():
     """RR at rest in the fluid's frame: one step leaves everything as it is, and the forces are those of (23)."""
     p = P.replace(omega_0=10.0)
-    after = step(ball(State(omega_c=10.0), 0.0, p), 1e-3, 10.0, constants(p, Settings()))
+    ball, _, _, given = prepared(State(omega_c=10.0), 0.0, p, Flow.steady(10.0), Settings(), np.array([0.0, 1.0]))
+    after = step(ball, 1e-3, 10.0, given)
     u = p.m * p.R * 100.0
     A_x, A_y, A_z, B_x, B_y, B_z = (impulse / 1e-3 for impulse in after.P)
     assert after.case == Case.RR
