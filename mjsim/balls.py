@@ -112,12 +112,6 @@ class Balls:
         return stiffness
 
     @property
-    def falls(self) -> Array:
-        """Speeds from which on balls that come down land, shape (runs,), m s-1."""
-        falls: Array = self.table[_FALL]
-        return falls
-
-    @property
     def loads(self) -> Array:
         """Normal forces of the contacts in the last step, shape (2, runs), N and N m."""
         return _rows(self._contact[1])

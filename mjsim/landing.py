@@ -57,16 +57,16 @@ def moments(balls: Balls) -> Array:
 
 def restart(balls: Balls, runs: Runs, moment: Array, closed: Mask, fluid: Array) -> None:
     """Let runs go on from moments (k,), s after the beginning of the step, at which contacts (2, k) are closed."""
-    h, lead = balls.steps[runs], balls.leads[runs]
+    h, lead, fall = balls.steps[runs], balls.leads[runs], balls.ball.fall[runs]
     v, before = balls.qvel[:, runs], (balls.qvel - balls.last)[:, runs] / h
     place = balls.qpos[:3, runs] + (moment - lead) * (v + before * (moment + lead) / 2)[:3]
     place[GAPS][closed] = 0.0
     balls.qpos[:3, runs], balls.qvel[:, runs] = place, v + moment * before
-    hits = (closed & (balls.speeds < -balls.falls)[:, runs]).any(axis=0)
+    hits = (closed & (balls.speeds[:, runs] < -fall)).any(axis=0)
     if hits.any():
         _stop(balls, runs[hits], closed[:, hits], fluid)
     balls.damp(runs)
-    _settle(balls, runs, closed & (np.abs(balls.speeds) <= balls.falls)[:, runs], fluid)
+    _settle(balls, runs, closed & (np.abs(balls.speeds[:, runs]) <= fall), fluid)
     after = balls.acceleration[:, runs]
     v = balls.qvel[:, runs] - moment * after
     balls.qvel[:, runs], balls.last[:, runs] = v, v - h * after
