@@ -16,8 +16,7 @@ from analytic.flowmeter import (
     unloading_limit,
 )
 from analytic.leaning import floor_force, leaning_modes
-from analytic.settings import Settings
-from analytic.simulation import simulate
+from analytic.simulation import Settings, simulate
 from analytic.slip_stability import SlipStability
 from analytic.stationary import (
     Stability,

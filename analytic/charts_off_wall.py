@@ -25,7 +25,7 @@ from model.drag import STOKES
 
 def rolling(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """RN: (Z, dZ/dt, work); the spin follows."""
-    Z_0, V_0, _, upright = _start(at, p)
+    start, _, _, upright = _start(at, p)
     unit, energy = _units(p)
 
     def lag_and_share(t: float, Z: complex, V: complex) -> tuple[complex, float]:
@@ -48,12 +48,12 @@ def rolling(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
         x = State.of(rolled.x)  # slip_x = 0 and v_h + r slip_z = 0 hold exactly
         return rolled._replace(x=x._replace(slip_x=0.0, slip_z=-x.v_h / p.r).stacked())
 
-    return Chart(case, [*_pairs(Z_0, V_0), at.work], [*unit, energy], rates, ("A slips", "B lands"), guards, path)
+    return Chart(case, [*start, at.work], [*unit, energy], rates, ("A slips", "B lands"), guards, path)
 
 
 def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """SN: (Z, dZ/dt, sliding speed at A, its direction in the resting frame, work)."""
-    Z_0, V_0, spin, upright = _start(at, p)
+    start, V, spin, upright = _start(at, p)
     unit, energy = _units(p)
     (*_, v), lever = unit, 1 + 1 / p.j
 
@@ -79,9 +79,9 @@ def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float
         return slid._replace(alpha=np.arctan2(-back.imag, -back.real))
 
     # The velocity of the lowest point; at the onset it is zero and only alpha tells its direction.
-    speed = abs(V_0 + 1j * p.r * spin)
+    speed = abs(V + 1j * p.r * spin)
     phase = cmath.phase(cmath.exp(1j * at.theta) * complex(-math.cos(at.alpha), -math.sin(at.alpha)))
-    first, scale = [*_pairs(Z_0, V_0), speed, phase, at.work], [*unit, v, 1.0, energy]
+    first, scale = [*start, speed, phase, at.work], [*unit, v, 1.0, energy]
     return Chart(case, first, scale, rates, ("A sticks", "B lands"), guards, path, slips=(4,))
 
 
@@ -90,7 +90,7 @@ def flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) 
 
     Else c depends on all components of the velocity: (Z, dZ/dt, y, v_y, work).
     """
-    Z_0, V_0, spin, upright = _start(at, p)
+    start, _, spin, upright = _start(at, p)
     (unit, energy), y, v_y, known = _units(p), at.x.y, at.x.v_y, p.drag == STOKES
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
@@ -109,21 +109,18 @@ def flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) 
         return _path(t, z, at, p, upright, np.full(len(t), spin), fall)
 
     if known:
-        landing, start, scale = at.time + flight.fall_time(y, v_y, p), [at.work], [energy]
+        landing, more, scale = at.time + flight.fall_time(y, v_y, p), [at.work], [energy]
     else:
-        landing, start, scale = math.inf, [y, v_y, at.work], [p.R, unit[-1], energy]
+        landing, more, scale = math.inf, [y, v_y, at.work], [p.R, unit[-1], energy]
     ends = ("B lands",) if known else ("B lands", "A lands")
-    return Chart(case, [*_pairs(Z_0, V_0), *start], [*unit, *scale], rates, ends, guards, path, landing=landing)
+    return Chart(case, [*start, *more], [*unit, *scale], rates, ends, guards, path, landing=landing)
 
 
-def _start(at: Moment, p: Parameters) -> tuple[complex, complex, complex, float]:
-    """A moment in the resting frame: Z, dZ/dt, the horizontal spin, and that about the vertical."""
+def _start(at: Moment, p: Parameters) -> tuple[list[float], complex, complex, float]:
+    """A moment in the resting frame: coordinates of (Z, dZ/dt), dZ/dt, horizontal spin, and that about the vertical."""
     turn, u = cmath.exp(1j * at.theta), velocities(at.x, p)
-    return (p.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k), turn * complex(-u.o_x, u.o_z), u.o_y
-
-
-def _pairs(Z: complex, V: complex) -> list[float]:
-    return [Z.real, Z.imag, V.real, V.imag]
+    Z, V = (p.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k)
+    return [Z.real, Z.imag, V.real, V.imag], V, turn * complex(-u.o_x, u.o_z), u.o_y
 
 
 def _units(p: Parameters) -> tuple[list[float], float]:

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from analytic.ensemble import simulate_many
 from analytic.fates import closed
-from analytic.settings import Settings
-from analytic.simulation import simulate
+from analytic.simulation import Settings, simulate
 from model import Case, Contact, Parameters
 from model.arrays import Array
 

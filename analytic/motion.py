@@ -91,10 +91,7 @@ class Chart:
 
     def least_slip(self, z: Sequence[float]) -> float:
         """The smallest slip that has a direction, in natural units; inf if there is none."""
-        least = math.inf
-        for k in self.slips:
-            least = min(least, z[k] / self.scale[k])
-        return least
+        return min((z[k] / self.scale[k] for k in self.slips), default=math.inf)
 
 
 def natural_units(p: Parameters) -> tuple[float, float, float, float]:
