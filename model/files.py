@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import os
 import socket
 from collections.abc import Iterator
@@ -208,6 +209,17 @@ def write_text(path: Path, text: str) -> None:
     except OSError as error:
         temporary.unlink(missing_ok=True)
         raise StorageError(f"cannot write {path}: {error.strerror}") from error
+
+
+@contextmanager
+def reading_json(path: Path, what: str) -> Iterator[Any]:
+    """What a JSON file holds; an error within the context is a `StorageError` that says it isn't what it should be."""
+    try:
+        yield json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise StorageError(f"{path} holds no {what}: {error}") from error
 
 
 def remove_leftovers(directory: Path) -> None:

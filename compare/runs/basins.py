@@ -25,9 +25,9 @@ from compare.runs.engines import MOREAU, MUJOCO
 from compare.runs.sweep import Axis
 from compare.runs.tasks import Task
 from mjsim import ContactSettings
-from model import Case, Contact, InputError, Parameters, StorageError, Trajectory, storage
+from model import Case, Contact, InputError, Parameters, State, Trajectory, storage
 from model.arrays import Array
-from model.files import write_text
+from model.files import reading_json, write_text
 from model.kinematics import VARIABLES
 from model.parameters import check_names
 
@@ -83,23 +83,15 @@ class Basins:
 
     def save(self, path: Path) -> None:
         """Write it as JSON."""
-        data = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)} | {
-            "parameters": dataclasses.asdict(self.parameters)
-        }
-        write_text(path, json.dumps({k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in data.items()}))
+        write_text(path, json.dumps(dataclasses.asdict(self), default=np.ndarray.tolist))
 
     @classmethod
     def load(cls, path: Path) -> Self:
         """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
-        try:
-            data: dict[str, Any] = json.loads(path.read_text("utf-8"))
+        with reading_json(path, "basins") as data:
             arrays: dict[str, Any] = {name: np.array(data.pop(name)) for name in ("x", "y", "fates", "mujoco")}
-            p = Parameters.from_mapping(data.pop("parameters"))
-            return cls(parameters=p, start=tuple(data.pop("start")), **data, **arrays)
-        except OSError as error:
-            raise StorageError(f"cannot read {path}: {error.strerror}") from error
-        except (ValueError, KeyError, TypeError) as error:
-            raise StorageError(f"{path} holds no basins: {error}") from error
+            p, start = Parameters.from_mapping(data.pop("parameters")), tuple(data.pop("start"))
+            return cls(parameters=p, start=start, **data, **arrays)
 
 
 def basins(
@@ -119,12 +111,11 @@ def basins(
     if p.c == 0:
         raise InputError("c = 0 1/s: without drag a ball doesn't settle, and there are no basins")
     x, y = np.array(across.values), np.array(up.values)
-    base = np.array([start.get(name, 0.0) for name in VARIABLES])
+    base = np.array(State(**start))
     states = np.tile(base, (len(y), len(x), 1))
     states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
-    fine_settings = Settings(method=MOREAU.name, step=math.sqrt(p.R / p.g) / STEPS)
-    fine = _tasks(states, MOREAU.name, p, fine_settings)
+    fine = _tasks(states, MOREAU.name, p, Settings(method=MOREAU.name, step=math.sqrt(p.R / p.g) / STEPS))
     tasks = [*fine, *_tasks(few, MUJOCO.name, p, ContactSettings.for_problem(p, timestep))]
     broken = {failure.task.key for failure in campaign.complete(tasks)}
     files = [None if task.key in broken else campaign.path(task) for task in tasks]

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from analytic.ensemble import interval
+from compare import pages
 from compare.runs.search import BOX, LOGARITHMIC, Searched
 
 PARTS = 6
@@ -57,17 +58,15 @@ def kept(name: str = KEPT[0]) -> Searched:
 
 INTRODUCTION = (
     "# Where the ball hops for ever",
-    "",
     "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: mu and eta are the "
     "friction of floor and wall, kappa = c√(R/g) and Omega_0 = ω₀√(R/g). "
     "`dualball search --kept --page docs/hopping.md` writes this page.",
-    "",
 )
 
 
 def page(*searches: Searched) -> str:
     """Results as a page of Markdown."""
-    return "\n".join([*INTRODUCTION, *(line for each in searches for line in _section(each))])
+    return "\n\n".join([*INTRODUCTION, *(part for each in searches for part in _section(each))]) + "\n"
 
 
 def _section(record: Searched) -> list[str]:
@@ -80,27 +79,25 @@ def _section(record: Searched) -> list[str]:
     broken = f" {record.failed} runs broke down." if record.failed else ""
     box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in record.search.box.items())
     least, most = record.search.box["kappa"]
-    lines = [
-        f"## Drag from kappa = {least:.3g} to {most:.3g}: {record.sets} sets",
-        "",
+    text = (
         f"The box is {box}. "
         f"Each set was started from {record.search.starts} random states. In {count} sets some start leads to hopping "
         f"that the event-driven simulation confirms: {100 * count / record.sets:.2f} %, or {100 * low:.2f} to "
         f"{100 * high:.2f} % with 95 % confidence. That is what {record.search.starts} starts find: an "
         "attractor with a small basin is missed. "
         f"{landings}By time stepping {len(record.rows)} sets still hopped after 60/c{others}.{broken} "
-        "In all other sets every ball stopped landing.",
-        "",
-    ]  # fmt: skip
-    lines += ["| | smallest with hopping | largest |", "| :-- | --: | --: |"]
-    lines += [f"| {name} | {least:.3g} | {most:.3g} |" for name, (least, most) in extremes(record).items()]
-    lines += ["", "| | from | to | sets | hopping | share, % | 95 % interval, % |"]
-    lines += ["| :-- | --: | --: | --: | --: | --: | --: |"]
+        "In all other sets every ball stopped landing."
+    )
+    ends = [[name, f"{least:.3g}", f"{most:.3g}"] for name, (least, most) in extremes(record).items()]
+    shares = []
     for part in parts(record):
         low, high = interval(part.hopping, part.sets)
         share = f"{100 * part.hopping / part.sets:.2f}" if part.sets else ""
-        lines.append(
-            f"| {part.group} | {part.low:.3g} | {part.high:.3g} | {part.sets} | {part.hopping} | {share} "
-            f"| {100 * low:.2f} … {100 * high:.2f} |"
-        )
-    return [*lines, ""]
+        numbers = [f"{part.low:.3g}", f"{part.high:.3g}", str(part.sets), str(part.hopping), share]
+        shares.append([part.group, *numbers, f"{100 * low:.2f} … {100 * high:.2f}"])
+    return [
+        f"## Drag from kappa = {least:.3g} to {most:.3g}: {record.sets} sets",
+        text,
+        pages.markdown([["", "smallest with hopping", "largest"], *ends]),
+        pages.markdown([["", "from", "to", "sets", "hopping", "share, %", "95 % interval, %"], *shares]),
+    ]

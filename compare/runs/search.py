@@ -28,9 +28,9 @@ from compare.runs.progress import Show
 from compare.runs.sweep import sobol
 from compare.runs.tasks import sources
 from compare.runs.workers import Workers
-from model import Parameters, SimulationError, StorageError
+from model import Parameters, SimulationError
 from model.arrays import Array
-from model.files import make_directory, write_text
+from model.files import make_directory, reading_json, write_text
 
 CHUNK = 50
 """Sets in a file."""
@@ -139,14 +139,9 @@ class Searched:
     @classmethod
     def load(cls, path: Path) -> Self:
         """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
-        try:
-            data = json.loads(path.read_text("utf-8"))
-            search = data["search"] | {"box": {name: tuple(ends) for name, ends in data["search"]["box"].items()}}
-            return cls(Search(**search), data["sets"], tuple(data["rows"]), data["failed"])
-        except OSError as error:
-            raise StorageError(f"cannot read {path}: {error.strerror}") from error
-        except (ValueError, KeyError, TypeError) as error:
-            raise StorageError(f"{path} holds no search: {error}") from error
+        with reading_json(path, "search") as data:
+            box = {name: tuple(ends) for name, ends in data["search"].pop("box").items()}
+            return cls(Search(box, **data["search"]), data["sets"], tuple(data["rows"]), data["failed"])
 
 
 def run(directory: Path, search: Search, count: int, workers: Workers, show: Show) -> Searched:

@@ -22,8 +22,7 @@ from compare.scorecard.contenders import Contestant
 from compare.scorecard.league import CONTACT, ERRORS, Entry
 from compare.statistics import plain
 from mjsim import ContactSettings, Run
-from model import StorageError
-from model.files import write_text
+from model.files import reading_json, write_text
 
 FILE = "scores.json"
 STEP = 1e-3
@@ -148,8 +147,5 @@ def read(directory: Path) -> dict[str, tuple[Entry, ...]]:
     path = directory / FILE
     if not path.exists():
         return {}
-    try:
-        rows = json.loads(path.read_text("utf-8"))
+    with reading_json(path, "scores: remove it, and they are measured again") as rows:
         return {name: tuple(league.from_mapping({"entries": rows[name]})) for name in ("ladder", "frontier")}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise StorageError(f"{path} is damaged: remove it, and it is measured again") from error
