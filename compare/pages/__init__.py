@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jinja2
@@ -25,6 +25,14 @@ def markdown(rows: Rows) -> str:
     """A table in Markdown."""
     cells = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells)
+
+
+def pairs(rows: Mapping[str, str]) -> Table:
+    """Names and what they stand for, for the terminal."""
+    shown = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    for name, text in rows.items():
+        shown.add_row(f"[bold]{name}", Text(text))
+    return shown
 
 
 def table(title: str, rows: Rows, no_wrap: bool = False, **look: Any) -> Table:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from rich.table import Table
 
+from compare import pages
 from compare.statistics import settled_case, settled_mean
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.files import WholeFile, check_writable, dataset, reading
@@ -37,29 +38,26 @@ def collect(directory: Path, output: Path) -> int:
     check_writable(output)
     if not directory.is_dir():
         raise StorageError(f"cannot read {directory}: there is no such directory")
-    files = sorted(file for file in directory.rglob("*.h5") if _may_be_run(file, output))
-    if not files:
-        raise StorageError(f"there are no runs in {directory}")
     rows, problems, known = [], [], dict[str, Path]()
-    for file in files:
+    for file in sorted(directory.rglob("*.h5")):
+        # The journal of a run that goes on, and the collection of the last time, are no runs.
+        if file.parent.suffix == ".journal" or file.resolve() == output.resolve():
+            continue
         try:
             trajectory = storage.load(file)
         except StorageError as error:
             problems.append(str(error))
-        else:
-            if (first := known.setdefault(_identity(trajectory), file)) is not file:
-                problems.append(f"{first} and {file} hold the same run")
-            rows.append(_row(trajectory, file.relative_to(directory)))
+            continue
+        if (first := known.setdefault(_identity(trajectory), file)) is not file:
+            problems.append(f"{first} and {file} hold the same run")
+        rows.append(_row(trajectory, file.relative_to(directory)))
     if problems:
         more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
         raise StorageError("; ".join(problems[:NAMED]) + more)
+    if not rows:
+        raise StorageError(f"there are no runs in {directory}")
     _write(rows, output)
     return len(rows)
-
-
-def _may_be_run(file: Path, output: Path) -> bool:
-    """Not the collection of the last time, nor a segment of the journal of a run that goes on."""
-    return file.parent.suffix != ".journal" and file.resolve() != output.resolve()
 
 
 def _identity(trajectory: Trajectory) -> str:
@@ -111,14 +109,15 @@ def _varied(columns: Mapping[str, Iterable[Any]]) -> list[str]:
 
 def table(about: dict[str, Any]) -> Table:
     """The description for the terminal."""
-    rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-    rows.add_row("[bold]runs", f"{about['runs']} ({', '.join(about['engines'])}), {len(about['failures'])} failed")
-    rows.add_row("[bold]cases", ", ".join(f"{name}: {count}" for name, count in about["cases"].items()))
-    varied = (f"{n} {about['ranges'][n][0]:g} … {about['ranges'][n][1]:g}" for n in about["varied"] if n != "drag")
-    rows.add_row("[bold]varied", "\n".join(varied))
-    rows.add_row("[bold]drag", ", ".join(about["drag"]))
-    rows.add_row("[bold]omega_c", "{:.9g} … {:.9g} rad s-1".format(*about["ranges"].get("omega_c", [np.nan, np.nan])))
-    return rows
+    ranges = about["ranges"]
+    rows = {
+        "runs": f"{about['runs']} ({', '.join(about['engines'])}), {len(about['failures'])} failed",
+        "cases": ", ".join(f"{name}: {count}" for name, count in about["cases"].items()),
+        "varied": "\n".join("{} {:g} … {:g}".format(n, *ranges[n]) for n in about["varied"] if n != "drag"),
+        "drag": ", ".join(about["drag"]),
+        "omega_c": "{:.9g} … {:.9g} rad s-1".format(*ranges.get("omega_c", [np.nan, np.nan])),
+    }
+    return pages.pairs(rows)
 
 
 def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
@@ -126,10 +125,10 @@ def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
     row |= dataclasses.asdict(trajectory.header.parameters)
     row |= {"duration": float(trajectory.time[-1]) if len(trajectory.time) else 0.0}
     row |= {"failure": trajectory.header.failure}
-    return row | settled(trajectory)
+    return row | _settled(trajectory)
 
 
-def settled(trajectory: Trajectory) -> dict[str, Any]:
+def _settled(trajectory: Trajectory) -> dict[str, Any]:
     """Mean, standard uncertainty and prevailing case over the last part of a run; nan for a run too short for it."""
     row: dict[str, Any] = {}
     for name in VARIABLES:

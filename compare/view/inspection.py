@@ -8,6 +8,7 @@ from typing import Any
 
 from rich.table import Table
 
+from compare import pages
 from model import Case, Flow, Parameters, storage
 from model.kinematics import UNITS, VARIABLES
 
@@ -51,29 +52,22 @@ def describe(path: Path) -> dict[str, Any]:
 
 def table(about: dict[str, Any]) -> Table:
     """What `describe` returned as a table of two columns."""
-    rows = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-    rows.add_column(style="bold")
-    rows.add_column()
-    rows.add_row("engine", f"{about['engine']} (" + ", ".join(f"{k} {v}" for k, v in about["versions"].items()) + ")")
-    rows.add_row("made", f"{about['created']} {about['commit'][:12]}".strip())
     units = {f.name: "" if f.metadata["unit"] == "1" else f.metadata["unit"] for f in Parameters.quantities()}
-    values = (f"{name} = {about['parameters'][name]:g} {unit}" for name, unit in units.items())
-    rows.add_row("parameters", ", ".join(value.strip() for value in values))
-    rows.add_row("drag", about["parameters"]["drag"])
-    rows.add_row("flow", _flow(Flow.from_mapping(about["flow"])))
-    rows.add_row("settings", ", ".join(f"{k} = {_short(v)}" for k, v in about["settings"].items()))
-    rows.add_row("samples", f"{about['samples']} over {about['duration']:g} s")
-    shown = [f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in about["cases"]]
-    rows.add_row("cases", _listed(shown))
-    events = [f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in about["events"]]
-    rows.add_row("events", _listed(events))
-    last = (
-        f"{name} = {about['last'][name]:.9g} {u}" for name, u in zip(VARIABLES, UNITS, strict=True) if about["last"]
-    )
-    rows.add_row("last state", "\n".join(last))
-    if about["failure"]:
-        rows.add_row("[red]failure", about["failure"])
-    return rows
+    parameters = (f"{name} = {about['parameters'][name]:g} {unit}".strip() for name, unit in units.items())
+    last = (f"{n} = {about['last'][n]:.9g} {u}" for n, u in zip(VARIABLES, UNITS, strict=True) if about["last"])
+    rows = {
+        "engine": f"{about['engine']} ({', '.join(f'{k} {v}' for k, v in about['versions'].items())})",
+        "made": f"{about['created']} {about['commit'][:12]}".strip(),
+        "parameters": ", ".join(parameters),
+        "drag": about["parameters"]["drag"],
+        "flow": _flow(Flow.from_mapping(about["flow"])),
+        "settings": ", ".join(f"{k} = {_short(v)}" for k, v in about["settings"].items()),
+        "samples": f"{about['samples']} over {about['duration']:g} s",
+        "cases": _listed([f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in about["cases"]]),
+        "events": _listed([f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in about["events"]]),
+        "last state": "\n".join(last),
+    }
+    return pages.pairs(rows | ({"[red]failure": about["failure"]} if about["failure"] else {}))
 
 
 def _flow(flow: Flow) -> str:
