@@ -18,26 +18,42 @@ STEP = 5e-3
 
 @dataclass(frozen=True)
 class Moment:
-    """A run at one time; vectors in the co-rotating frame."""
+    """A run at times in s, scalar or (n,), interpolated linearly; vectors in the co-rotating frame."""
 
-    time: float
-    theta: float
-    x: Array
-    """State, shape (8,)."""
-    forces: tuple[Array, Array]
-    """At A and B, N."""
-    case: Case
+    run: Trajectory
+    time: Array
 
+    def _at(self, values: Array) -> Array:
+        columns = np.reshape(values, (len(values), -1)).T
+        return np.stack([np.interp(self.time, self.run.time, column) for column in columns], axis=-1)
 
-def moment(run: Trajectory, time: float) -> Moment:
-    """The run at a time in s, interpolated linearly; the case is that of the last sample."""
-    last = max(0, int(np.searchsorted(run.time, time, side="right")) - 1)
+    @property
+    def theta(self) -> Array:
+        """Azimuth, rad."""
+        return self._at(self.run.theta)[..., 0]
 
-    def at(values: Array) -> Array:
-        return np.array([np.interp(time, run.time, column) for column in values.T])
+    @property
+    def x(self) -> Array:
+        """States (..., 8)."""
+        return self._at(self.run.x)
 
-    theta = float(np.interp(time, run.time, run.theta))
-    return Moment(time, theta, at(run.x), (at(run.force_A), at(run.force_B)), Case(run.case[last]))
+    @property
+    def forces(self) -> tuple[Array, Array]:
+        """At A and B, (..., 3), N."""
+        return self._at(self.run.force_A), self._at(self.run.force_B)
+
+    @property
+    def cases(self) -> list[Case]:
+        """Those of the last samples."""
+        last = np.searchsorted(self.run.time, np.atleast_1d(self.time), side="right") - 1
+        return [Case(code) for code in self.run.case[np.maximum(last, 0)]]
+
+    @property
+    def centre(self) -> Array:
+        """Of the ball in the world, (..., 3), m."""
+        p, x, theta = self.run.header.parameters, self.x, self.theta
+        rho = p.R - x[..., 6]
+        return np.stack([rho * np.cos(theta), rho * np.sin(theta), p.r + x[..., 0]], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -52,10 +68,8 @@ class Turning:
         """From the ball's angular velocity; the first orientation is upright."""
         steps = max(1, math.ceil((run.time[-1] - run.time[0]) / STEP))
         times = np.linspace(run.time[0], run.time[-1], steps + 1)
-        middle = (times[1:] + times[:-1]) / 2
-        x = np.stack([np.interp(middle, run.time, column) for column in run.x.T], axis=-1)
-        theta = np.interp(middle, run.time, run.theta)
-        world = np.einsum("nab,na->nb", frame(theta), angular_velocity(x, run.header.parameters))
+        there = Moment(run, (times[1:] + times[:-1]) / 2)
+        world = np.einsum("nab,na->nb", frame(there.theta), angular_velocity(there.x, run.header.parameters))
         turned = [Rotation.identity()]
         for step in Rotation.from_rotvec(world * np.diff(times)[:, None]):
             turned.append(step * turned[-1])

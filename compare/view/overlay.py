@@ -10,12 +10,12 @@ from PIL import Image, ImageDraw, ImageFont
 from compare.figures import style
 from compare.figures.style import FORCE, INK, SLIP
 from compare.view.motion import Moment
-from model import Flow, Parameters
+from model import Case, Parameters
 from model.kinematics import slip_speeds
 
 
 def compose(
-    image: Image.Image, small: Image.Image, moment: Moment, p: Parameters, flow: Flow, slips: bool, note: str
+    image: Image.Image, small: Image.Image, moment: Moment, p: Parameters, slips: bool, note: str
 ) -> Image.Image:
     """The picture from outside, changed in place, with the small one from beside the ball in its corner.
 
@@ -25,14 +25,15 @@ def compose(
     margin = round(22 * unit)
     draw = ImageDraw.Draw(image)
     _paste(image, small, draw, margin, unit)
-    right, bottom = _sign(draw, moment, margin, unit)
+    (case,) = moment.cases
+    right, bottom = _sign(draw, case, margin, unit)
     text = _font(round(17 * unit))
-    words = f"floor: {moment.case.A.value}\nwall: {moment.case.B.value}"
+    words = f"floor: {case.A.value}\nwall: {case.B.value}"
     draw.multiline_text((right, margin + 2 * unit), words, INK, font=text, spacing=5 * unit)
     floor, wall = slip_speeds(moment.x, p)
     lines = (
         f"t = {moment.time:.3f} s   {note}",
-        f"ω₀ = {float(flow(moment.time)):.2f} rad/s",
+        f"ω₀ = {float(moment.run.header.flow(moment.time)):.2f} rad/s",
         f"ω_c = {moment.x[2]:.2f} rad/s",
         f"slip: floor {floor:.3f} m/s, wall {wall:.3f} m/s",
     )
@@ -52,13 +53,13 @@ def _paste(image: Image.Image, small: Image.Image, draw: ImageDraw.ImageDraw, ma
     draw.rectangle(frame, outline="#8a94a3", width=max(1, round(1.5 * unit)))
 
 
-def _sign(draw: ImageDraw.ImageDraw, moment: Moment, margin: int, unit: float) -> tuple[float, float]:
+def _sign(draw: ImageDraw.ImageDraw, case: Case, margin: int, unit: float) -> tuple[float, float]:
     """The case, as a sign in its colour; return where text to the right of it and below it may begin."""
     font, pad = _font(round(34 * unit)), 14 * unit
-    _, _, width, height = draw.textbbox((0, 0), moment.case.name, font=font)
+    _, _, width, height = draw.textbbox((0, 0), case.name, font=font)
     right, bottom = margin + width + 2 * pad, margin + height + 1.2 * pad
-    draw.rounded_rectangle((margin, margin, right, bottom), 8 * unit, fill=style.COLOURS[moment.case])
-    draw.text((margin + pad, margin + 0.5 * pad), moment.case.name, "white", font=font)
+    draw.rounded_rectangle((margin, margin, right, bottom), 8 * unit, fill=style.COLOURS[case])
+    draw.text((margin + pad, margin + 0.5 * pad), case.name, "white", font=font)
     return right + pad, bottom + pad
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -112,9 +113,6 @@ def _within(run: Trajectory) -> Range:
 def _frames(run: Trajectory, times: Array, width: int, note: str = "") -> Iterator[Image.Image]:
     check_number("time", times[0], "s", _within(run), _IN_RUN)
     check_number("width", width, "pixels", WIDTHS)
-    stage = Stage(run, width)
-    try:
+    with closing(Stage(run, width)) as stage:
         for time in times:
             yield stage.show(float(time), note)
-    finally:
-        stage.close()

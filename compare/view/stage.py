@@ -11,13 +11,16 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 
 from compare.figures import style
-from compare.figures.style import FORCE, SLIP
-from compare.view import opengl, overlay, scenery
-from compare.view.motion import STEP, Moment, Turning, moment
-from model import Case, Trajectory
+from compare.figures.style import BALL, FORCE, SLIP
+from compare.view import opengl, overlay
+from compare.view.motion import STEP, Moment, Turning
+from mjsim import ContactSettings, scene
+from model import InputError, Parameters, Trajectory
 from model.arrays import Array
 from model.kinematics import frame, slip_velocities
 
+_HIDDEN = 5
+"""A group of geoms that isn't drawn."""
 _WEIGHT = 3.0
 """Length of the arrow of a force m g, in radii of the ball."""
 _FASTEST = 3.0
@@ -39,7 +42,7 @@ class Stage:
         self._run, self._p = run, run.header.parameters
         self._size = (width, width * 10 // 16)
         self._inset = self._size[1] * 5 // 12
-        spec = scenery.spec(run)
+        spec = _spec(run)
         spec.visual.global_.offwidth, spec.visual.global_.offheight = (2 * n for n in self._size)
         spec.visual.quality.offsamples, spec.visual.quality.shadowsize = 0, 2048
         self._model = spec.compile()
@@ -62,30 +65,24 @@ class Stage:
 
     def show(self, time: float, note: str) -> Image.Image:
         """The run at a time in s, with a note beside the time."""
-        now = moment(self._run, time)
-        p = self._p
-        axes = frame(now.theta)
-        rho = p.R - now.x[6]
-        centre = np.array([rho * math.cos(now.theta), rho * math.sin(now.theta), p.r + now.x[0]])
-        self._data.geom_xpos[self._ball] = centre
+        now, p = Moment(self._run, np.asarray(time)), self._p
+        self._data.geom_xpos[self._ball] = now.centre
         self._data.geom_xmat[self._ball] = self._turns.at(time).as_matrix().ravel()
         outside = _camera(np.array([0.0, 0.0, 0.35 * p.r]), 2.9 * (p.R + p.r), 90.0, -38.0)
         # From behind the ball and a little inwards, so that floor and wall are both seen edge-on.
-        beside = _camera(centre, 6.4 * p.r, math.degrees(now.theta) + 78.0, -14.0)
-        image = self._draw(outside, self._size, now, axes, centre, trail=True)
-        small = self._draw(beside, (self._inset, self._inset), now, axes, centre, trail=False)
-        return overlay.compose(image, small, now, p, self._run.header.flow, self._fastest > 0, note)
+        beside = _camera(now.centre, 6.4 * p.r, math.degrees(now.theta) + 78.0, -14.0)
+        image = self._draw(outside, self._size, now, trail=True)
+        small = self._draw(beside, (self._inset, self._inset), now, trail=False)
+        return overlay.compose(image, small, now, p, self._fastest > 0, note)
 
-    def _draw(
-        self, camera: Any, size: tuple[int, int], now: Moment, axes: Array, centre: Array, trail: bool
-    ) -> Image.Image:
+    def _draw(self, camera: Any, size: tuple[int, int], now: Moment, trail: bool) -> Image.Image:
         option = mujoco.MjvOption()
         everything = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(self._model, self._data, option, None, camera, everything, self._scene)
         if trail:
-            self._add_trail(now.time)
-        self._add_spots(centre)
-        self._add_arrows(now, axes, centre)
+            self._add_trail(now)
+        self._add_spots(now.centre)
+        self._add_arrows(now)
         # Twice the size, scaled down: smooth edges without support of the driver.
         area = mujoco.MjrRect(0, 0, 2 * size[0], 2 * size[1])
         pixels = np.empty((area.height, area.width, 3), np.uint8)
@@ -93,19 +90,15 @@ class Stage:
         mujoco.mjr_readPixels(pixels, None, area, self._drawing)
         return Image.fromarray(np.flipud(pixels)).resize(size, Image.Resampling.LANCZOS)
 
-    def _add_trail(self, time: float) -> None:
+    def _add_trail(self, now: Moment) -> None:
         """Where the ball touched the floor's height before, in the colours of the cases, fading."""
-        run, p = self._run, self._p
-        times = np.arange(max(float(run.time[0]), time - _LONGEST_TRAIL), time, STEP)
-        theta, y, h = (np.interp(times, run.time, values) for values in (run.theta, run.y, run.h))
-        now = float(np.interp(time, run.time, run.theta))
-        age = np.abs(theta - now) / (2 * math.pi * _TRAIL)
-        rho = p.R - h
-        points = np.stack([rho * np.cos(theta), rho * np.sin(theta), y + 0.08 * p.r], axis=-1)
-        cases = run.case[np.searchsorted(run.time, times, side="right") - 1]
-        for k in range(len(times) - 1):
+        p, end = self._p, float(now.time)
+        before = Moment(self._run, np.arange(max(float(self._run.time[0]), end - _LONGEST_TRAIL), end, STEP))
+        age = np.abs(before.theta - now.theta) / (2 * math.pi * _TRAIL)
+        points = before.centre - [0.0, 0.0, 0.92 * p.r]
+        for k, case in enumerate(before.cases[:-1]):
             if max(age[k], age[k + 1]) < 1:
-                rgba = (*to_rgb(style.COLOURS[Case(cases[k])]), 0.9 * (1 - age[k]))
+                rgba = (*to_rgb(style.COLOURS[case]), 0.9 * (1 - age[k]))
                 self._connect(mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[k], points[k + 1], rgba)
 
     def _add_spots(self, centre: Array) -> None:
@@ -116,8 +109,8 @@ class Stage:
             geom.size[:] = 0.11 * self._p.r
             geom.pos[:] = centre + 0.95 * self._p.r * spot
 
-    def _add_arrows(self, now: Moment, axes: Array, centre: Array) -> None:
-        p = self._p
+    def _add_arrows(self, now: Moment) -> None:
+        p, centre, axes = self._p, now.centre, frame(now.theta)
         contacts = (centre - p.r * axes[1], centre - p.r * axes[0])
         slips = slip_velocities(now.x, p)
         # Slip lies in the tangent plane; it's lifted off the surface so as to be seen.
@@ -149,3 +142,47 @@ def _camera(lookat: Array, distance: float, azimuth: float, elevation: float) ->
     camera = mujoco.MjvCamera()
     camera.lookat, camera.distance, camera.azimuth, camera.elevation = lookat, distance, azimuth, elevation
     return camera
+
+
+def _spec(run: Trajectory) -> Any:
+    """The scene as an `mujoco.MjSpec`: what only serves contact is hidden, the vessel is a ring of glass.
+
+    It is that of the MJCF which the run holds, or of its parameters if it holds none. Raises `InputError` if the MJCF
+    is not valid or has no ball.
+    """
+    p = run.header.parameters
+    mjcf = run.header.mjcf or scene.build(p, ContactSettings())[1]
+    try:
+        made = mujoco.MjSpec.from_string(mjcf)
+    except ValueError as error:
+        raise InputError(f"the run holds no valid MJCF: {' '.join(str(error).split())}") from error
+    for geom in made.geoms:
+        if geom.name not in ("ball", "floor"):
+            geom.group = _HIDDEN
+    if made.geom("ball") is None:
+        raise InputError("the run's MJCF has no geom named 'ball' to show")
+    made.geom("ball").material, made.geom("ball").rgba = "", (*to_rgb(BALL), 0.26)  # arrows stand inside
+    floor = made.geom("floor")
+    if floor is not None:
+        floor.material, floor.rgba = "", (0.80, 0.82, 0.85, 1.0)
+    _add_ring(made, p)
+    return made
+
+
+def _add_ring(spec: Any, p: Parameters, sides: int = 120) -> None:
+    """The vessel's wall, as high as the ball, as a mesh."""
+    angle = np.linspace(0.0, 2 * math.pi, sides, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides)], axis=-1)
+    inside, outside = p.R + p.r, p.R + 1.15 * p.r
+    up = np.array([0.0, 0.0, 2.2 * p.r])
+    corners = np.concatenate([inside * circle, inside * circle + up, outside * circle + up, outside * circle])
+    this = np.arange(sides)
+    other = (this + 1) % sides
+    faces = []
+    for k in range(4):
+        a, b = k * sides, (k + 1) % 4 * sides
+        faces += [np.stack([a + this, a + other, b + this], -1), np.stack([a + other, b + other, b + this], -1)]
+    mesh = spec.add_mesh(name="ring", uservert=corners.ravel(), userface=np.concatenate(faces).ravel())
+    mesh.smoothnormal = False
+    glass = {"rgba": (0.45, 0.65, 0.80, 0.22), "contype": 0, "conaffinity": 0}
+    spec.worldbody.add_geom(name="ring", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ring", **glass)
