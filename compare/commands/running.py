@@ -15,10 +15,10 @@ from compare.runs import engines, progress
 from compare.runs.campaign import Campaign
 from compare.runs.engines import Settings
 from compare.runs.tasks import Task
-from compare.runs.workers import Workers, dask
+from compare.runs.workers import Workers, dask, processes
 from model import Flow, InputError, Parameters, State
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import Range, check_names, check_number, parse_number
+from model.parameters import check_names, parse_number
 
 
 def add_flow(parser: argparse.ArgumentParser) -> None:
@@ -107,10 +107,9 @@ def campaign(args: argparse.Namespace, doing: str, directory: str = "", **more: 
         yield made
 
 
-def workers(args: argparse.Namespace) -> int | Workers:
+def workers(args: argparse.Namespace) -> Workers:
     """What the options of `add_workers` name."""
-    check_number("workers", args.workers, "processes", Range(0, whole=True))
-    return dask(args.scheduler) if args.scheduler else int(args.workers)
+    return dask(args.scheduler) if args.scheduler else processes(args.workers)
 
 
 def add_start(parser: argparse.ArgumentParser) -> None:

@@ -15,8 +15,6 @@ from compare.commands import options, running
 from compare.runs import basins, progress, regions, search
 from compare.runs.search import BOX, Search, Searched
 from compare.runs.sweep import Axis
-from compare.runs.workers import processes
-from model import InputError
 from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import POSITIVE, Range, check_number
@@ -70,13 +68,9 @@ def _searched(args: argparse.Namespace) -> Searched:
     starts = int(check_number("starts", args.starts, "starts", Range(1, whole=True)))
     units = dict.fromkeys(BOX, "1")
     axes = [Axis.parse(text, units, "group", POSITIVE) for text in args.range]
-    workers = running.workers(args)
-    if workers == 0:
-        raise InputError("workers = 0: a search needs processes; must be >= 1")
-    pool = processes(workers) if isinstance(workers, int) else workers
     searched = Search(BOX | {axis.name: axis.ends for axis in axes}, starts, args.seed)
     with progress.shown(args.quiet or args.json) as show:
-        return search.run(args.output, searched, count, pool, show)
+        return search.run(args.output, searched, count, running.workers(args), show)
 
 
 def plane(args: argparse.Namespace) -> int:

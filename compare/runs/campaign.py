@@ -64,10 +64,7 @@ class Campaign:
     doing: str = ""
 
     def __post_init__(self) -> None:
-        if isinstance(self.workers, int):
-            self._workers = None if self.workers == 0 else processes(self.workers)
-        else:
-            self._workers = self.workers
+        self._workers = processes(self.workers) if isinstance(self.workers, int) else self.workers
         check_number("batch", self.batch, "runs", Range(1, whole=True))
         if self.limit != math.inf:
             check_number("limit", self.limit, "s", POSITIVE)
@@ -123,7 +120,7 @@ class Campaign:
                 todo.append(task)
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
-        for finished, failed in self._carry_out(_batches(todo, self.batch, self._workers)):
+        for finished, failed in self._carry_out(_batches(todo, self.batch, self._workers.count)):
             done += finished
             failures += failed
             self.report(self.doing, done, len(unique), len(failures))
@@ -134,10 +131,6 @@ class Campaign:
 
     def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[int, list[Failure]]]:
         """Yield, for each batch that ends, how many of its runs are whole and those that failed."""
-        if self._workers is None:
-            for batch in fresh:
-                yield self._tally(batch, run_batch(batch, self.directory, self.limit, self.memory > 0))
-            return
         pending: dict[Future[list[Outcome]], tuple[Task, ...]] = {}
         # A worker that dies takes other batches down with it. Those are tried again one by one, alone, so that it
         # shows which is to blame; a batch to blame is taken apart.
@@ -171,7 +164,6 @@ class Campaign:
                         suspects.append(batch)
 
     def _submit(self, batch: tuple[Task, ...]) -> Future[list[Outcome]]:
-        assert self._workers is not None
         for _ in range(2):
             if self._executor is None:
                 self._executor = self._workers.start()
@@ -194,7 +186,7 @@ class Campaign:
         return len(batch) - len(failures), failures
 
     def _stop(self, at_once: bool) -> None:
-        if self._executor is not None and self._workers is not None:
+        if self._executor is not None:
             self._workers.stop(self._executor, at_once)
             self._executor = None
 
@@ -218,12 +210,12 @@ def run_batch(tasks: Sequence[Task], directory: Path, limit: float, hand_over: b
     return outcomes if hand_over else [Outcome(outcome.failure) for outcome in outcomes]
 
 
-def _batches(tasks: Iterable[Task], size: int, workers: Workers | None) -> Iterator[tuple[Task, ...]]:
+def _batches(tasks: Iterable[Task], size: int, workers: int) -> Iterator[tuple[Task, ...]]:
     """Tasks that can run together, in the order of their first appearance, shared out evenly among the workers."""
     groups: dict[str, list[Task]] = {}
     for task in tasks:
         groups.setdefault(task.batch_key, []).append(task)
     for group in groups.values():
-        share = min(size, math.ceil(len(group) / (workers.count if workers else 1)))
+        share = min(size, math.ceil(len(group) / workers))
         for start in range(0, len(group), share):
             yield tuple(group[start : start + share])

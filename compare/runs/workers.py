@@ -10,17 +10,18 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context, parent_process
 from types import FrameType
-from typing import Any
+from typing import Any, TypeVar
 
 from model import InputError
 from model.parameters import Range, check_number
 
+T = TypeVar("T")
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -40,8 +41,10 @@ class Workers:
 
 
 def processes(count: int) -> Workers:
-    """`count` processes of this machine, one BLAS thread each; raises `InputError` for a bad count."""
-    check_number("workers", count, "processes", Range(1, whole=True))
+    """`count` processes of this machine, one BLAS thread each; for 0 this one. Raises `InputError` for a bad count."""
+    check_number("workers", count, "processes", Range(0, whole=True))
+    if count == 0:
+        return Workers(1, _Here, lambda executor, at_once: None, ())
 
     def start() -> Executor:
         for name in _THREADS:  # inherited by the workers; numpy reads it when they import it
@@ -56,6 +59,15 @@ def processes(count: int) -> Workers:
         executor.shutdown(wait=True, cancel_futures=True)
 
     return Workers(count, start, stop, (BrokenProcessPool,))
+
+
+class _Here(Executor):
+    """Does everything at once, in this process; what is raised is for the caller."""
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        done: Future[T] = Future()
+        done.set_result(fn(*args, **kwargs))
+        return done
 
 
 def dask(address: str) -> Workers:

@@ -118,7 +118,7 @@ def test_a_file_that_is_no_search(tmp_path):
         (["--range", "mu=2"], "write mu=from:to"),
         (["--range", "mu=-1:1"], "mu = -1"),
         (["--sets", "0"], "sets = 0"),
-        (["--workers", "0"], "workers = 0"),
+        (["--workers", "-1"], "workers = -1"),
     ],
 )
 def test_bad_input(words, message, capsys):
