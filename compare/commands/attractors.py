@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +13,12 @@ from rich.table import Table
 import analytic
 from analytic import orbit_branch
 from analytic.fates import LASTING, Attractor
-from analytic.orbits import Orbit
 from compare import pages
 from compare.commands import options, running
 from compare.runs.engines import EVENT
 from compare.runs.sweep import Axis, grid
 from compare.runs.tasks import carry_out
+from compare.statistics import plain
 from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
@@ -76,56 +75,45 @@ def run(args: argparse.Namespace) -> int:
 
 def attractor_data(of: Attractor) -> dict[str, Any]:
     """An attractor as JSON-able data, SI."""
-    fate, run = of.fate, of.run
-    mean = fate.orbit.mean if fate.orbit else run.x.mean(axis=0)
-    return {
-        "kind": fate.kind.value,
-        "cases": [case.name for case in _cases(of)],
-        "count": of.count,
-        "starts": of.starts,
-        "share": of.share,
-        "share_95": of.interval,
-        "period": _finite(fate.orbit.period if fate.orbit else fate.period),
-        "period_in_the_run": _finite(fate.period),
-        "multipliers": [[v.real, v.imag] for v in fate.orbit.multipliers] if fate.orbit else [],
-        "lyapunov": _finite(fate.exponent),
-        "theory": fate.solution.case.name if fate.solution else "orbit" if fate.orbit else None,
-        "mean": dict(zip(VARIABLES, mean.tolist(), strict=True)),
-        "low": dict(zip(VARIABLES, run.x.min(axis=0).tolist(), strict=True)),
-        "high": dict(zip(VARIABLES, run.x.max(axis=0).tolist(), strict=True)),
-        "failure": fate.failure,
-    }
+    fate, run, orbit = of.fate, of.run, of.fate.orbit
+    states = {"mean": orbit.mean if orbit else run.x.mean(axis=0), "low": run.x.min(axis=0), "high": run.x.max(axis=0)}
+    # Those of a period, or those of the last window in the order in which they first come up.
+    cases = orbit.cases if orbit else dict.fromkeys(fate.last.cases)
+    data: dict[str, Any] = plain(
+        {
+            "kind": fate.kind.value,
+            "cases": [case.name for case in cases],
+            "count": of.count,
+            "starts": of.starts,
+            "share": of.share,
+            "share_95": of.interval,
+            "period": orbit.period if orbit else fate.period,
+            "period_in_the_run": fate.period,
+            "multipliers": [[v.real, v.imag] for v in orbit.multipliers] if orbit else [],
+            "lyapunov": fate.exponent,
+            "theory": fate.solution.case.name if fate.solution else "orbit" if orbit else None,
+        }
+    )
+    data |= {name: dict(zip(VARIABLES, x.tolist(), strict=True)) for name, x in states.items()}
+    return data | {"failure": fate.failure}
 
 
 def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
     """A branch as JSON-able data, SI."""
-    return {
-        "parameter": branch.name,
-        "places": [{"kind": place.kind.value, "value": place.value, "reason": place.reason} for place in branch.places],
-        "orbits": [orbit_data(orbit, branch.name) for orbit in branch.orbits],
-    }
-
-
-def orbit_data(orbit: Orbit, name: str) -> dict[str, Any]:
-    """An orbit of a branch as JSON-able data, SI."""
-    return {
-        name: getattr(orbit.p, name),
-        "period": orbit.period,
-        "omega_c": float(orbit.mean[VARIABLES.index("omega_c")]),
-        "height": float(orbit.cycle.y.max()),
-        "stable": orbit.stable,
-        "multipliers": [[v.real, v.imag] for v in orbit.multipliers],
-        "x": orbit.loop.x.tolist(),
-    }
-
-
-def _cases(of: Attractor) -> Sequence[Any]:
-    """The cases of a period, or those of the last window in the order in which they first come up."""
-    return of.fate.orbit.cases if of.fate.orbit else list(dict.fromkeys(of.fate.last.cases))
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    orbits = [
+        {
+            branch.name: getattr(orbit.p, branch.name),
+            "period": orbit.period,
+            "omega_c": float(orbit.mean[VARIABLES.index("omega_c")]),
+            "height": float(orbit.cycle.y.max()),
+            "stable": orbit.stable,
+            "multipliers": [[v.real, v.imag] for v in orbit.multipliers],
+            "x": orbit.loop.x.tolist(),
+        }
+        for orbit in branch.orbits
+    ]
+    places = [{"kind": place.kind.value, "value": place.value, "reason": place.reason} for place in branch.places]
+    return {"parameter": branch.name, "places": places, "orbits": orbits}
 
 
 _COLUMNS = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
@@ -151,14 +139,12 @@ def _page(data: dict[str, Any]) -> str:
         name = branch["parameter"]
         lines += ["", f"## Followed in {name}", ""]
         lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}" for p in branch["places"]), ""]
-        head = [name, "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"]
-        lines.append(pages.markdown([head, *(_orbit_cells(orbit, name) for orbit in branch["orbits"])]))
+        rows = [[name, "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"]]
+        for orbit in branch["orbits"]:
+            numbers = orbit[name], orbit["period"], orbit["omega_c"], 1e3 * orbit["height"], _largest(orbit)
+            rows.append([*(f"{number:.7g}" for number in numbers), "yes" if orbit["stable"] else "no"])
+        lines.append(pages.markdown(rows))
     return "\n".join(lines) + "\n"
-
-
-def _orbit_cells(orbit: dict[str, Any], name: str) -> list[str]:
-    numbers = orbit[name], orbit["period"], orbit["omega_c"], 1e3 * orbit["height"], _largest(orbit)
-    return [*(f"{number:.7g}" for number in numbers), "yes" if orbit["stable"] else "no"]
 
 
 def _largest(row: dict[str, Any]) -> float:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 
 from compare.commands import options
 from compare.runs import benchmark
+from compare.statistics import plain
 
 
 def add(commands: options.Commands) -> None:
@@ -13,11 +15,11 @@ def add(commands: options.Commands) -> None:
     command = options.command(
         commands, "benchmark", run, "cost of the loop round MuJoCo's step, as ratios within one run"
     )
-    command.add_argument("--json", action="store_true", help="print JSON")
+    options.outputs(command)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and show."""
     figures = benchmark.run()
-    options.show(figures.to_mapping(), lambda _: benchmark.table(figures), args.json)
+    options.show(plain(dataclasses.asdict(figures)), lambda _: benchmark.table(figures), args.json)
     return 0

@@ -35,7 +35,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("file", type=Path, metavar="FILE.toml", help="fluid, flow, bounds, materials, tolerances")
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write")
     command.add_argument("--seed", type=int, default=0, metavar="N", help="of the search (default 0)")
-    command.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    options.outputs(command, shown="print JSON instead of tables")
 
 
 def run(args: argparse.Namespace) -> int:

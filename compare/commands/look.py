@@ -28,7 +28,7 @@ def add(commands: options.Commands) -> None:
     command = options.command(commands, "inspect", inspect, "what a trajectory file holds")
     command.add_argument("file", type=Path, metavar="FILE")
     command.add_argument("--plot", type=Path, metavar="FILE", help="draw it (png, svg or pdf)")
-    command.add_argument("--json", action="store_true", help="print JSON")
+    options.outputs(command)
 
     command = options.command(
         commands, "render", render, "a picture or film of a run: the scene, contact forces, slip, case"

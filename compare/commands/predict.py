@@ -26,7 +26,7 @@ def add(commands: options.Commands) -> None:
     what = "stationary solutions, thresholds and operating range, from theory"
     command = options.command(commands, "predict", run, what)
     options.add_parameters(command)
-    command.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    options.outputs(command, shown="print JSON instead of tables")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -26,7 +26,7 @@ def add(commands: options.Commands) -> None:
         "--sample-interval", type=options.number, metavar="s", help="default: a thousandth of the duration"
     )
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HDF5 file to write")
-    command.add_argument("--json", action="store_true", help="print the last state as JSON")
+    options.outputs(command, shown="print the last state as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -42,7 +42,7 @@ def add(commands: options.Commands) -> None:
 def _add_shared(command: argparse.ArgumentParser) -> None:
     command.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
     command.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
-    command.add_argument("--json", action="store_true", help="print the verdicts as JSON")
+    options.outputs(command, shown="print the verdicts as JSON")
 
 
 def run(args: argparse.Namespace) -> int:

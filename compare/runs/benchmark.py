@@ -17,10 +17,10 @@ from typing import Any
 from rich.table import Table
 
 from analytic import stable_solutions
+from compare import pages
 from compare.runs.campaign import Campaign
 from compare.runs.tasks import Task, store
 from compare.runs.workers import Workers, dask, processes
-from compare.statistics import plain
 from mjsim import benchmark
 from model import Parameters
 
@@ -51,10 +51,6 @@ class Figures:
     dask_over_processes: float
     """Throughput of two Dask workers over that of two processes; nan without Dask."""
 
-    def to_mapping(self) -> dict[str, Any]:
-        """JSON-able data."""
-        return {name: plain(value) for name, value in dataclasses.asdict(self).items()}
-
 
 def run() -> Figures:
     """Measure the loop over bare steps, alone and in a batch; then campaigns."""
@@ -67,17 +63,17 @@ def run() -> Figures:
 
 def table(figures: Figures) -> Table:
     """The figures for the terminal."""
-    shown = Table(title="Cost of the study's loop", title_justify="left", title_style="bold")
-    for column in ("", "bare mj_step", "whole loop", "ratio"):
-        shown.add_column(column, justify="right" if column else "left")
+    rows = [["", "bare mj_step", "whole loop", "ratio"]]
     for name, cost in (("one simulation", figures.single), (f"batch of {figures.batch.runs}", figures.batch)):
-        shown.add_row(name, f"{1e6 * cost.bare:.2f} µs", f"{1e6 * cost.whole:.2f} µs", f"{cost.ratio:.2f}")
-    shown.add_row("campaign: two processes over one", "", "", f"{figures.two_over_one:.2f}")
-    shown.add_row("the same of bare arithmetic: the machine's limit", "", "", f"{figures.machine:.2f}")
-    shown.add_row("campaign: two Dask workers over two processes", "", "", f"{figures.dask_over_processes:.2f}")
-    shown.add_row("campaign: bookkeeping of a task", "", f"{1e3 * figures.bookkeeping:.1f} ms", "")
-    shown.add_row(f"campaign: resuming {FINISHED} finished tasks", "", f"{figures.resuming:.1f} s", "")
-    return shown
+        rows.append([name, f"{1e6 * cost.bare:.2f} µs", f"{1e6 * cost.whole:.2f} µs", f"{cost.ratio:.2f}"])
+    rows += [
+        ["campaign: two processes over one", "", "", f"{figures.two_over_one:.2f}"],
+        ["the same of bare arithmetic: the machine's limit", "", "", f"{figures.machine:.2f}"],
+        ["campaign: two Dask workers over two processes", "", "", f"{figures.dask_over_processes:.2f}"],
+        ["campaign: bookkeeping of a task", "", f"{1e3 * figures.bookkeeping:.1f} ms", ""],
+        [f"campaign: resuming {FINISHED} finished tasks", "", f"{figures.resuming:.1f} s", ""],
+    ]
+    return pages.table("Cost of the study's loop", rows)
 
 
 def _tasks(count: int, t_end: float) -> list[Task]:

@@ -62,9 +62,8 @@ class Column:
 
     def to_mapping(self) -> dict[str, Any]:
         """JSON-able data; None for what is missing."""
-        values = dataclasses.asdict(self)
         more = {"reproduced": self.reproduced, "cost_of_a_second": self.cost_of_a_second}
-        return {name: plain(value) for name, value in (values | more).items()}
+        return dict(plain(dataclasses.asdict(self) | more))
 
 
 def grade(
