@@ -42,8 +42,8 @@ class Engine:
     """Options of the command line that `configure` takes."""
     configure: Callable[[Mapping[str, float], Parameters], Settings]
     """Settings of a person's run from such options; those not given have their defaults."""
-    at: Callable[[float, Parameters], Settings]
-    """Settings of a study for a time step in s; engines without a step ignore it."""
+    study: Callable[[float, Parameters], Settings] | None = None
+    """Settings of a study for a time step in s, where they are others than those of a person's run."""
     simulate: Simulate | None = None
     stream: Stream | None = None
     sources: tuple[str, ...]
@@ -69,6 +69,12 @@ class Engine:
         return {name: version(name) for name in self.stands_on} | (
             {self.needs.name: self.needs.version} if self.needs else {}
         )
+
+    def at(self, step: float | None, p: Parameters) -> Settings:
+        """Settings of a study for a time step in s; engines without a step ignore it."""
+        if step is None or "timestep" not in self.options:
+            return self.configure({}, p)
+        return self.study(step, p) if self.study else self.configure({"timestep": step}, p)
 
     def configured(self, given: Mapping[str, float], p: Parameters) -> Settings:
         """`configure`, but an option that belongs to other engines is an `InputError`."""
@@ -137,7 +143,6 @@ def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, c
         settings=adapter.Settings,
         options=("timestep",),
         configure=lambda given, p: adapter.Settings(**given),
-        at=lambda step, p: adapter.Settings(timestep=step),
         simulate=partial(loop.simulate, name, library, adapter.scene),
         sources=("model", "mjsim", "compare.engines"),
         stands_on=("numpy",),
@@ -150,23 +155,22 @@ def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, c
         best,
         name=other,
         configure=lambda given, p: adapter.newcomer(given.get("timestep", newcomer_step)),
-        at=lambda step, p: adapter.newcomer(step),
         simulate=partial(loop.simulate, other, library, adapter.scene),
         mark=marks[1],
     )
 
 
-def _time_stepping(given: Mapping[str, float]) -> analytic.Settings:
-    return analytic.Settings(method="time-stepping", **{_STEP.get(name, name): given[name] for name in given})  # type: ignore[arg-type]
+def _time_stepping(given: Mapping[str, float], p: Parameters) -> analytic.Settings:
+    named: dict[str, Any] = {{"timestep": "step"}.get(name, name): value for name, value in given.items()}
+    return analytic.Settings(method="time-stepping", **named)
 
 
-_STEP = {"timestep": "step"}
 MUJOCO = Engine(
     name="mujoco",
     settings=ContactSettings,
     options=("timestep",),
     configure=lambda given, p: ContactSettings.at(given.get("timestep", ContactSettings.timestep)).suited(p),
-    at=_mujoco_study,
+    study=_mujoco_study,
     stream=mjsim.Run,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
@@ -178,7 +182,7 @@ NEWCOMER = replace(
     MUJOCO,
     name="mujoco-defaults",
     configure=lambda given, p: newcomer(given.get("timestep", ContactSettings.timestep)),
-    at=lambda step, p: newcomer(step),
+    study=None,
     stream=_unwarned,
     mark="x",
     colour="#CC79A7",
@@ -188,7 +192,6 @@ EVENT = Engine(
     settings=analytic.Settings,
     options=("rtol", "restitution"),
     configure=lambda given, p: analytic.Settings(**given),  # type: ignore[arg-type]
-    at=lambda step, p: analytic.Settings(),
     simulate=partial(_theory, "event"),
     sources=("model", "analytic"),
     stands_on=("numpy", "scipy"),
@@ -199,8 +202,7 @@ MOREAU = replace(
     EVENT,
     name="time-stepping",
     options=("timestep", "rtol", "restitution"),
-    configure=lambda given, p: _time_stepping(given),
-    at=lambda step, p: _time_stepping({"timestep": step}),
+    configure=_time_stepping,
     simulate=partial(_theory, "time-stepping"),
     mark="^",
     colour="#009E73",
