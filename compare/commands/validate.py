@@ -28,41 +28,34 @@ def add(commands: options.Commands) -> None:
     own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
     own.add_argument("--parameters", type=Path, metavar="FILE", help="your own set, a TOML file, instead of many")
     running.add_engine_name(command)
-    command.add_argument("-o", "--output", type=Path, default=Path("results"), metavar="DIR")
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     running.add_workers(command)
-    command.add_argument("--quiet", action="store_true", help="no progress")
-    _add_shared(command)
+    _add_shared(command, "results")
 
     command = options.command(commands, "judge", judge, "judge the stored measurements of a validation again")
     command.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR")
     _add_shared(command)
 
 
-def _add_shared(command: argparse.ArgumentParser) -> None:
+def _add_shared(command: argparse.ArgumentParser, directory: str = "") -> None:
     command.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
     command.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
-    options.outputs(command, shown="print the verdicts as JSON")
+    options.outputs(command, directory, "print the verdicts as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and judge."""
     from compare import validation  # here, because it loads everything there is
 
-    console = Console()
+    console, chosen = Console(quiet=args.json), _own_set(args)
     if args.list:
-        console.print(tables.claims(CLAIMS))
+        Console().print(tables.claims(CLAIMS))
         return 0
-    chosen = _own_set(args)
-
-    def announce(verdict: Verdict) -> None:
-        if not args.json:
-            console.print(tables.line(verdict), soft_wrap=True)
-
     with progress.shown(quiet=args.quiet or args.json) as show:
         wanted = {"level": args.level, "claims": args.claim, "sets": chosen, "limit": args.limit, "engine": args.engine}
+        wanted |= {"workers": running.workers(args), "progress": show}
         verdicts = validation.validate(
-            args.output, **wanted, workers=running.workers(args), progress=show, announce=announce
+            args.output, **wanted, announce=lambda verdict: console.print(tables.line(verdict), soft_wrap=True)
         )
     admitted = [v for v in verdicts if v.outcome is not Outcome.NOT_RUN] if chosen else verdicts
     return _finish(verdicts, admitted, args, console)
@@ -72,11 +65,9 @@ def judge(args: argparse.Namespace) -> int:
     """Judge what is stored."""
     from compare import validation  # here, because it loads everything there is
 
-    console = Console()
-    verdicts = validation.judge_stored(args.output, args.claim)
-    if not args.json:
-        for verdict in verdicts:
-            console.print(tables.line(verdict), soft_wrap=True)
+    console, verdicts = Console(quiet=args.json), validation.judge_stored(args.output, args.claim)
+    for verdict in verdicts:
+        console.print(tables.line(verdict), soft_wrap=True)
     return _finish(verdicts, [v for v in verdicts if v.outcome is not Outcome.NOT_RUN], args, console)
 
 
@@ -92,9 +83,8 @@ def _finish(
     """Print what there is, and return the exit code: 0 if all that count came out as expected."""
     if args.json:
         print(json.dumps([results.describe(verdict) for verdict in verdicts], indent=1))
-    else:
-        if args.verbose:
-            console.print(*(tables.checks(verdict) for verdict in verdicts if verdict.checks))
-        console.print(tables.summary(verdicts), soft_wrap=True)
-        console.print(f"report: {args.output / results.REPORT}")
+    if args.verbose:
+        console.print(*(tables.checks(verdict) for verdict in verdicts if verdict.checks))
+    console.print(tables.summary(verdicts), soft_wrap=True)
+    console.print(f"report: {args.output / results.REPORT}")
     return 0 if all(verdict.passed for verdict in counting) else 1
