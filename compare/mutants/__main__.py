@@ -18,18 +18,14 @@ def main() -> int:
     parser.add_argument("directory", type=Path, metavar="DIR", help="results of 'dualball validate --quick'")
     parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
     parser.add_argument("--beside", type=Path, metavar="DIR", help="results of another level, tried and shown as well")
-    parser.add_argument(
-        "--page", type=Path, metavar="FILE", help="page to write; else a theory is judged until a claim notices it"
-    )
+    page = "page to write; else a theory is judged until a claim notices it"
+    parser.add_argument("--page", type=Path, metavar="FILE", help=page)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
-    parser.add_argument(
-        "--least", type=float, default=1.0, metavar="SHARE", help="share that must be noticed (default 1: all)"
-    )
+    parser.add_argument("--least", type=float, default=1.0, metavar="SHARE", help="to be noticed (default 1: all)")
     args = parser.parse_args()
     try:
-        levels = [
-            trial.judged(each, args.workers, whole=bool(args.page)) for each in (args.directory, args.beside) if each
-        ]
+        directories = filter(None, (args.directory, args.beside))
+        levels = [trial.judged(each, args.workers, whole=bool(args.page)) for each in directories]
         measured = trial.wrong_engines(args.directory, args.workers) if args.engines else []
         if args.page:
             write_text(args.page, trial.page(levels, measured))

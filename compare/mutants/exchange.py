@@ -1,4 +1,7 @@
-"""Putting a wrong function in the place of a right one, wherever it is known, for as long as a context lasts."""
+"""Putting a wrong function in the place of a right one, wherever it is known, for as long as a context lasts.
+
+A fault makes the wrong function from the right one. Most change its answer, or the parameters of the ball it is given.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,8 @@ import numpy as np
 from model import Case, Parameters
 
 Function = Callable[..., Any]
+Fault = Callable[[Function], Function]
+Change = Callable[[Any], Any]
 PACKAGES = ("analytic", "compare.claims")
 """Where functions of the theory are known by name."""
 
@@ -27,8 +32,7 @@ class WrongTheory:
     """The fault, in words."""
     module: str
     function: str
-    wrong: Callable[[Function], Function]
-    """Makes the wrong function from the right one."""
+    wrong: Fault
 
 
 @contextmanager
@@ -53,40 +57,32 @@ def _exchange(old: Function, new: Function) -> None:
                 value.update({key: new for key, entry in value.items() if entry is old})
 
 
-def scaled(factor: float, *entries: int) -> Callable[[Function], Function]:
-    """What it returns is `factor` times too large: all of it, or these entries of a sequence."""
-
-    def wrong(right: Function) -> Function:
-        def function(*args: Any, **named: Any) -> Any:
-            result = right(*args, **named)
-            if not entries:
-                return factor * result
-            parts = list(result)
-            for k in entries:
-                parts[k] = factor * parts[k]
-            return type(result)(*parts) if hasattr(result, "_fields") else type(result)(parts)
-
-        return function
-
-    return wrong
+def answer(change: Change) -> Fault:
+    """Its answer is changed."""
+    return lambda right: lambda *args, **named: change(right(*args, **named))
 
 
-def in_case(case: Case, change: Callable[[Function], Function]) -> Callable[[Function], Function]:
-    """The fault shows only where the first argument is this case."""
-
-    def wrong(right: Function) -> Function:
-        faulty = change(right)
-        return lambda first, *rest, **named: (faulty if first is case else right)(first, *rest, **named)
-
-    return wrong
+def scaled(factor: float, *entries: int) -> Fault:
+    """Its answer is `factor` times too large: all of it, or these entries."""
+    return answer(times(factor, *entries))
 
 
-def given(change: Callable[[Parameters], Parameters]) -> Callable[[Function], Function]:
+def given(change: Callable[[Parameters], Parameters]) -> Fault:
     """It takes other parameters for those of the ball."""
     change = functools.cache(change)
 
-    def wrong(right: Function) -> Function:
+    def taking(right: Function) -> Function:
         return lambda *args, **named: right(*(change(a) if isinstance(a, Parameters) else a for a in args), **named)
+
+    return taking
+
+
+def in_case(case: Case, fault: Fault) -> Fault:
+    """The fault shows only where the first argument is this case."""
+
+    def wrong(right: Function) -> Function:
+        faulty = fault(right)
+        return lambda first, *rest, **named: (faulty if first is case else right)(first, *rest, **named)
 
     return wrong
 
@@ -101,17 +97,22 @@ def swapped(p: Parameters) -> Parameters:
     return p.replace(mu=p.eta, eta=p.mu)
 
 
-def answer(change: Callable[[Any], Any]) -> Callable[[Function], Function]:
-    """Its answer is changed."""
-    return lambda right: lambda *args, **named: change(right(*args, **named))
+def fields(**changes: Change) -> Change:
+    """A dataclass or named tuple with some of its fields changed."""
+
+    def change(record: Any) -> Any:
+        put = {name: each(getattr(record, name)) for name, each in changes.items()}
+        return record._replace(**put) if hasattr(record, "_replace") else replace(record, **put)
+
+    return change
 
 
-def fields(**changes: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """The answer with some of its fields changed."""
-    return lambda answer: replace(answer, **{name: change(getattr(answer, name)) for name, change in changes.items()})
+def entries(**changes: Change) -> Change:
+    """A mapping with some of its entries changed."""
+    return lambda mapping: mapping | {name: change(mapping[name]) for name, change in changes.items()}
 
 
-def each(case: Case | None, change: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def of_case(case: Case | None, change: Change) -> Change:
     """Of a list of solutions those of a case are changed, all for None; None in the place of one takes it away."""
 
     def changed(solutions: list[Any]) -> list[Any]:
@@ -121,12 +122,15 @@ def each(case: Case | None, change: Callable[[Any], Any]) -> Callable[[Any], Any
     return changed
 
 
-def times(factor: float, *entries: int) -> Callable[[Any], Any]:
-    """An array with all, or some, of its entries multiplied."""
+def times(factor: float, *entries: int) -> Change:
+    """A number or array multiplied, or some entries of a sequence."""
 
     def change(values: Any) -> Any:
-        out = np.array(values)
-        out[list(entries) if entries else ...] *= factor
-        return out
+        if not entries:
+            return factor * values
+        parts = [factor * part if k in entries else part for k, part in enumerate(values)]
+        if isinstance(values, np.ndarray):
+            return np.array(parts)
+        return type(values)(*parts) if hasattr(values, "_fields") else type(values)(parts)
 
     return change

@@ -10,7 +10,7 @@ import functools
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -29,11 +29,26 @@ from compare.mutants.theories import THEORIES
 from compare.report import results
 from compare.runs.workers import processes
 
-Outcomes = Mapping[str, Outcome]
+Outcomes = dict[str, Outcome]
 PROVING = frozenset({"settled", "laws", "field", "impacts"})
 """Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in contact and landing."""
 PATIENCE = 40.0
 """Processor time that the predictions of a claim may take under a wrong theory, s; several times what they need."""
+_PAGE = """\
+# What the verdicts notice
+
+Every verdict must be able to be lost. Here the theory is replaced by slightly wrong ones, one at a time,
+and the stored measurements of the {level} level are judged again; then MuJoCo is replaced by
+slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim changes.
+Written by `make mutants`.
+{others}{trials}
+## Resolving power
+
+The relative error of a theory that every measurement of a quantity would
+notice, of all sets the largest; and the ceiling, beyond which a check is inconclusive.
+
+{powers}
+"""
 
 
 @dataclass(frozen=True)
@@ -41,31 +56,14 @@ class Trial:
     """What became of the verdicts under one fault."""
 
     what: str
-    noticed: tuple[tuple[str, Outcome], ...]
+    noticed: Outcomes
     """Claims whose verdict is another than without the fault, and what it is."""
 
-
-def theories(directory: Path, workers: int = 2, whole: bool = True) -> list[Trial]:
-    """Every wrong theory, judged on the measurements stored in a results directory.
-
-    By all claims; unless `whole`, by the quickest ones first and only until one notices it.
-    """
-    return _tried(functools.partial(_theory, directory, whole), len(THEORIES), workers)
-
-
-def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
-    """Every wrong engine, measured anew by the protocols of `PROVING`; runs are kept, each engine's apart."""
-    return _tried(functools.partial(_engine, directory), len(WRONG_ENGINES), workers)
-
-
-def _tried(one: Callable[[int], Trial], count: int, workers: int) -> list[Trial]:
-    """The trials by number, each shown on standard error as soon as it is there."""
-    tried = []
-    with processes(workers).start() as pool:
-        for trial in pool.map(one, range(count)):
-            print(f"{trial.what}: {_told(trial)}", file=sys.stderr, flush=True)
-            tried.append(trial)
-    return tried
+    @property
+    def by(self) -> str:
+        """Who noticed it."""
+        named = (name if of is Outcome.REFUTED else f"{name} ({of})" for name, of in self.noticed.items())
+        return ", ".join(named) or "**nobody**"
 
 
 @dataclass(frozen=True)
@@ -80,78 +78,81 @@ class Judged:
 
 
 def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
-    """Every wrong theory judged on the measurements stored in a results directory, and their resolving power."""
+    """Every wrong theory judged on the measurements stored in a results directory, and their resolving power.
+
+    By all claims; unless `whole`, by the quickest ones first and only until one notices it.
+    """
     power: dict[str, float] = {}
-    for each in judge(CLAIMS, _stored(directory)[0]):
+    for each in judge(CLAIMS, _records(directory)):
         if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
             for name, value in each.resolving_power.items():
                 power[name] = max(power.get(name, 0.0), value)
-    return Judged(results.load(directory).level.lower(), theories(directory, workers, whole), power)
+    tried = _tried(functools.partial(_theory, directory, whole), len(THEORIES), workers)
+    return Judged(results.load(directory).level.lower(), tried, power)
+
+
+def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
+    """Every wrong engine, measured anew by the protocols of `PROVING`; runs are kept, each engine's apart."""
+    return _tried(functools.partial(_engine, directory), len(WRONG_ENGINES), workers)
+
+
+def _tried(one: Callable[[int], Trial], count: int, workers: int) -> list[Trial]:
+    """The trials by number, each shown on standard error as soon as it is there."""
+    tried = []
+    with processes(workers).start() as pool:
+        for trial in pool.map(one, range(count)):
+            print(f"{trial.what}: {trial.by}", file=sys.stderr, flush=True)
+            tried.append(trial)
+    return tried
 
 
 def page(levels: Sequence[Judged], measured: Sequence[Trial]) -> str:
     """The page that says which claim notices what, in Markdown; the claims are those of the first level."""
     first, *others = levels
-    lines = [
-        "# What the verdicts notice",
-        "",
-        "Every verdict must be able to be lost. Here the theory is replaced by slightly wrong ones, one at a time,",
-        f"and the stored measurements of the {first.name} level are judged again; then MuJoCo is replaced by",
-        "slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim changes.",
-        "Written by `make mutants`.",
-    ]
-    for other in others:
-        missed = "".join(f"; not {trial.what}" for trial in other.trials if not trial.noticed)
-        seen = sum(bool(trial.noticed) for trial in other.trials)
-        lines += ["", f"At the {other.name} level {seen} of {len(other.trials)} wrong theories are noticed{missed}."]
-    for title, trials in (("Wrong theories", first.trials), ("Wrong engines", measured)):
-        if trials:
-            seen = sum(bool(trial.noticed) for trial in trials)
-            lines += ["", f"## {title}: {seen} of {len(trials)} noticed", ""]
-            lines.append(pages.markdown([["fault", "noticed by"], *([each.what, _told(each)] for each in trials)]))
-    return "\n".join([*lines, *_powers(levels)]) + "\n"
-
-
-def _powers(levels: Sequence[Judged]) -> Iterator[str]:
-    """A table of the resolving powers, of quantities that are no whole numbers."""
-    yield from (
-        "",
-        "## Resolving power",
-        "",
-        "The relative error of a theory that every measurement of a quantity would",
-    )
-    yield from ("notice, of all sets the largest; and the ceiling, beyond which a check is inconclusive.", "")
+    tables = "".join(_table(*each) for each in (("theories", first.trials), ("engines", measured)) if each[1])
     rows = [["quantity", "ceiling", *(each.name for each in levels)]]
     for name, quantity in QUANTITIES.items():
         if quantity.resolves and any(name in each.power for each in levels):
             powers = (f"{each.power[name]:.1g}" if name in each.power else "–" for each in levels)
             rows.append([quantity.symbol, f"{quantity.resolves:.1g}", *powers])
-    yield pages.markdown(rows)
+    said = "".join(f"\n{_counted(other)}\n" for other in others)
+    return _PAGE.format(level=first.name, others=said, trials=tables, powers=pages.markdown(rows))
 
 
-def _told(trial: Trial) -> str:
-    claims = [name if outcome is Outcome.REFUTED else f"{name} ({outcome})" for name, outcome in trial.noticed]
-    return ", ".join(claims) or "**nobody**"
+def _counted(level: Judged) -> str:
+    missed = "".join(f"; not {trial.what}" for trial in level.trials if not trial.noticed)
+    seen = sum(bool(trial.noticed) for trial in level.trials)
+    return f"At the {level.name} level {seen} of {len(level.trials)} wrong theories are noticed{missed}."
+
+
+def _table(what: str, trials: Sequence[Trial]) -> str:
+    rows = pages.markdown([["fault", "noticed by"], *([each.what, each.by] for each in trials)])
+    return f"\n## Wrong {what}: {sum(bool(each.noticed) for each in trials)} of {len(trials)} noticed\n\n{rows}\n"
 
 
 @functools.cache
-def _stored(directory: Path) -> tuple[Records, Outcomes, Sequence[Claim]]:
-    """Measurements, the outcomes of the right theory, and the claims, those that are judged quickest first."""
-    records, took, outcomes = results.load(directory).records(directory), dict[str, float](), dict[str, Outcome]()
+def _records(directory: Path) -> Records:
+    return results.load(directory).records(directory)
+
+
+@functools.cache
+def _right(directory: Path) -> tuple[Outcomes, Sequence[Claim]]:
+    """The outcomes of the right theory, and the claims, those that are judged quickest first."""
+    outcomes, took = Outcomes(), dict[str, float]()
     for claim in CLAIMS:
         begun = time.process_time()
-        outcomes[claim.id] = verdict(claim, records).outcome
+        outcomes[claim.id] = verdict(claim, _records(directory)).outcome
         took[claim.id] = time.process_time() - begun
-    return records, outcomes, sorted(CLAIMS, key=lambda claim: took[claim.id])
+    return outcomes, sorted(CLAIMS, key=lambda claim: took[claim.id])
 
 
 def _theory(directory: Path, whole: bool, number: int) -> Trial:
-    records, right, quickest_first = _stored(directory)
+    right, quickest_first = _right(directory)
     forget()
-    noticed: tuple[tuple[str, Outcome], ...] = ()
+    noticed = Outcomes()
     with believed(THEORIES[number]):
         for claim in CLAIMS if whole else quickest_first:
-            noticed += _changed(right, _outcomes([_patiently(claim, records)]))
+            noticed |= _changed(right, [_patiently(claim, _records(directory))])
             if noticed and not whole:
                 break
     return Trial(THEORIES[number].what, noticed)
@@ -173,17 +174,11 @@ def _too_long(number: int, frame: FrameType | None) -> None:
 
 def _engine(directory: Path, number: int) -> Trial:
     engines.register()
-    wrong = WRONG_ENGINES[number]
-    _, right, _ = _stored(directory)
-    apart = directory / "wrong-engines" / f"{number}"
+    wrong, apart = WRONG_ENGINES[number], directory / "wrong-engines" / f"{number}"
     claims = [claim.id for claim in CLAIMS if claim.protocols and claim.protocols <= PROVING]
     verdicts = validation.validate(apart, level=lab.Level.QUICK, claims=claims, engine=wrong, workers=0, report=False)
-    return Trial(wrong.name, _changed(right, _outcomes(verdicts)))
+    return Trial(wrong.name, _changed(_right(directory)[0], verdicts))
 
 
-def _outcomes(verdicts: Sequence[Verdict]) -> Outcomes:
-    return {verdict.claim.id: verdict.outcome for verdict in verdicts}
-
-
-def _changed(right: Outcomes, outcomes: Outcomes) -> tuple[tuple[str, Outcome], ...]:
-    return tuple((name, outcome) for name, outcome in outcomes.items() if outcome is not right[name])
+def _changed(right: Outcomes, verdicts: Sequence[Verdict]) -> Outcomes:
+    return {each.claim.id: each.outcome for each in verdicts if each.outcome is not right[each.claim.id]}
