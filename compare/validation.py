@@ -108,7 +108,7 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None) -> 
 
 def material(directory: Path, verdicts: Sequence[Verdict], records: Records) -> Material:
     """What figures of a results directory are made of."""
-    return Material(tuple(verdicts), records, directory, **scores.read(directory))
+    return Material({v.claim.id: v.checks for v in verdicts}, records, directory, **scores.read(directory))
 
 
 def stored_material(directory: Path) -> Material:
@@ -130,7 +130,7 @@ def _write(
     if report:
         from compare.report import report as page  # here, because drawing takes a second to load
 
-        page.write(material(directory, verdicts, records), summary)
+        page.write(material(directory, verdicts, records), verdicts, summary)
     else:
         results.save(summary, directory)
     return verdicts

@@ -9,6 +9,7 @@ import numpy as np
 import analytic
 from analytic import orbits
 from analytic.orbits import Orbit
+from compare.claims.cases import simulated
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered
 from compare.measure.attractors import hops
@@ -27,13 +28,8 @@ def _orbit(p: Parameters, x: tuple[float, ...], period: float) -> Orbit:
     return orbits.refine(p, x, period)
 
 
-@remembered
-def _simulated(p: Parameters, x: tuple[float, ...], duration: float, samples: int) -> Trajectory:
-    return analytic.simulate(p, x, duration, sample_interval=duration / samples)
-
-
 def _hops(m: Measurement) -> float:
-    return hops(_simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
+    return hops(simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
 
 
 def _orbiting(protocol: str, quantity: str, predict: Callable[[Orbit], float]) -> Bearing:
@@ -50,7 +46,7 @@ def _after_rest(quantity: str, predict: Callable[[Trajectory], float]) -> Bearin
     """A number of what theory's simulation comes to from rest."""
 
     def of(m: Measurement) -> float:
-        return predict(_simulated(m.parameters, (0.0,) * 6, LASTS / m.parameters.c, 1))
+        return predict(simulated(m.parameters, (0.0,) * 6, LASTS / m.parameters.c))
 
     return Bearing("choice", quantity, of, by="analytic.simulate, which leaves rolling by Definitions 1-3")
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 import analytic
 from analytic import stokes
 from analytic.rolling_forces import margin, slip_margin
@@ -36,12 +34,14 @@ def _sinking(m: Measurement) -> float:
 
 
 @remembered
-def _after(x: tuple[float, ...], p: Parameters, time: float) -> Trajectory:
-    return analytic.simulate(p, np.array(x), time, sample_interval=time)
+def simulated(p: Parameters, x: tuple[float, ...], duration: float, samples: int = 1) -> Trajectory:
+    """Theory's motion from a state."""
+    return analytic.simulate(p, x, duration, sample_interval=duration / samples)
 
 
-def _simulated(m: Measurement) -> Trajectory:
-    return _after(state(m), m.parameters, float(m.conditions["time"]))
+def _end(m: Measurement, name: str) -> float:
+    """A column of theory's motion where the measured one ends."""
+    return float(getattr(simulated(m.parameters, state(m), float(m.conditions["time"])), name)[-1])
 
 
 def _decides(m: Measurement) -> bool:
@@ -65,7 +65,7 @@ def _landed(name: str) -> Bearing:
     return Bearing(
         "impacts",
         f"after_{name}",
-        lambda m: float(getattr(_simulated(m), name)[-1]),
+        lambda m: _end(m, name),
         size=lambda m: _speed(name, m.parameters),
         by="analytic.simulate",
     )
@@ -96,7 +96,7 @@ CLAIMS = (
         "Fig. 2, Table 3",
         "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
         "equations of motion say.",
-        (Bearing("motions", "case", lambda m: float(_simulated(m).case[-1]), when=_decides, by="analytic.simulate"),),
+        (Bearing("motions", "case", lambda m: _end(m, "case"), when=_decides, by="analytic.simulate"),),
     ),
     Claim(
         "impacts",

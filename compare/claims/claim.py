@@ -50,6 +50,11 @@ def given(**conditions: Condition) -> When:
     return lambda m: conditions.items() <= m.conditions.items()
 
 
+def every(*whens: When) -> When:
+    """Chooses what all of them choose."""
+    return lambda m: all(when(m) for when in whens)
+
+
 @dataclass(frozen=True)
 class Bearing:
     """Measurements that bear on a claim, and what theory says they should be."""

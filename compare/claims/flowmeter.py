@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import analytic
-from compare.claims.claim import Bearing, Claim, Text, When, given
+from compare.claims.claim import Bearing, Claim, Text, When, every, given
 from compare.claims.judge import remembered
 from compare.claims.stationary import (
-    both,
     cases,
     detected,
     from_floor,
@@ -29,7 +28,7 @@ def _slope(p: Parameters, case: Case) -> float:
 
 def _slopes(by: str, predict: Callable[[Measurement], float], function: str, *cases: Case) -> Bearing:
     """Slopes measured in one way, in units of the slope of rolling."""
-    when = both(given(by=by), is_in(*cases))
+    when = every(given(by=by), is_in(*cases))
     return Bearing("slope", "slope", predict, when=when, size=lambda m: 1.0, by=f"analytic.{function}")
 
 
@@ -127,8 +126,8 @@ CLAIMS = (
         "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, from rest the ball "
         "slips (η < j), and on the wall it stays (η > j).",
         (
-            _settled("case", _only_rolling, both(both(from_floor, _flows), slips_first)),
-            _settled("case", _only_rolling, both(_stays, lifts_first)),
+            _settled("case", _only_rolling, every(from_floor, _flows, slips_first)),
+            _settled("case", _only_rolling, every(_stays, lifts_first)),
             _settled("omega_c", _reads_flow, _stays),
         ),
     ),

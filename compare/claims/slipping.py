@@ -9,7 +9,7 @@ import numpy as np
 
 from analytic import slip_bounds, slip_stability
 from analytic.slip_bounds import HeldBound, SlipBound
-from compare.claims.claim import Bearing, Claim, Outcome, Text, given
+from compare.claims.claim import Bearing, Claim, Outcome, Text, When, every, given
 from compare.measure.check import Relation
 from compare.measure.field import slip_unit
 from compare.measure.record import Measurement, state
@@ -37,7 +37,7 @@ def _arrow(m: Measurement) -> Arrow:
     return Case[str(m.conditions["inner"])], Case[str(m.conditions["outer"])]
 
 
-def _along(arrow: Arrow, *by: str) -> Callable[[Measurement], bool]:
+def _along(arrow: Arrow, *by: str) -> When:
     """Chooses slips along an arrow that were measured in one of some ways."""
     return lambda m: _arrow(m) == arrow and m.conditions.get("by", "") in by
 
@@ -87,14 +87,11 @@ def _bound(
 
     `side` is the sign of n_z where that makes another bound; `from_rest`: the zero is 0 or nearly so.
     """
-    on_line = _along(arrow, by)
-
-    def when(m: Measurement) -> bool:
-        return on_line(m) and (not side or m.conditions["n_z"] == side)
 
     def natural(m: Measurement) -> float:
         return m.parameters.g / m.parameters.R
 
+    when = every(_along(arrow, by), given(n_z=side)) if side else _along(arrow, by)
     power, size = "_square" if by == "stationary" else "", natural if from_rest else None
     return (
         Bearing("bounds", f"gamma_zero{power}", lambda m: bound(m).zero, when=when, size=size, by="slip_bounds"),

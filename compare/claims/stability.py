@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import analytic
 from analytic import StationarySolution
-from compare.claims.claim import Bearing, Claim, Text, given
+from compare.claims.claim import Bearing, Claim, Text, every, given
 from compare.claims.judge import remembered
 from compare.measure.check import Relation
 from compare.measure.rates import natural_size
@@ -72,11 +72,11 @@ def _bearings(case: Case) -> tuple[Bearing, ...]:
 
 def _slowest(grows: bool) -> Bearing:
     """The slowest decay of SR is one above omega_03 and none below."""
-    leans = given(case="SR", mode=1)
 
-    def when(m: Measurement) -> bool:
-        return leans(m) and bool(m.parameters.omega_0 < analytic.thresholds(m.parameters).omega_03) is grows
+    def there(m: Measurement) -> bool:
+        return bool(m.parameters.omega_0 < analytic.thresholds(m.parameters).omega_03) is grows
 
+    when = every(given(case="SR", mode=1), there)
     relation, by = Relation.AT_MOST if grows else Relation.AT_LEAST, "analytic.thresholds: omega_03"
     return Bearing("rates", "decay_rate", lambda m: 0.0, when=when, size=_size, relation=relation, by=by)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 
 import analytic
 from analytic import StationarySolution, bifurcation
-from compare.claims.claim import Bearing, Claim, Text, When, given
+from compare.claims.claim import Bearing, Claim, Text, When, every, given
 from compare.claims.judge import remembered
 from compare.measure.record import Measurement
 from compare.measure.settling import FORCES, SUMS, family, scale
@@ -129,11 +129,6 @@ def is_in(*cases: Case) -> When:
     return lambda m: detected(m) in cases
 
 
-def both(one: When, other: When) -> When:
-    """Chooses what both choose."""
-    return lambda m: one(m) and other(m)
-
-
 def slips_first(m: Measurement) -> bool:
     """Whether eta < j: slip ends rolling."""
     return m.parameters.eta < m.parameters.j
@@ -154,7 +149,9 @@ def _cases(when: When) -> Bearing:
 
 
 def _with_fluid(when: When = lambda m: True) -> Bearing:
-    return Bearing("settled", "case", rolling, when=both(given(start="with the fluid"), when), by="analytic.thresholds")
+    return Bearing(
+        "settled", "case", rolling, when=every(given(start="with the fluid"), when), by="analytic.thresholds"
+    )
 
 
 def _plane(figure: str, source: str, axis: str) -> Claim:
@@ -168,7 +165,7 @@ def _plane(figure: str, source: str, axis: str) -> Claim:
 
 
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
-_LEANS = both(_LIFTED, from_floor)
+_LEANS = every(_LIFTED, from_floor)
 _STATE = (*MOTION, *FORCES)
 
 CLAIMS = (
@@ -183,7 +180,7 @@ CLAIMS = (
         "prop-1-rough",
         "Prop. 1, (83), (86)",
         "With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
-        (*bearings(("omega_c",), both(lifts_first, _ROLLS), by="(32)"), _with_fluid(lifts_first)),
+        (*bearings(("omega_c",), every(lifts_first, _ROLLS), by="(32)"), _with_fluid(lifts_first)),
     ),
     Claim(
         "prop-2-forces",
@@ -239,8 +236,8 @@ DIAGRAMS = (
         "Fig. 10",
         "For η < j the spins on the wall in rolling, slipping and in the lifted state join as drawn.",
         (
-            *bearings(("wall_spin",), both(slips_first, is_in(Case.RR, Case.SS)), by="(91)"),
-            *bearings(("wall_spin",), both(slips_first, _LEANS), leaning, by="(91)"),
+            *bearings(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), by="(91)"),
+            *bearings(("wall_spin",), every(slips_first, _LEANS), leaning, by="(91)"),
         ),
     ),
     Claim(
@@ -248,8 +245,8 @@ DIAGRAMS = (
         "Fig. 11",
         "For η > j rolling ends at ω₀₃ upon the state whose spin on the wall falls like 1/ω₀.",
         (
-            *bearings(("wall_spin",), both(lifts_first, _ROLLS), by="(91)"),
-            *bearings(("wall_spin",), both(lifts_first, _LEANS), leaning, by="(91)"),
+            *bearings(("wall_spin",), every(lifts_first, _ROLLS), by="(91)"),
+            *bearings(("wall_spin",), every(lifts_first, _LEANS), leaning, by="(91)"),
             _with_fluid(lifts_first),
         ),
     ),

@@ -8,22 +8,17 @@ from collections.abc import Callable
 import numpy as np
 
 import analytic
+from compare.claims.cases import simulated
 from compare.claims.claim import Bearing, Claim
-from compare.claims.judge import remembered
 from compare.measure.record import Measurement, state
 from compare.measure.settling import family
 from compare.measure.unloading import first_top
 from compare.statistics import Measured
-from model import Case, Contact, Parameters, Trajectory
+from model import Case, Contact, Trajectory
 
 SAMPLES = 2000
 STEPS = 100
 """Steps of the integrator up to an event, about, whose errors may be of one sign."""
-
-
-@remembered
-def _motion(p: Parameters, x0: tuple[float, ...], t_end: float) -> Trajectory:
-    return analytic.simulate(p, x0, t_end, sample_interval=t_end / SAMPLES)
 
 
 def _event(run: Trajectory, happens: Callable[[Case, Case], bool]) -> int:
@@ -65,7 +60,7 @@ def _case(m: Measurement) -> float:
 
 
 def _run(m: Measurement) -> Trajectory:
-    return _motion(m.parameters, state(m), float(m.conditions["duration"]))
+    return simulated(m.parameters, state(m), float(m.conditions["duration"]), SAMPLES)
 
 
 def _ends(start: str) -> Bearing:

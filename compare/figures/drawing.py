@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from compare.claims.claim import Verdict
 from compare.measure.check import Check
 from compare.measure.record import Measurement, Records
-from model import Trajectory, storage
+from model import Parameters, Trajectory, storage
 
 if TYPE_CHECKING:  # it takes half a second to load, and much that hands over material never draws
     from matplotlib.figure import Figure
@@ -24,14 +23,17 @@ class Motion:
     """A trajectory handed to a figure, by a name that stands for its content; it is read only to be drawn."""
 
     name: str
+    engine: str
+    p: Parameters
     load: Callable[[], Trajectory] = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True)
 class Material:
-    """What figures are made of: verdicts, measurements, and run files; without any, theory alone is drawn."""
+    """What figures are made of: judged numbers, measurements, and run files; without any, theory alone is drawn."""
 
-    verdicts: tuple[Verdict, ...] = ()
+    checks: Mapping[str, Sequence[Check]] = field(default_factory=dict)
+    """By the id of the claim on which they bear."""
     records: Records = Records()
     directory: Path = Path()
     """The results directory, where names of run files begin."""
@@ -40,38 +42,31 @@ class Material:
     frontier: tuple[Entry, ...] = ()
     """What methods reach, with their cost."""
 
-    @cached_property
-    def by_claim(self) -> Mapping[str, Verdict]:
-        """The verdicts by the id of their claim."""
-        return {verdict.claim.id: verdict for verdict in self.verdicts}
-
-    def checks(self, *claims: str) -> tuple[Check, ...]:
-        """All checks of some claims."""
-        return tuple(c for name in claims if name in self.by_claim for c in self.by_claim[name].checks)
-
-    def select(self, quantity: str, **conditions: Any) -> Iterator[Measurement]:
-        """Measurements of a quantity that have the given conditions; None stands for any value."""
-        for m in self.records.measurements:
-            if m.quantity == quantity and all(
-                name in m.conditions and value in (None, m.conditions[name]) for name, value in conditions.items()
-            ):
-                yield m
+    def select(self, quantity: str, *conditions: str) -> Iterator[Measurement]:
+        """Measurements of a quantity that have conditions of these names."""
+        named = set(conditions)
+        return (m for m in self.records.measurements if m.quantity == quantity and named <= m.conditions.keys())
 
     def motions(self, m: Measurement) -> list[Motion]:
         """The runs of a measurement whose files are there."""
-        paths = [self.directory / name for name in m.runs]
-        return [
-            Motion(name, lambda path=path: storage.load(path))  # type: ignore[misc]
-            for name, path in zip(m.runs, paths, strict=True)
-            if path.is_file()
-        ]
+        there = [name for name in m.runs if (self.directory / name).is_file()]
+        return [Motion(name, m.engine, m.parameters, partial(storage.load, self.directory / name)) for name in there]
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """A figure by its name, a parameter set, and what was measured with it."""
+
+    figure: str
+    p: Parameters
+    states: tuple[Measurement, ...] = ()
 
 
 class GapError(Exception):
     """Why a figure can't be drawn, in a sentence for the reader."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Drawing:
     """One figure: a record of the registry."""
 

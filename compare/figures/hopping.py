@@ -5,13 +5,11 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -25,7 +23,7 @@ from model.kinematics import VARIABLES
 
 _PAIRS = (("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0"))
 _CELLS = 8
-_LABELS = {"mu": "μ", "eta": "η", "kappa": "κ", "Omega_0": "$Ω_0 = ω_0\\sqrt{R/g}$", "j": "j"}
+_AXES, _SYMBOLS = style.SYMBOLS | {"Omega_0": style.FREE_0}, style.SYMBOLS | {"Omega_0": "Ω₀"}
 _COLOURS = ("#F0E442", "#0072B2", "#D55E00", "#009E73", "#000000")
 """Of `FATES`."""
 
@@ -51,7 +49,8 @@ def draw_where(record: Searched) -> Figure:
             own = [r for r in rows if (r["confirmed"]["landings"] == 1) is simple]
             label = "one landing a period" if simple else "several, or no period"
             axes.plot([r[a] for r in own], [r[b] for r in own], mark, ms=3.2, mfc="none", color=colour, label=label)
-        _scales(axes, a, b)
+        x, y = ("log" if name in LOGARITHMIC else "linear" for name in (a, b))
+        axes.set(xlabel=_AXES[a], ylabel=_AXES[b], xscale=x, yscale=y)
     style.legend(figure.axes[0], loc="upper left", fontsize=7.5)
     return figure
 
@@ -60,27 +59,20 @@ def _edges(name: str, low: float, high: float) -> np.ndarray:
     return (np.geomspace if name in LOGARITHMIC else np.linspace)(low, high, _CELLS + 1)
 
 
-def _scales(axes: Axes, a: str, b: str) -> None:
-    axes.set(xlabel=_LABELS[a], ylabel=_LABELS[b])
-    if a in LOGARITHMIC:
-        axes.set_xscale("log")
-    if b in LOGARITHMIC:
-        axes.set_yscale("log")
-
-
 def caption_where(record: Searched) -> str:
     """What was found, and the share with its confidence."""
-    count = len(record.confirmed)
-    low, high = interval(count, record.sets)
-    box = ", ".join(
-        f"{_LABELS.get(k, k).split(' =')[0].strip('$')} {a:g} … {b:.3g}" for k, (a, b) in record.search.box.items()
-    )
+    count, search = len(record.confirmed), record.search
+    box = ", ".join(f"{_SYMBOLS.get(name, name)} {a:g} … {b:.3g}" for name, (a, b) in search.box.items())
     return (
-        f"Sets in which the ball hops for ever from some of {record.search.starts} random starts, found by time "
+        f"Sets in which the ball hops for ever from some of {search.starts} random starts, found by time "
         f"stepping and confirmed by the event-driven simulation: {count} of {record.sets} sets, "
-        f"{100 * count / record.sets:.2f} % ({100 * low:.2f} to {100 * high:.2f} % with 95 % confidence). Box: {box}. "
-        "r/R plays no part, as it drops out of the equations."
+        f"{_share(count, record.sets)}. Box: {box}. r/R plays no part, as it drops out of the equations."
     )
+
+
+def _share(hits: int, of: int) -> str:
+    low, high = interval(hits, of)
+    return f"{100 * hits / of:.2f} % ({100 * low:.2f} to {100 * high:.2f} % with 95 % confidence)"
 
 
 def plane(material: object) -> Basins:
@@ -92,18 +84,8 @@ def draw_plane(basins: Basins) -> Figure:
     """The map by time stepping, and a point for each run of MuJoCo."""
     figure = style.figure(6.2, 4.4)
     axes = figure.subplots()
-    colours = ListedColormap([*_COLOURS])
-    axes.pcolormesh(
-        basins.x,
-        basins.y,
-        basins.fates,
-        cmap=colours,
-        vmin=-0.5,
-        vmax=len(FATES) - 0.5,
-        alpha=0.55,
-        shading="nearest",
-        rasterized=True,
-    )
+    look: dict[str, Any] = {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": len(FATES) - 0.5, "alpha": 0.55}
+    axes.pcolormesh(basins.x, basins.y, basins.fates, shading="nearest", rasterized=True, **look)
     present = set(np.unique(basins.fates)) | set(np.unique(basins.mujoco))
     handles: list[object] = [Patch(color=_COLOURS[k], alpha=0.55, label=FATES[k]) for k in sorted(present)]
     if basins.coarse:
@@ -115,44 +97,32 @@ def draw_plane(basins: Basins) -> Figure:
         if np.any(differ):
             handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
         handles += axes.plot([], [], "o", ms=4, color="white", mec="k", mew=0.6, label="MuJoCo")
-    axes.set(xlabel=f"{_SYMBOLS[basins.across]} at the start", ylabel=f"{_SYMBOLS[basins.up]} at the start")
+    axes.set(xlabel=f"{_VARIABLES[basins.across]} at the start", ylabel=f"{_VARIABLES[basins.up]} at the start")
     axes.legend(handles=handles, fontsize=8, loc="upper left", framealpha=0.95)
     return figure
 
 
-_SYMBOLS = {
-    "omega_c": style.OMEGA_C, "slip_x": "$\\tilde\\omega_x$ (rad/s)", "slip_y": "$\\tilde\\omega_y$ (rad/s)",
-    "slip_z": "$\\tilde\\omega_z$ (rad/s)", "y": "y (m)", "v_y": "$v_y$ (m/s)", "h": "h (m)", "v_h": "$v_h$ (m/s)",
-}  # fmt: skip
+_VARIABLES = {
+    "omega_c": style.OMEGA_C,
+    **{f"slip_{axis}": f"$\\tilde\\omega_{axis}$ (rad/s)" for axis in "xyz"},
+    **{"y": "y (m)", "v_y": "$v_y$ (m/s)", "h": "h (m)", "v_h": "$v_h$ (m/s)"},
+}
 
 
 def caption_plane(basins: Basins) -> str:
     """The parameters, the other variables, shares with confidence, and where the two engines differ."""
     p = basins.parameters
-    fixed = ", ".join(f"{n} = {v:.3g}" for n, v in _fixed(basins))
+    others = {n: v for n, v in zip(VARIABLES, basins.start, strict=True) if n not in (basins.across, basins.up)}
+    fixed = ", ".join(f"{n} = {v:.3g}" for n, v in others.items() if v)
+    shares = "; ".join(f"{fate} {_share(*basins.share(fate))}" for fate in FATES if basins.share(fate)[0])
     text = (
         f"What becomes of a ball that starts on a plane of states ({fixed}; all others zero). "
-        f"{style.named(p)}, Ω₀ = {p.omega_0 * math.sqrt(p.R / p.g):.3g}. Ground: time stepping, "
-        f"{basins.fates.size} starts: "
+        f"{style.named(p)}, Ω₀ = {p.Omega_0:.3g}. Ground: time stepping, {basins.fates.size} starts: {shares}."
     )
-    text += "; ".join(_share(basins, fate) for fate in FATES if basins.share(fate)[0])
-    if basins.coarse:
-        far = basins.differences()
-        text += f". Dots: MuJoCo at {1e3 * basins.timestep:g} ms; {len(far)} of {basins.mujoco.size} differ"
-        text += (
-            f", {np.sum(far <= 1)} of them next to a boundary, the others up to {far.max():g} cells away"
-            if len(far)
-            else ""
-        )
+    if not basins.coarse:
+        return text
+    far = basins.differences()
+    text += f" Dots: MuJoCo at {1e3 * basins.timestep:g} ms; {len(far)} of {basins.mujoco.size} differ"
+    if len(far):
+        text += f", {np.sum(far <= 1)} of them next to a boundary, the others up to {far.max():g} cells away"
     return text + "."
-
-
-def _fixed(basins: Basins) -> Sequence[tuple[str, float]]:
-    varied = (basins.across, basins.up)
-    return [(n, v) for n, v in zip(VARIABLES, basins.start, strict=True) if v != 0 and n not in varied]
-
-
-def _share(basins: Basins, fate: str) -> str:
-    hits, of = basins.share(fate)
-    low, high = interval(hits, of)
-    return f"{fate} {100 * hits / of:.1f} % ({100 * low:.1f} to {100 * high:.1f} % with 95 % confidence)"

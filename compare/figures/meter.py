@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,16 +11,9 @@ from matplotlib.figure import Figure
 from analytic import flowmeter
 from analytic.design import THRESHOLDS, Design
 from compare.figures import style
-from model import Case, Parameters
+from model import Case
 
-_LABELS = {
-    "gravity": "gravity",
-    "mu": "$\\mu$",
-    "eta": "$\\eta$",
-    "rho_b": "$\\rho_b$",
-    "rho_f": "$\\rho_f$",
-    "nu_f": "$\\nu_f$",
-}
+_LABELS = {name: f"$\\{name}$" for name in ("mu", "eta", "rho_b", "rho_f", "nu_f")} | {"gravity": "gravity"}
 _LINES = {"omega_01": Case.SS, "omega_02": Case.NR, "omega_03": Case.SR, "omega_04": Case.NS}
 """Each threshold by the colour of the case that begins there."""
 _FINE = 51
@@ -28,26 +22,16 @@ _FINE = 51
 
 def characteristic(made: Design) -> Figure:
     """Reading over flow, with the band of the tolerances, the flows to measure and the limits."""
-    curve, chosen = made.curve, made.choice
+    curve, chosen, request = made.curve, made.choice, made.request
     figure = style.figure(7.0, 4.3)
     axes = figure.add_subplot()
-    flows = np.append(0.0, curve.omega_0)
-    low, high = (np.append(0.0, each) for each in curve.meant)
-    below, above = (np.append(0.0, each) for each in curve.band)
+    flows, low, high, below, above = (np.append(0.0, each) for each in (curve.omega_0, *curve.meant, *curve.band))
     axes.fill_between(flows, below, above, color="0.82", lw=0, label="within the tolerances")
     axes.plot(flows, low, color=style.COLOURS[Case.SS], lw=2, label="as meant, rising flow")
     axes.plot(flows, high, color=style.COLOURS[Case.NR], lw=2, ls="--", label="as meant, falling flow")
-    axes.axvspan(
-        made.request.slowest, made.request.fastest, color="#0072B2", alpha=0.12, lw=0, label="flows to measure"
-    )
-    axes.axvspan(
-        chosen.worst.omega_0,
-        chosen.limit.omega_0,
-        color=style.FORCE,
-        alpha=0.25,
-        lw=1,
-        label="limit, from at worst to as meant",
-    )
+    axes.axvspan(request.slowest, request.fastest, color="#0072B2", alpha=0.12, lw=0, label="flows to measure")
+    limit: dict[str, Any] = {"color": style.FORCE, "alpha": 0.25, "lw": 1, "label": "limit, from at worst to as meant"}
+    axes.axvspan(chosen.worst.omega_0, chosen.limit.omega_0, **limit)
     axes.set(xlim=(0, flows[-1]), ylim=(0, None), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {key: getattr(made.thresholds, key) for key in THRESHOLDS})
     style.legend(axes, loc="upper left")
@@ -70,7 +54,7 @@ def sensitivities(made: Design) -> Figure:
     axes.set_xticks(range(len(names)), [_LABELS.get(name, f"${name}$") for name in names])
     axes.set_ylabel("% of the threshold per %")
     axes.grid(axis="y", alpha=0.25)
-    figure.legend(loc="outside upper center", ncols=len(there), fontsize=8.5, frameon=False)
+    style.legend(figure, loc="outside upper center", ncols=len(there))
     return figure
 
 
@@ -79,7 +63,7 @@ def friction(made: Design) -> Figure:
     chosen = made.choice
     top = {name: max(1.5 * chosen.values[name], 1.25 * chosen.p.j) for name in ("mu", "eta")}
     mu, eta = (np.linspace(top[name] / 50, top[name], _FINE) for name in ("mu", "eta"))
-    limits = [[flowmeter.operating_range(_rubbed(chosen.p, m, e)) for e in eta] for m in mu]
+    limits = [[flowmeter.operating_range(chosen.p.replace(mu=float(m), eta=float(e))) for e in eta] for m in mu]
     figure = style.figure(7.0, 4.3)
     axes = figure.add_subplot()
     shown = axes.contourf(eta, mu, limits, levels=14, cmap="cividis")
@@ -91,10 +75,6 @@ def friction(made: Design) -> Figure:
     axes.errorbar(x, y, yerr, xerr, fmt="o", color="white", mec="black", ms=7, capsize=4)
     axes.set(xlabel="wall friction $\\eta$", ylabel="floor friction $\\mu$")
     return figure
-
-
-def _rubbed(p: Parameters, mu: float, eta: float) -> Parameters:
-    return p.replace(mu=float(mu), eta=float(eta))
 
 
 FIGURES: tuple[tuple[Callable[[Design], Figure], str], ...] = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,7 +56,7 @@ class Plane:
 
 def select(material: Material, figure: str) -> Plane:
     """The plane of the measured points of a figure, "fig-7" or "fig-8"; of several sets the first."""
-    checks = [c for c in material.checks(figure) if c.measurement.quantity in ("case", "cases")]
+    checks = material.checks.get(figure, ())
     chosen = tuple(c for c in checks if c.measurement.set == checks[0].measurement.set)
     return Plane(chosen[0].measurement.parameters if chosen else _THEORY, figure == "fig-8", chosen)
 
@@ -98,8 +98,8 @@ def draw(plane: Plane) -> Figure:
     _points(axes, plane)
     friction = "friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$"
     axes.set(xlabel=friction, ylabel=style.OMEGA_0, xlim=(0, _WIDEST), ylim=(0, fastest))
-    figure.legend(loc="outside lower center", fontsize=8, ncols=6, frameon=False, handlelength=2.6)
-    style.dimensionless_y(axes, p, style.UP_TO_UNITS)
+    style.legend(figure, loc="outside lower center", ncols=6, handlelength=2.6)
+    style.dimensionless(axes, p, y=style.FREE_0)
     return figure
 
 
@@ -156,13 +156,12 @@ def _far_label(axes: Axes, here: tuple[float, float], text: str) -> None:
 
 
 def _points(axes: Axes, plane: Plane) -> None:
-    for engine in dict.fromkeys(check.measurement.engine for check in plane.checks):
-        x, y = _places(check for check in plane.checks if check.measurement.engine == engine)
-        axes.plot(x, y, ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
+    for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items():
+        axes.plot(*_places(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
     if failed := [check for check in plane.checks if not check.agrees]:
         axes.plot(*_places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
 
 
-def _places(checks: Iterable[Check]) -> Array:
+def _places(checks: Sequence[Check]) -> Array:
     """Wall friction and flow of each, (2, n)."""
     return np.transpose([(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -23,21 +23,13 @@ _LASTS = 0.012
 """Time that Fig. 5 shows, s."""
 
 
-@dataclass(frozen=True)
-class Push:
-    """A push and the motion after it."""
-
-    p: Parameters
-    motion: Motion
-
-
-def select(_: Material, figure: str) -> Push:
+def select(_: Material, figure: str) -> Motion:
     """The motion of the event-driven simulation, which starts in the formal stationary state of NR."""
     p = FLOWS[figure]
-    return Push(p, Motion(f"{p}, {SLIP}, {BETA}", lambda: scenarios.slip_perturbation(p, SLIP, BETA, t_end=_LASTS)))
+    return Motion(f"{SLIP}, {BETA}", "event", p, partial(scenarios.slip_perturbation, p, SLIP, BETA, t_end=_LASTS))
 
 
-def caption(push: Push) -> str:
+def caption(push: Motion) -> str:
     """Of either figure."""
     p = push.p
     stable = p.eta * p.Omega_0**2 > 1
@@ -50,9 +42,9 @@ def caption(push: Push) -> str:
     )
 
 
-def draw(push: Push) -> Figure:
+def draw(push: Motion) -> Figure:
     """Slip at the wall over time, and its path in the orthogonal plane (55)."""
-    run = push.motion.load()
+    run = push.load()
     figure = style.figure(8.4, 3.3)
     time, plane = figure.subplots(1, 2)
     stops = len(run.events) > 0 and run.cases[-1] is Case.NR
@@ -72,12 +64,8 @@ def draw(push: Push) -> Figure:
     plane.plot(w_z, w_y, color="black", lw=1.4)
     plane.plot([w_z[0], 0], [w_y[0], 0], **style.GUIDE)
     halfway = int(np.searchsorted(np.hypot(np.diff(w_z), np.diff(w_y)).cumsum(), 0.5 * SLIP))
-    plane.annotate(
-        "",
-        (w_z[halfway + 1], w_y[halfway + 1]),
-        (w_z[halfway], w_y[halfway]),
-        arrowprops={"arrowstyle": "-|>", "color": "black", "mutation_scale": 14},
-    )
+    tail, head = zip(w_z[halfway : halfway + 2], w_y[halfway : halfway + 2], strict=True)
+    plane.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": "black", "mutation_scale": 14})
     plane.plot(w_z[0], w_y[0], "kx", ms=7, mew=1.8)
     style.mark(plane, 0.0, 0.0, "NR", (6, -6))
     plane.set(xlabel="$\\tilde\\omega_z$ (rad/s)", ylabel="$\\tilde\\omega_y$ (rad/s)")

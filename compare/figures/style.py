@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
 
+import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from compare.measure.record import Measurement
 from compare.runs.engines import ENGINES
-from model import Case, Parameters
+from model import Case, Parameters, Trajectory
 from model.drag import STOKES
 
+T = TypeVar("T")
 COLOURS = {
     Case.RR: "#0072B2",
     Case.RS: "#56B4E9",
@@ -28,8 +31,11 @@ COLOURS = {
 """Okabe and Ito's colours, told apart by colour-blind readers; names beside the curves tell them apart in print."""
 FORCE, SLIP, BALL, INK = "#b3261e", "#6a3d9a", "#f5cc6b", "#1c2430"
 """Of pictures and films: arrows of force and slip, the ball, text."""
+Line = str | tuple[object, ...]
 STABLE, UNSTABLE = "-", (0, (5, 2.5))
 """Line styles."""
+Place = tuple[float, tuple[float, float]]
+"""Where the name of a curve stands: at a share of its length, with an offset in points."""
 GUIDE: dict[str, Any] = {"color": "0.55", "lw": 0.8, "ls": ":", "zorder": 0}
 """Lines that only help the eye."""
 POINT: dict[str, Any] = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none", "zorder": 5}
@@ -38,12 +44,13 @@ HALO: dict[str, Any] = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none
 """Ground of a name that stands on lines."""
 _TEXT: dict[str, Any] = {"fontsize": 9, "bbox": HALO}
 OMEGA_0, OMEGA_C, OMEGA_X = "$\\omega_0$ (rad/s)", "$\\omega_c$ (rad/s)", "$\\omega_x^0$ (rad/s)"
-UP_TO_UNITS = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$"
+FREE_0, FREE_C = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$", "$\\Omega_c = \\omega_c\\sqrt{R/g}$"
+FREE_X = "$\\omega_x^0\\sqrt{R/g}$"
 THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
-SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "c": "c", "omega_0": "ω₀"}
+SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
 
 
-def figure(width: float = 5.0, height: float = 3.6) -> Figure:
+def figure(width: float, height: float) -> Figure:
     """An empty figure in inches, sized for a column of print, with room for all labels."""
     return Figure(figsize=(width, height), layout="constrained")
 
@@ -56,22 +63,43 @@ def named(p: Parameters, *names: str) -> str:
     return ", ".join(values)
 
 
-def dimensionless_x(axes: Axes, p: Parameters) -> None:
-    """A second scale at the top: angular velocity in units of sqrt(g/R)."""
-    axes.secondary_xaxis("top", functions=_scale(p)).set_xlabel(UP_TO_UNITS)
+def marks(states: Sequence[Measurement]) -> str:
+    """What a caption says of measured points; nothing where there are none."""
+    many = f" Marks: {len(states)} measured numbers; three standard uncertainties are smaller than most marks."
+    return many if states else ""
 
 
-def dimensionless_y(axes: Axes, p: Parameters, label: str) -> None:
-    """A second scale on the right: angular velocity in units of sqrt(g/R)."""
-    axes.secondary_yaxis("right", functions=_scale(p)).set_ylabel(label)
-
-
-def _scale(p: Parameters) -> tuple[Any, Any]:
+def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:
+    """Second scales, at the top and on the right if they are named: angular velocity in units of sqrt(g/R)."""
     unit = math.sqrt(p.g / p.R)
-    return lambda w: w / unit, lambda W: W * unit
+    scale: Any = (lambda w: w / unit, lambda W: W * unit)
+    if x:
+        axes.secondary_xaxis("top", functions=scale).set_xlabel(x)
+    if y:
+        axes.secondary_yaxis("right", functions=scale).set_ylabel(y)
 
 
-def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (6, 6)) -> None:
+def curve(
+    axes: Axes,
+    case: Case,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    text: str = "",
+    place: Place | None = None,
+    line: Line = STABLE,
+) -> None:
+    """A line of theory (n,) in the colour of its case, where y is a number, and its name if that has a place."""
+    axes.plot(x, y, color=COLOURS[case], ls=line, lw=2)
+    if place:
+        points, (at, offset) = np.transpose([x, y]), place
+        steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))
+        way = steps.cumsum()
+        k = int(np.searchsorted(way, at * way[-1]))
+        here_x, here_y = points[k + 1] - (way[k] - at * way[-1]) / steps[k] * (points[k + 1] - points[k])
+        name(axes, here_x, here_y, text, offset, COLOURS[case])
+
+
+def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float]) -> None:
     """A black dot with its name beside it, `offset` in points."""
     axes.plot([x], [y], **POINT)
     name(axes, x, y, text, offset)
@@ -106,20 +134,55 @@ def mark_of(engine: str) -> dict[str, Any]:
     return {"marker": given.mark if given else "D", "color": given.colour if given else "0.3", "mfc": "white"}
 
 
-def points(axes: Axes, states: Sequence[Measurement], lift: float = 0.0, way: str = "", **look: Any) -> None:
-    """Measured values over omega_0 by engine, drawn higher by `lift`; capped bars of three standard uncertainties."""
-    for engine in dict.fromkeys(m.engine for m in states):
-        own = [m for m in states if m.engine == engine]
-        omegas, values = [m.parameters.omega_0 for m in own], [m.value + lift for m in own]
-        bars = [3 * m.uncertainty for m in own]
-        usual = {"ms": 5, "label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4}
-        axes.errorbar(omegas, values, yerr=bars, ls="none", **mark_of(engine) | usual | look)
+def by_engine(rows: Iterable[T], engine: Callable[[T], str]) -> dict[str, list[T]]:
+    """Rows by the name of their engine."""
+    sorted_out: dict[str, list[T]] = {}
+    for row in rows:
+        sorted_out.setdefault(engine(row), []).append(row)
+    return sorted_out
 
 
-def legend(axes: Axes, **where: Any) -> None:
-    """A legend that names everything once, if there is anything to name."""
-    handles, labels = axes.get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
+def omega_0(m: Measurement) -> float:
+    """The flow at which something was measured, rad s-1."""
+    return m.parameters.omega_0
+
+
+def points(
+    axes: Axes,
+    rows: Iterable[Measurement],
+    x: Callable[[Measurement], float] = omega_0,
+    y: Callable[[Measurement], float] = lambda m: m.value,
+    unit: float = 1.0,
+    way: str = "",
+    **look: Any,
+) -> None:
+    """Measured values, one `unit` each, by engine; capped bars of three standard uncertainties."""
+    for engine, own in by_engine(rows, lambda m: m.engine).items():
+        usual = {"ms": 5, "label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
+        bars = [3 * unit * m.uncertainty for m in own]
+        axes.errorbar([x(m) for m in own], [unit * y(m) for m in own], bars, **mark_of(engine) | usual | look)
+
+
+def legend(of: Axes | Figure, **where: Any) -> None:
+    """A legend that names everything once, if there is anything to name; of a figure it stands outside the panels."""
+    once: dict[str, Any] = {}
+    for axes in of.axes if isinstance(of, Figure) else [of]:
+        handles, labels = axes.get_legend_handles_labels()
+        once |= dict(zip(labels, handles, strict=True))
     if once:
-        given: dict[str, Any] = {"fontsize": 8.5, "framealpha": 0.95} | where
-        axes.legend(list(once.values()), list(once), **given)
+        usual = {"frameon": False, "fontsize": 8} if isinstance(of, Figure) else {"framealpha": 0.95, "fontsize": 8.5}
+        of.legend(list(once.values()), list(once), **usual | where)
+
+
+def ground(
+    axes: Axes, run: Trajectory, span: tuple[float, float], unit: float = 1.0, origin: float = 0.0, named: bool = True
+) -> None:
+    """Shade each stretch of a span of time in the colour of its case, and name it above where there is room."""
+    stretches = run.phases()
+    for (case, first, _), (_, last, _) in zip(stretches, [*stretches[1:], (None, run.time[-1], 0.0)], strict=True):
+        low, high = max(first, span[0]), min(last, span[1])
+        if low < high:
+            x = unit * (np.array([low, high]) - origin)
+            axes.axvspan(*x, color=COLOURS[case], alpha=0.15, lw=0)
+            if named and high - low > 0.04 * (span[1] - span[0]):
+                axes.text(x.mean(), 1.02, case.name, transform=axes.get_xaxis_transform(), ha="center", fontsize=8)

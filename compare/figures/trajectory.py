@@ -1,4 +1,4 @@
-"""One run over time: orbit, slip, gaps, forces and the case."""
+"""One run over time: orbit, slip, gaps and forces, on the case."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from model import Trajectory
 
 
 def draw(trajectory: Trajectory) -> Figure:
-    """omega_c, slip, gaps and forces over time, with the case as a band."""
+    """omega_c, slip, gaps and forces over time; grounds in the colour of the case, named above."""
     t, p = trajectory.time, trajectory.header.parameters
-    figure = style.figure(9, 9)
-    orbit, slip, gap, force, band = figure.subplots(5, sharex=True, height_ratios=[3, 3, 2, 3, 0.6])
-    orbit.plot(t, trajectory.header.flow(t), color="0.6", ls="--", label="ω₀")
-    orbit.plot(t, trajectory.omega_c, color="#0072B2", label="ω_c")
-    orbit.set_ylabel("orbit (rad/s)")
-    colours = {"ω̃ₓ": "#D55E00", "ω̃ᵧ": "#009E73", "ω̃_z": "#CC79A7"}
-    for values, (symbol, colour) in zip(trajectory.x[:, 3:6].T, colours.items(), strict=True):
-        slip.plot(t, values, label=symbol, color=colour)
-    slip.set_ylabel("slip (rad/s)")
-    gap.plot(t, 1e3 * trajectory.y, color="#0072B2", label="y (floor)")
-    gap.plot(t, 1e3 * trajectory.h, color="#E69F00", ls="--", label="h (wall)")
-    gap.set_ylabel("gap (mm)")
-    force.plot(t, trajectory.force_A[:, 1], color="#0072B2", label="A_y")
-    force.plot(t, np.hypot(*trajectory.force_A[:, [0, 2]].T), color="#0072B2", ls=":", label="friction at A")
-    force.plot(t, trajectory.force_B[:, 0], color="#E69F00", label="B_x")
-    force.plot(t, np.hypot(*trajectory.force_B[:, [1, 2]].T), color="#E69F00", ls=":", label="friction at B")
-    force.set_ylabel("force (N)")
-    for case, start, end in trajectory.phases():
-        band.axvspan(start, end, color=style.COLOURS[case], lw=0)
-        if t[-1] > 0 and end - start > 0.04 * t[-1]:
-            band.text((start + end) / 2, 0.5, case.name, ha="center", va="center", fontsize=8, color="white")
-    band.set_yticks([])
-    band.set_ylabel("case", rotation=0, ha="right", va="center")
-    band.set_xlabel("time (s)")
-    for axes in (orbit, slip, gap, force):
-        axes.legend(fontsize=8, ncols=4, frameon=False)
+    friction_A, friction_B = np.hypot(*trajectory.force_A[:, [0, 2]].T), np.hypot(*trajectory.force_B[:, [1, 2]].T)
+    blue, green, orange, pink = "#0072B2", "#009E73", "#E69F00", "#CC79A7"
+    curves = {
+        "orbit (rad/s)": (("ω₀", trajectory.header.flow(t), "0.6", "--"), ("ω_c", trajectory.omega_c, blue, "-")),
+        "slip (rad/s)": (
+            ("ω̃ₓ", trajectory.slip_x, "#D55E00", "-"),
+            ("ω̃ᵧ", trajectory.slip_y, green, "-"),
+            ("ω̃_z", trajectory.slip_z, pink, "-"),
+        ),
+        "gap (mm)": (("y (floor)", 1e3 * trajectory.y, blue, "-"), ("h (wall)", 1e3 * trajectory.h, orange, "--")),
+        "force (N)": (
+            ("A_y", trajectory.force_A[:, 1], blue, "-"),
+            ("friction at A", friction_A, blue, ":"),
+            ("B_x", trajectory.force_B[:, 0], orange, "-"),
+            ("friction at B", friction_B, orange, ":"),
+        ),
+    }
+    figure = style.figure(9, 8.6)
+    panels = figure.subplots(4, sharex=True, height_ratios=[3, 3, 2, 3])
+    for axes, (label, lines) in zip(panels, curves.items(), strict=True):
+        for name, values, colour, line in lines:
+            axes.plot(t, values, color=colour, ls=line, label=name)
+        style.ground(axes, trajectory, (t[0], t[-1]), named=axes is panels[0])
+        axes.set(ylabel=label, xlim=t[[0, -1]])
         axes.grid(alpha=0.3)
+        style.legend(axes, ncols=4)
+    panels[-1].set_xlabel("time (s)")
     set_ = f"μ = {p.mu:g}, η = {p.eta:g}, j = {p.j:g}, c = {p.c:g} 1/s"
     figure.suptitle(f"{trajectory.header.engine}: {set_}", fontsize=11)
     return figure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -13,13 +14,12 @@ from matplotlib.ticker import NullFormatter
 
 import analytic
 from analytic import bifurcation, pulsation, response
-from compare.claims.unsteady import ramp_end
 from compare.figures import style
 from compare.figures.bifurcation_diagrams import slipping
 from compare.figures.drawing import Material, Motion
 from compare.measure.record import Measurement
-from compare.measure.unsteady import JUMP
-from model import Case, Flow, Parameters
+from compare.measure.unsteady import JUMP, caught_up
+from model import Case, Flow, Parameters, Trajectory
 
 SET = "reference"
 REFERENCE = Parameters.named(SET)
@@ -54,8 +54,12 @@ class Measurements:
 def select(material: Material, figure: str) -> Measurements:
     """The measurements of a protocol; for the jumps their runs, too."""
     own = tuple(m for m in material.records.measurements if m.protocol == figure and m.set == SET)
-    jumped = [m for m in own if m.quantity == "jump_height"]
-    return Measurements(own, tuple(material.motions(jumped[0])) if jumped else ())
+    runs = [motion for m in own if m.quantity == "jump_height" for motion in material.motions(m)]
+    return Measurements(own, tuple(runs[:2]))
+
+
+def _at(name: str) -> Callable[[Measurement], float]:
+    return lambda m: float(m.conditions[name])
 
 
 @cache
@@ -69,13 +73,13 @@ def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
 def caption_pulsation(of: Measurements) -> str:
     """Of gain, phase, onset of slip and mean error."""
     p = of.mean
-    text = (
+    return (
         f"A ball in a flow that pulsates about ω₀ = {p.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, where it "
         f"rolls at both points (RR) and, dashed, where it slips at both (SS, about {FLOWS[1]:g} rad/s). Right: the "
         "amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast pulsations; "
         f"and the error of its mean reading when the amplitude is half as much again. {style.named(p)}."
+        f"{style.marks(of.rows)}"
     )
-    return text + (" Marks: measured, three standard uncertainties smaller than the marks." if of.rows else "")
 
 
 def draw_pulsation(of: Measurements) -> Figure:
@@ -86,12 +90,11 @@ def draw_pulsation(of: Measurements) -> Figure:
     f = np.geomspace(*DECADES, 400)
     for q, case, line in ((p, Case.RR, "-"), (REFERENCE.replace(omega_0=FLOWS[1]), Case.SS, "--")):
         ratio = response.transfer(q, case, f)
-        gain.loglog(f, np.abs(ratio), color=style.COLOURS[case], ls=line, lw=2)
-        phase.plot(f, -np.degrees(np.unwrap(np.angle(ratio))), color=style.COLOURS[case], ls=line, lw=2)
+        style.curve(gain, case, f, np.abs(ratio), line=line)
+        style.curve(phase, case, f, -np.degrees(np.unwrap(np.angle(ratio))), line=line)
         style.name(gain, f[60], abs(ratio[60]), case.name, (0, -8), style.COLOURS[case])
     frequencies, onsets, errors = _theory(p)
-    onset.loglog(frequencies, onsets, color=style.COLOURS[Case.RR], lw=2)
-    onset.margins(y=0.12)
+    style.curve(onset, Case.RR, frequencies, onsets)
     for limit, text, at, shift in (
         (pulsation.slow_onset(p), "limit of slow pulsations", 1.0, 3),
         (pulsation.fast_onset(p), "limit of fast pulsations", 0.12, -3),
@@ -99,35 +102,32 @@ def draw_pulsation(of: Measurements) -> Figure:
         onset.axhline(limit, **style.GUIDE)
         style.name(onset, at, limit, text, (0, shift))
     error.plot(frequencies, errors, ".-", color=style.COLOURS[Case.SS], lw=1.5, ms=5)
-    _marks(gain, of.of("gain"))
-    _marks(phase, of.of("phase_lag"), 180 / math.pi)
-    _marks(onset, of.of("slip_amplitude"))
-    _marks(error, of.of("mean_error"))
-    gain.set_ylabel("gain $|\\omega_c/\\omega_0|$")
-    phase.set(ylabel="phase lag (°)", xlabel="frequency (Hz)")
-    onset.set_ylabel("amplitude at which\nslip begins (rad/s)")
-    error.set(ylabel="mean of $\\omega_c - \\omega_0$ (rad/s)", xlabel="frequency (Hz)")
     error.axhline(0, **style.GUIDE)
+    for axes, quantity, unit in (
+        (gain, "gain", 1.0),
+        (phase, "phase_lag", 180 / math.pi),
+        (onset, "slip_amplitude", 1.0),
+        (error, "mean_error", 1.0),
+    ):
+        style.points(axes, of.of(quantity), _at("f"), unit=unit)
+    gain.set(xscale="log", yscale="log", ylabel="gain $|\\omega_c/\\omega_0|$")
+    phase.set(ylabel="phase lag (°)", xlabel="frequency (Hz)")
+    onset.set(yscale="log", ylabel="amplitude at which\nslip begins (rad/s)")
+    onset.margins(y=0.12)
+    error.set(ylabel="mean of $\\omega_c - \\omega_0$ (rad/s)", xlabel="frequency (Hz)")
     style.legend(gain, loc="lower left")
     return figure
-
-
-def _marks(axes: Axes, rows: list[Measurement], unit: float = 1.0) -> None:
-    for engine in dict.fromkeys(m.engine for m in rows):
-        own = [m for m in rows if m.engine == engine]
-        at, values = [float(m.conditions["f"]) for m in own], [unit * m.value for m in own]
-        axes.plot(at, values, ls="none", ms=6, label=engine, zorder=5, **style.mark_of(engine))
 
 
 def caption_unsteady(of: Measurements) -> str:
     """Of jumps and ramps."""
     measured = f" Dots: MuJoCo, half the difference of two jumps by {JUMP:.1%}, up and down." if of.runs else ""
-    marks = " Marks: measured." if of.of("ramp_end") else ""
     return (
         "Left: ω_c after a small jump of the flow, over its change in the end; a ball that rolls creeps to its new "
         f"reading, one that slips at both points rings.{measured} Middle: ramps past the fold, faster ones catch up "
         "with the flow later. Right: by how much a ramp passes ω₀₄ until the ball lags by half as much as at first, "
-        f"dashed the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).{marks} {style.named(REFERENCE)}."
+        f"dashed the law of slow ramps, 2.338 (ρ²/(ab))^(1/3). {style.named(REFERENCE)}."
+        f"{style.marks(of.of('ramp_end'))}"
     )
 
 
@@ -135,56 +135,61 @@ def draw_unsteady(of: Measurements) -> Figure:
     """Step responses, ramps, overshoot over rate."""
     figure = style.figure(10.0, 3.6)
     jump, ramp, law = figure.subplots(1, 3)
-    t, shades = np.linspace(0.0, 4.0, 800), (0.4, 0.7, 1.0)
-    rolling = response.step_response(REFERENCE, Case.RR, t)
-    jump.plot(t, rolling, color=style.COLOURS[Case.RR], lw=2, label="RR")
-    measured = of.of("jump_height")
-    flows = [*FLOWS[1:], measured[0].parameters.omega_0 if measured else FLOWS[0]]
-    for omega_0, shade in zip(sorted(flows), shades, strict=True):
-        p = REFERENCE.replace(omega_0=omega_0)
-        y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
-        jump.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {omega_0:.3g} rad/s")
-    if len(of.runs) == 2:
-        up, down = (motion.load() for motion in of.runs)
-        y, shown = (up.omega_c - down.omega_c) / (up.omega_c - down.omega_c)[-1], up.time <= t[-1]
-        jump.plot(up.time[shown][::5], y[shown][::5], "k.", ms=3.5, label="MuJoCo")
-    jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$, 1 in the end")
-    style.legend(jump)
-    _ramps(ramp)
-    _law(law, of.of("ramp_end"))
+    _jumps(jump, of)
+    ends = of.of("ramp_end")
+    p = ends[0].parameters if ends else REFERENCE.replace(omega_0=34.9)
+    runs = {rate: _ramp(p, rate) for rate in RATES}
+    _ramps(ramp, runs)
+    _law(law, runs, ends)
     return figure
 
 
-def _ramps(axes: Axes) -> None:
+def _jumps(axes: Axes, of: Measurements) -> None:
+    t = np.linspace(0.0, 4.0, 800)
+    axes.plot(t, response.step_response(REFERENCE, Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")
+    measured = of.of("jump_height")
+    flows = [*FLOWS[1:], measured[0].parameters.omega_0 if measured else FLOWS[0]]
+    for omega_0, shade in zip(sorted(flows), (0.4, 0.7, 1.0), strict=True):
+        p = REFERENCE.replace(omega_0=omega_0)
+        y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
+        axes.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {omega_0:.3g} rad/s")
+    if len(of.runs) == 2:
+        up, down = (motion.load() for motion in of.runs)
+        y, shown = (up.omega_c - down.omega_c) / (up.omega_c - down.omega_c)[-1], up.time <= t[-1]
+        axes.plot(up.time[shown][::5], y[shown][::5], "k.", ms=3.5, label="MuJoCo")
+    axes.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$, 1 in the end")
+    style.legend(axes)
+
+
+def _ramp(p: Parameters, rate: float) -> Trajectory:
+    """Theory's motion from slipping to well past the fold."""
+    span = 15.0
+    flow, interval = Flow.ramp(p.omega_0, p.omega_0 + span, span / rate), span / rate / 5000
+    return analytic.simulate(p, analytic.solution(p, Case.SS).x, span / rate, flow, sample_interval=interval)
+
+
+def _ramps(axes: Axes, runs: Mapping[float, Trajectory]) -> None:
     end = bifurcation.thresholds(REFERENCE).omega_04
-    slipping(axes, REFERENCE, lambda spin, omega_c: omega_c, "SS", (0.5, (0, 0)), (0.2, (-4, 6)))
-    style.name(axes, end + 5.5, end + 5.5, "NR", (-5, 5), style.COLOURS[Case.NR])
-    for rate, shade in zip(RATES, (1.0, 0.65, 0.4), strict=True):
-        p = REFERENCE.replace(omega_0=end - 8)
-        x, span = analytic.solution(p, Case.SS).x, 15.0
-        flow = Flow.ramp(end - 8, end - 8 + span, span / rate)
-        run = analytic.simulate(p, x, span / rate, flow, sample_interval=span / rate / 2000)
-        axes.plot(flow(run.time), run.omega_c, color="black", alpha=shade, lw=1.5, label=f"rising by {rate:g} rad/s²")
-    axes.axline((end, end), slope=1, color=style.COLOURS[Case.NR], lw=1.5)
-    axes.set(xlim=(end - 6, end + 7), ylim=(15, 55), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    slipping(axes, REFERENCE, lambda slip_x, omega_c: omega_c, unstable=(0.2, (-4, 6)))
+    for (rate, run), shade in zip(runs.items(), (1.0, 0.65, 0.4), strict=True):
+        flow, label = run.header.flow(run.time), f"rising by {rate:g} rad/s²"
+        axes.plot(flow, run.omega_c, color="black", alpha=shade, lw=1.5, label=label)
+    beyond = np.array([end - 6, end + 7])
+    style.curve(axes, Case.NR, beyond, beyond, "NR", (0.9, (-5, 5)))
+    axes.set(xlim=beyond, ylim=(15, 55), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {"omega_04": end})
     style.legend(axes, loc="upper left")
 
 
-def _law(axes: Axes, rows: list[Measurement]) -> None:
+def _law(axes: Axes, runs: Mapping[float, Trajectory], ends: list[Measurement]) -> None:
     end, K = bifurcation.thresholds(REFERENCE).omega_04, response.ramp_coefficient(REFERENCE)
-    rates = np.geomspace(0.05, 1.0, 5)
-    p = rows[0].parameters if rows else REFERENCE.replace(omega_0=34.9)
-    x = tuple(analytic.solution(p, Case.SS).x[:6].tolist())
+    rates = np.array([*runs])
     axes.loglog(rates, K * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
-    passed = [ramp_end(p, rate, x) - end for rate in rates.tolist()]
-    axes.loglog(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
-    for m in rows:
-        at = float(m.conditions["rate"]), m.value - end
-        axes.plot(*at, ls="none", ms=6, zorder=5, label=m.engine, **style.mark_of(m.engine))
-    axes.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)")
+    passed = [caught_up(run) - end for run in runs.values()]
+    axes.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
+    style.points(axes, ends, _at("rate"), lambda m: m.value - end)
+    axes.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)", yticks=[0.5, 1, 2, 5])
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter(NullFormatter())
-    axes.set_yticks([0.5, 1, 2, 5])
     style.legend(axes, loc="upper left")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from compare import pages
-from compare.figures import league as figure
+from compare.figures import settings
 from compare.report.pictures import address, svg
 from compare.scorecard import league, standings
 
@@ -13,7 +13,7 @@ from compare.scorecard import league, standings
 def html(data: dict[str, Any]) -> str:
     """The page of `league.to_mapping`, which needs nothing but itself."""
     entries = league.from_mapping(data)
-    picture = address(svg(figure.draw(entries)))
+    picture = address(svg(settings.draw_league(entries)))
     failures = [
         (f"{entry.name}, {1e3 * (entry.step or 0):g} ms, {name}", reason)
         for entry in entries

@@ -17,17 +17,8 @@ from analytic.flowmeter import End
 from compare import pages
 from compare.pages import Rows
 
-SYMBOLS = {
-    "omega_01": "ω₀₁",
-    "omega_02": "ω₀₂",
-    "omega_03": "ω₀₃",
-    "omega_04": "ω₀₄",
-    "mu": "μ",
-    "eta": "η",
-    "rho_b": "ρ_b",
-    "rho_f": "ρ_f",
-    "nu_f": "ν_f",
-}
+SYMBOLS = {"mu": "μ", "eta": "η", "rho_b": "ρ_b", "rho_f": "ρ_f", "nu_f": "ν_f"}
+SYMBOLS |= {f"omega_0{k}": f"ω₀{sub}" for k, sub in enumerate("₁₂₃₄", 1)}
 UNITS = {"r": "m", "R": "m", "rho_b": "kg/m³", "rho_f": "kg/m³", "nu_f": "m²/s", "gravity": "m/s²"}
 _NONE = "–"
 
@@ -74,26 +65,26 @@ def _warning(made: Design) -> list[str]:
     ]
 
 
-def materials(made: Design) -> Rows:
+def _materials(made: Design) -> Rows:
     """A column for the best meter of each material that can be used, the best of all first."""
-    choices = sorted(made.choices.items(), key=lambda item: -item[1].margin)
-    rows = [["", *(name for name, _ in choices)]]
-    rows += [[_named(name), *(_number(c.values[name]) for _, c in choices)] for name in made.choice.values]
-    rows += [["limit at worst (rad/s)", *(_number(c.worst.omega_0) for _, c in choices)]]
-    rows += [["limit as meant (rad/s)", *(_number(c.limit.omega_0) for _, c in choices)]]
-    rows += [["margin at worst", *(_number(c.margin) for _, c in choices)]]
-    return [*rows, ["time constant (s)", *(_number(c.response) for _, c in choices)]]
+    names, choices = zip(*sorted(made.choices.items(), key=lambda item: -item[1].margin), strict=True)
+    numbers: dict[str, list[float]] = {_named(name): [c.values[name] for c in choices] for name in made.choice.values}
+    numbers |= {
+        "limit at worst (rad/s)": [c.worst.omega_0 for c in choices],
+        "limit as meant (rad/s)": [c.limit.omega_0 for c in choices],
+        "margin at worst": [c.margin for c in choices],
+        "time constant (s)": [c.response for c in choices],
+    }
+    return [["", *names], *([name, *map(_number, row)] for name, row in numbers.items())]
 
 
-def thresholds(made: Design) -> Rows:
+def _thresholds(made: Design) -> Rows:
     """A row for each threshold: its value, and between which it lies within the tolerances."""
-    rows = [["threshold", "as meant (rad/s)", "lowest", "highest"]]
-    for key in THRESHOLDS:
-        rows.append([SYMBOLS[key], *map(_number, (getattr(made.thresholds, key), *made.spread[key]))])
-    return rows
+    rows = ([SYMBOLS[k], *map(_number, (getattr(made.thresholds, k), *made.spread[k]))] for k in THRESHOLDS)
+    return [["threshold", "as meant (rad/s)", "lowest", "highest"], *rows]
 
 
-def sensitivities(made: Design) -> Rows:
+def _sensitivities(made: Design) -> Rows:
     """A row for each value: by how many per cent a threshold, a column each, changes if the value does by one."""
     rows = [["% per %", *(SYMBOLS[key] for key in THRESHOLDS)]]
     for name in made.sensitivities[THRESHOLDS[0]]:
@@ -102,8 +93,11 @@ def sensitivities(made: Design) -> Rows:
 
 
 def _titled(made: Design) -> list[tuple[str, Rows]]:
-    tables = {"The best of each material": materials, "Thresholds": thresholds, "Sensitivities": sensitivities}
-    return [(title, rows(made)) for title, rows in tables.items()]
+    return [
+        ("The best of each material", _materials(made)),
+        ("Thresholds", _thresholds(made)),
+        ("Sensitivities", _sensitivities(made)),
+    ]
 
 
 def tables(made: Design) -> list[Table | str]:
@@ -147,45 +141,33 @@ def page(made: Design) -> str:
     from compare.report import pictures
 
     drawn = [(pictures.svg(draw(made)), caption) for draw, caption in figures.FIGURES]
-    return pages.render(
-        "compare.report",
-        "meter.html",
-        made=made,
-        sentences=sentences(made),
-        tables=_titled(made),
-        asked=_asked(made),
-        figures=drawn,
-    )
+    shown = {"sentences": sentences(made), "tables": _titled(made), "asked": _asked(made), "figures": drawn}
+    return pages.render("compare.report", "meter.html", made=made, **shown)
 
 
 def _asked(made: Design) -> dict[str, str]:
     """The request in words."""
     r, bounds = made.request, made.request.bounds[made.material]
     response = f", time constant up to {r.response:g} s" if math.isfinite(r.response) else ""
+    spans = {n: f"{low:g} … {high:g}" if low < high else f"{low:g}" for n, (low, high) in bounds.items()}
     return {
         "fluid": _values(r.fluid),
         "flow": f"ω₀ = {r.slowest:g} … {r.fastest:g} rad/s{response}",
-        "bounds": ", ".join(
-            f"{_named(name)} {f'{low:g} … {high:g}' if low < high else f'{low:g}'}"
-            for name, (low, high) in bounds.items()
-        ),
-        "tolerances": ", ".join(f"{SYMBOLS.get(name, name)} ± {100 * t:g} %" for name, t in r.tolerances.items())
-        or "none",
+        "bounds": ", ".join(f"{_named(name)} {span}" for name, span in spans.items()),
+        "tolerances": ", ".join(f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()) or "none",
     }
 
 
 def _choice(c: Choice) -> dict[str, Any]:
     limits = {
-        name: {"omega_0": each.omega_0, "end": each.end.name} for name, each in (("limit", c.limit), ("worst", c.worst))
+        name: {"omega_0": of.omega_0, "end": of.end.name} for name, of in (("limit", c.limit), ("worst", c.worst))
     }
     return {"values": c.values, **limits, "margin": c.margin, "response": c.response}
 
 
 def _values(values: Mapping[str, Any]) -> str:
-    texts = {
-        name: x if isinstance(x, str) else f"{_number(x)} {UNITS.get(name, '')}".rstrip() for name, x in values.items()
-    }
-    return ", ".join(f"{SYMBOLS.get(name, name)} = {text}" for name, text in texts.items())
+    shown = {n: x if isinstance(x, str) else f"{_number(x)} {UNITS.get(n, '')}".rstrip() for n, x in values.items()}
+    return ", ".join(f"{SYMBOLS.get(name, name)} = {text}" for name, text in shown.items())
 
 
 def _named(name: str) -> str:

@@ -16,7 +16,6 @@ from compare import pages
 from compare.claims.claim import Outcome, Verdict
 from compare.figures.drawing import Drawing, GapError, Material
 from compare.figures.registry import FIGURES, figures_of
-from compare.measure.check import Check
 from compare.measure.lab import Level
 from compare.measure.record import Records
 from compare.report import pictures, results, wording
@@ -31,7 +30,7 @@ REASONS = 12
 _OPTIONS = {Level.QUICK: " --quick", Level.DEFAULT: "", Level.FULL: " --full"}
 
 
-def write(material: Material, summary: Summary) -> Path:
+def write(material: Material, verdicts: Sequence[Verdict], summary: Summary) -> Path:
     """Write ``summary.json`` and ``report.html`` into the material's results directory; return the page's path.
 
     Raises `model.StorageError` if it can't be written.
@@ -40,17 +39,16 @@ def write(material: Material, summary: Summary) -> Path:
     results.save(summary, directory)
     make_directory(directory / results.FIGURES)
     path = directory / results.REPORT
-    write_text(path, render(material, summary))
+    write_text(path, render(material, verdicts, summary))
     return path
 
 
-def render(material: Material, summary: Summary) -> str:
+def render(material: Material, verdicts: Sequence[Verdict], summary: Summary) -> str:
     """The page as text; what was not run is named in one line, a figure that can't be drawn is a gap."""
-    ran = [verdict for verdict in material.verdicts if verdict.outcome is not Outcome.NOT_RUN]
+    directory, ran = material.directory, [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     option = _OPTIONS[Level[summary.level]]
     rows = [_row(material, verdict, option) for verdict in ran]
-    sections = dict.fromkeys(row["section"] for row in rows)
-    judged = {row["id"] for row in rows}
+    judged, sections = {verdict.claim.id for verdict in ran}, dict.fromkeys(verdict.claim.section for verdict in ran)
     free = {name: each for name, each in FIGURES.items() if not judged & set(each.claims)}
     drawn = [
         _figure(material, name, each) | {"background": each.background or bool(each.claims)}
@@ -65,12 +63,13 @@ def render(material: Material, summary: Summary) -> str:
         tiles=_tiles(ran, material.records),
         figures=[each for each in drawn if not each["background"] and not each["gap"]],
         background=[each for each in drawn if each["background"] and not each["gap"]],
-        sections=[(name, [row for row in rows if row["section"] == name]) for name in sections],
-        total=len(rows),
-        outcomes=sorted({row["outcome"] for row in rows}),
-        not_run=[verdict.claim for verdict in material.verdicts if verdict.outcome is Outcome.NOT_RUN],
+        sections=[(name, [row for row in rows if row["claim"].section == name]) for name in sections],
+        outcomes=sorted({verdict.outcome for verdict in ran}),
+        wording=wording,
+        run_of=lambda m: next((name for name in m.runs if (directory / name).is_file()), ""),
+        not_run=[verdict.claim for verdict in verdicts if verdict.outcome is Outcome.NOT_RUN],
         not_drawn=[f"{each['title']}: {each['gap']}" for each in drawn if each["gap"]],
-        command=f"dualball validate --full -o {material.directory}",
+        command=f"dualball validate --full -o {directory}",
         errata=errata(),
         provenance=_provenance(summary),
     )
@@ -91,52 +90,22 @@ def errata() -> str:
 
 
 def _row(material: Material, verdict: Verdict, option: str) -> dict[str, Any]:
+    """What the page shows of a claim besides claim and verdict themselves."""
     claim = verdict.claim
     mark, symbol = wording.MARKS[verdict.outcome]
-    checks = wording.ranked(verdict.checks)
-    figures = figures_of(claim.id) if checks else {}
+    figures = figures_of(claim.id) if verdict.checks else {}
     missing = verdict.missing[:REASONS]
     more = len(verdict.missing) - len(missing)
-    about = {name: getattr(claim, name) for name in ("id", "section", "source", "statement", "reason")}
-    return about | {
-        "outcome": verdict.outcome.value,
+    return {
+        "claim": claim,
+        "verdict": verdict,
         "mark": "other" if verdict.passed and mark == "fail" else mark,
         "symbol": symbol,
-        "expected": "" if verdict.passed else claim.expected.value,
-        "text": claim.text.value,
-        "error": verdict.error,
         "predicted": list(dict.fromkeys(bearing.by for bearing in claim.bearings if bearing.by)),
-        "noticed": wording.noticed(verdict),
-        "worst": wording.worst(verdict),
         "missing": [*missing, f"and {more} more, see {results.SUMMARY}"] if more else missing,
-        "checks": [_number(material, check) for check in checks[:ROWS]],
-        "total": len(checks),
+        "checks": wording.ranked(verdict.checks)[:ROWS],
         "figures": [_figure(material, name, figure) for name, figure in figures.items()],
         "repeat": f"dualball validate --claim {claim.id}{option} -o {material.directory}",
-    }
-
-
-def _number(material: Material, check: Check) -> dict[str, Any]:
-    m = check.measurement
-    run = next((name for name in m.runs if (material.directory / name).is_file()), "")
-    errors = {name: wording.size(getattr(check, name)) for name in ("tolerance", "resolves")}
-    return errors | {
-        "good": check.agrees,
-        "coarse": not check.conclusive,
-        "set": m.set,
-        "omega_0": f"{m.parameters.omega_0:.6g}",
-        "conditions": wording.conditions(m.conditions),
-        "engine": m.engine,
-        "protocol": m.protocol,
-        "symbol": wording.SYMBOLS[m.quantity],
-        "unit": wording.unit(m.unit),
-        "relation": "" if check.relation == "=" else check.relation,
-        "predicted": wording.value(m, check.predicted),
-        "measured": wording.value(m, m.value),
-        "uncertainty": wording.size(m.uncertainty),
-        "deviation": wording.size(check.deviation, "+"),
-        "run": run,
-        "more": len(m.runs) - 1 if run else 0,
     }
 
 
@@ -154,13 +123,9 @@ def _figure(material: Material, name: str, drawing: Drawing) -> dict[str, Any]:
 
 def _lead(ran: Sequence[Verdict]) -> str:
     what = "A ball rolls and slips round a cylinder. "
-    orbits = [
-        check
-        for verdict in ran
-        for check in verdict.checks
-        if check.measurement.quantity == "omega_c" and verdict.claim.section == "Stationary states"
-    ]
-    orbits = [check for check in orbits if math.isfinite(check.predicted) and check.scale > 0]
+    stationary = [check for verdict in ran for check in verdict.checks if verdict.claim.section == "Stationary states"]
+    turning = [check for check in stationary if check.measurement.quantity == "omega_c"]
+    orbits = [check for check in turning if math.isfinite(check.predicted) and check.scale > 0]
     if not orbits:
         return what + "Its closed-form theory by Antali and Stépán is held against simulation."
     largest = max(abs(check.deviation / check.scale) for check in orbits)

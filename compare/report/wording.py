@@ -13,14 +13,9 @@ from compare.measure.record import Condition, Measurement
 from model import Case
 
 SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {
-    "h": "h",
-    "v_h": "v_h",
-    "n_x": "n_x",
-    "n_y": "n_y",
-    "n_z": "n_z",
-    "time": "t",
+    name: name for name in ("v_h", "n_x", "n_y", "n_z")
 }
-"""How named conditions are written, where that isn't their name."""
+"""How quantities and named conditions are written, where that isn't their name without underscores."""
 _UNITS = {"h": "m", "v_h": "m s-1", "f": "Hz", "amplitude": "rad s-1", "rate": "rad s-2"} | {
     name: each.unit for name, each in QUANTITIES.items()
 }
@@ -90,9 +85,7 @@ def noticed(verdict: Verdict) -> str:
 
 
 def worst(verdict: Verdict) -> str:
-    """The check that comes nearest to failing, or fails most."""
-    if not verdict.checks:
-        return ""
+    """The check that comes nearest to failing, or fails most; there is one."""
     check = ranked(verdict.checks)[0]
     where = f"{SYMBOLS[check.measurement.quantity]}, {check.measurement.set}"
     if quantity(check.measurement.quantity).resolves == 0:
@@ -104,12 +97,7 @@ def worst(verdict: Verdict) -> str:
 
 def ranked(checks: Sequence[Check]) -> list[Check]:
     """Checks, the worst first: what fails, then what is too coarse, then by deviation over tolerance."""
-
-    def ease(check: Check) -> tuple[bool, bool, float]:
-        share = abs(check.deviation) / check.tolerance if check.tolerance > 0 else 0.0
-        return check.agrees, check.conclusive, -share if math.isfinite(share) else -math.inf
-
-    return sorted(checks, key=ease)
+    return sorted(checks, key=lambda check: (check.agrees, check.conclusive, -check.share))
 
 
 def headline(verdicts: Sequence[Verdict]) -> str:

@@ -15,9 +15,8 @@ import analytic
 import mjsim
 from analytic import thresholds
 from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Bearing, Claim, Outcome, Verdict
 from compare.figures import bifurcation_diagrams, deviations, gallery, periodic, slipping, style, unloading, unsteady
-from compare.figures.drawing import GapError, Material
+from compare.figures.drawing import Diagram, GapError, Material, Motion
 from compare.figures.registry import FIGURES, figures_of
 from compare.measure.check import Check
 from compare.measure.record import Measurement, Records
@@ -25,19 +24,9 @@ from compare.runs.engines import ENGINES
 from compare.scorecard.league import COST, Entry
 from model import Case, InputError, Parameters, StorageError
 
-DEPENDS = {
-    **dict.fromkeys(
-        ["characteristic", *(f"fig-{k}" for k in (4, 5, 9, 10, 11, 12)), "fig-13-left", "fig-13-right", "unloading"],
-        ("μ", "η", "j", "κ"),
-    ),
-    **dict.fromkeys(
-        ["ladder", "basins", "hopping-orbit", "hopping-branch", "pulsation", "unsteady"], ("μ", "η", "j", "κ")
-    ),
-    "frontier": ("μ", "η", "j", "κ"),
-    "fig-7": ("μ", "j", "κ"),
-    "fig-8": ("j", "κ"),
-}
-"""The parameters that a caption must give with their values; those of the other figures depend on none."""
+BARE = ("fig-2", "fig-3", "fig-6", "hopping")
+"""Figures that depend on no parameters; the captions of all others must give them with their values."""
+DEPENDS = {name: "μηjκ" for name in FIGURES if name not in BARE} | {"fig-7": "μjκ", "fig-8": "jκ"}
 WITH_SCALES = ["fig-7", "fig-8", "fig-9", "fig-10", "fig-11", "fig-12", "fig-13-left", "fig-13-right"]
 
 
@@ -50,12 +39,6 @@ def measurement(quantity: str, value: float, set: str = "reference", omega_0: fl
         "parameters": Parameters.named(set).replace(omega_0=omega_0),
     }
     return Measurement(quantity=quantity, value=value, set=set, **(given | changes))
-
-
-def verdict(name: str, checks: tuple[Check, ...], outcome: Outcome = Outcome.CONFIRMED) -> Verdict:
-    bearing = Bearing(protocol="settled", quantity="omega_c", predict=lambda m: 1.0)
-    claim = Claim(id=name, section="S", source="(1)", statement="What is stated.", bearings=(bearing,))
-    return Verdict(claim=claim, outcome=outcome, checks=checks)
 
 
 def check(m: Measurement, predicted: float, tolerance: float = 3e-9) -> Check:
@@ -78,13 +61,13 @@ def material() -> Material:
         measurement("cases", 129.0, omega_0=omega_0, conditions={"figure": "fig-7"}, protocol="plane")
         for omega_0 in (8.0, 10.0)
     ]
-    verdicts = (
-        verdict("fig-7", (check(plane[0], 129.0, 0.0), check(plane[1], 1.0, 0.0))),
-        verdict("prop-1", (check(states[0], 10.0), check(states[1], 10.0))),
-    )
+    checks = {
+        "fig-7": (check(plane[0], 129.0, 0.0), check(plane[1], 1.0, 0.0)),
+        "prop-1": (check(states[0], 10.0), check(states[1], 10.0)),
+    }
     errors = {"a": 0.0, "b": math.nan, "c": 1e-3}
     scores = tuple(Entry(name, 1e-3, {"RR at 12": error, COST: 0.1}) for name, error in errors.items())
-    return Material(verdicts, Records((*states, *plane)), Path("nowhere"), scores, scores)
+    return Material(checks, Records((*states, *plane)), Path("nowhere"), scores, scores)
 
 
 @pytest.fixture
@@ -124,7 +107,7 @@ def test_every_figure_draws_and_gives_its_parameters(name: str, results: bool, m
     assert buffer.tell() > 1000
     caption = drawing.caption(data)
     assert caption.endswith(".")
-    for symbol in DEPENDS.get(name, ()):
+    for symbol in DEPENDS.get(name, ""):
         assert f"{symbol} = " in caption
     assert name in DEPENDS or drawing.background
     if name not in DEPENDS:
@@ -177,12 +160,12 @@ def test_stable_and_unstable_parts_of_figure_10() -> None:
 def test_the_hopf_point_of_figure_12_is_marked() -> None:
     (axes,) = FIGURES["fig-12"].draw(FIGURES["fig-12"].select(Material())).axes
     assert {"P3", "NF2", "NT1", "F", "H"} <= {text.get_text() for text in axes.texts}
-    assert "Hopf" in FIGURES["fig-12"].caption(bifurcation_diagrams.Diagram("fig-12", bifurcation_diagrams.RELEASED))
+    assert "Hopf" in FIGURES["fig-12"].caption(Diagram("fig-12", bifurcation_diagrams.RELEASED))
 
 
 @pytest.mark.parametrize("name", ["fig-4", "fig-5"])
 def test_the_path_of_slip_bends_and_ends_as_the_paper_says(name: str) -> None:
-    run = FIGURES[name].select(Material()).motion.load()
+    run = FIGURES[name].select(Material()).load()
     path = np.stack([run.slip_z, run.slip_y], axis=-1)
     first = path[0] / np.linalg.norm(path[0])
     across = np.abs(path @ np.array([-first[1], first[0]])).max()
@@ -216,7 +199,7 @@ def test_measured_states_have_their_engines_marks(material: Material) -> None:
 def test_deviations_are_drawn_over_tolerance() -> None:
     m = measurement("omega_c", 10.0)
     far = dataclasses.replace(check(m, 10.0), predicted=9.0)
-    made = Material((verdict("x", (check(m, 10.0 - 1.5e-9), far)),))
+    made = Material({"x": (check(m, 10.0 - 1.5e-9), far)})
     drawing = deviations.of("x")
     (axes,) = drawing.draw(drawing.select(made)).axes
     points = [line for line in axes.lines if line.get_marker() == "o"]
@@ -224,7 +207,7 @@ def test_deviations_are_drawn_over_tolerance() -> None:
     assert sum(len(line.get_xdata()) for line in axes.lines if line.get_marker() == ">") == 1
     assert "μ = 0.2" in drawing.caption(drawing.select(made))
     with pytest.raises(GapError):
-        drawing.select(Material((verdict("x", (check(measurement("case", 0.0), 0.0, 0.0),)),)))
+        drawing.select(Material({"x": (check(measurement("case", 0.0), 0.0, 0.0),)}))
 
 
 def test_the_fall_shows_cases_and_impact() -> None:
@@ -236,9 +219,8 @@ def test_the_fall_shows_cases_and_impact() -> None:
 def test_a_fall_that_did_not_happen_is_a_gap() -> None:
     p = Parameters.named("reference")
     run = analytic.simulate(p, [0, 0, p.omega_0, 0, 0, 0], 0.1)
-    motion = dataclasses.replace(FIGURES["unloading"].select(Material()).motion, load=lambda: run)
     with pytest.raises(GapError, match="never landed"):
-        unloading.draw(unloading.Fall("event", p, motion))
+        unloading.draw(Motion("rolling", "event", p, lambda: run))
 
 
 def test_claims_have_their_own_figures_or_deviations() -> None:

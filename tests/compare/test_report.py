@@ -108,8 +108,9 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def page(directory: Path, few_figures: None) -> Path:
-    material = Material(VERDICTS, Records(tuple(check.measurement for check in VERDICTS[0].checks)), directory)
-    return report.write(material, Summary.of(directory, VERDICTS, Level.QUICK, []))
+    records = Records(tuple(check.measurement for check in VERDICTS[0].checks))
+    material = Material({verdict.claim.id: verdict.checks for verdict in VERDICTS}, records, directory)
+    return report.write(material, VERDICTS, Summary.of(directory, VERDICTS, Level.QUICK, []))
 
 
 def row(text: str, name: str) -> str:
@@ -168,7 +169,8 @@ def test_no_empty_sections(page: Path) -> None:
 
 
 def test_an_empty_page_is_a_page_too(tmp_path: Path) -> None:
-    text = report.write(Material((), Records(), tmp_path), Summary.of(tmp_path, [], Level.QUICK, [])).read_text("utf-8")
+    page = report.write(Material(directory=tmp_path), [], Summary.of(tmp_path, [], Level.QUICK, []))
+    text = page.read_text("utf-8")
     assert "Nothing has been checked yet" in text
     assert 'id="claims"' not in text
 
@@ -251,7 +253,7 @@ def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
         drawn.append(data)
         return Figure(figsize=(1, 1))
 
-    drawing = Drawing(title="t", select=lambda _: None, draw=draw, caption=lambda _: "")
+    drawing = Drawing("t", lambda _: None, draw, lambda _: "")
     path = tmp_path / "made.svg"
     first = pictures.kept(path, drawing, ("a", 1.0))
     assert pictures.kept(path, drawing, ("a", 1.0)) == first
@@ -265,7 +267,7 @@ def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
 
 def test_a_picture_is_drawn_again_when_the_program_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = []
-    drawing = Drawing(title="t", select=lambda _: None, draw=lambda d: drawn.append(d) or Figure(), caption=str)
+    drawing = Drawing("t", lambda _: None, lambda d: drawn.append(d) or Figure(), str)
     pictures.kept(tmp_path / "made.svg", drawing, 1)
     monkeypatch.setattr(pictures, "sources", lambda *packages: " ".join(packages))
     pictures.kept(tmp_path / "made.svg", drawing, 1)
@@ -276,12 +278,11 @@ def test_a_figure_that_can_not_be_drawn_is_a_gap(tmp_path: Path, monkeypatch: py
     def refuse(_: object) -> Figure:
         raise GapError("the run <is> lost")
 
-    drawing = Drawing(title="A fall", select=lambda _: None, draw=refuse, caption=lambda _: "", claims=("good",))
+    drawing = Drawing("A fall", lambda _: None, refuse, lambda _: "", ("good",))
     monkeypatch.setattr(report, "FIGURES", {})
     monkeypatch.setattr(report, "figures_of", lambda name: {"fall": drawing})
-    text = report.write(
-        Material(VERDICTS[:1], Records(), tmp_path), Summary.of(tmp_path, [], Level.QUICK, [])
-    ).read_text("utf-8")
+    page = report.write(Material(directory=tmp_path), VERDICTS[:1], Summary.of(tmp_path, [], Level.QUICK, []))
+    text = page.read_text("utf-8")
     assert "A fall is not drawn: the run &lt;is&gt; lost" in text
 
 
