@@ -19,11 +19,10 @@ COVERAGE = 3.0
 
 @dataclass(frozen=True)
 class Measured:
-    """A value, its standard uncertainty, and how many independent samples it stands on."""
+    """A value and its standard uncertainty."""
 
     value: float
     uncertainty: float
-    independent: float = math.nan
 
 
 def plain(value: Any) -> Any:
@@ -53,7 +52,7 @@ def window_mean(time: npt.ArrayLike, values: npt.ArrayLike) -> Measured:
     independent = len(v) / correlation_length(v)
     scatter = float(v.std(ddof=1)) / math.sqrt(independent)
     rounding = float(np.finfo(float).eps * np.abs(v).max())
-    return Measured(mean, math.sqrt(scatter**2 + _approach(v) ** 2 + rounding**2), independent)
+    return Measured(mean, math.sqrt(scatter**2 + _approach(v) ** 2 + rounding**2))
 
 
 def correlation_length(values: Array) -> float:

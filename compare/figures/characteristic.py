@@ -58,7 +58,7 @@ def caption(curves: tuple[Diagram, ...]) -> str:
     crosses = ", crosses: MuJoCo's own contact parameters from rest" * any(m.engine == NEWCOMER.name for m in states)
     return (
         f"Angular velocity ω_c of the ball's orbit over that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
-        "dashed where unstable; SR and NR lie on one line. Measured are settled states, from rest, going round "
+        "dashed where unstable; SR and NR lie on one line. Settled states were measured from rest, going round "
         f"with the fluid, and high up on the wall{crosses}. Below: relative deviation from the nearest attracting "
         f"solution; what is below 1e-16 is drawn there.{style.marks(states)}"
     )

@@ -56,8 +56,8 @@ def draw_branch(of: Diagram) -> Figure:
     p, edge = of.p, bifurcation.thresholds(of.p).omega_02
     figure = style.figure(9.0, 4.2)
     orbit, wall = figure.subplots(1, 2)
-    _diagram(orbit, p, lambda slip_x, omega_c: omega_c)
-    _diagram(wall, p, functools.partial(spin, p))
+    _diagram(orbit, p, lambda slip_x, omega_c: omega_c, (-5, -5))
+    _diagram(wall, p, functools.partial(spin, p), (-5, 5))
     orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * HIGH * edge))
     wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, p)))
     style.points(orbit, of.states)
@@ -65,18 +65,19 @@ def draw_branch(of: Diagram) -> Figure:
     return figure
 
 
-def _diagram(axes: Axes, p: Parameters, quantity: Quantity) -> None:
+def _diagram(axes: Axes, p: Parameters, quantity: Quantity, offset: tuple[float, float]) -> None:
+    """The diagram of a quantity; the names of SS stand at an offset that is clear of the other curves."""
     edge = bifurcation.thresholds(p).omega_02
     carried, sinking = np.linspace(edge, HIGH * edge, 100), np.array([LOW * edge, edge])
     slipping(axes, p, quantity)
     fast = p.replace(omega_0=0.95 * HIGH * edge)  # the branch goes on far beyond the frame
     for stable, text in ((True, "SS"), (False, "SS, unstable")):
         x = analytic.solution(fast, Case.SS, stable=stable).x
-        style.name(axes, fast.omega_0, float(quantity(x[3], x[2])), text, (-5, -5), style.COLOURS[Case.SS])
+        style.name(axes, fast.omega_0, float(quantity(x[3], x[2])), text, offset, style.COLOURS[Case.SS])
     spins = {Case.NR: [lifted(w, p) for w in carried], Case.NS: p.eta / p.j * sinking * p.R / p.r}
     for case, x, text, place in (
         (Case.NR, carried, "SR, NR", (0.6, (-5, 5))),
-        (Case.NS, sinking, "NS", (0.05, (6, 5))),
+        (Case.NS, sinking, "NS", (0.5, (-3, 7))),
     ):
         slip = np.asarray(spins[case]) - p.R / p.r * x
         style.curve(axes, case, x, quantity(slip, x), text, place)

@@ -65,7 +65,7 @@ def named(p: Parameters, *names: str) -> str:
 
 def marks(states: Sequence[Measurement]) -> str:
     """What a caption says of measured points; nothing where there are none."""
-    many = f" Marks: {len(states)} measured numbers; three standard uncertainties are smaller than most marks."
+    many = f" Marks: {len(states)} measured values; three standard uncertainties are smaller than most marks."
     return many if states else ""
 
 

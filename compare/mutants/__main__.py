@@ -17,22 +17,20 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m compare.mutants", description=trial.__doc__)
     parser.add_argument("directory", type=Path, metavar="DIR", help="results of 'dualball validate --quick'")
     parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
-    parser.add_argument("--beside", type=Path, metavar="DIR", help="results of another level, tried and shown as well")
     page = "page to write; else a theory is judged until a claim notices it"
     parser.add_argument("--page", type=Path, metavar="FILE", help=page)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     parser.add_argument("--least", type=float, default=1.0, metavar="SHARE", help="to be noticed (default 1: all)")
     args = parser.parse_args()
     try:
-        directories = filter(None, (args.directory, args.beside))
-        levels = [trial.judged(each, args.workers, whole=bool(args.page)) for each in directories]
+        level = trial.judged(args.directory, args.workers, whole=bool(args.page))
         measured = trial.wrong_engines(args.directory, args.workers) if args.engines else []
         if args.page:
-            write_text(args.page, trial.page(levels, measured))
+            write_text(args.page, trial.page(level, measured))
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    trials = [*(each for level in levels for each in level.trials), *measured]
+    trials = [*level.trials, *measured]
     missed, count = [each.what for each in trials if not each.noticed], len(trials)
     print(f"{count - len(missed)} of {count} faults were noticed")
     for what in missed:

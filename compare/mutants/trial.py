@@ -41,7 +41,7 @@ Every verdict must be able to be lost. Here the theory is replaced by slightly w
 and the stored measurements of the {level} level are judged again; then MuJoCo is replaced by
 slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim changes.
 Written by `make mutants`.
-{others}{trials}
+{trials}
 ## Resolving power
 
 The relative error of a theory that every measurement of a quantity would
@@ -106,23 +106,14 @@ def _tried(one: Callable[[int], Trial], count: int, workers: int) -> list[Trial]
     return tried
 
 
-def page(levels: Sequence[Judged], measured: Sequence[Trial]) -> str:
-    """The page that says which claim notices what, in Markdown; the claims are those of the first level."""
-    first, *others = levels
-    tables = "".join(_table(*each) for each in (("theories", first.trials), ("engines", measured)) if each[1])
-    rows = [["quantity", "ceiling", *(each.name for each in levels)]]
+def page(level: Judged, measured: Sequence[Trial]) -> str:
+    """The page that says which claim notices what, in Markdown."""
+    tables = "".join(_table(*each) for each in (("theories", level.trials), ("engines", measured)) if each[1])
+    rows = [["quantity", "ceiling", level.name]]
     for name, quantity in QUANTITIES.items():
-        if quantity.resolves and any(name in each.power for each in levels):
-            powers = (f"{each.power[name]:.1g}" if name in each.power else "–" for each in levels)
-            rows.append([quantity.symbol, f"{quantity.resolves:.1g}", *powers])
-    said = "".join(f"\n{_counted(other)}\n" for other in others)
-    return _PAGE.format(level=first.name, others=said, trials=tables, powers=pages.markdown(rows))
-
-
-def _counted(level: Judged) -> str:
-    missed = "".join(f"; not {trial.what}" for trial in level.trials if not trial.noticed)
-    seen = sum(bool(trial.noticed) for trial in level.trials)
-    return f"At the {level.name} level {seen} of {len(level.trials)} wrong theories are noticed{missed}."
+        if quantity.resolves and name in level.power:
+            rows.append([quantity.symbol, f"{quantity.resolves:.1g}", f"{level.power[name]:.1g}"])
+    return _PAGE.format(level=level.name, trials=tables, powers=pages.markdown(rows))
 
 
 def _table(what: str, trials: Sequence[Trial]) -> str:
