@@ -17,9 +17,9 @@ import numpy as np
 from compare.measure.brackets import Bracket, Care, Search, narrow
 from compare.measure.extrapolation import vanishing
 from compare.measure.lab import Lab, Level, coarse_step
-from compare.measure.questions import lasting, rest, wall
-from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
-from compare.measure.settling import TAPER, Settled, Start, family, rotation_scale, settle
+from compare.measure.questions import lasting
+from compare.measure.record import Measurement, Missing, Records, if_sure, measurement, sure_enough
+from compare.measure.settling import begin, family, rotation_scale, settle_groups, taper
 from compare.runs.tasks import Task
 from compare.statistics import Measured, tail
 from model import Case, Parameters, State, Trajectory
@@ -87,61 +87,39 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     """
     yield from (Missing(PROTOCOL, name, UNDAMPED) for name, p in sets.items() if p.drag == QUADRATIC)
     sets = {name: p for name, p in sets.items() if p.drag != QUADRATIC}
-    limits = {name: _limits(records, name) for name in sets}
-    folds = {name: between for name, between in limits.items() if between}
+    limits = {name: [records.threshold(name, omega) for omega in ("omega_02", "omega_04")] for name in sets}
+    folds = {name: (low.value, high.value) for name, (low, high) in limits.items() if low and high}
     for name in sets:
         if name not in folds:
             yield Missing(PROTOCOL, name, "at no flow are a slipping ball and a lifted one both settled")
-    if not folds:
-        return
-    soonest = max(folds, key=lambda name: sets[name].c)
     parts = dict.fromkeys(folds, PARTS[lab.level])
-    if lab.level is Level.QUICK:
-        parts[soonest] = CLOSING
-    edges, missing = _lines(lab, sets, {n: [a + part * (b - a) for part in parts[n]] for n, (a, b) in folds.items()})
-    yield from missing
-    followed = _followed(lab, edges)
+    if folds and lab.level is Level.QUICK:
+        parts[max(folds, key=lambda name: sets[name].c)] = CLOSING
+    flows = [
+        (name, sets[name].replace(omega_0=low + part * (high - low)))
+        for name, (low, high) in folds.items()
+        for part in parts[name]
+    ]
+    begun = list(_lines(lab, flows))
+    yield from (each for each in begun if isinstance(each, Missing))
+    followed = _followed(lab, [each for each in begun if isinstance(each, Edge)])
     for edge in followed:
         yield from _rows(lab, edge)
-    for name in folds:
-        own = [edge for edge in followed if edge.set == name and _part(edge, *folds[name]) < max(CLOSING) + 1e-6]
-        yield from _closing(lab, sets[name], name, own)
+    for name, (low, high) in folds.items():
+        last = low + (max(CLOSING) + 1e-6) * (high - low)
+        yield from _closing(lab, name, [edge for edge in followed if edge.set == name and edge.p.omega_0 < last])
 
 
-def _limits(records: Records, name: str) -> tuple[float, float] | None:
-    """omega_02 and omega_04 of a set, as measured; None without either."""
-    low, high = records.threshold(name, "omega_02"), records.threshold(name, "omega_04")
-    return (low.value, high.value) if low and high else None
-
-
-def _part(edge: Edge, low: float, high: float) -> float:
-    return (edge.p.omega_0 - low) / (high - low)
-
-
-def _lines(
-    lab: Lab, sets: Mapping[str, Parameters], flows: Mapping[str, Sequence[float]]
-) -> tuple[list[Edge], list[Missing]]:
+def _lines(lab: Lab, flows: Sequence[tuple[str, Parameters]]) -> Iterator[Edge | Missing]:
     """The first lines, between the settled states at each flow."""
-    begin = [
-        Start(name, q, kind, start(q, q.omega_0))
-        for name, omegas in flows.items()
-        for q in (sets[name].replace(omega_0=float(omega)) for omega in omegas)
-        for kind, start in (("rest", rest), ("wall", wall))
-    ]
-    states, edges, missing = settle(lab, begin, loose=ROUGHLY), [], []
-    for slipping, lifted in zip(states[::2], states[1::2], strict=True):
-        name, q = slipping.start.set, slipping.start.p
+    starts = [[begin(name, q, "rest"), begin(name, q, "on the wall")] for name, q in flows]
+    for (name, q), (slipping, lifted) in zip(flows, settle_groups(lab, starts, loose=ROUGHLY), strict=True):
         if slipping.failure or lifted.failure or (slipping.case, family(lifted.case)) != (Case.SS, Case.NR):
-            why = f"no two attractors settled at omega_0 = {q.omega_0:.4g} rad/s: {_fate(slipping)}, {_fate(lifted)}"
-            missing.append(Missing(PROTOCOL, name, why))
+            fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
+            yield Missing(PROTOCOL, name, f"no two attractors settled at omega_0 = {q.omega_0:.4g} rad/s: {fates}")
         else:
             low, high = (_grounded(state.mean) for state in (slipping, lifted))
-            edges.append(Edge(name, q, low, high, low, high - low, (0.0, 1.0)))
-    return edges, missing
-
-
-def _fate(state: Settled) -> str:
-    return state.failure or state.case.name
+            yield Edge(name, q, low, high, low, high - low, (0.0, 1.0))
 
 
 def _grounded(x: Array) -> Array:
@@ -196,7 +174,7 @@ def _onward(edge: Edge) -> Edge:
     along = np.abs((high - low) @ edge.line / float(edge.line @ edge.line))
     together = int(np.argmax(along > TOGETHER)) or len(along)
     length = max(together - together // 4, 1)
-    weights = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER
+    weights = taper(length)
     mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
     parting = _grounded((high - low)[together - 1])
     line = parting * float(edge.line @ edge.line) / float(parting @ edge.line)
@@ -205,25 +183,20 @@ def _onward(edge: Edge) -> Edge:
 
 
 def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
-    """The state on the edge, as far as it is sure enough."""
-    for name, value in _values(edge).items():
-        quantity, roll = f"edge_{name}", 1.0 if name == "omega_c" else edge.p.R / edge.p.r
-        if not sure_enough(quantity, value, rotation_scale(edge.p) * roll):
-            at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
-            yield Missing(PROTOCOL, edge.set, f"{name} on the edge {at} is uncertain by {value.uncertainty:.1g} rad/s")
-            continue
-        yield measurement(lab, PROTOCOL, edge.set, edge.p, f"edge_{name}", value, edge.tasks, case="SS")
-
-
-def _values(edge: Edge) -> dict[str, Measured]:
-    """omega_c, the slips and the spin on the wall, each with its uncertainty; those of the slips are alike."""
+    """omega_c, the slips and the spin on the wall, as far as they are sure enough; the uncertainties are alike."""
     x, sure, roll = State.of(edge.crossing), State.of(_sure(edge)), edge.p.R / edge.p.r
     slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
-    return {
+    values = {
         "omega_c": Measured(x.omega_c, slips / roll),
         **{name: Measured(getattr(x, name), slips) for name in ("slip_x", "slip_y", "slip_z")},
         "wall_spin": Measured(x.slip_x + roll * x.omega_c, slips),
     }
+    for name, value in values.items():
+        row = measurement(lab, PROTOCOL, edge.set, edge.p, f"edge_{name}", value, edge.tasks, case="SS")
+        why = (
+            f"{name} on the edge at omega_0 = {edge.p.omega_0:.4g} rad/s is uncertain by {value.uncertainty:.1g} rad/s"
+        )
+        yield if_sure(row, rotation_scale(edge.p) * (1.0 if name == "omega_c" else roll), why)
 
 
 def _sure(edge: Edge) -> Array:
@@ -244,7 +217,7 @@ def _sure(edge: Edge) -> Array:
     return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
 
 
-def _closing(lab: Lab, p: Parameters, name: str, edges: Sequence[Edge]) -> Iterator[Measurement | Missing]:
+def _closing(lab: Lab, name: str, edges: Sequence[Edge]) -> Iterator[Measurement]:
     """Where the edge would meet the lifted ball: the distance in omega_c, extrapolated to zero."""
     if len(edges) < len(CLOSING):
         return
@@ -254,5 +227,5 @@ def _closing(lab: Lab, p: Parameters, name: str, edges: Sequence[Edge]) -> Itera
     place = vanishing(omegas, apart)
     if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
         tasks, by = [task for edge in edges for task in edge.tasks], "unstable slipping meets the lifted ball"
-        q = p.replace(omega_0=place.value)
+        q = edges[0].p.replace(omega_0=place.value)
         yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", by=by)

@@ -14,10 +14,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
+from compare.measure.record import Measurement, Missing, Records, if_sure, measurement
 from compare.runs.tasks import Task
 from compare.statistics import Measured
-from model import Flow, Parameters, Trajectory
+from model import Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import slip_velocities
 
@@ -45,11 +45,11 @@ FLUIDS: Mapping[str, Mapping[str, float]] = {
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """How far the laws are off, the ratio of friction to normal force, and the speed at which balls sink in a fluid."""
-    tasks = {(name, k): _tasks(lab, p, k) for name, p in sets.items() for k in REFINE[lab.level]}
-    falls = {(name, k): _falls(lab, name, k) for name in FLUIDS for k in REFINE[lab.level]}
-    lab.complete([task for group in (*tasks.values(), *falls.values()) for task in group])
-    for name, p in sets.items():
-        coarse, fine = (deviations(lab.run(tasks[name, k])) for k in REFINE[lab.level])
+    tasks = [_tasks(lab, p, refine) for p in sets.values() for refine in REFINE[lab.level]]
+    falls = [_falls(lab, _ball(name), refine) for name in FLUIDS for refine in REFINE[lab.level]]
+    runs = lab.groups([*tasks, *falls])
+    for name, p, fine_tasks in zip(sets, sets.values(), tasks[1::2], strict=True):
+        coarse, fine = deviations(next(runs)), deviations(next(runs))
         for key, value in fine.items():
             quantity, law, contact = key
             if math.isnan(value) or math.isnan(coarse[key]):
@@ -58,13 +58,11 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             # Halving the step may by chance not show what it does: of all laws of a kind the largest change stands.
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[0] == quantity]
             sure = Measured(value, math.hypot(np.nanmax(changes), ROUNDING))
-            if not sure_enough(quantity, sure, 1.0):
-                yield Missing(PROTOCOL, name, f"the step changes what is seen at {contact}: {law}")
-                continue
-            runs = tasks[name, REFINE[lab.level][1]]
-            yield measurement(lab, PROTOCOL, name, p, quantity, sure, runs, law=law, contact=contact)
-    for name in FLUIDS:
-        yield _sinking(lab, name, [falls[name, k] for k in REFINE[lab.level]])
+            row = measurement(lab, PROTOCOL, name, p, quantity, sure, fine_tasks, law=law, contact=contact)
+            yield if_sure(row, 1.0, f"the step changes what is seen at {contact}: {law}")
+    for name, fine_tasks in zip(FLUIDS, falls[1::2], strict=True):
+        speed, p = _sinking(next(runs), next(runs)), _ball(name)
+        yield measurement(lab, PROTOCOL, name, p, "v_y", speed, fine_tasks, case="NN", by=name, **FLUIDS[name])
 
 
 def _tasks(lab: Lab, p: Parameters, refine: int) -> list[Task]:
@@ -74,17 +72,8 @@ def _tasks(lab: Lab, p: Parameters, refine: int) -> list[Task]:
     up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
     down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
     half = Flow.steady(fast / 2)
-    starts: tuple[tuple[Flow, dict[int, float]], ...] = (
-        (up, {}),
-        (down, {0: 2 * p.R, 2: fast}),
-        (half, {2: fast / 3, 6: p.R / 2}),
-    )
-    tasks = []
-    for flow, values in starts:
-        x = np.zeros(8)
-        x[list(values)] = list(values.values())
-        tasks.append(lab.task(p, x, t_end, step / refine, flow=flow, samples=LASTS))
-    return tasks
+    starts = (up, State()), (down, State(y=2 * p.R, omega_c=fast)), (half, State(omega_c=fast / 3, h=p.R / 2))
+    return [lab.task(p, x, t_end, step / refine, flow=flow, samples=LASTS) for flow, x in starts]
 
 
 Deviations = dict[tuple[str, str, str], float]
@@ -149,25 +138,19 @@ def _ball(name: str) -> Parameters:
     return Parameters.from_fluid(**FLUIDS[name], R=5 * FLUIDS[name]["r"], mu=0.2, eta=0.2)
 
 
-def _falls(lab: Lab, name: str, refine: int) -> list[Task]:
+def _falls(lab: Lab, p: Parameters, refine: int) -> list[Task]:
     """A ball in the middle of still fluid, off floor and wall, from rest and sinking already."""
-    p = _ball(name)
-    step, speed = coarse_step(p), math.sqrt(p.g * p.R)
-    return [
-        lab.task(p, [100 * p.R, v_y, 0.0, 0.0, 0.0, 0.0, p.R / 2, 0.0], 64 * step, step / refine, samples=64)
-        for v_y in (0.0, -speed)
-    ]
+    step, middle = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
+    starts = middle, middle._replace(v_y=-math.sqrt(p.g * p.R))
+    return [lab.task(p, x, 64 * step, step / refine, samples=64) for x in starts]
 
 
-def _sinking(lab: Lab, name: str, tasks: Sequence[Sequence[Task]]) -> Measurement:
+def _sinking(coarse: Sequence[Trajectory], fine: Sequence[Trajectory]) -> Measured:
     """The speed at which a ball sinks steadily, where its acceleration vanishes, from two falls on either time step."""
-    coarse, fine = (terminal_speed(*lab.run(each)) for each in tasks)
-    scale = abs(fine)
+    before, value = terminal_speed(*coarse), terminal_speed(*fine)
     # What is left of a fall that has only just begun is a difference of speeds, each of them rounded in every step.
-    run = lab.run(tasks[1])[0]
-    rounding = ROUNDING * scale / (_ball(name).c * float(run.time[-1]))
-    value = Measured(fine, math.hypot(fine - coarse, rounding))
-    return measurement(lab, PROTOCOL, name, _ball(name), "v_y", value, tasks[1], case="NN", by=name, **FLUIDS[name])
+    rounding = ROUNDING * abs(value) / (fine[0].header.parameters.c * float(fine[0].time[-1]))
+    return Measured(value, math.hypot(value - before, rounding))
 
 
 def terminal_speed(slow: Trajectory, fast: Trajectory) -> float:

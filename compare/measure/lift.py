@@ -24,7 +24,7 @@ from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters, Trajectory
 from model.arrays import Array
 
-NAME = "lift"
+PROTOCOL = "lift"
 ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
     (Case.RR, Case.NR): (0.0, 0.0, 0.0),
     (Case.RS, Case.NS): (0.0, 0.8, 0.0),
@@ -61,36 +61,43 @@ class Line:
 
     def task(self, lab: Lab, omega_c: float, times: int = 1) -> Task:
         """The run from there, with the step `times` as short."""
+        step = coarse_step(self.p) / REFINED / times
+        return lab.task(*self.at(omega_c), STEPS * step, step, samples=STEPS)
+
+    def missing(self, why: str) -> Missing:
+        """That nothing was measured along it."""
+        return Missing(PROTOCOL, self.set, why)
+
+    def row(
+        self, lab: Lab, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]
+    ) -> Measurement:
+        """What was measured along it, with the state at an orbit."""
         p, x = self.at(omega_c)
-        step = coarse_step(p) / REFINED / times
-        return lab.task(p, x, STEPS * step, step, samples=STEPS)
+        inner, outer = self.inner.name, self.outer.name
+        return measurement(lab, PROTOCOL, self.set, p, quantity, value, tasks, inner=inner, outer=outer, **state_of(x))
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
     lines = [Line(name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
     first = [[line.task(lab, Omega / time_unit(line.p)) for Omega in ORBITS] for line in lines]
-    lab.complete([task for row in first for task in row])
-    seen = [_direct(line, lab.run(row)) for line, row in zip(lines, first, strict=True)]
-    about = [_about(runs) for runs in seen]
+    seen = [_direct(line, runs) for line, runs in zip(lines, lab.groups(first), strict=True)]
     near = [
         [line.task(lab, where * (1 - part), times) for part in NEAR for times in (1, 2)] if where else []
-        for line, where in zip(lines, about, strict=True)
+        for line, where in zip(lines, map(_about, seen), strict=True)
     ]
-    lab.complete([task for row in near for task in row])
-    for line, orbits, begun, tasks in zip(lines, first, seen, near, strict=True):
+    for line, orbits, begun, tasks, runs in zip(lines, first, seen, near, lab.groups(near), strict=True):
         lifted = next((run for run in begun if _force(run) is None), None)
         if not begun:
-            yield Missing(NAME, line.set, f"the ball doesn't stay in {line.inner.name} at any orbit")
+            yield line.missing(f"the ball doesn't stay in {line.inner.name} at any orbit")
         elif lifted is None:
-            yield _record(lab, line, "lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
-        elif Case(int(lifted.case[-1])) is not line.outer:
-            to = Case(int(lifted.case[-1])).name
-            yield Missing(NAME, line.set, f"out of {line.inner.name} the ball leaves the floor for {to}")
-        elif (value := _onset(lab.run(tasks))) is None:
-            yield Missing(NAME, line.set, f"where the ball leaves {line.inner.name} the floor's contact comes and goes")
+            yield line.row(lab, "lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
+        elif (to := Case(int(lifted.case[-1]))) is not line.outer:
+            yield line.missing(f"out of {line.inner.name} the ball leaves the floor for {to.name}")
+        elif (value := _onset(runs)) is None:
+            yield line.missing(f"where the ball leaves {line.inner.name} the floor's contact comes and goes")
         else:
-            yield _record(lab, line, "lift_onset", value.value, value, tasks)
+            yield line.row(lab, "lift_onset", value.value, value, tasks)
 
 
 def _direct(line: Line, runs: Sequence[Trajectory]) -> list[Trajectory]:
@@ -98,14 +105,6 @@ def _direct(line: Line, runs: Sequence[Trajectory]) -> list[Trajectory]:
     strays = [not np.isin(run.case[SKIPPED:], [line.inner, line.outer]).all() for run in runs]
     begin = [*strays, False].index(False)
     return list(runs[begin : [*strays, True].index(True, begin)])
-
-
-def _record(
-    lab: Lab, line: Line, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]
-) -> Measurement:
-    p, x = line.at(omega_c)
-    inner, outer = line.inner.name, line.outer.name
-    return measurement(lab, NAME, line.set, p, quantity, value, tasks, inner=inner, outer=outer, **state_of(x))
 
 
 def _force(run: Trajectory) -> Measured | None:

@@ -78,39 +78,64 @@ class State:
     case: Case
     x: Array = field(repr=False)
 
+    @property
+    def active(self) -> list[int]:
+        """Which of the variables are pushed."""
+        return [VARIABLES.index(name) for name in TRAITS[self.case].active]
+
+    @property
+    def units(self) -> Array:
+        """Natural sizes of the active variables."""
+        return state_units(self.p)[self.active]
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
+        size = PUSH.get(self.case, SMALL if self.p.drag == STOKES else SLIGHT)
+        return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
+
+    def tasks(self, lab: Lab) -> list[list[Task]]:
+        """Runs for each of the `sizes`: every active variable is pushed, up and down."""
+        step, (coarse, fine) = coarse_step(self.p), REFINE[lab.level]
+        lasts, samples = BRIEF.get(self.case, RECORD)
+        pushes = []
+        for size, refine in zip(self.sizes, (coarse, fine, fine), strict=False):
+            starts = self.x + np.kron(np.diag(size * self.units), [[1], [-1]]) @ np.eye(8)[self.active]
+            pushes.append([lab.task(self.p, x, lasts * step, step / refine, samples=samples) for x in starts])
+        return pushes
+
+    def missing(self, why: str) -> Missing:
+        """That its rates were not measured."""
+        return Missing(PROTOCOL, self.set, f"{self.case.name} at omega_0 = {self.p.omega_0:.4g} rad/s: {why}")
+
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
     states = [state for name, p in sets.items() for state in chosen(records, name, p, MORE[lab.level])]
-    tasks = [_tasks(lab, state) for state in states]
-    failures = lab.complete([task for pushes in tasks for push in pushes for task in push])
-    failed = {failure.task.key: failure.reason for failure in failures}
-    for state, pushes in zip(states, tasks, strict=True):
-        broken = [failed[task.key] for push in pushes for task in push if task.key in failed]
-        if broken:
-            yield _missing(state, f"a run {broken[0]}")
+    tasks = [[task for push in state.tasks(lab) for task in push] for state in states]
+    lab.complete([task for own in tasks for task in own])
+    for state, own in zip(states, tasks, strict=True):
+        runs, step = lab.attempt(own), coarse_step(state.p) / REFINE[lab.level][1]
+        if isinstance(runs, str):
+            yield state.missing(f"a run {runs}")
             continue
-        answers = [answer(state, size, lab.run(push)) for size, push in zip(_sizes(state), pushes, strict=True)]
+        count = 2 * len(state.active)
+        answers = [answer(state, size, runs[k * count : (k + 1) * count]) for k, size in enumerate(state.sizes)]
         if min(map(len, answers)) < LEAST.get(state.case, 8):
-            yield _missing(state, "pushed, the ball doesn't stay in this case")
-            continue
-        step = coarse_step(state.p) / REFINE[lab.level][1]
-        exponents, uncertainty = spectrum(state, answers, step)
-        yield from _measurements(lab, state, exponents, uncertainty, step, pushes[-1])
+            yield state.missing("pushed, the ball doesn't stay in this case")
+        else:
+            yield from _measurements(lab, state, *spectrum(state, answers, step), step, own[-count:])
     for name in sets:
-        there = {state.case for state in states if state.set == name}
         for case in STATES:
-            if case not in there:
-                why = (
-                    f"the ball settles in {case.name} at no flow that was tried, or slips too slowly or too fast there"
-                )
-                yield Missing(PROTOCOL, name, why)
+            if case not in {state.case for state in states if state.set == name}:
+                at = f"the ball settles in {case.name} at no flow that was tried"
+                yield Missing(PROTOCOL, name, f"{at}, or slips too slowly or too fast there")
 
 
 def chosen(records: Records, name: str, p: Parameters, more: int) -> list[State]:
     """The states of a set that are pushed: at most so many of a case, and spinning on the spot next to the wall."""
     unit = time_unit(p)
-    still = np.array([0.0, 0.0, 0.0, 0.0, SPIN / unit * p.R / p.r, 0.0, 0.0, 0.0])
+    still = model.State(slip_y=SPIN / unit * p.R / p.r).stacked()
     kept = [State(name, p.replace(omega_0=0.0), Case.RS, still)]
     states = [state for state in settled(records, name) if _suits(state)]
     if p.drag == QUADRATIC:  # it settles no ball that goes round with the fluid; but one that begins so goes on so
@@ -139,11 +164,6 @@ def settled(records: Records, name: str) -> Iterator[State]:
                 yield State(name, p, Case.SR, on_floor.stacked())
 
 
-def units(state: State) -> Array:
-    """Natural sizes of the active variables."""
-    return state_units(state.p)[_active(state)]
-
-
 def _suits(state: State) -> bool:
     """Whether what slips does so neither too slowly nor too fast.
 
@@ -162,33 +182,6 @@ def _suits(state: State) -> bool:
     )
 
 
-def _size(state: State) -> float:
-    """Size of a push."""
-    return PUSH.get(state.case, SMALL if state.p.drag == STOKES else SLIGHT)
-
-
-def _sizes(state: State) -> tuple[float, ...]:
-    """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
-    size = _size(state)
-    return (size / 2, size, size / 2) if state.case in PUSH else (size / 2, size)
-
-
-def _tasks(lab: Lab, state: State) -> list[list[Task]]:
-    """Runs for each of the `_sizes`: every active variable is pushed, up and down."""
-    p, step = state.p, coarse_step(state.p)
-    coarse, fine = REFINE[lab.level]
-    lasts, samples = BRIEF.get(state.case, RECORD)
-    pushes = []
-    for size, refine in zip(_sizes(state), (coarse, fine, fine), strict=False):
-        starts = state.x + np.kron(np.diag(size * units(state)), [[1], [-1]]) @ np.eye(8)[_active(state)]
-        pushes.append([lab.task(p, x, lasts * step, step / refine, samples=samples) for x in starts])
-    return pushes
-
-
-def _active(state: State) -> list[int]:
-    return [VARIABLES.index(name) for name in TRAITS[state.case].active]
-
-
 def answer(state: State, size: float, runs: Sequence[Trajectory]) -> Array:
     """D (n, d, d): how the active variables, over `units`, follow pushes of one size; runs in the order of the tasks.
 
@@ -197,14 +190,13 @@ def answer(state: State, size: float, runs: Sequence[Trajectory]) -> Array:
     """
     ups, downs = runs[::2], runs[1::2]
     if state.case is Case.SR:
-        leaning = [max(pair, key=lambda run: stays(run, state.case)) for pair in zip(ups, downs, strict=True)]
-        columns = [(1 if run in ups else -1) * (run.x - state.x) for run in leaning]
+        seen = [max(pair, key=lambda run: stays(run, state.case)) for pair in zip(ups, downs, strict=True)]
+        columns = [(1 if run in ups else -1) * (run.x - state.x) for run in seen]
     else:
-        leaning = [*runs]
+        # Where the wall carries nothing, as beside a ball that only spins, no contact with it shows.
+        seen = list(runs[:2] if state.case is Case.RS else runs)
         columns = [(up.x - down.x) / 2 for up, down in zip(ups, downs, strict=True)]
-    # Where the wall carries nothing, as beside a ball that only spins, no contact with it shows.
-    seen = leaning[:2] if state.case is Case.RS else leaning
-    D = np.stack(columns, axis=-1)[:, _active(state)] / (size * units(state)[:, None])
+    D = np.stack(columns, axis=-1)[:, state.active] / (size * state.units[:, None])
     ends = [stays(run, state.case) for run in seen]
     ends.append(int(np.argmax(np.append(size * np.abs(D).max(axis=(1, 2)) > FAR * (1 + 1e-9), True))))
     return np.asarray(D[1 : min(ends)])
@@ -216,7 +208,7 @@ def stays(run: Trajectory, case: Case) -> int:
 
 
 def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
-    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `_sizes`.
+    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `State.sizes`.
 
     The engine's order in the time step is taken to be 2. The uncertainty is that correction, which is larger than what
     is left if the order is 1; by how much the first half of the record differs; the next term in the size of the push,
@@ -243,11 +235,10 @@ def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Expon
     plain = matched(exponents_of(small, small), values)
     correction = (plain - matched(exponents_of(coarse, coarse), plain)) / 3
     half = np.abs(values - matched(exponents_of(large, small, 0.5), values))
-    bent = np.abs(values - plain)
-    size = _size(state) ** ORDER.get(state.case, 2)
-    bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size, 1.0)
+    bent, size = np.abs(values - plain), max(state.sizes)
+    bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size ** ORDER.get(state.case, 2), 1.0)
     stepped = np.abs(values) * (np.abs(values).max() * step) ** 2 / 12
-    solved = SOLVED / (_size(state) * interval)
+    solved = SOLVED / (size * interval)
     uncertainty = np.sqrt(np.abs(correction) ** 2 + half**2 + bent**2 + stepped**2 + solved**2)
     # Relative errors of one propagator have the same causes; that of one exponent may vanish by chance.
     alike = np.abs(values) * uncertainty.max() / np.abs(values).max()
@@ -258,27 +249,25 @@ def _measurements(
     lab: Lab, state: State, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
 ) -> Iterator[Measurement | Missing]:
     """One of each pair of conjugates, in the order of their decay, slowest first; and how many there are in all."""
-
     at: dict[str, Condition] = {"case": state.case.name, **state_of(state.x)}
     yield measurement(lab, PROTOCOL, state.set, state.p, "modes", len(exponents), tasks, **at)
-    parts: list[tuple[str, Measured, float, dict[str, Condition]]] = []
+    rows = []
     order = [k for k in np.argsort(-exponents.real) if exponents[k].imag >= 0]
+    fast = [k for k in order if abs(exponents[k]) * step > RESOLVED]
+    for k in fast:
+        yield state.missing(f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step")
     for mode, k in enumerate(order, start=1):
-        if abs(exponents[k]) * step > RESOLVED:
-            yield _missing(state, f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step")
+        if k in fast:
             continue
-        decay, frequency, sure = -float(exponents[k].real), float(exponents[k].imag), float(uncertainty[k])
-        parts.append(("decay_rate", Measured(decay, sure), frequency, {"mode": mode, "frequency": frequency}))
-        parts.append(("frequency", Measured(frequency, sure), decay, {"mode": mode, "decay_rate": decay}))
-    # They come from one propagator: where one is too vague for a check, the others are not to be trusted either.
-    for quantity, value, other, _ in parts:
-        if not sure_enough(quantity, value, natural_size(value.value, other, state.p)):
-            yield _missing(
-                state, f"one of its exponents, {value.value:.3g} 1/s, is uncertain by {value.uncertainty:.1g}"
-            )
-            return
-    for quantity, value, _, which in parts:
-        yield measurement(lab, PROTOCOL, state.set, state.p, quantity, value, tasks, **at, **which)
+        parts = {"decay_rate": -float(exponents[k].real), "frequency": float(exponents[k].imag)}
+        for (quantity, value), (name, other) in zip(parts.items(), reversed(parts.items()), strict=True):
+            sure, which = Measured(value, float(uncertainty[k])), {"mode": mode, name: other}
+            # They come from one propagator: where one is too vague for a check, the others aren't to be trusted either.
+            if not sure_enough(quantity, sure, natural_size(value, other, state.p)):
+                yield state.missing(f"one of its exponents, {value:.3g} 1/s, is uncertain by {sure.uncertainty:.1g}")
+                return
+            rows.append(measurement(lab, PROTOCOL, state.set, state.p, quantity, sure, tasks, **at, **which))
+    yield from rows
 
 
 def natural_size(rate: float, other: float, p: Parameters) -> float:
@@ -290,7 +279,3 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
         if size > REST * p.c:
             return size
     return 1 / time_unit(p)
-
-
-def _missing(state: State, why: str) -> Missing:
-    return Missing(PROTOCOL, state.set, f"{state.case.name} at omega_0 = {state.p.omega_0:.4g} rad/s: {why}")

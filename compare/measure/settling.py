@@ -222,13 +222,18 @@ def _judged(start: Start, task: Task, run: Trajectory, length: int, loose: float
     return Settled(start, case, values, means[len(series) :], task, excess, failure)
 
 
+def taper(length: int) -> Array:
+    """The window (n,): it falls off smoothly at both ends."""
+    return np.asarray(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER)
+
+
 def steady_mean(values: Array, length: int) -> tuple[Array, Array]:
     """Mean of rows (k, n) over their last `length` samples, tapered, and how far it may be from its limit; both (k,).
 
     From three windows, each a quarter of its length later than the one before: what is left of an approach by a
     constant ratio, plus the last change itself.
     """
-    weights = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER
+    weights = taper(length)
     weights /= weights.sum()
     n, shift = values.shape[1], length // 4
     first, second, last = (values[:, n - length - k * shift : n - k * shift] @ weights for k in (2, 1, 0))

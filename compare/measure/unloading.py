@@ -15,14 +15,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from compare.measure import onset
 from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.onset import LOOSE
 from compare.measure.questions import lasting
-from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
-from compare.measure.settling import Settled, Start, family, high, settle
+from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of
+from compare.measure.settling import Settled, begin, family, settle_groups
 from compare.runs.tasks import Task
 from compare.statistics import Measured, settled_case
-from model import Case, Parameters, State, Trajectory
+from model import Parameters, State, Trajectory
 from model.arrays import Array
 
 PROTOCOL = "unloading"
@@ -55,94 +55,78 @@ class Trial:
     name: str
     p: Parameters
     x0: Array
+    steps: Sequence[float]
     tasks: Sequence[Task] = field(repr=False)
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Settle a ball on the wall of every set that carries it, and begin from there."""
-    begin: list[tuple[str, Start]] = []
+    starts, trials = [], []
     for name, p in sets.items():
         if (limit := records.threshold(name, "omega_02")) is None:
             yield Missing(PROTOCOL, name, "no flow was measured that is the least to hold a ball on the wall")
             continue
         lifts = records.threshold(name, "omega_03") or limit
-        flows = {"unloading": ABOVE * limit.value, "push": LIFTED * max(limit.value, lifts.value)}
-        for kind, omega in flows.items():
-            q = p.replace(omega_0=omega)
-            begin.append((kind, Start(name, q, kind, np.array([high(q), 0.0, omega, 0.0, 0.0, 0.0]))))
-    trials = []
-    for (kind, start), state in zip(
-        begin, settle(lab, [start for _, start in begin], loose=onset.LOOSE[lab.level]), strict=True
-    ):
-        if state.failure:
-            yield Missing(PROTOCOL, start.set, f"no ball to begin with on the wall: {state.failure}")
-        elif kind == "unloading":
-            trials += [_unloading(lab, state, landing) for landing in (True, False)]
-        else:
-            trials += [_push(lab, state, upwards) for upwards in (True, False)]
-    lab.complete([task for trial in trials for task in trial.tasks])
+        flows = ABOVE * limit.value, LIFTED * max(limit.value, lifts.value)
+        starts.append([begin(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
+    for states in settle_groups(lab, starts, loose=LOOSE[lab.level]):
+        for state, begun in zip(states, (_unloaded, _pushed), strict=True):
+            if state.failure:
+                yield Missing(PROTOCOL, state.start.set, f"no ball to begin with on the wall: {state.failure}")
+            else:
+                trials += [_trial(lab, state.start.set, *each) for each in begun(state)]
     yield from _rows(lab, trials)
 
 
-def _unloading(lab: Lab, state: Settled, landing: bool) -> Trial:
-    p = state.start.p
-    mean = State.of(state.mean)
-    x0 = State(y=HEIGHT * p.R, omega_c=mean.omega_c, slip_x=mean.slip_x)
-    return _trial(
-        lab, state, LANDING if landing else UNLOADED, p.replace(omega_0=p.omega_0 * BELOW / ABOVE), x0.stacked()
-    )
+Begun = Iterator[tuple[str, Parameters, State]]
+"""Names of trials, parameters with the flow, and states."""
 
 
-def _push(lab: Lab, state: Settled, upwards: bool) -> Trial:
+def _unloaded(state: Settled) -> Begun:
     p, x = state.start.p, State.of(state.mean)
-    v_y = PUSH * math.sqrt(p.g * p.R) if upwards else 0.0
-    spin = 0.0 if upwards else PUSH * (x.slip_x + p.R / p.r * x.omega_c)
-    x0 = State(v_y=v_y, omega_c=x.omega_c, slip_x=x.slip_x + spin).stacked()
-    return _trial(lab, state, UPWARDS if upwards else BY_SPIN, p, x0)
+    for name in (LANDING, UNLOADED):
+        x0 = State(y=HEIGHT * p.R, omega_c=x.omega_c, slip_x=x.slip_x)
+        yield name, p.replace(omega_0=p.omega_0 * BELOW / ABOVE), x0
 
 
-def _trial(lab: Lab, state: Settled, name: str, p: Parameters, x0: Array) -> Trial:
+def _pushed(state: Settled) -> Begun:
+    p, x = state.start.p, State.of(state.mean)
+    yield UPWARDS, p, State(v_y=PUSH * math.sqrt(p.g * p.R), omega_c=x.omega_c, slip_x=x.slip_x)
+    spin = PUSH * (x.slip_x + p.R / p.r * x.omega_c)
+    yield BY_SPIN, p, State(omega_c=x.omega_c, slip_x=x.slip_x + spin)
+
+
+def _trial(lab: Lab, set: str, name: str, p: Parameters, x0: State) -> Trial:
     """Runs with both steps, sampled at every step where a landing is looked at."""
-    t_end, landing = lasting(p, UNLOADING if name == LANDING else SETTLING), name == LANDING
-    steps = _steps(lab, name, p)
+    landing = name == LANDING
+    t_end = lasting(p, UNLOADING if landing else SETTLING)
+    steps = [coarse_step(p) / (refine if landing else refine // 4) for refine in REFINE[lab.level]]
     tasks = [lab.task(p, x0, t_end, step, samples=round(t_end / step) if landing else 1000) for step in steps]
-    return Trial(state.start.set, name, p, x0, tasks)
-
-
-def _steps(lab: Lab, name: str, p: Parameters) -> list[float]:
-    """Both time steps of a trial, s."""
-    return [coarse_step(p) / (refine if name == LANDING else refine // 4) for refine in REFINE[lab.level]]
+    return Trial(set, name, p, x0.stacked(), steps, tasks)
 
 
 def _rows(lab: Lab, trials: Sequence[Trial]) -> Iterator[Measurement | Missing]:
     """Numbers of all trials; the step counts for each at least as much as for half of the trials."""
     measured: dict[tuple[str, str, str], list[tuple[Trial, float, float, float]]] = {}
-    for trial in trials:
-        coarse, fine = lab.run(trial.tasks)
+    for trial, runs in zip(trials, lab.groups([trial.tasks for trial in trials]), strict=True):
         if trial.name != LANDING:
-            yield _ended(lab, trial, *(family(settled_case(run)) for run in (coarse, fine)))
-        steps = _steps(lab, trial.name, trial.p)
-        numbers = [_numbers(trial.name, run, step) for run, step in zip((coarse, fine), steps, strict=True)]
-        if numbers[0].keys() != numbers[1].keys() or (trial.name == LANDING and not numbers[1]):
+            coarse, fine = (family(settled_case(run)) for run in runs)
+            if coarse is fine:
+                yield _record(lab, trial, "case", fine)
+            else:
+                yield Missing(PROTOCOL, trial.set, f"{trial.name}: with half the time step the ball ends up otherwise")
+        before, numbers = (_numbers(trial.name, run, step) for run, step in zip(runs, trial.steps, strict=True))
+        if before.keys() != numbers.keys() or (trial.name == LANDING and not numbers):
             yield Missing(PROTOCOL, trial.set, f"{trial.name}: the ball does not slip and land")
             continue
-        for key, (value, own) in numbers[1].items():
-            change = abs(numbers[0][key][0] / value - 1)
-            measured.setdefault((trial.name, *key), []).append((trial, value, own, change))
+        for key, (value, own) in numbers.items():
+            measured.setdefault((trial.name, *key), []).append((trial, value, own, abs(before[key][0] / value - 1)))
     for (_, quantity, event), rows in measured.items():
         usual = float(np.median([change for *_, change in rows]))
         for trial, value, own, change in rows:
             sure = Measured(value, math.hypot(max(change, usual) * value, own))
-            if sure_enough(quantity, sure, abs(value)):
-                yield _record(lab, trial, quantity, sure, event=event)
-            else:
-                yield Missing(PROTOCOL, trial.set, f"{trial.name}: {quantity} is uncertain by {sure.uncertainty:.1g}")
-
-
-def _ended(lab: Lab, trial: Trial, coarse: Case, fine: Case) -> Measurement | Missing:
-    if coarse is fine:
-        return _record(lab, trial, "case", fine)
-    return Missing(PROTOCOL, trial.set, f"{trial.name}: with half the time step the ball ends up otherwise")
+            row = _record(lab, trial, quantity, sure, event=event)
+            yield if_sure(row, abs(value), f"{trial.name}: {quantity} is uncertain by {row.uncertainty:.1g}")
 
 
 def _record(lab: Lab, trial: Trial, quantity: str, value: Measured | float, **conditions: Condition) -> Measurement:
