@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -51,19 +50,9 @@ TURN = 0.5
 """Largest change of a slip in a window over the slip itself, and of what friction alone would make of it: where it is
 about to vanish, or is held at a trace, friction turns too fast."""
 COMPONENTS = ("Ax", "Ay", "Az", "Bx", "By", "Bz")
-
-
-@dataclass(frozen=True)
-class Sighting:
-    """State, rates and contact forces in the middle of a window."""
-
-    case: Case
-    x: Array
-    """(8,)"""
-    rates: Array
-    """(8,), each per second."""
-    forces: Array
-    """(6,): A_x, A_y, A_z, B_x, B_y, B_z in N."""
+STATE, RATES, FORCES = slice(0, 8), slice(8, 16), slice(16, 22)
+"""Parts of a sighting (22,), what is there in the middle of a window: the state, its rates of change in SI, and the
+contact forces `COMPONENTS` in N."""
 
 
 def slip_unit(p: Parameters) -> float:
@@ -101,14 +90,14 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     kept = Counter[tuple[str, Case]]()
     for centre in CENTRES:
         for (name, p, _), pair, (coarse, fine) in zip(starts, tasks, runs, strict=True):
-            seen = _seen(coarse, fine, centre)
-            if seen is None or kept[name, seen[0].case] == KEPT[lab.level]:
+            if not (found := _seen(coarse, fine, centre)) or kept[name, found[0]] == KEPT[lab.level]:
                 continue
-            values = list(_values(*seen, p))
-            kept[name, seen[0].case] += bool(values)
-            for what, value in values:
-                at = state_of(seen[0].x)
-                yield measurement(lab, NAME, name, p, what, value, pair, case=seen[0].case.name, **at)
+            case, seen = found
+            values = dict(_values(case, seen, p))
+            kept[name, case] += bool(values)
+            for what, value in values.items():
+                at = state_of(seen[0, STATE])
+                yield measurement(lab, NAME, name, p, what, value, pair, case=case.name, **at)
     for name in sets:
         for case in Case:
             if not kept[name, case]:
@@ -161,35 +150,34 @@ def constrained(case: Case, x: Array, p: Parameters) -> Array:
     return State.of(x)._replace(slip_z=-State.of(x).v_h / p.r).stacked() if case is Case.RN else x
 
 
-def _seen(coarse: Trajectory, fine: Trajectory, centre: int) -> tuple[Sighting, Sighting, Sighting] | None:
-    """A window's sighting extrapolated to a vanishing step, that of the finer run, and that by polynomials less high.
+def _seen(coarse: Trajectory, fine: Trajectory, centre: int) -> tuple[Case, Array] | None:
+    """A window's case, and sightings (3, 22): extrapolated to a vanishing step, that of the finer run, and that by
+    polynomials less high.
 
     None if the case changes in or near the window, or a slip turns or hardly presses.
     """
     high, low = DEGREES
     one, two = _sight(coarse, centre, 1, high), _sight(fine, 2 * centre, 2, high)
-    lower = _sight(fine, 2 * centre, 2, low)
-    if not (one and two and lower and one.case is two.case):
+    lower, case = _sight(fine, 2 * centre, 2, low), Case(int(coarse.case[centre]))
+    if one is None or two is None or lower is None or fine.case[2 * centre] != case:
         return None
-    x, rates, force = (
-        b + (b - a) * LIMIT for a, b in ((one.x, two.x), (one.rates, two.rates), (one.forces, two.forces))
-    )
-    return Sighting(one.case, constrained(one.case, x, fine.header.parameters), rates, force), two, lower
+    best = two + (two - one) * LIMIT
+    best[STATE] = constrained(case, best[STATE], fine.header.parameters)
+    return case, np.stack([best, two, lower])
 
 
-def _sight(run: Trajectory, centre: int, refined: int, degree: int) -> Sighting | None:
+def _sight(run: Trajectory, centre: int, refined: int, degree: int) -> Array | None:
     """What happens in a window, None if the case changes in or near it or a slip turns."""
     near, half = (HALF + APART) * refined, HALF * refined
     window = slice(centre - half, centre + half + 1)
-    case = Case(int(run.case[centre]))
-    if np.ptp(run.case[centre - near : centre + near + 1]) or _turns(case, run, window):
+    if np.ptp(run.case[centre - near : centre + near + 1]) or _turns(Case(int(run.case[centre])), run, window):
         return None
     time, at = run.time[window], float(run.time[centre])
     x, rates = polynomial(time, run.x[window], degree, at)
     # The forces of a sample act from then on for a step: they belong to the middle of it.
     later = (time[1] - time[0]) / 2
     force, _ = polynomial(time + later, np.concatenate([run.force_A, run.force_B], axis=1)[window], degree, at)
-    return Sighting(case, x, rates, force)
+    return np.concatenate([x, rates, force])
 
 
 def _turns(case: Case, run: Trajectory, window: slice) -> bool:
@@ -206,43 +194,33 @@ def _turns(case: Case, run: Trajectory, window: slice) -> bool:
     return False
 
 
-def _values(best: Sighting, fine: Sighting, lower: Sighting, p: Parameters) -> Iterator[tuple[str, Measured]]:
+def _values(case: Case, seen: Array, p: Parameters) -> Iterator[tuple[str, Measured]]:
     """Quantities with uncertainties: what the extrapolation, and another degree of the polynomials, change.
 
     The largest change over the scales of the rates, or of the forces, stands for all of them: that of one may vanish
     by accident. None where it is more than `COARSE`.
     """
-    moving = [k for k, name in enumerate(VARIABLES) if name in TRAITS[best.case].active and name not in ("y", "h")]
-    scales = _rate_scales(p)
-    pressing = _forces(best)
-    weight = p.m * p.g
+    moving = [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
+    speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
+    scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
+    forces = [_forces(case, row) for row in seen[:, FORCES]]
     rate_change, force_change = (
-        max(0.0, *(abs(a - b) * DOUBT / LIMIT + abs(b - c) for a, b, c in zip(*rows, strict=True)))
-        for rows in (
-            [(each.rates / scales)[moving] for each in (best, fine, lower)],
-            [[force / weight for force in _forces(each).values()] or [0.0] for each in (best, fine, lower)],
-        )
+        max((abs(a - b) * DOUBT / LIMIT + abs(b - c) for a, b, c in np.transpose(rows).tolist()), default=0.0)
+        for rows in ((seen[:, RATES] / scales)[:, moving], [[w / weight for w in each.values()] for each in forces])
     )
     rate_change, force_change = max(rate_change, floor(p) * (1 + p.j) / p.j), max(force_change, floor(p))
     if max(rate_change, force_change) > COARSE:
         return
     for k in moving:
-        yield f"rate_{VARIABLES[k]}", Measured(float(best.rates[k]), rate_change * float(scales[k]))
-    for name, force in pressing.items():
+        yield f"rate_{VARIABLES[k]}", Measured(float(seen[0, RATES][k]), rate_change * float(scales[k]))
+    for name, force in forces[0].items():
         yield f"moving_force_{name}", Measured(force, force_change * weight)
 
 
-def _forces(seen: Sighting) -> dict[str, float]:
-    """The forces that the motion determines, of the contacts that are closed."""
-    named = dict(zip(COMPONENTS, seen.forces.tolist(), strict=True))
-    if seen.case is Case.RR:  # the contacts share the load in ways that Newton's laws don't tell apart
+def _forces(case: Case, forces: Array) -> dict[str, float]:
+    """Of forces (6,) those that the motion determines, of the contacts that are closed."""
+    named = dict(zip(COMPONENTS, forces.tolist(), strict=True))
+    if case is Case.RR:  # the contacts share the load in ways that Newton's laws don't tell apart
         A_x, A_y, A_z, B_x, B_y, B_z = named.values()
         return {"Ax-By": A_x - B_y, "Ay+By": A_y + B_y, "Bx+By": B_x + B_y, "Az": A_z, "Bz": B_z}
-    return {name: force for name, force in named.items() if getattr(seen.case, name[0]) is not Contact.N}
-
-
-def _rate_scales(p: Parameters) -> Array:
-    """Natural sizes of the rates of the eight variables: m s-1, m s-2, rad s-2."""
-    spin = p.g / p.r
-    speed = math.sqrt(p.g * p.R)
-    return np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
+    return {name: force for name, force in named.items() if getattr(case, name[0]) is not Contact.N}

@@ -201,23 +201,20 @@ def _judged(start: Start, task: Task, run: Trajectory, length: int, loose: float
     series = columns(run)
     swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in determined(case))
     means, drifts = steady_mean(np.stack([*series.values(), *run.x.T]), length)
-    sure = dict(zip(series, zip(means.tolist(), drifts.tolist(), strict=False), strict=False))
+    mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
+    groups = [[q for q in group if q in determined(case)] for group in GROUPS]
+    worst = {q: max(drift[each] / scale(each, p) for each in group) for group in groups for q in group}
     solved = SOLVED / (p.c * coarse_step(p))
-    values: dict[str, Measured] = {}
-    drift, floor, failure = 0.0, 0.0, ""
-    for group in GROUPS:
-        alike = [q for q in group if q in determined(case)]
-        worst = max((sure[q][1] / scale(q, p) for q in alike), default=0.0)
-        values |= {q: Measured(sure[q][0], math.hypot(solved, worst) * scale(q, p)) for q in alike}
-        for q in alike:
-            drift = max(drift, COVERAGE * MARGIN * worst / quantity(q).resolves)
-            floor = max(floor, COVERAGE * solved / quantity(q).resolves)  # the same however long a run is
-    excess = max(drift, swings / SWING)
+    values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
+    drifting = max(COVERAGE * MARGIN * worst[q] / quantity(q).resolves for q in worst)
+    floor = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
+    failure = ""
+    excess = max(drifting, swings / SWING)
     if counts.max() < STEADY * length:
         excess = math.inf
         failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
     elif max(excess, floor) > loose:
-        way = "drifts" if max(drift, floor) > loose else "swings"
+        way = "drifts" if max(drifting, floor) > loose else "swings"
         failure = f"in {case.name} it still {way} {max(excess, floor):.2g} times as much as it may"
     return Settled(start, case, values, means[len(series) :], task, excess, failure)
 

@@ -7,7 +7,10 @@ from collections.abc import Iterator
 import pytest
 
 from compare.figures.registry import FIGURES
+from compare.measure.lab import Lab, Level
 from compare.report import report
+from compare.runs.campaign import Campaign
+from compare.runs.engines import MUJOCO
 
 
 @pytest.fixture(scope="module")
@@ -16,3 +19,10 @@ def few_figures() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "FIGURES", {name: FIGURES[name] for name in ("ladder", "fig-3")})
         yield
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
+    """Where protocols run MuJoCo at the quick level."""
+    with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
+        yield Lab(campaign, MUJOCO, Level.QUICK)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,12 +13,11 @@ from compare.claims import cases as claims
 from compare.claims.claim import Outcome, Verdict
 from compare.claims.judge import judge
 from compare.measure import laws
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab
 from compare.measure.record import Measurement, Missing, Records
-from compare.runs.campaign import Campaign
-from compare.runs.engines import MUJOCO
 from model import Case, Flow, Parameters, Trajectory
 from model.trajectory import SAMPLE, Events, Header
+from tests.measured import measured
 
 P = Parameters.named("high-wall-friction")
 SAMPLES = 50
@@ -78,16 +76,7 @@ def test_every_deviation_is_measured() -> None:
 
 
 def law(quantity: str, value: float, uncertainty: float, contact: str = "A") -> Measurement:
-    return Measurement(
-        protocol="laws",
-        quantity=quantity,
-        value=value,
-        uncertainty=uncertainty,
-        engine="mujoco",
-        set="mine",
-        parameters=P,
-        conditions={"law": "a law", "contact": contact},
-    )
+    return measured("laws", quantity, value, uncertainty, P, law="a law", contact=contact)
 
 
 def table_3(*rows: Measurement) -> Verdict:
@@ -108,9 +97,8 @@ def test_laws_are_judged() -> None:
     assert table_3(*good, law("law_in_motion", 0.0, 1e-2)).outcome is Outcome.INCONCLUSIVE
 
 
-def test_laws_and_drag_are_measured_with_mujoco(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_laws_and_drag_are_measured_with_mujoco(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(laws, "LASTS", 256)
-    lab = Lab(Campaign(tmp_path, workers=0), MUJOCO, Level.QUICK)
     rows = list(laws.measure(lab, {"reference": Parameters.named("reference")}, Records()))
     records = Records.of(rows)
     for verdict in judge([claim for claim in claims.CLAIMS if claim.protocols == {laws.PROTOCOL}], records):
@@ -122,9 +110,7 @@ def test_laws_and_drag_are_measured_with_mujoco(tmp_path: Path, monkeypatch: pyt
     assert drag.outcome is Outcome.REFUTED
 
 
-def test_a_drag_coefficient_that_disagrees_with_stokes_is_noticed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_drag_coefficient_that_disagrees_with_stokes_is_noticed(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     of_fluid = Parameters.from_fluid
 
     def wrong(**values: float) -> Parameters:
@@ -132,7 +118,6 @@ def test_a_drag_coefficient_that_disagrees_with_stokes_is_noticed(
         return p.replace(c=1.01 * p.c)
 
     monkeypatch.setattr(Parameters, "from_fluid", wrong)
-    lab = Lab(Campaign(tmp_path, workers=0), MUJOCO, Level.QUICK)
     records = Records.of(laws.measure(lab, {}, Records()))
     (drag,) = (verdict for verdict in judge(claims.CLAIMS, records) if verdict.claim.id == "eq-10")
     assert drag.outcome is Outcome.REFUTED

@@ -17,14 +17,13 @@ from compare.measure import onset, thresholds
 from compare.measure.brackets import FINER, LONGER, Bracket, Search, narrow
 from compare.measure.edge import Edge, _falls_behind
 from compare.measure.extrapolation import turning, vanishing
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Level
 from compare.measure.questions import held, keeps_on, rolling, settles, slides, stays_rolling
-from compare.measure.record import Measurement, Records
+from compare.measure.record import Records
 from compare.measure.sets import sets
-from compare.runs.campaign import Campaign
-from compare.runs.engines import MUJOCO
 from compare.statistics import Measured
 from model import Case, Parameters
+from tests.measured import measured
 
 REFERENCE = Parameters.named("reference")
 NUMBERS = SimpleNamespace(run=list)
@@ -99,12 +98,6 @@ def test_a_line_has_no_maximum():
     assert not math.isfinite(turning(where, [Measured(float(w), 0.0) for w in where]).value)
 
 
-@pytest.fixture(scope="module")
-def lab(tmp_path_factory):
-    with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
-        yield Lab(campaign, MUJOCO, Level.QUICK)
-
-
 def _ran(lab, p, omega, x0, units=5.0):
     return lab.run([held(lab, p, omega, x0, units)])[0]
 
@@ -160,37 +153,23 @@ def test_protocol_on_a_set_without_fold(lab):
     assert verdicts["table-5-NF2"].outcome is Outcome.NOT_RUN
 
 
-def _measured(quantity, value, protocol="thresholds", p=REFERENCE, **conditions):
-    return Measurement(
-        protocol=protocol,
-        quantity=quantity,
-        value=value,
-        uncertainty=1e-6 * abs(value),
-        engine="mujoco",
-        set="reference",
-        parameters=p,
-        conditions=conditions,
-    )
-
-
 def _records():
     t = analytic.thresholds(REFERENCE)
     rough = Parameters.named("high-wall-friction")
     by = {"side": "from above", "by": "hand"}
     p = REFERENCE.replace(omega_0=(t.omega_02 + t.omega_04) / 2)
     x = analytic.solution(p, Case.SS, stable=False).x
-    return Records(
-        (
-            _measured("omega_01", t.omega_01, **by),
-            _measured("omega_02", t.omega_02, **by),
-            _measured("omega_04", t.omega_04, **by),
-            _measured("omega_03", analytic.thresholds(rough).omega_03, p=rough, **by),
-            _measured("omega_02", t.omega_02, "edge", **by),
-            dataclasses.replace(_measured("folds", 1.0), uncertainty=0.0),
-            _measured("edge_omega_c", x[2], "edge", p, case="SS"),
-            _measured("edge_slip_x", x[3], "edge", p, case="SS"),
-        )
+    rows = (
+        ("thresholds", "omega_01", t.omega_01, REFERENCE, by),
+        ("thresholds", "omega_02", t.omega_02, REFERENCE, by),
+        ("thresholds", "omega_04", t.omega_04, REFERENCE, by),
+        ("thresholds", "omega_03", analytic.thresholds(rough).omega_03, rough, by),
+        ("edge", "omega_02", t.omega_02, REFERENCE, by),
+        ("edge", "edge_omega_c", x[2], p, {"case": "SS"}),
+        ("edge", "edge_slip_x", x[3], p, {"case": "SS"}),
     )
+    known = [measured(name, what, value, 1e-6 * abs(value), of, **at) for name, what, value, of, at in rows]
+    return Records((*known, measured("thresholds", "folds", 1.0)))
 
 
 def test_claims_agree_with_the_right_theory():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,14 +14,13 @@ from compare.claims import stability
 from compare.claims.claim import Outcome
 from compare.claims.judge import judge
 from compare.measure import rates
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Measurement, Records
-from compare.runs.campaign import Campaign
-from compare.runs.engines import MUJOCO
+from compare.measure.lab import Lab, coarse_step, time_unit
+from compare.measure.record import Records
 from compare.statistics import exponents, matched, propagator
 from model import Case, Parameters
 from model.arrays import Array
 from model.kinematics import VARIABLES
+from tests.measured import measured
 
 P = Parameters.named("reference")
 EPS = float(np.finfo(float).eps)
@@ -92,8 +91,7 @@ def test_what_depends_on_the_size_of_the_push_and_on_the_step_is_extrapolated() 
     assert np.abs(values - wanted).max() < np.abs(matched(plain, values) - wanted).max() / 10
 
 
-def test_a_run_counts_up_to_where_the_ball_leaves_the_case(tmp_path: Path) -> None:
-    lab = Lab(Campaign(tmp_path, workers=0), MUJOCO, Level.QUICK)
+def test_a_run_counts_up_to_where_the_ball_leaves_the_case(lab: Lab) -> None:
     slow = P.replace(omega_0=1.0)
     (run,) = lab.run([lab.task(slow, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, P.R / 2, -0.5], 0.2, 1e-3)])
     first = run.cases[1]
@@ -111,20 +109,7 @@ def spectra(*cases: tuple[Case, float, Parameters]) -> Records:
         (solution,) = (s for s in analytic.stationary_solutions(p) if s.case is case and (s.stable or case is Case.SR))
         values = [*solution.eigenvalues, *([0.0j] if case is Case.NS else [])]
 
-        def row(
-            quantity: str, value: float, sure: float, p: Parameters = p, case: Case = case, **of: float
-        ) -> Measurement:
-            return Measurement(
-                protocol="rates",
-                quantity=quantity,
-                value=value,
-                uncertainty=sure,
-                engine="mujoco",
-                set="mine",
-                parameters=p,
-                conditions={"case": case.name, **of},
-            )
-
+        row = partial(measured, "rates", p=p, set="mine", case=case.name)
         rows.append(row("modes", len(values), 0.0))
         slowest_first = sorted((v for v in values if v.imag >= 0), key=lambda v: -v.real)
         for mode, value in enumerate(slowest_first, start=1):
@@ -187,26 +172,11 @@ def test_a_state_that_theory_calls_unstable_is_noticed(monkeypatch: pytest.Monke
     assert judge([claim], records)[0].outcome is Outcome.REFUTED
 
 
-def test_the_rate_of_rolling_and_of_spinning_is_measured_with_mujoco(tmp_path: Path) -> None:
+def test_the_rate_of_rolling_and_of_spinning_is_measured_with_mujoco(lab: Lab) -> None:
     p = P.replace(omega_0=0.6 / time_unit(P))
     values = {name: p.omega_0 if name == "omega_c" else 0.0 for name in VARIABLES[1:6]}
-    before = Records(
-        tuple(
-            Measurement(
-                protocol="settled",
-                quantity=name,
-                value=value,
-                uncertainty=0.0,
-                engine="mujoco",
-                set="mine",
-                parameters=p,
-                conditions={"case": "RR", "start": "rest"},
-            )
-            for name, value in values.items()
-        )
-    )
-    lab = Lab(Campaign(tmp_path, workers=0), MUJOCO, Level.QUICK)
-    records = Records.of(rates.measure(lab, {"mine": P}, before))
+    before = [measured("settled", name, w, p=p, set="mine", case="RR", start="rest") for name, w in values.items()]
+    records = Records.of(rates.measure(lab, {"mine": P}, Records(tuple(before))))
     verdicts = {verdict.claim.id: verdict for verdict in judge(stability.CLAIMS, records)}
     for name, quantities in (("prop-1-rate", 3), ("prop-2", 5)):
         assert verdicts[name].outcome is Outcome.CONFIRMED

@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import analytic
 from compare.measure import characteristic, plane, settled, settling
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records
 from compare.measure.sets import sets
 from compare.runs import engines
-from compare.runs.campaign import Campaign
 from model import Case, Parameters
+from tests.measured import thresholds
 
 THICK = Parameters.named("reference").replace(c=10.0)
 FLOWS = (0.6, 1.4, 2.0, 2.6)
 """Flows, omega_0 sqrt(R/g): one at which the ball rolls, two at which it slips, one at which the wall carries it."""
-
-
-def _lab(directory: Path) -> Lab:
-    return Lab(Campaign(directory, workers=0), engines.MUJOCO, Level.QUICK)
-
-
-@pytest.fixture(scope="module")
-def lab(tmp_path_factory: pytest.TempPathFactory) -> Lab:
-    return _lab(tmp_path_factory.mktemp("runs"))
 
 
 @pytest.fixture(scope="module")
@@ -132,16 +120,8 @@ class TestOthers:
         assert abs(by_case["SS"].value - 1.0) > 0.1
 
     def test_the_jump_is_looked_for_where_slipping_was_seen_to_begin(self, lab: Lab) -> None:
-        onset = Measurement(
-            protocol="thresholds",
-            quantity="omega_01",
-            value=analytic.thresholds(THICK).omega_01,
-            uncertainty=1e-6,
-            engine="mujoco",
-            set="thick",
-            parameters=THICK,
-        )
-        (only,) = characteristic.slope(lab, {"thick": THICK}, Records((onset,)))
+        known = thresholds("thick", THICK, "omega_01")
+        (only,) = characteristic.slope(lab, {"thick": THICK}, known)
         assert isinstance(only, Measurement)
         assert only.value == pytest.approx(-1.0, abs=3 * only.uncertainty)
 

@@ -14,21 +14,16 @@ from analytic import bifurcation, slip_bounds, slip_stability
 from compare.claims import cases, equations, formal, slipping
 from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import judge
-from compare.measure import bounds, field, growth, lift, motions, thresholds
+from compare.measure import bounds, field, growth, lift, motions
 from compare.measure.lab import Lab, Level
-from compare.measure.record import Measurement, Records
+from compare.measure.record import Records
 from compare.measure.sets import sets
-from compare.runs.campaign import Campaign
-from compare.runs.engines import MUJOCO
+from compare.measure.thresholds import birth
 from model import Case, Parameters, storage
 from model.cases import TRAITS
+from tests.measured import thresholds
 
 SETS = {"reference": Parameters.named("reference")}
-
-
-@pytest.fixture(scope="module")
-def lab(tmp_path_factory: pytest.TempPathFactory) -> Lab:
-    return Lab(Campaign(tmp_path_factory.mktemp("runs"), workers=0), MUJOCO, Level.QUICK)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +97,7 @@ def test_a_wrong_growth_is_noticed(
 
 
 def test_growth_passes_through_zero_where_it_should(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    known = Records(tuple(_end(quantity) for quantity in ("omega_01", "omega_02")))
+    known = thresholds("reference", SETS["reference"], "omega_01", "omega_02")
     measured = Records.of([*bounds.measure(lab, SETS, known), *bounds.watched(lab, SETS, known)])
     ids = ("eq-61", "eq-66", "eq-67", "eq-82", "eq-83", "fig-4-5")
     verdicts = outcomes(slipping.CLAIMS, measured)
@@ -120,21 +115,6 @@ def test_a_bent_line_has_its_zero_and_slope(power: float) -> None:
     assert abs(zero.value - 1.7 ** (1 / power)) < 3 * zero.uncertainty < 0.03
     assert abs(slope.value - power * zero.value ** (power - 1)) < 3 * slope.uncertainty < 0.06
     assert np.isnan([m.value for m in bounds._curve(q, q + 1, np.full(len(q), 1e-6))]).all()
-
-
-def _end(quantity: str, name: str = "reference") -> Measurement:
-    """A flow at which rolling ends, as if it had been measured before."""
-    p = sets(Level.QUICK)[name]
-    value = getattr(analytic.thresholds(p), quantity)
-    return Measurement(
-        protocol="thresholds",
-        quantity=quantity,
-        value=value,
-        uncertainty=1e-4 * value,
-        engine="mujoco",
-        set=name,
-        parameters=p,
-    )
 
 
 def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,9 +135,9 @@ def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest
 
 
 def test_the_fold_is_born_at_the_critical_drag(lab: Lab) -> None:
-    name = "thick-fluid"
-    known = Records(tuple(_end(quantity, name) for quantity in ("omega_01", "omega_02")))
-    measured = Records.of(thresholds.birth(lab, {name: sets(Level.QUICK)[name]}, known))
+    thick = {"thick-fluid": sets(Level.QUICK)["thick-fluid"]}
+    known = thresholds(*next(iter(thick.items())), "omega_01", "omega_02")
+    measured = Records.of(birth(lab, thick, known))
     (m,) = measured.measurements
     assert abs(m.value - bifurcation.critical_drag(m.parameters)) < 3 * m.uncertainty < 5e-3 * m.value
 

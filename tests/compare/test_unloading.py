@@ -9,31 +9,19 @@ from compare.claims import unloading as claims
 from compare.claims.claim import Outcome
 from compare.claims.judge import judge
 from compare.measure import unloading
-from compare.measure.lab import Lab, Level
-from compare.measure.record import Measurement, Records
+from compare.measure.lab import Level
+from compare.measure.record import Records
 from compare.measure.sets import sets
-from compare.runs.campaign import Campaign
-from compare.runs.engines import MUJOCO
+from tests.measured import thresholds
 
 NAME = "thick-fluid"
 P = sets(Level.QUICK)[NAME]
 
 
 @pytest.fixture(scope="module")
-def records(tmp_path_factory):
-    limit = Measurement(
-        protocol="thresholds",
-        quantity="omega_02",
-        value=analytic.thresholds(P).omega_02,
-        uncertainty=1e-5,
-        engine="mujoco",
-        set=NAME,
-        parameters=P,
-        conditions={"side": "from above", "by": "hand"},
-    )
-    with Campaign(tmp_path_factory.mktemp("runs"), workers=0) as campaign:
-        lab, known = Lab(campaign, MUJOCO, Level.QUICK), Records((limit,))
-        return known + Records.of(unloading.measure(lab, {NAME: P}, known))
+def records(lab):
+    known = thresholds(NAME, P, "omega_02")
+    return known + Records.of(unloading.measure(lab, {NAME: P}, known))
 
 
 def test_everything_is_measured(records):

@@ -1,0 +1,36 @@
+"""Measurements made up for tests."""
+
+from __future__ import annotations
+
+import analytic
+from compare.measure.record import Condition, Measurement, Records
+from model import Parameters
+
+
+def measured(
+    protocol: str,
+    quantity: str,
+    value: float,
+    uncertainty: float = 0.0,
+    p: Parameters | None = None,
+    set: str = "reference",
+    **conditions: Condition,
+) -> Measurement:
+    """A measurement by MuJoCo, on the reference unless parameters are given."""
+    return Measurement(
+        protocol=protocol,
+        quantity=quantity,
+        value=value,
+        uncertainty=uncertainty,
+        engine="mujoco",
+        set=set,
+        parameters=p or Parameters.named("reference"),
+        conditions=conditions,
+    )
+
+
+def thresholds(set: str, p: Parameters, *names: str) -> Records:
+    """Flows at which rolling ends, as if they had been measured before."""
+    known = analytic.thresholds(p)
+    values = {name: getattr(known, name) for name in names}
+    return Records(tuple(measured("thresholds", name, w, 1e-6 * w, p, set) for name, w in values.items()))
