@@ -11,24 +11,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from compare.measure import questions
 from compare.measure.brackets import Answer, Bracket, Care, Search, narrow
 from compare.measure.lab import Lab, Level, time_unit
 from compare.measure.laws import PRESSES
-from compare.measure.questions import (
-    From,
-    falls,
-    held,
-    keeps_on,
-    leaning,
-    rest,
-    rider,
-    rolling,
-    rolls_again,
-    settles,
-    slides,
-    stays_rolling,
-    wall,
-)
+from compare.measure.questions import From, held
 from compare.measure.settling import Settled, Start, family, high, settle_groups
 from compare.runs.tasks import Task
 from compare.statistics import Measured, settled_case, tail
@@ -56,6 +43,11 @@ TURNS: Array = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
 RIDES: Array = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
 """Relative distances of the states that are continued to where a ball rides the wall as slowly as it can."""
 
+ROLLING = questions.rolling, 5, questions.stays_rolling
+RIDING = questions.wall, 20, questions.falls
+SLIPPING = questions.rest, 40, questions.keeps_on
+"""From where a ball starts, for how many 1/c it runs, and what is asked of it."""
+
 Key = tuple[str, str]
 """A set, and what is looked for: the end of "rolling", "slipping", "leaning", or the beginning of "riding"."""
 Brackets = Mapping[Key, Bracket]
@@ -64,7 +56,11 @@ States = Mapping[Key, Sequence[Settled]]
 
 def look(lab: Lab, sets: Mapping[str, Parameters]) -> dict[Key, list[Case]]:
     """The cases to which the ball comes along the grid, by set and by where it starts."""
-    begin: dict[str, tuple[From, float]] = {"rest": (rest, 20), "rolling": (rolling, 5), "wall": (wall, 12)}
+    begin: dict[str, tuple[From, float]] = {
+        "rest": (questions.rest, 20),
+        "rolling": (questions.rolling, 5),
+        "wall": (questions.wall, 12),
+    }
     tasks = {
         (name, kind): [held(lab, p, omega, start(p, omega), units) for omega in GRID / time_unit(p)]
         for name, p in sets.items()
@@ -85,7 +81,7 @@ def _change(p: Parameters, yes: Sequence[bool]) -> Bracket | None:
 def ends_of_rolling(lab: Lab, sets: Mapping[str, Parameters], cases: Mapping[Key, list[Case]]) -> dict[Key, Bracket]:
     """The largest flow at which a ball that rolls on both goes on so, bisected."""
     searches = {
-        (name, "rolling"): _search(lab, p, begin, (rolling, 5, stays_rolling), WIDTH[lab.level] * begin.high)
+        (name, "rolling"): _search(lab, p, begin, ROLLING, WIDTH[lab.level] * begin.high)
         for name, p in sets.items()
         if (begin := _change(p, [case is Case.RR for case in cases[name, "rolling"]]))
     }
@@ -100,12 +96,12 @@ def neighbourhoods(
     for name, p in sets.items():
         up, begin = (_change(p, [case is not Case.NR for case in cases[name, kind]]) for kind in ("wall", "rest"))
         if up:
-            searches[name, "riding"] = _search(lab, p, up, (wall, 20, falls), ROUGH_WIDTH * up.high)
+            searches[name, "riding"] = _search(lab, p, up, RIDING, ROUGH_WIDTH * up.high)
         end = rolling.get((name, "rolling"))
         if end and begin and not lifts(end) and end.high < begin.high:
             around = Bracket(max(begin.low, end.high), begin.high)
             width = ROUGH_WIDTH * around.high
-            searches[name, "slipping"] = _search(lab, p, around, (rest, 40, keeps_on), width, follow=True)
+            searches[name, "slipping"] = _search(lab, p, around, SLIPPING, width, follow=True)
     return _narrowed(lab, searches, careful=False)
 
 
@@ -137,14 +133,14 @@ def _places(name: str, brackets: Brackets) -> dict[str, tuple[list[float], From]
     """Flows at which states of a set are settled, and from where, by what they are for."""
     places: dict[str, tuple[Array, From]] = {}
     if carried := brackets.get((name, "riding")):
-        places["riding"] = carried.high * (1 + RIDES), wall
-        places["sinking"] = carried.low * (1 - NEAR), wall
+        places["riding"] = carried.high * (1 + RIDES), questions.wall
+        places["sinking"] = carried.low * (1 - NEAR), questions.wall
     if (end := brackets.get((name, "rolling"))) and lifts(end):
-        places["lifted"] = end.high * (1 + RIDES), wall
+        places["lifted"] = end.high * (1 + RIDES), questions.wall
     elif end and (last := brackets.get((name, "slipping"))):
         span = last.low - end.high
-        places["slipping"] = end.high + NEAR * min(span, end.high), rest
-        places["turning"] = last.low - TURNS * span, rest
+        places["slipping"] = end.high + NEAR * min(span, end.high), questions.rest
+        places["turning"] = last.low - TURNS * span, questions.rest
     return {kind: (omegas.tolist(), start) for kind, (omegas, start) in places.items()}
 
 
@@ -155,12 +151,12 @@ def refined(lab: Lab, sets: Mapping[str, Parameters], brackets: Brackets, states
     for name, p in sets.items():
         if len(riding := states.get((name, "riding"), [])) == len(RIDES):
             begin = brackets[name, "riding"]
-            ride = rider(riding, high(p)), 5, slides
+            ride = questions.rider(riding, high(p)), 5, questions.slides
             searches[name, "riding"] = _search(lab, p, begin, ride, width * begin.high)
         if len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
             end = brackets[name, "rolling"]
             around = Bracket(end.low * (1 - ROUGH_WIDTH), end.high * (1 + ROUGH_WIDTH))
-            lean = leaning(lifted), 20, rolls_again
+            lean = questions.leaning(lifted), 20, questions.rolls_again
             searches[name, "leaning"] = _search(lab, p, around, lean, width * end.high)
     return _narrowed(lab, searches)
 
@@ -175,7 +171,7 @@ def folded(
         width = max(FOLD_WIDTH[lab.level], MARGIN * top.uncertainty / top.value)
         x = states[name, "turning"][0].mean
         around = Bracket(top.value * (1 - width), top.value * (1 + width))
-        stay = (lambda p, omega, x=x: x), units, settles
+        stay = (lambda p, omega, x=x: x), units, questions.settles
         searches[name, "fold"] = _search(lab, sets[name], around, stay, width * top.value)
     return _narrowed(lab, searches, careful=False)
 

@@ -47,22 +47,18 @@ class Quantity:
 
 _SPEEDS = {"v_y": "v_y", "v_h": "v_h"}
 _TURNS = {"omega_c": "ω_c", "slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
-_DETERMINED = {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}
-"""What the balances say of the forces where both contacts roll."""
+_FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
+_FORCES |= {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}
+"""And what the balances say of the forces where both contacts roll."""
 _ALL = (
     Quantity("case", "case", "1", 0.0),
     Quantity("cases", "cases reached", "1", 0.0),
-    Quantity("omega_c", "ω_c", "rad s-1", 1e-7),
-    Quantity("slip_x", "ω̃_x", "rad s-1", 1e-6),
-    Quantity("slip_y", "ω̃_y", "rad s-1", 1e-6),
-    Quantity("slip_z", "ω̃_z", "rad s-1", 1e-6),
+    *(Quantity(n, symbol, "rad s-1", 1e-7 if n == "omega_c" else 1e-6) for n, symbol in _TURNS.items()),
     Quantity("wall_spin", "ω_x⁰", "rad s-1", 1e-6),
     Quantity("v_y", "v_y", "m s-1", 1e-6),
     Quantity("y", "y", "m", 1e-2),
-    *(Quantity(f"force_{c}{a}", f"{c}_{a}", "N", 1e-5) for c in "AB" for a in "xyz"),
-    *(Quantity(f"force_{name}", symbol, "N", 1e-5) for name, symbol in _DETERMINED.items()),
-    *(Quantity(f"moving_force_{c}{a}", f"{c}_{a} in motion", "N", 5e-3) for c in "AB" for a in "xyz"),
-    *(Quantity(f"moving_force_{n}", f"{s} in motion", "N", 5e-3) for n, s in _DETERMINED.items()),
+    *(Quantity(f"force_{name}", symbol, "N", 1e-5) for name, symbol in _FORCES.items()),
+    *(Quantity(f"moving_force_{name}", f"{symbol} in motion", "N", 5e-3) for name, symbol in _FORCES.items()),
     Quantity("decay_rate", "−Re λ", "s-1", 2e-2),
     Quantity("frequency", "Im λ", "rad s-1", 2e-2),
     Quantity("modes", "number of eigenvalues", "1", 0.0),
@@ -77,10 +73,7 @@ _ALL = (
     *(Quantity(f"rate_{name}", f"d{symbol}/dt", "rad s-2", 5e-3) for name, symbol in _TURNS.items()),
     *(Quantity(f"after_{name}", f"{symbol} after", "m s-1", 5e-2) for name, symbol in _SPEEDS.items()),
     *(Quantity(f"after_{name}", f"{symbol} after", "rad s-1", 5e-2) for name, symbol in _TURNS.items()),
-    Quantity("omega_01", "ω₀₁", "rad s-1", 1e-4),
-    Quantity("omega_02", "ω₀₂", "rad s-1", 1e-4),
-    Quantity("omega_03", "ω₀₃", "rad s-1", 1e-4),
-    Quantity("omega_04", "ω₀₄", "rad s-1", 1e-3),
+    *(Quantity(f"omega_0{k}", f"ω₀{'₁₂₃₄'[k - 1]}", "rad s-1", 1e-3 if k == 4 else 1e-4) for k in range(1, 5)),
     *(Quantity(f"edge_{n}", f"{s} on the edge", "rad s-1", 1e-3) for n, s in (_TURNS | {"wall_spin": "ω_x⁰"}).items()),
     Quantity("lifts", "leaves the floor", "1", 0.0),
     Quantity("lift_onset", "ω_c at A_y = 0", "rad s-1", 2e-2),
