@@ -7,6 +7,7 @@ omega_c - omega_0, whose drag accelerates the ball (23); the loads grow with ome
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -16,17 +17,19 @@ from scipy.optimize import brentq
 from analytic import bifurcation, drag, slip_bounds, stationary
 from analytic.simulation import simulate
 from analytic.two_point_rolling import MARGINS
-from model import Case, Flow, InputError, Parameters, SimulationError, State
+from model import Case, Flow, InputError, Parameters, SimulationError
 from model.arrays import Array
+from model.drag import STOKES
 
-PHASES = 720
-"""Phases of a period at which slip is looked for, and once more in the cell of the least margin."""
-HARMONICS, FINE = np.arange(1, 64, 2), np.arange(1, 512, 2)
-"""Of the lag: odd ones, as a sine and every law of drag are; and so many that those left out are 10^-8 of it."""
+PHASES, CLOSER = 360, 32
+"""Phases of a period at which slip is looked for, and twice more in the two cells around the least margin."""
+HARMONICS, FINE = 32, 128
+"""Of the lag: odd ones, as a sine and every law of drag are; those left out are some 10^-6 of it, and 10^-7."""
 NEWTON, SOLVED = 50, 1e-9
 """Most steps of Newton's method for it, and what may be left of its equation, over the flow's acceleration."""
-PERIODS, ROUNDS, SETTLED = 3, 50, 1e-9
-"""Length of the runs of `mean_error`, the most of them, and when the mean is settled."""
+ROUNDS, DEPTH, SETTLED, RTOL = 100, 2, 1e-7, 1e-7
+"""Most periods that `mean_error` simulates; how many differences point to the next; by how much the last may change the
+motion, over the flow; and the integrator's rtol. The mean is then known to some 1e-7 of the flow."""
 
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
@@ -36,7 +39,8 @@ def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLik
 
 def _swing(p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], phase: Array) -> tuple[Array, Array]:
     omega_0 = p.omega_0 + amplitude * np.sin(phase)
-    return omega_0 + np.real(np.exp(1j * phase[..., None] * HARMONICS) @ lag), omega_0
+    waves = np.exp(1j * phase[..., None] * np.arange(1, 2 * len(lag), 2))
+    return omega_0 + (waves * lag).sum(axis=-1).real, omega_0
 
 
 def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex:
@@ -44,28 +48,33 @@ def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex
     return complex(1 + 1j * _lag(p, amplitude, frequency, FINE)[0] / amplitude)
 
 
-def _lag(
-    p: Parameters, amplitude: float, frequency: float, harmonics: npt.NDArray[np.int64] = HARMONICS
-) -> npt.NDArray[np.complex128]:
-    """Complex amplitudes at some harmonics of D = omega_c - omega_0 in rad s-1, where (23) repeats itself.
+def _lag(p: Parameters, amplitude: float, frequency: float, harmonics: int = HARMONICS) -> npt.NDArray[np.complex128]:
+    """Complex amplitudes at the first odd harmonics of D = omega_c - omega_0 in rad s-1, where (23) repeats itself.
 
-    D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With Stokes' law the first
-    step of Newton's method has nothing left to do. Raises ArithmeticError if it doesn't converge.
+    D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With Stokes' law there is
+    one, and the first step of Newton's method has nothing left to do. Raises ArithmeticError if it doesn't converge.
     """
     turn, inertia = 2 * math.pi * frequency, 1 + 2 * p.j
-    phase = np.linspace(0.0, math.pi, 2 * len(harmonics), endpoint=False)
-    waves, push = np.exp(1j * phase[:, None] * harmonics), amplitude * turn * np.cos(phase)
-    amplitudes = waves.conj().T / len(harmonics)
-    derivative = turn * np.real(waves * (1j * harmonics) @ amplitudes)
+    phase, amplitudes, derivative = _collocation(1 if p.drag == STOKES else harmonics)
+    push = amplitude * turn * np.cos(phase)
     rate = drag.coefficient(p.R * amplitude, p) / inertia
     lag = -amplitude * turn * np.real(np.exp(1j * phase) / (rate + 1j * turn))
     for _ in range(NEWTON):
         speed = p.R * np.abs(lag)
-        left = derivative @ lag + drag.coefficient(speed, p) * lag / inertia + push
+        left = turn * (derivative @ lag) + drag.coefficient(speed, p) * lag / inertia + push
         if np.abs(left).max() <= SOLVED * amplitude * turn:
             return np.asarray(amplitudes @ lag, dtype=np.complex128)
-        lag = lag - np.linalg.solve(derivative + drag.slope(speed, p) / inertia * np.eye(len(lag)), left)
+        lag = lag - np.linalg.solve(turn * derivative + np.diag(drag.slope(speed, p) / inertia), left)
     raise ArithmeticError(f"no periodic lag in a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz")
+
+
+@functools.cache
+def _collocation(harmonics: int) -> tuple[Array, npt.NDArray[np.complex128], Array]:
+    """Phases of half a period, and matrices from values there to complex amplitudes and to derivatives by the phase."""
+    odd, phase = np.arange(1, 2 * harmonics, 2), np.linspace(0.0, math.pi, 2 * harmonics, endpoint=False)
+    waves = np.exp(1j * phase[:, None] * odd)
+    amplitudes = waves.conj().T / harmonics
+    return phase, amplitudes, np.real(waves * (1j * odd) @ amplitudes)
 
 
 def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stability") -> float:
@@ -79,19 +88,19 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
         return math.inf
 
     def slack(amplitude: float) -> float:
-        phases, lag = np.linspace(0.0, 2 * math.pi, PHASES + 1), _lag(p, amplitude, frequency)
-        for _ in range(2):
+        lag, at, cells = _lag(p, amplitude, frequency), 0.0, math.pi
+        for count in (PHASES, CLOSER, CLOSER):
+            phases = at + np.linspace(-cells, cells, count + 1)
             omega_c, omega_0 = _swing(p, amplitude, lag, phases)
             margins = margin(omega_c, p, omega_0)
-            k, cell = int(margins.argmin()), phases[1] - phases[0]
-            phases = np.linspace(phases[k] - cell, phases[k] + cell, PHASES + 1)
+            at, cells = float(phases[margins.argmin()]), 2 * cells / count
         return float(margins.min())
 
     low, high = 0.0, 1e-3 * math.sqrt(p.g / p.R)
     if slack(low) <= 0:
         return 0.0
     while slack(high) > 0:
-        low, high = high, 1.25 * high
+        low, high = high, 1.5 * high
     return float(brentq(slack, low, high, rtol=1e-12))
 
 
@@ -122,25 +131,28 @@ def fast_onset(p: Parameters) -> float:
     return min(lags)
 
 
-def mean_error(p: Parameters, amplitude: float, frequency: float, settled: float = SETTLED) -> float:
+def mean_error(
+    p: Parameters, amplitude: float, frequency: float, settled: float = SETTLED, rtol: float = RTOL
+) -> float:
     """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic; frequency in Hz.
 
-    0 below `slip_onset`; beyond it, from the event-driven simulation, by the azimuth that the ball runs through. Each
-    run starts from where the one before points to (Aitken), until the mean changes by less than `settled`, relative to
-    the flow. Raises `SimulationError` if it never does.
+    0 if the ball rolls on; else from the event-driven simulation, by the azimuth that the ball runs through. Each
+    period starts from where the last few point to (Anderson's method), until the motion repeats itself to `settled`
+    times the flow. Raises `SimulationError` if it never does.
     """
-    if amplitude <= slip_onset(p, frequency):
-        return 0.0
-    x, flow = State(omega_c=float(swing(p, amplitude, frequency, 0.0)[0])), Flow.sine(p.omega_0, amplitude, frequency)
+    x, flow = np.zeros(8), Flow.sine(p.omega_0, amplitude, frequency)
+    x[2] = swing(p, amplitude, frequency, 0.0)[0]
+    starts, ends = np.empty((0, 4)), np.empty((0, 4))
     for _ in range(ROUNDS):
-        run = simulate(p, x, PERIODS / frequency, flow, sample_interval=1 / frequency)
-        before, last = (float(turn) * frequency for turn in np.diff(run.theta)[-2:])
-        if abs(last - before) <= settled * abs(p.omega_0):
-            return last - p.omega_0
-        first, second = (float(step) for step in np.diff(run.omega_c)[-2:])
-        ahead = second**2 / (first - second) if abs(second) < abs(first) else 0.0
-        x = State(*run.x[-1].tolist())
-        x = x._replace(omega_c=x.omega_c + ahead)
+        run = simulate(p, x, 1 / frequency, flow, sample_interval=1 / frequency, rtol=rtol)
+        if not len(starts) and not len(run.events.time) and run.case[0] == Case.RR:
+            return 0.0
+        starts, ends = np.vstack([starts[-DEPTH:], x[2:6]]), np.vstack([ends[-DEPTH:], run.x[-1, 2:6]])
+        change = ends - starts
+        if np.abs(change[-1]).max() <= settled * abs(p.omega_0):
+            return float(run.theta[-1]) * frequency - p.omega_0
+        x = run.x[-1].copy()
+        x[2:6] -= np.diff(ends, axis=0).T @ np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
     raise SimulationError(f"a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz doesn't become periodic", run)
 
 

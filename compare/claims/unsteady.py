@@ -22,10 +22,15 @@ FAR, SAMPLES = 3.0, 20_000
 
 
 def _ratio(m: Measurement) -> complex:
-    p, frequency = m.parameters, float(m.conditions["f"])
+    return _followed(m.parameters, float(m.conditions["amplitude"]), float(m.conditions["f"]))
+
+
+@remembered
+def _followed(p: Parameters, amplitude: float, frequency: float) -> complex:
+    """omega_c over omega_0 in a pulsation."""
     if p.drag == STOKES:
         return complex(response.transfer(p, Case.RR, frequency))
-    return pulsation.first_harmonic(p, float(m.conditions["amplitude"]), frequency)
+    return pulsation.first_harmonic(p, amplitude, frequency)
 
 
 @remembered

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from analytic import pulsation, response, simulate
+from analytic import pulsation, response, simulate, stationary
 from model import Case, Flow, Parameters
 
 REFERENCE = Parameters.named("reference")
@@ -79,6 +79,17 @@ def test_no_onset(changes: dict[str, float], wanted: float) -> None:
     assert pulsation.slip_onset(REFERENCE.replace(**changes), 1.0) == wanted
 
 
+@pytest.mark.parametrize("name", ["slips at both", "wake", "quadratic"])
+def test_finer_predictions_are_the_same(name: str) -> None:
+    """Twice as many harmonics, and a motion that is integrated and repeats itself more exactly, change little."""
+    p, frequency = SETS[name], 1.0
+    amplitude = 1.5 * pulsation.slip_onset(p, frequency)
+    exact = 1 + 1j * pulsation._lag(p, amplitude, frequency, 2 * pulsation.FINE)[0] / amplitude
+    assert pulsation.first_harmonic(p, amplitude, frequency) == pytest.approx(exact, rel=1e-6)
+    exact = pulsation.mean_error(p, amplitude, frequency, settled=1e-9, rtol=1e-10)
+    assert pulsation.mean_error(p, amplitude, frequency) == pytest.approx(exact, rel=2e-6)
+
+
 def test_mean_error_of_fast_pulsations() -> None:
     """None as long as the ball rolls; beyond, as Moreau's time stepping has it, which knows no cases."""
     p, frequency = SETS["slips at both"], 1.5
@@ -89,6 +100,12 @@ def test_mean_error_of_fast_pulsations() -> None:
     run = simulate(p, x0, 20 / frequency, flow, method="time-stepping", step=1e-3, sample_interval=1 / frequency)
     assert expected < -0.1
     assert (run.theta[-1] - run.theta[-2]) * frequency - p.omega_0 == pytest.approx(expected, rel=0.01)
+
+
+def test_a_ball_may_slip_all_the_time() -> None:
+    """In SS throughout, with no change of case, the mean is that of the characteristic as long as it is straight."""
+    p = SETS["slips at both"].replace(omega_0=25.0)
+    assert pulsation.mean_error(p, 1e-3, 1.0) == pytest.approx(stationary.solution(p, Case.SS).x[2] - 25.0, rel=1e-5)
 
 
 def test_mean_error_of_slow_pulsations() -> None:
