@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import html
 import io
 import re
 import urllib.parse
@@ -23,19 +24,23 @@ _KEPT = " !$'()*+,-./:;<=>?@_~"
 """What needs no escape in an address between double quotes."""
 
 
-def kept(path: Path, drawing: Drawing, data: Any) -> str:
-    """The address of a picture that is its own content: a browser looks into it only to show it.
+def kept(path: Path, drawing: Drawing, data: Any) -> tuple[str, str]:
+    """The address of a picture that is its own content, as a browser looks into it only to show it; and its caption.
 
-    The picture in the SVG file `path` is taken if it was made from the same data by the same program, else drawn and
-    written there. Raises what drawing raises, and `StorageError` if it can't be written.
+    The picture in the SVG file `path`, which describes itself by the caption, is taken if it was made from the same
+    data by the same program, else drawn and written there. Raises what drawing raises, and `StorageError` if it can't
+    be written.
     """
     made_from = "\n".join([repr(data), drawing.title, matplotlib.__version__, sources(*_PROGRAM)])
     mark = f"<!-- {hashlib.sha256(made_from.encode()).hexdigest()} -->"
     picture = path.read_text("utf-8") if path.is_file() else ""
     if not picture.endswith(mark):
-        picture = svg(drawing.draw(data)) + mark
+        caption = f"<desc>{html.escape(drawing.caption(data))}</desc>"
+        picture = svg(drawing.draw(data)).replace("<defs>", f"{caption}<defs>", 1) + mark
         write_text(path, picture)
-    return address(picture)
+    before, _, caption_on = picture.partition("<desc>")
+    caption, _, after = caption_on.partition("</desc>")
+    return address(before + after), html.unescape(caption)
 
 
 def address(picture: str) -> str:

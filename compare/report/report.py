@@ -114,8 +114,8 @@ def _figure(material: Material, name: str, drawing: Drawing) -> dict[str, Any]:
     shown = {"id": f"figure-{name}", "title": drawing.title, "caption": "", "picture": "", "gap": ""}
     try:
         data = drawing.select(material)
-        shown["picture"] = pictures.kept(material.directory / results.FIGURES / f"{name}.svg", drawing, data)
-        shown["caption"] = drawing.caption(data)
+        path = material.directory / results.FIGURES / f"{name}.svg"
+        shown["picture"], shown["caption"] = pictures.kept(path, drawing, data)
     except (GapError, StorageError) as error:
         shown["gap"] = str(error)
     return shown

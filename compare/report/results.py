@@ -111,7 +111,7 @@ def load(directory: Path) -> Summary:
 def save(summary: Summary, directory: Path) -> None:
     """Write the summary, whole or not at all."""
     content = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **dataclasses.asdict(summary)}
-    write_text(directory / SUMMARY, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
+    write_text(directory / SUMMARY, json.dumps(content, ensure_ascii=False, allow_nan=False))
 
 
 def _provenance() -> dict[str, Any]:

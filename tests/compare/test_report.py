@@ -253,13 +253,15 @@ def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
         drawn.append(data)
         return Figure(figsize=(1, 1))
 
-    drawing = Drawing("t", lambda _: None, draw, lambda _: "")
+    drawing = Drawing("t", lambda _: None, draw, lambda data: f"{len(drawn)} <&> {data}")
     path = tmp_path / "made.svg"
-    first = pictures.kept(path, drawing, ("a", 1.0))
-    assert pictures.kept(path, drawing, ("a", 1.0)) == first
+    first, caption = pictures.kept(path, drawing, ("a", 1.0))
+    assert caption == "0 <&> ('a', 1.0)"
+    assert "desc" not in first
+    assert pictures.kept(path, drawing, ("a", 1.0)) == (first, caption)
     assert len(drawn) == 1
     path.write_text("something else")
-    assert pictures.kept(path, drawing, ("a", 1.0))[:30] == first[:30] == "data:image/svg+xml,%3C?xml ver"
+    assert pictures.kept(path, drawing, ("a", 1.0))[0][:30] == first[:30] == "data:image/svg+xml,<?xml versio"
     pictures.kept(path, drawing, ("a", 2.0))
     assert len(drawn) == 3
     ElementTree.parse(path)
