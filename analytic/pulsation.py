@@ -15,6 +15,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from analytic import bifurcation, drag, slip_bounds, stationary
+from analytic.settings import Settings
 from analytic.simulation import simulate
 from analytic.two_point_rolling import MARGINS
 from model import Case, Flow, InputError, Parameters, SimulationError
@@ -132,19 +133,25 @@ def fast_onset(p: Parameters) -> float:
 
 
 def mean_error(
-    p: Parameters, amplitude: float, frequency: float, settled: float = SETTLED, rtol: float = RTOL
+    p: Parameters,
+    amplitude: float,
+    frequency: float,
+    settled: float = SETTLED,
+    rtol: float = RTOL,
+    leave_rolling: str = "slip-stability",
 ) -> float:
     """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic; frequency in Hz.
 
     0 if the ball rolls on; else from the event-driven simulation, by the azimuth that the ball runs through. Each
     period starts from where the last few point to (Anderson's method), until the motion repeats itself to `settled`
-    times the flow. Raises `SimulationError` if it never does.
+    times the flow. `rtol` and `leave_rolling` as in `Settings`. Raises `SimulationError` if it never does.
     """
+    settings = Settings(rtol=rtol, leave_rolling=leave_rolling)
     x, flow = np.zeros(8), Flow.sine(p.omega_0, amplitude, frequency)
     x[2] = swing(p, amplitude, frequency, 0.0)[0]
     starts, ends = np.empty((0, 4)), np.empty((0, 4))
     for _ in range(ROUNDS):
-        run = simulate(p, x, 1 / frequency, flow, sample_interval=1 / frequency, rtol=rtol)
+        run = simulate(p, x, 1 / frequency, flow, settings, sample_interval=1 / frequency)
         if not len(starts) and not len(run.events.time) and run.case[0] == Case.RR:
             return 0.0
         starts, ends = np.vstack([starts[-DEPTH:], x[2:6]]), np.vstack([ends[-DEPTH:], run.x[-1, 2:6]])

@@ -53,6 +53,8 @@ SURE = 0.9
 """Part of what is measured that stands for what will be predicted, where it is asked whether it is sure enough."""
 BEYOND = 1.5
 """Amplitude at which the mean reading is measured, over the one at which slip begins."""
+ANEW = 8
+"""Phases of a period at which the motion is started anew from its state: what changes then hangs on more than that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +93,19 @@ class Rhythm:
         )
 
     def task(
-        self, lab: Lab, amplitude: float, x: Array, periods: float, largest: float, refine: int, samples: int = 64
+        self,
+        lab: Lab,
+        amplitude: float,
+        x: Array,
+        periods: float,
+        largest: float,
+        refine: int,
+        samples: int = 64,
+        phase: float = 0.0,
     ) -> Task:
         """A run from a state; no amplitude that it is compared with is above the `largest`."""
         step = 1 / (self.frequency * self.steps(lab, largest) * refine)
-        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency)
+        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, phase)
         return lab.task(self.p, x, periods / self.frequency, step, flow=flow, samples=round(samples * periods))
 
 
@@ -220,9 +230,14 @@ def _alone(run: Trajectory) -> float:
 
 
 def _mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator[Measurement | Missing]:
-    """Means over the last period, with both steps, once each period is as the one before."""
+    """Means over the last period, with both steps, once each period is as the one before.
+
+    The engine may remember what a state doesn't hold, such as how strongly floor and wall press against each other. How
+    much the mean hangs on it is seen in periods that start anew from states of the last one.
+    """
     states = [rhythm.start(amplitude) for rhythm, amplitude in slipping]
     means: list[list[float]] = [[] for _ in slipping]
+    last: list[Array] = [np.empty(0) for _ in slipping]
     for n in range(ROUNDS):
         refine = 2 if n == ROUNDS - 1 else 1
         tasks = [r.task(lab, a, x, PERIODS, a, refine) for (r, a), x in zip(slipping, states, strict=True)]
@@ -233,15 +248,27 @@ def _mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator
             x = run.x[-1].copy()
             x[2] = _limit(run.omega_c[period::period])
             states[k] = x
-    for (rhythm, amplitude), task, (*_, before, usual, last, fine) in zip(slipping, tasks, means, strict=True):
+            if n == ROUNDS - 2:
+                last[k] = run.x[-1 - period : -1 : period // ANEW]
+    anew = [
+        r.task(lab, a, x, 1, a, 1, phase=2 * math.pi * k / ANEW)
+        for (r, a), period in zip(slipping, last, strict=True)
+        for k, x in enumerate(period)
+    ]
+    begun = np.reshape([run.theta[-1] - run.theta[0] for run in lab.run(anew)], (-1, ANEW))
+    for (rhythm, amplitude), task, (*_, before, usual, coarse, fine), turns in zip(
+        slipping, tasks, means, begun, strict=True
+    ):
         value = fine - rhythm.p.omega_0
-        drift = abs(fine - usual) + abs(fine - last) + abs(usual - before)
+        spread = float(np.abs(turns * rhythm.frequency - usual).max())
+        drift = abs(fine - usual) + abs(fine - coarse) + abs(usual - before) + spread
         # Slip begins and ends within a step: that much of a period, and of what it takes off the mean, is open.
         error = Measured(value, drift + abs(value) / (2 * rhythm.steps(lab, amplitude)))
         if sure_enough("mean_error", error, SURE * abs(error.value)):
             yield _record(lab, rhythm, "mean_error", error, [task], amplitude=amplitude)
         else:
-            yield Missing(PROTOCOL, rhythm.set, f"the mean reading at {rhythm.frequency:g} Hz doesn't settle")
+            at = f"the mean reading at {rhythm.frequency:g} Hz"
+            yield Missing(PROTOCOL, rhythm.set, f"{at} doesn't settle, or hangs on more than the state")
 
 
 def _limit(values: Array) -> float:

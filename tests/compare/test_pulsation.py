@@ -75,6 +75,21 @@ def test_pulsation_under_the_quadratic_law(tmp_path) -> None:
     assert {v.outcome for v in judge(claims.CLAIMS[:3], measured)} == {Outcome.CONFIRMED}
 
 
+@pytest.mark.slow
+def test_a_mean_may_hang_on_more_than_the_state(tmp_path) -> None:
+    """Where theory itself has two answers (docs/theory.md, 11) the protocol sees that its own is none, blind."""
+    p, f, a = sets(Level.DEFAULT)["design-5"].replace(omega_0=11.7694), 4.0, 199.89
+    early, late = (
+        analytic.pulsation.mean_error(p, a, f, leave_rolling=rule) for rule in ("slip-stability", "infeasible")
+    )
+    assert late - early > 0.015 * abs(early)
+    begin = analytic.pulsation.swing(p, a, f, 0.0)[0] - p.omega_0
+    rhythm = pulsation.Rhythm("design-5", p, f, a, reach=1.0, begin=float(begin) / a)
+    with Campaign(tmp_path, workers=0) as campaign:
+        (row,) = pulsation._mean_errors(Lab(campaign, MUJOCO, Level.DEFAULT), [(rhythm, a)])
+    assert "more than the state" in row.reason
+
+
 def test_sets_without_slip_say_why(tmp_path) -> None:
     wall = {"wall": Parameters.named("high-wall-friction")}
     with Campaign(tmp_path, workers=0) as campaign:
