@@ -119,7 +119,11 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
     here, step, before, reason = start, FIRST, [start], ""
     along = np.append(np.zeros(len(start.loop.free)), sign)
     for _ in range(most):
-        matrix = jacobian(here.loop, name)
+        try:
+            matrix = jacobian(here.loop, name)
+        except NoOrbitError as error:
+            yield Place(Bifurcation.LOST, getattr(here.p, name), here, str(error))
+            return
         tangent = np.linalg.svd(matrix)[2][-1]
         along = tangent if tangent @ along >= 0 else -tangent
         there = None

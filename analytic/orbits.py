@@ -176,6 +176,8 @@ class Orbit:
     """Gain of azimuth in a period, rad."""
     steps: int
     """Steps that Newton's method took."""
+    derivative: Array
+    """Derivative (d - 1, d - 1) of the return map."""
 
     @property
     def period(self) -> float:
@@ -186,11 +188,6 @@ class Orbit:
     def p(self) -> Parameters:
         """Its parameters."""
         return self.loop.p
-
-    @cached_property
-    def derivative(self) -> Array:
-        """Derivative (d - 1, d - 1) of the return map."""
-        return self.loop.derivative()
 
     @cached_property
     def multipliers(self) -> npt.NDArray[np.complex128]:
@@ -229,7 +226,8 @@ def refine(p: Parameters, x: npt.ArrayLike, period: float) -> Orbit:
     Raises
     ------
     NoOrbitError
-        If Newton's method does not converge to `CLOSED` within `ITERATIONS` steps.
+        If Newton's method does not converge to `CLOSED` within `ITERATIONS` steps, or the ball doesn't come back from
+        beside the orbit, so that the return map has no derivative.
     """
     return close(Loop.of(p, x, period))
 
@@ -247,7 +245,7 @@ def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None)
         defect = loop.coordinates(back.x - loop.x)
         size = float(np.abs(defect).max())
         if size <= CLOSED:
-            return Orbit(loop, back.changes, back.turn, step)
+            return Orbit(loop, back.changes, back.turn, step, loop.derivative())
         if size > before / FAST:
             neighbour = None
         before = size
