@@ -15,7 +15,7 @@ from analytic.flowmeter import (
     slope_jump,
     unloading_limit,
 )
-from analytic.leaning import floor_force, leaning_modes
+from analytic.leaning import leaning_modes
 from analytic.simulation import Settings, simulate
 from analytic.slip_stability import SlipStability
 from analytic.stationary import (
@@ -41,7 +41,6 @@ __all__ = [
     "attractors",
     "characteristic_slope",
     "contact_forces",
-    "floor_force",
     "leaning_modes",
     "mean_slope",
     "operating_limit",

@@ -10,16 +10,6 @@ import numpy.typing as npt
 
 from analytic import drag, jacobian, stationary
 from model import Case, InputError, Parameters
-from model.arrays import Array
-
-
-def floor_force(omega_c: npt.ArrayLike, slip_x: npt.ArrayLike, p: Parameters) -> Array:
-    """A_y in N in SR (29): m (g - j R omega_c^2 - j r omega_c slip_x); the floor carries it where it is positive.
-
-    omega_c, slip_x : rad s-1, broadcast against each other
-    """
-    omega_c, slip_x = np.asarray(omega_c, dtype=float), np.asarray(slip_x, dtype=float)
-    return np.asarray(p.m * (p.g - p.j * omega_c * (p.R * omega_c + p.r * slip_x)))
 
 
 def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:

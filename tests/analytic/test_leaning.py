@@ -1,4 +1,4 @@
-"""SR at the border to NR: the force of the floor, and the modes of a ball that leans on it."""
+"""SR at the border to NR: the modes of a ball that leans on the floor."""
 
 from __future__ import annotations
 
@@ -6,22 +6,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from analytic import contact_forces, dynamics, floor_force, leaning_modes, simulate, solution
+from analytic import contact_forces, dynamics, leaning_modes, simulate, solution
 from model import Case, InputError, Parameters, State
 
 P = Parameters.named("high-wall-friction")
-
-
-def test_floor_force() -> None:
-    """A_y of (29) at random states; zero at the stationary solution."""
-    rng = np.random.default_rng(0)
-    omega_c, slip_x = rng.normal(0, [20, 60], (50, 2)).T
-    x = State(omega_c=omega_c, slip_x=slip_x).stacked()
-    force_A, _ = contact_forces(Case.SR, x, P)
-    scale = P.m * (P.g + P.j * np.abs(omega_c) * (P.R * np.abs(omega_c) + P.r * np.abs(slip_x)))
-    assert np.all(np.abs(floor_force(omega_c, slip_x, P) - force_A[:, 1]) <= 1e-14 * scale)
-    s = solution(P.replace(omega_0=25.0), Case.SR)
-    assert abs(floor_force(s.state.omega_c, s.state.slip_x, P)) <= 1e-14 * P.m * P.g * 5
 
 
 def test_modes_in_closed_form() -> None:
@@ -54,7 +42,8 @@ def test_modes(omega_0: float) -> None:
     np.testing.assert_allclose(values.prod(), -drive * p.c / (1 + p.j), rtol=1e-12)
     assert (values[0].real > 0) == (omega_0**2 < p.g / (p.j * p.R))
     for along_omega_c, along_slip_x in 1e-6 * vectors.real:
-        assert floor_force(x.omega_c + along_omega_c, x.slip_x + along_slip_x, p) > 0
+        near = x._replace(omega_c=x.omega_c + along_omega_c, slip_x=x.slip_x + along_slip_x)
+        assert contact_forces(Case.SR, near, p)[0][1] > 0
 
 
 @pytest.mark.parametrize("omega_0", [20.0, 30.0])
@@ -68,7 +57,7 @@ def test_a_leaning_ball_moves_at_that_rate(omega_0: float) -> None:
     start = x._replace(omega_c=x.omega_c + by_omega_c, slip_x=x.slip_x + by_slip_x)
     run = simulate(p, start, 1.0 / abs(values[0]), rtol=1e-12)
     assert set(run.cases) == {Case.SR}
-    lean = floor_force(run.omega_c, run.slip_x, p)
+    lean = run.force_A[:, 1]
     assert np.log(lean[-1] / lean[0]) / run.time[-1] == pytest.approx(values[0].real, rel=1e-3)
 
 
