@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -49,7 +49,6 @@ def simulate_many(
     sample_interval: float | None = None,
     quiet: float | None = None,
     threads: int | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> Ensemble:
     """Time stepping (`time_stepping`) of many runs, on all cores if numba is installed.
 
@@ -61,7 +60,6 @@ def simulate_many(
     settings : step and restitution count; one step for all where it is given
     quiet : end a run in which nothing has landed for that long, s; its last state stands for the rest
     threads : number of threads, that of the cores if None
-    progress : called with the fraction of runs done
 
     Raises
     ------
@@ -101,9 +99,7 @@ def simulate_many(
             failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"
 
     with ThreadPoolExecutor(workers) as pool:
-        for done, _ in enumerate(pool.map(carry_out, range(count)), 1):
-            if progress:
-                progress(done / count)
+        list(pool.map(carry_out, range(count)))
     return Ensemble(times, x, case, landings, end, tuple(failure))
 
 

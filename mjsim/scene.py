@@ -32,13 +32,10 @@ _INTEGRATORS = {
 _CONES = {"elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC, "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL}
 
 
-def spec(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -> Any:
-    """The scene as an `mujoco.MjSpec`.
-
-    Raises `InputError` if the file can't be read or lacks one of the named elements.
-    """
-    spec = _read(Path(scene))
-    named = {kind: {name: _find(spec, kind, name, scene) for name in names} for kind, names in _ELEMENTS.items()}
+def spec(p: Parameters, settings: ContactSettings) -> Any:
+    """The scene as an `mujoco.MjSpec`."""
+    spec = mujoco.MjSpec.from_string(SCENE.read_text("utf-8"))
+    named = {kind: {name: getattr(spec, kind)(name) for name in names} for kind, names in _ELEMENTS.items()}
     _set_options(spec.option, p, settings)
     _set_geometry(named["body"], named["geom"], named["joint"], p)
     for name, friction in (("A", p.mu), ("B", p.eta)):
@@ -52,36 +49,19 @@ def spec(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) ->
     return spec
 
 
-def build(p: Parameters, settings: ContactSettings, scene: str | Path = SCENE) -> tuple[Any, str]:
-    """The scene compiled to an `mujoco.MjModel`, and as the MJCF text that is simulated; raises as `spec`."""
-    filled = spec(p, settings, scene)
+def build(p: Parameters, settings: ContactSettings) -> tuple[Any, str]:
+    """The scene compiled to an `mujoco.MjModel`, and as the MJCF text that is simulated.
+
+    Raises `InputError` if MuJoCo refuses the parameters.
+    """
+    filled = spec(p, settings)
     try:
         model = filled.compile()
     except ValueError as error:
-        raise InputError(f"MuJoCo cannot compile {scene}: {_one_line(error)}") from error
+        raise InputError(f"MuJoCo cannot compile the scene: {' '.join(str(error).split())}") from error
     # Without one in the scene, the engine looks at surface velocities only if this flag says so.
     model.flg_surfacevel = settings.shifts_surfaces
     return model, str(filled.to_xml())
-
-
-def _read(scene: Path) -> Any:
-    try:
-        return mujoco.MjSpec.from_string(scene.read_text("utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read the scene {scene}: {error.strerror}") from error
-    except ValueError as error:
-        raise InputError(f"{scene} is not a valid MJCF scene: {_one_line(error)}") from error
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
-
-
-def _find(spec: Any, kind: str, name: str, scene: str | Path) -> Any:
-    element = getattr(spec, kind)(name)
-    if element is None:
-        raise InputError(f"{scene} has no {kind} named {name!r}, which the simulation needs")
-    return element
 
 
 def _set_options(option: Any, p: Parameters, settings: ContactSettings) -> None:
