@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from itertools import product
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from model.arrays import Array
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, slip_velocities
 
-NAME = "field"
+PROTOCOL = "field"
 SEED = 53
 STARTS = {Level.QUICK: 4, Level.DEFAULT: 4, Level.FULL: 12}
 """Random starts for every case and set."""
@@ -97,11 +98,10 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             kept[name, case] += bool(values)
             for what, value in values.items():
                 at = state_of(seen[0, STATE])
-                yield measurement(lab, NAME, name, p, what, value, pair, case=case.name, **at)
-    for name in sets:
-        for case in Case:
-            if not kept[name, case]:
-                yield Missing(NAME, name, f"no random start moved smoothly in case {case.name} for {2 * HALF} steps")
+                yield measurement(lab, PROTOCOL, name, p, what, value, pair, case=case.name, **at)
+    for name, case in product(sets, Case):
+        if not kept[name, case]:
+            yield Missing(PROTOCOL, name, f"no random start moved smoothly in case {case.name} for {2 * HALF} steps")
 
 
 def _starts(p: Parameters, count: int, name: str) -> Iterator[tuple[Parameters, Array]]:

@@ -89,7 +89,7 @@ class Push:
     """Unit vector (3,) over slip_x, slip_y, slip_z."""
     by: str = ""
     """``sideways`` for the direction `SIDEWAYS`, ``dragged`` where the fluid pulls hard, ``rest`` out of rest in a
-    fluid at rest; empty for one at random."""
+    fluid at rest; empty for one at random; how a line of `compare.measure.bounds` goes."""
 
     @property
     def sizes(self) -> tuple[float, ...]:

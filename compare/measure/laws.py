@@ -111,27 +111,16 @@ def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
 
     Then slip speed over sqrt(g R), gap over R and the contact's letter, each (n,).
     """
-    p, floor = run.header.parameters, contact == "A"
-    force = run.force_A if floor else run.force_B
-    normal, tangent = (force[:, 1], force[:, [0, 2]]) if floor else (force[:, 0], force[:, 1:])
-    v_A, v_B = slip_velocities(run.x, p)
-    slip = v_A[:, [0, 2]] if floor else v_B[:, 1:]
-    speed = np.hypot(*slip.T)
+    p, k = run.header.parameters, "AB".index(contact)
+    across, along = ((1, [0, 2]), (0, [1, 2]))[k]
+    force, slip = (run.force_A, run.force_B)[k], slip_velocities(run.x, p)[k][:, along]
+    normal, tangent, speed = force[:, across], force[:, along], np.hypot(*slip.T)
+    friction, limit = np.hypot(*tangent.T), (p.mu, p.eta)[k] * normal
     direction = slip / np.maximum(speed, np.finfo(float).tiny)[:, None]
-    friction, weight = np.hypot(*tangent.T), p.m * p.g
     against = np.hypot(*(tangent + friction[:, None] * direction).T)
-    limit = (p.mu if floor else p.eta) * normal
-    letters = np.array([case.name[0 if floor else 1] for case in run.cases])
-    gap = (run.gap_A if floor else run.gap_B) / p.R
-    return (
-        normal / weight,
-        friction / weight,
-        limit / weight,
-        against / weight,
-        speed / math.sqrt(p.g * p.R),
-        gap,
-        letters,
-    )
+    letters = np.array([case.name[k] for case in run.cases])
+    over_weight = (each / (p.m * p.g) for each in (normal, friction, limit, against))
+    return *over_weight, speed / math.sqrt(p.g * p.R), (run.gap_A, run.gap_B)[k] / p.R, letters
 
 
 def _ball(name: str) -> Parameters:
