@@ -7,16 +7,12 @@ import math
 import analytic
 from analytic import stokes
 from analytic.rolling_forces import margin, slip_margin
-from compare.claims.claim import Bearing, Claim, Text
+from compare.claims.claim import Bearing, Claim, Text, one
 from compare.claims.judge import remembered
 from compare.measure.laws import FLUIDS
 from compare.measure.motions import NAMES
 from compare.measure.record import Measurement, state
 from model import Parameters, State, Trajectory
-
-
-def _one(m: Measurement) -> float:
-    return 1.0
 
 
 def _none(m: Measurement) -> float:
@@ -78,8 +74,8 @@ CLAIMS = (
         "A contact that rolls doesn't slip; contacts press and never pull; friction stays within mu or eta times "
         "the normal force, has that size where the contact slips, and opposes the slip.",
         (
-            Bearing("laws", "law", _none, size=_one, by="(12), (13)"),
-            Bearing("laws", "law_in_motion", _none, size=_one, by="Table 3, (14)-(17)"),
+            Bearing("laws", "law", _none, size=one, by="(12), (13)"),
+            Bearing("laws", "law_in_motion", _none, size=one, by="Table 3, (14)-(17)"),
             Bearing("laws", "friction_ratio", _friction, by="(14), (15)"),
         ),
     ),

@@ -55,6 +55,11 @@ def every(*whens: When) -> When:
     return lambda m: all(when(m) for when in whens)
 
 
+def one(m: Measurement) -> float:
+    """The size of what is a ratio, an angle, or a deviation over its own scale."""
+    return 1.0
+
+
 @dataclass(frozen=True)
 class Bearing:
     """Measurements that bear on a claim, and what theory says they should be."""

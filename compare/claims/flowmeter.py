@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import analytic
-from compare.claims.claim import Bearing, Claim, Text, When, every, given
+from compare.claims.claim import Bearing, Claim, Text, When, every, given, one
 from compare.claims.judge import remembered
 from compare.claims.stationary import (
     cases,
@@ -29,7 +29,7 @@ def _slope(p: Parameters, case: Case) -> float:
 def _slopes(by: str, predict: Callable[[Measurement], float], function: str, *cases: Case) -> Bearing:
     """Slopes measured in one way, in units of the slope of rolling."""
     when = every(given(by=by), is_in(*cases))
-    return Bearing("slope", "slope", predict, when=when, size=lambda m: 1.0, by=f"analytic.{function}")
+    return Bearing("slope", "slope", predict, when=when, size=one, by=f"analytic.{function}")
 
 
 def _along_curve(*cases: Case) -> Bearing:

@@ -9,7 +9,7 @@ import numpy as np
 
 from analytic import slip_bounds, slip_stability
 from analytic.slip_bounds import HeldBound, SlipBound
-from compare.claims.claim import Bearing, Claim, Outcome, Text, When, every, given
+from compare.claims.claim import Bearing, Claim, Outcome, Text, When, every, given, one
 from compare.measure.check import Relation
 from compare.measure.field import slip_unit
 from compare.measure.record import Measurement, state
@@ -44,10 +44,6 @@ def _along(arrow: Arrow, *by: str) -> When:
 
 def _unit(m: Measurement) -> float:
     return slip_unit(m.parameters)
-
-
-def _one(m: Measurement) -> float:
-    return 1.0
 
 
 def _gamma(m: Measurement) -> float:
@@ -150,7 +146,7 @@ CLAIMS = (
                 "steepest",
                 "steepest",
                 lambda m: float(slip_bounds.steepest_nr(_x(m), m.parameters)),
-                size=_one,
+                size=one,
                 by="slip_bounds.steepest_nr",
             ),
         ),
@@ -220,7 +216,7 @@ CLAIMS = (
                 "growth",
                 "filippov_share",
                 lambda m: slip_bounds.filippov_share(_arrow(m)[1], _held(m), m.parameters),
-                size=_one,
+                size=one,
                 by="slip_bounds.filippov_share",
             ),
         ),

@@ -18,7 +18,7 @@ from compare.figures.drawing import Drawing
 from compare.runs.tasks import sources
 from model.files import write_text
 
-_PROGRAM = ("model", "analytic", "compare", "compare.runs", "compare.measure", "compare.claims", "compare.figures")
+_PROGRAM = ("model", "analytic", "compare", "compare.runs", "compare.measure", "compare.scorecard", "compare.figures")
 """Packages whose constants and functions a picture may show."""
 _KEPT = " !$'()*+,-./:;<=>?@_~"
 """What needs no escape in an address between double quotes."""
