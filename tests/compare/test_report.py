@@ -261,7 +261,7 @@ def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
     assert pictures.kept(path, drawing, ("a", 1.0)) == (first, caption)
     assert len(drawn) == 1
     path.write_text("something else")
-    assert pictures.kept(path, drawing, ("a", 1.0))[0][:30] == first[:30] == "data:image/svg+xml,<?xml versio"
+    assert pictures.kept(path, drawing, ("a", 1.0))[0][:30] == first[:30] == "data:image/svg+xml,<?xml versi"
     pictures.kept(path, drawing, ("a", 2.0))
     assert len(drawn) == 3
     ElementTree.parse(path)
