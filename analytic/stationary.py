@@ -112,9 +112,10 @@ def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = F
     return those[0]
 
 
-def stable_solutions(p: Parameters) -> list[StationarySolution]:
-    """The stationary solutions that a disturbed ball returns to; the one that only sinks (NS) is none."""
-    return [s for s in stationary_solutions(p) if s.exists and s.stable and s.slip_stable and not s.moves]
+def stable_solutions(p: Parameters, sinking: bool = False) -> list[StationarySolution]:
+    """The stationary solutions that a disturbed ball returns to; not the one that only sinks (NS) unless `sinking`."""
+    those = [s for s in stationary_solutions(p) if s.exists and s.stable]
+    return [s for s in those if (sinking if s.moves else s.slip_stable)]
 
 
 def slowest_time_constant(of: StationarySolution) -> float:

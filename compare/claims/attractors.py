@@ -9,9 +9,8 @@ import numpy as np
 import analytic
 from analytic import orbits
 from analytic.orbits import Orbit
-from compare.claims.cases import simulated
 from compare.claims.claim import Bearing, Claim
-from compare.claims.judge import remembered
+from compare.claims.judge import remembered, simulated
 from compare.measure.attractors import hops
 from compare.measure.lab import Level
 from compare.measure.record import Measurement, state

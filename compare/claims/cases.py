@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 
-import analytic
 from analytic import stokes
 from analytic.rolling_forces import margin, slip_margin
 from compare.claims.claim import Bearing, Claim, Text, one
-from compare.claims.judge import remembered
+from compare.claims.judge import simulated
 from compare.measure.laws import FLUIDS
 from compare.measure.motions import NAMES
 from compare.measure.record import Measurement, state
-from model import Parameters, State, Trajectory
+from model import Parameters, State
 
 
 def _none(m: Measurement) -> float:
@@ -27,12 +26,6 @@ def _friction(m: Measurement) -> float:
 def _sinking(m: Measurement) -> float:
     """v_y in m/s by Stokes' drag, from the properties of fluid and ball."""
     return -stokes.sinking_speed(**{name: float(m.conditions[name]) for name in FLUIDS[m.set]})
-
-
-@remembered
-def simulated(p: Parameters, x: tuple[float, ...], duration: float, samples: int = 1) -> Trajectory:
-    """Theory's motion from a state."""
-    return analytic.simulate(p, x, duration, sample_interval=duration / samples)
 
 
 def _end(m: Measurement, name: str) -> float:

@@ -7,17 +7,20 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
+import analytic
 from analytic.orbits import NoOrbitError
 from compare.claims.claim import Bearing, Claim, Outcome, Verdict
 from compare.measure.check import Check
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Records
 from compare.statistics import COVERAGE, Measured
-from model import InputError, SimulationError
+from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
 
 F = TypeVar("F", bound=Callable[..., Any])
 _remembered: list[Any] = []
+RTOL = 1e-7
+"""Relative tolerance of simulations that predict: what they predict is measured to 1e-4 at best."""
 UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
 """What a prediction raises where theory knows no such state or motion: that is a deviation, not a breakdown."""
 
@@ -27,6 +30,14 @@ def remembered(function: F) -> F:
     cached = functools.lru_cache(maxsize=None)(function)
     _remembered.append(cached)
     return cached  # type: ignore[return-value]
+
+
+@remembered
+def simulated(
+    p: Parameters, x: tuple[float, ...], t_end: float, samples: int = 1, flow: Flow | None = None
+) -> Trajectory:
+    """The motion of theory from a state, with so many samples after the first."""
+    return analytic.simulate(p, x, t_end, flow, sample_interval=t_end / samples, rtol=RTOL)
 
 
 def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:

@@ -20,8 +20,7 @@ MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
 @remembered
 def lasting(p: Parameters) -> tuple[StationarySolution, ...]:
     """The stationary solutions that a ball may settle to: those that attract, and the one that sinks for ever."""
-    sinking = [s for s in analytic.stationary_solutions(p) if s.moves and s.exists and s.stable]
-    return (*analytic.stable_solutions(p), *sinking)
+    return tuple(analytic.stable_solutions(p, sinking=True))
 
 
 def cases(p: Parameters) -> set[Case]:

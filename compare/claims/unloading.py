@@ -7,9 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-import analytic
-from compare.claims.cases import simulated
 from compare.claims.claim import Bearing, Claim
+from compare.claims.judge import RTOL, simulated
 from compare.measure.record import Measurement, state
 from compare.measure.settling import family
 from compare.measure.unloading import first_top
@@ -75,7 +74,7 @@ def _bearing(quantity: str, read: Callable[[Trajectory, Measurement], float]) ->
 
     def predict(m: Measurement) -> Measured:
         value = read(_run(m), m)
-        return Measured(value, STEPS * analytic.Settings().rtol * abs(value))
+        return Measured(value, STEPS * RTOL * abs(value))
 
     return Bearing("unloading", quantity, predict, by="analytic.simulate")
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import analytic
 from analytic import pulsation, response
 from compare.claims.claim import Bearing, Claim
-from compare.claims.judge import remembered
+from compare.claims.judge import remembered, simulated
 from compare.measure.check import Relation
 from compare.measure.record import Measurement
 from compare.measure.unsteady import caught_up
@@ -17,7 +17,7 @@ from model.drag import STOKES
 from model.kinematics import VARIABLES
 
 PULSATION, UNSTEADY = "pulsation", "unsteady"
-FAR, SAMPLES = 3.0, 20_000
+FAR, SAMPLES = 3.0, 5_000
 """Where theory's ramp ends beyond the fold, over the overshoot of a slow one; samples of it."""
 
 
@@ -54,9 +54,7 @@ def ramp_end(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
     """The flow at which a ramp ends slipping at both points by theory; LookupError if it doesn't."""
     beyond = analytic.thresholds(p).omega_04 + FAR * response.ramp_coefficient(p) * rate ** (2 / 3)
     t_end = (beyond - p.omega_0) / rate
-    end = caught_up(
-        analytic.simulate(p, x0, t_end, Flow.ramp(p.omega_0, beyond, t_end), sample_interval=t_end / SAMPLES)
-    )
+    end = caught_up(simulated(p, x0, t_end, SAMPLES, Flow.ramp(p.omega_0, beyond, t_end)))
     if math.isnan(end):
         raise LookupError("in theory the ramp doesn't end slipping")
     return end

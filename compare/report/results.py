@@ -110,7 +110,7 @@ def load(directory: Path) -> Summary:
 
 def save(summary: Summary, directory: Path) -> None:
     """Write the summary, whole or not at all."""
-    content = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **dataclasses.asdict(summary)}
+    content = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **vars(summary)}
     write_text(directory / SUMMARY, json.dumps(content, ensure_ascii=False, allow_nan=False))
 
 

@@ -112,7 +112,7 @@ def _changed(monkeypatch: pytest.MonkeyPatch, change: Any) -> None:
     right = {name: getattr(analytic, name) for name in ("stationary_solutions", "stable_solutions", "solution")}
 
     def several(name: str) -> Any:
-        return lambda p: [new for s in right[name](p) if (new := change(s, p)) is not None]
+        return lambda p, **more: [new for s in right[name](p, **more) if (new := change(s, p)) is not None]
 
     def one(p: Parameters, case: Case, **how: Any) -> StationarySolution:
         new: StationarySolution | None = change(right["solution"](p, case, **how), p)

@@ -7,7 +7,7 @@ import pytest
 import analytic
 from compare.claims import unloading as claims
 from compare.claims.claim import Outcome
-from compare.claims.judge import judge
+from compare.claims.judge import forget, judge
 from compare.measure import unloading
 from compare.measure.lab import Level
 from compare.measure.record import Records
@@ -34,6 +34,23 @@ def test_theory_and_engine_agree(records):
     assert {v.claim.id: v.outcome for v in judge(claims.CLAIMS, records)} == dict.fromkeys(
         ("fig-13-right", "push"), Outcome.CONFIRMED
     )
+
+
+def test_predictions_are_as_sure_as_they_say(records, monkeypatch):
+    def predicted():
+        forget()
+        return [
+            b.predict(m)
+            for c in claims.CLAIMS
+            for b in c.bearings
+            if b.quantity != "case"
+            for m in records.select("unloading", b.quantity, b.when)
+        ]
+
+    usual = predicted()
+    monkeypatch.setattr("compare.claims.judge.RTOL", 1e-10)
+    for one, finer in zip(usual, predicted(), strict=True):
+        assert abs(one.value - finer.value) <= one.uncertainty
 
 
 def test_claims_notice_a_theory_with_other_friction(records, monkeypatch):
