@@ -27,9 +27,9 @@ HARMONICS, FINE = 32, 128
 """Of the lag: odd ones, as a sine and every law of drag are; those left out are some 10^-6 of it, and 10^-7."""
 NEWTON, SOLVED = 50, 1e-9
 """Most steps of Newton's method for it, and what may be left of its equation, over the flow's acceleration."""
-ROUNDS, DEPTH, SETTLED, RTOL = 100, 2, 1e-7, 1e-7
+ROUNDS, DEPTH, SETTLED, RTOL = 100, 2, 1e-6, 1e-6
 """Most periods that `mean_error` simulates; how many differences point to the next; by how much the last may change the
-motion, over the flow; and the integrator's rtol. The mean is then known to some 1e-7 of the flow."""
+motion, over the flow; and the integrator's rtol. The mean is then known to some 1e-6 of the flow."""
 
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
