@@ -16,7 +16,8 @@ from analytic.flowmeter import (
     unloading_limit,
 )
 from analytic.leaning import leaning_modes
-from analytic.simulation import Settings, simulate
+from analytic.settings import Settings
+from analytic.simulation import simulate
 from analytic.slip_stability import SlipStability
 from analytic.stationary import (
     Stability,

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analytic.simulation import Settings, sample_times, start_state
+from analytic.settings import Settings
+from analytic.simulation import sample_times, start_state
 from model import Flow, InputError, Parameters
 from model.arrays import Array
 from model.kinematics import VARIABLES

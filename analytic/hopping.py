@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from analytic.ensemble import simulate_many
 from analytic.fates import closed
-from analytic.simulation import Settings, simulate
+from analytic.settings import Settings
+from analytic.simulation import simulate
 from model import Case, Contact, Parameters
 from model.arrays import Array
 

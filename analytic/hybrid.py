@@ -18,7 +18,7 @@ from analytic.integrator import StalledError, Stretch
 from analytic.motion import Chart, Fluid, Moment, Path
 from analytic.records import REPORT_EVERY, Event, Recorder
 from analytic.rigid_body import NOTHING, Forces
-from analytic.simulation import Settings
+from analytic.settings import Settings
 from analytic.transitions import Shortest
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array

@@ -15,7 +15,8 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from analytic import bifurcation, drag, slip_bounds, stationary
-from analytic.simulation import Settings, simulate
+from analytic.settings import Settings
+from analytic.simulation import simulate
 from analytic.two_point_rolling import MARGINS
 from model import Case, Flow, InputError, Parameters, SimulationError
 from model.arrays import Array

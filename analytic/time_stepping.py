@@ -27,7 +27,7 @@ from analytic import drag, marching, rigid_body, stepping
 from analytic.contact_problem import NotConvergedError
 from analytic.records import Event, Recorder
 from analytic.rigid_body import NOTHING, Forces
-from analytic.simulation import Settings
+from analytic.settings import Settings
 from model import Case, Flow, Parameters, State
 from model.arrays import Array
 
