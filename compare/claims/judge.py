@@ -20,7 +20,7 @@ from model.errors import suggestion
 F = TypeVar("F", bound=Callable[..., Any])
 _remembered: list[Any] = []
 RTOL = 1e-7
-"""Relative tolerance of simulations that predict: what they predict is measured to 1e-4 at best."""
+"""Relative tolerance of simulations that predict: what most of them predict is measured to 1e-4 at best."""
 UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
 """What a prediction raises where theory knows no such state or motion: that is a deviation, not a breakdown."""
 
@@ -34,10 +34,10 @@ def remembered(function: F) -> F:
 
 @remembered
 def simulated(
-    p: Parameters, x: tuple[float, ...], t_end: float, samples: int = 1, flow: Flow | None = None
+    p: Parameters, x: tuple[float, ...], t_end: float, samples: int = 1, flow: Flow | None = None, rtol: float = RTOL
 ) -> Trajectory:
     """The motion of theory from a state, with so many samples after the first."""
-    return analytic.simulate(p, x, t_end, flow, sample_interval=t_end / samples, rtol=RTOL)
+    return analytic.simulate(p, x, t_end, flow, sample_interval=t_end / samples, rtol=rtol)
 
 
 def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:

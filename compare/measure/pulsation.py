@@ -142,7 +142,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         else:
             yield _record(lab, rhythm, "slip_amplitude", onset, bracket.tasks)
             slipping.append((rhythm, BEYOND * onset.value))
-    yield from _mean_errors(lab, slipping)
+    yield from mean_errors(lab, slipping)
 
 
 def _rhythms(lab: Lab, rhythms: Sequence[Rhythm]) -> list[Rhythm]:
@@ -229,7 +229,7 @@ def _alone(run: Trajectory) -> float:
     return float(np.abs(run.slip_speed_A - run.slip_speed_B)[late].max() / math.sqrt(p.g * p.R))
 
 
-def _mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator[Measurement | Missing]:
+def mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator[Measurement | Missing]:
     """Means over the last period, with both steps, once each period is as the one before.
 
     The engine may remember what a state doesn't hold, such as how strongly floor and wall press against each other. How

@@ -86,7 +86,7 @@ def test_a_mean_may_hang_on_more_than_the_state(tmp_path) -> None:
     begin = analytic.pulsation.swing(p, a, f, 0.0)[0] - p.omega_0
     rhythm = pulsation.Rhythm("design-5", p, f, a, reach=1.0, begin=float(begin) / a)
     with Campaign(tmp_path, workers=0) as campaign:
-        (row,) = pulsation._mean_errors(Lab(campaign, MUJOCO, Level.DEFAULT), [(rhythm, a)])
+        (row,) = pulsation.mean_errors(Lab(campaign, MUJOCO, Level.DEFAULT), [(rhythm, a)])
     assert "more than the state" in row.reason
 
 
