@@ -263,7 +263,7 @@ class ContactSettings:
     @classmethod
     def at(cls, timestep: float, **changes: Any) -> Self:
         """The defaults with their times scaled to another step, and the given changes."""
-        check_number("timestep", timestep, "s")
+        check_number("timestep", timestep, *_NUMBERS["timestep"])
         scale, (time, ratio) = timestep / 1e-3, cls.solref
         scaled = {"solref": (time * scale, ratio), "solreffriction": cls.solreffriction * scale}
         return cls.from_mapping({"timestep": timestep, "servo": cls.servo * scale} | scaled | changes)
