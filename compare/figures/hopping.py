@@ -19,7 +19,7 @@ from compare.figures import style
 from compare.runs import regions
 from compare.runs.basins import FATES, Basins
 from compare.runs.search import LOGARITHMIC, Searched
-from model.kinematics import VARIABLES
+from model.kinematics import UNITS, VARIABLES
 
 _PAIRS = (("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0"))
 _CELLS = 8
@@ -112,8 +112,8 @@ _VARIABLES = {
 def caption_plane(basins: Basins) -> str:
     """The parameters, the other variables, shares with confidence, and where the two engines differ."""
     p = basins.parameters
-    others = {n: v for n, v in zip(VARIABLES, basins.start, strict=True) if n not in (basins.across, basins.up)}
-    fixed = ", ".join(f"{n} = {v:.3g}" for n, v in others.items() if v)
+    rest = ((n, v, unit) for n, v, unit in zip(VARIABLES, basins.start, UNITS, strict=True) if v)
+    fixed = ", ".join(f"{n} = {v:.3g} {unit}" for n, v, unit in rest if n not in (basins.across, basins.up))
     shares = "; ".join(f"{fate} {_share(*basins.share(fate))}" for fate in FATES if basins.share(fate)[0])
     text = (
         f"What becomes of a ball that starts on a plane of states ({fixed}; all others zero). "
