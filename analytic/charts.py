@@ -26,8 +26,8 @@ from model.arrays import Array
 def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """The chart of a case (any but RR, see `two_point_rolling`) that starts at a moment.
 
-    `floor` is the slip in natural units below which its direction turns no faster any more: directions turn at a rate
-    inverse to the slip, and settle before the slip vanishes.
+    `floor` is the slip in natural units below which the turning rate of its direction is capped: the rate is inverse to
+    the slip, and directions settle before the slip vanishes.
     """
     return _CHARTS[case](case, at, p, omega_0, floor)
 

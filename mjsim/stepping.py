@@ -42,7 +42,7 @@ class Stepper(Protocol):
     """When each run reached the vessel's axis, s; inf for those that have not."""
 
     def advance(self, omega_0: Iterable[Array], row: Array | None = None) -> None:
-        """Take a step for each omega_0 (runs,); write (qpos, qvel, sensors) of the first to row (runs, 41)."""
+        """Take a step for each omega_0 (runs,); write (qpos, qvel, sensors) of the first to row (runs, `COLUMNS`)."""
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next."""
