@@ -35,7 +35,7 @@ motion, over the flow; and the integrator's rtol. The mean is then known to some
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
     """omega_c and omega_0 in rad s-1 of RR that has pulsated for long, at phases of the flow in rad, same shape."""
-    return _swing(p, amplitude, _lag(p, amplitude, frequency), np.asarray(phase, dtype=float))
+    return _swing(p, amplitude, lag_harmonics(p, amplitude, frequency), np.asarray(phase, dtype=float))
 
 
 def _swing(p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], phase: Array) -> tuple[Array, Array]:
@@ -46,10 +46,12 @@ def _swing(p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], pha
 
 def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex:
     """That of omega_c in `swing` over that of omega_0; with Stokes' law `response.transfer` at any amplitude."""
-    return complex(1 + 1j * _lag(p, amplitude, frequency, FINE)[0] / amplitude)
+    return complex(1 + 1j * lag_harmonics(p, amplitude, frequency, FINE)[0] / amplitude)
 
 
-def _lag(p: Parameters, amplitude: float, frequency: float, harmonics: int = HARMONICS) -> npt.NDArray[np.complex128]:
+def lag_harmonics(
+    p: Parameters, amplitude: float, frequency: float, harmonics: int = HARMONICS
+) -> npt.NDArray[np.complex128]:
     """Complex amplitudes at the first odd harmonics of D = omega_c - omega_0 in rad s-1, where (23) repeats itself.
 
     D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With Stokes' law there is
@@ -89,7 +91,7 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
         return math.inf
 
     def slack(amplitude: float) -> float:
-        lag, at, cells = _lag(p, amplitude, frequency), 0.0, math.pi
+        lag, at, cells = lag_harmonics(p, amplitude, frequency), 0.0, math.pi
         for count in (PHASES, CLOSER, CLOSER):
             phases = at + np.linspace(-cells, cells, count + 1)
             omega_c, omega_0 = _swing(p, amplitude, lag, phases)

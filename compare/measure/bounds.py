@@ -161,7 +161,7 @@ def _result(lab: Lab, line: Line, points: Array, tasks: Sequence[Task]) -> Itera
     flows, gamma, noise = points[:, ~np.isnan(points[1])]
     q, noise = flows**line.power, np.maximum(noise, floor)
     if line.bent:
-        zero, slope = _curve(q, gamma, noise)
+        zero, slope = zero_and_slope(q, gamma, noise)
     else:
         # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none.
         _, slope = straight_line(q, gamma, noise)
@@ -178,7 +178,7 @@ def _result(lab: Lab, line: Line, points: Array, tasks: Sequence[Task]) -> Itera
     yield measurement(lab, "bounds", line.set, push.p, f"gamma_slope{square}", slope, tasks, **push.conditions)
 
 
-def _curve(q: Array, gamma: Array, noise: Array) -> tuple[Measured, Measured]:
+def zero_and_slope(q: Array, gamma: Array, noise: Array) -> tuple[Measured, Measured]:
     """Zero of a curve through points (n,), and its slope there; uncertain by a third of what the last degree changes.
 
     nan without a single zero between the points.

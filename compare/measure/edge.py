@@ -150,12 +150,12 @@ def _search(lab: Lab, edge: Edge, width: float) -> Search:
         return lab.task(edge.p, edge.centre + s * edge.line, t_end, step, samples=round(t_end / (8 * step)))
 
     def falls_behind(run: Trajectory) -> bool:
-        return _falls_behind(run, edge)
+        return ends_slipping(run, edge)
 
     return Search(Bracket(*edge.reach), task, falls_behind, width)
 
 
-def _falls_behind(run: Trajectory, edge: Edge) -> bool:
+def ends_slipping(run: Trajectory, edge: Edge) -> bool:
     """Whether a ball ends up slipping: by which way it still goes, or where it has come to rest."""
     last = run.omega_c[tail(run, 0.2)]
     first, second = np.array_split(last, 2)

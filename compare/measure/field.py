@@ -170,7 +170,7 @@ def _sight(run: Trajectory, centre: int, refined: int, degree: int) -> Array | N
     """What happens in a window, None if the case changes in or near it or a slip turns."""
     near, half = (HALF + APART) * refined, HALF * refined
     window = slice(centre - half, centre + half + 1)
-    if np.ptp(run.case[centre - near : centre + near + 1]) or _turns(Case(int(run.case[centre])), run, window):
+    if np.ptp(run.case[centre - near : centre + near + 1]) or turns_or_hovers(Case(int(run.case[centre])), run, window):
         return None
     time, at = run.time[window], float(run.time[centre])
     x, rates = polynomial(time, run.x[window], degree, at)
@@ -180,7 +180,7 @@ def _sight(run: Trajectory, centre: int, refined: int, degree: int) -> Array | N
     return np.concatenate([x, rates, force])
 
 
-def _turns(case: Case, run: Trajectory, window: slice) -> bool:
+def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
     """Whether a contact that slips hardly presses, or its velocity changes by more than `TURN` of it, or would by
     friction alone.
     """

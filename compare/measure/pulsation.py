@@ -158,7 +158,7 @@ def _rhythms(lab: Lab, rhythms: Sequence[Rhythm]) -> list[Rhythm]:
             ratio = _ratio(run, rhythm, period)
             followed[k] = replace(
                 rhythm,
-                begin=(_limit(run.omega_c[period::period]) - rhythm.p.omega_0) / rhythm.amplitude,
+                begin=(limit(run.omega_c[period::period]) - rhythm.p.omega_0) / rhythm.amplitude,
                 ratio=ratio,
                 uncertainty=abs(ratio - rhythm.ratio),
                 tasks=(*rhythm.tasks[-1:], task),
@@ -246,7 +246,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator[
             turns = np.diff(run.theta[::period]) * slipping[k][0].frequency
             means[k] += [float(turns[-2]), float(turns[-1])]
             x = run.x[-1].copy()
-            x[2] = _limit(run.omega_c[period::period])
+            x[2] = limit(run.omega_c[period::period])
             states[k] = x
             if n == ROUNDS - 2:
                 last[k] = run.x[-1 - period : -1 : period // ANEW]
@@ -271,7 +271,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator[
             yield Missing(PROTOCOL, rhythm.set, f"{at} doesn't settle, or hangs on more than the state")
 
 
-def _limit(values: Array) -> float:
+def limit(values: Array) -> float:
     """Where the last three values of a row point to, that of a geometric approach; the last one if they diverge."""
     first, second = values[-2] - values[-3], values[-1] - values[-2]
     return float(values[-1] + (second**2 / (first - second) if abs(second) < abs(first) else 0.0))

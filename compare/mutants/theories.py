@@ -183,7 +183,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "response.step_response": {"ringing after a jump in a fluid with 5 % more drag": given(other(c=1.05))},
     # The fluid goes round as the ball does, and its acceleration takes no friction.
     "pulsation._swing": {"pulsation takes no friction": answer(lambda swing: (swing[0], swing[0]))},
-    "pulsation._lag": {"rolling follows a pulsation as under Stokes' drag": given(_by_stokes)},
+    "pulsation.lag_harmonics": {"rolling follows a pulsation as under Stokes' drag": given(_by_stokes)},
     "pulsation.slip_onset": {
         "slip begins 3 % late in a pulsation": scaled(1.03),
         "slip begins 3 % early in a pulsation": scaled(0.97),

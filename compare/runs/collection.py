@@ -82,10 +82,11 @@ def describe(path: Path) -> dict[str, Any]:
         version = file.attrs.get("schema_version")
         if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
             raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
-        return _described({name: dataset(file, name)[...] for name in file})
+        return described({name: dataset(file, name)[...] for name in file})
 
 
-def _described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
+def described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
+    """As `describe`, for the columns of a collection by name; `drag` is missing in older ones."""
     numbers = {name: values for name, values in columns.items() if values.dtype.kind == "f"}
     failures = [text.decode() for text in columns["failure"] if text]
     codes, counts = np.unique(columns["case"], return_counts=True)

@@ -84,7 +84,7 @@ def test_finer_predictions_are_the_same(name: str) -> None:
     """Twice as many harmonics, and a motion that is integrated and repeats itself more exactly, change little."""
     p, frequency = SETS[name], 1.0
     amplitude = 1.5 * pulsation.slip_onset(p, frequency)
-    exact = 1 + 1j * pulsation._lag(p, amplitude, frequency, 2 * pulsation.FINE)[0] / amplitude
+    exact = 1 + 1j * pulsation.lag_harmonics(p, amplitude, frequency, 2 * pulsation.FINE)[0] / amplitude
     assert pulsation.first_harmonic(p, amplitude, frequency) == pytest.approx(exact, rel=1e-6)
     exact = pulsation.mean_error(p, amplitude, frequency, settled=1e-9, rtol=1e-10)
     assert pulsation.mean_error(p, amplitude, frequency) == pytest.approx(exact, rel=2e-5)

@@ -60,7 +60,7 @@ def test_the_law_of_drag_is_kept(tmp_path: Path) -> None:
     assert collection.table(about).row_count == 5
     with reading(tmp_path / "all.h5") as file:
         older = {name: dataset(file, name)[...] for name in file if name != "drag"}
-    assert collection._described(older)["varied"] == ["nu_f"]
+    assert collection.described(older)["varied"] == ["nu_f"]
 
 
 def test_a_single_run_varies_nothing(runs: Path, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from compare.claims.claim import Outcome
 from compare.claims.judge import judge
 from compare.measure import onset, thresholds
 from compare.measure.brackets import FINER, LONGER, Bracket, Search, narrow
-from compare.measure.edge import Edge, _falls_behind
+from compare.measure.edge import Edge, ends_slipping
 from compare.measure.extrapolation import turning, vanishing
 from compare.measure.lab import Level
 from compare.measure.questions import held, keeps_on, rolling, settles, slides, stays_rolling
@@ -132,9 +132,9 @@ def test_edge_tells_by_the_way_a_run_still_goes():
     slipping, lifted = np.eye(8)[2] * 10.0, np.eye(8)[2] * 30.0
     edge = Edge("reference", REFERENCE, slipping, lifted, slipping, lifted - slipping, (0.0, 1.0))
     for rate, falls in ((-0.1, True), (0.1, False)):
-        assert _falls_behind(SimpleNamespace(time=np.arange(101), omega_c=25 + rate * np.arange(101)), edge) is falls
+        assert ends_slipping(SimpleNamespace(time=np.arange(101), omega_c=25 + rate * np.arange(101)), edge) is falls
     for end, falls in ((10.0, True), (30.0, False)):
-        assert _falls_behind(SimpleNamespace(time=np.arange(101), omega_c=np.full(101, end)), edge) is falls
+        assert ends_slipping(SimpleNamespace(time=np.arange(101), omega_c=np.full(101, end)), edge) is falls
 
 
 def test_protocol_on_a_set_without_fold(lab):

@@ -102,8 +102,8 @@ def test_sets_without_slip_say_why(tmp_path) -> None:
 
 
 def test_a_row_points_to_its_limit() -> None:
-    assert pulsation._limit(5 + 0.3 ** np.arange(3)) == pytest.approx(5.0, rel=1e-12)
-    assert pulsation._limit(np.array([0.0, 1.0, 3.0])) == 3.0
+    assert pulsation.limit(5 + 0.3 ** np.arange(3)) == pytest.approx(5.0, rel=1e-12)
+    assert pulsation.limit(np.array([0.0, 1.0, 3.0])) == 3.0
 
 
 def test_rolling_on_is_judged_after_the_beginning(records: Records) -> None:

@@ -111,10 +111,10 @@ def test_growth_passes_through_zero_where_it_should(lab: Lab, monkeypatch: pytes
 @pytest.mark.parametrize("power", [1.3, 1.687, 2.0])
 def test_a_bent_line_has_its_zero_and_slope(power: float) -> None:
     q = np.array([0.0, 1.1, 1.5, 2.0])
-    zero, slope = bounds._curve(q, q**power - 1.7, np.full(len(q), 1e-6))
+    zero, slope = bounds.zero_and_slope(q, q**power - 1.7, np.full(len(q), 1e-6))
     assert abs(zero.value - 1.7 ** (1 / power)) < 3 * zero.uncertainty < 0.03
     assert abs(slope.value - power * zero.value ** (power - 1)) < 3 * slope.uncertainty < 0.06
-    assert np.isnan([m.value for m in bounds._curve(q, q + 1, np.full(len(q), 1e-6))]).all()
+    assert np.isnan([m.value for m in bounds.zero_and_slope(q, q + 1, np.full(len(q), 1e-6))]).all()
 
 
 def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,4 +190,4 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share: float,
     x = np.tile([0, 0, 1.0, 0, 1.0 / p.r, 0, 0, 0], (5, 1))
     forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / p.eta)}
     run = SimpleNamespace(header=SimpleNamespace(parameters=p), time=time, x=x, **forces)
-    assert field._turns(Case.NS, run, slice(0, 5)) is turns
+    assert field.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
