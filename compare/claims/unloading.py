@@ -11,7 +11,7 @@ from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import simulated
 from compare.measure.record import Measurement, state
 from compare.measure.settling import family
-from compare.measure.unloading import first_top
+from compare.measure.unloading import BY_SPIN, UNLOADED, UPWARDS, first_top
 from compare.statistics import Measured
 from model import Case, Contact, Trajectory
 
@@ -64,11 +64,9 @@ def _run(m: Measurement) -> Trajectory:
     return simulated(m.parameters, state(m), float(m.conditions["duration"]), SAMPLES, rtol=RTOL)
 
 
-def _ends(start: str) -> Bearing:
-    """The case in which a motion ends that starts so."""
-    return Bearing(
-        "unloading", "case", _case, when=lambda m: str(m.conditions["start"]).startswith(start), by="analytic.simulate"
-    )
+def _ends(*starts: str) -> Bearing:
+    """The case in which a motion ends that starts in one of these ways."""
+    return Bearing("unloading", "case", _case, when=lambda m: m.conditions["start"] in starts, by="analytic.simulate")
 
 
 def _bearing(quantity: str, read: Callable[[Trajectory, Measurement], float]) -> Bearing:
@@ -88,7 +86,7 @@ CLAIMS = (
         "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
         "rolling at both points.",
         (
-            _ends("unloading"),
+            _ends(UNLOADED),
             _bearing("time", _time),
             _bearing("landing_speed", _landing_speed),
             _bearing("landing_impulse", _impulse),
@@ -98,6 +96,6 @@ CLAIMS = (
         "push",
         "section 5.3",
         "A small push lifts the ball from SR to NR, where it stays off the floor.",
-        (_ends("push"), _bearing("lift", _lift)),
+        (_ends(UPWARDS, BY_SPIN), _bearing("lift", _lift)),
     ),
 )
