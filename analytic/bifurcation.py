@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import slipping_branch
-from analytic.stationary import StationarySolution
-from model import InputError, Parameters
-from model.arrays import Array
+from model import InputError, Parameters, State
+from model.arrays import Array, Real
 
 
 @dataclass(frozen=True)
@@ -176,6 +175,6 @@ def case_map(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.
     return plane
 
 
-def wall_spin(solution: StationarySolution, p: Parameters) -> float:
+def wall_spin(state: State, p: Parameters) -> Real:
     """omega_x^0 = slip_x + omega_c R/r of (91), rad s-1: the spin on the wall, ordinate of Figs. 9-12."""
-    return float(solution.state.slip_x + p.R / p.r * solution.state.omega_c)
+    return state.slip_x + p.R / p.r * state.omega_c

@@ -13,7 +13,7 @@ from analytic.ensemble import simulate_many
 from analytic.fates import closed
 from analytic.settings import Settings
 from analytic.simulation import simulate
-from model import Case, Contact, Parameters
+from model import Case, Contact, Parameters, State
 from model.arrays import Array
 
 DURATION = 60.0
@@ -71,7 +71,7 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     fate = closed(seen)
     if fate and fate.orbit and (landings := sum(itertools.starmap(_lands, fate.orbit.changes))):
         orbit = fate.orbit
-        omega_c, height = float(orbit.mean[2]) / p.omega_0, float(orbit.cycle.y.max()) / p.R
+        omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R
         return Hopping(landings, orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max()))
     lasts = max(CONFIRMING / p.c, 4 * SEEN * unit)
     run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SAMPLES)

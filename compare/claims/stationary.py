@@ -59,7 +59,7 @@ def leaning(m: Measurement) -> StationarySolution:
 def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
     """A quantity of a stationary solution by its name in the measurements."""
     if quantity == "wall_spin":
-        return bifurcation.wall_spin(s, p)
+        return float(bifurcation.wall_spin(s.state, p))
     if quantity.startswith("force_"):
         return force(quantity.removeprefix("force_"), s.force_A, s.force_B)
     return float(s.x[VARIABLES.index(quantity)])

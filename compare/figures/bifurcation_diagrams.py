@@ -6,14 +6,16 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+import analytic
 from analytic import bifurcation, branch_stability, slipping_branch
 from compare.figures import style
 from compare.figures.drawing import Diagram, Material
 from compare.figures.style import UNSTABLE, Place
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.arrays import Array
 
 RELEASED = Parameters.named("reference").replace(eta=0.43)
@@ -41,8 +43,8 @@ def select(material: Material, figure: str) -> Diagram:
     if figure == "fig-12":
         return Diagram(figure, RELEASED)
     name, cases = SETS[figure]
-    spins = material.select("wall_spin", "case")
-    own = tuple(m for m in spins if m.set == name and m.conditions["case"] in cases)
+    measured = [*material.select("wall_spin", "case"), *material.select("edge_wall_spin", "case")]
+    own = tuple(m for m in measured if m.set == name and m.conditions["case"] in cases)
     return Diagram(figure, Parameters.named(name), own)
 
 
@@ -54,7 +56,7 @@ def caption(of: Diagram) -> str:
         text += " H: a Hopf point of SS, beyond which an oscillation grows, too."
     if of.states and of.figure in ("fig-10", "fig-11"):
         text += " A ball on the wall (NR) has the spin of SR, also where SR is unstable."
-    return text + style.marks(of.states)
+    return text + style.edge(of.states) + style.marks(of.states)
 
 
 def draw(of: Diagram) -> Figure:
@@ -73,8 +75,8 @@ def draw(of: Diagram) -> Figure:
 
 def _figure_9(axes: Axes, p: Parameters) -> dict[str, float]:
     t = bifurcation.thresholds(p)
-    below = np.array([0.0, t.omega_02])
-    style.curve(axes, Case.NS, below, p.eta / p.j * below * p.R / p.r, "NS", (0.35, (-4, 6)))
+    below = np.linspace(1e-3, 1 - 1e-9, 100) * t.omega_02
+    style.curve(axes, Case.NS, below, spins(Case.NS, below, p), "NS", (0.35, (-4, 6)))
     _lifting(axes, p, t.omega_02, 2 * t.omega_02, "NR", (0.5, (4, 6)), case=Case.NR)
     style.mark(axes, t.omega_02, lifted(t.omega_02, p), "P2", (0, 8))
     _frame(axes, 0.0, 2 * t.omega_02)
@@ -130,20 +132,26 @@ def _figure_12(axes: Axes, p: Parameters) -> dict[str, float]:
 
 def spin(p: Parameters, slip_x: Array, omega_c: Array) -> Array:
     """The spin on the wall (91), rad s-1."""
-    return np.asarray(slip_x + p.R / p.r * omega_c)
+    return np.asarray(bifurcation.wall_spin(State(omega_c=omega_c, slip_x=slip_x), p))
 
 
 def _spin_of(x: Array, p: Parameters) -> float:
-    return float(spin(p, x[3], x[2]))
+    return float(bifurcation.wall_spin(State.of(x), p))
 
 
 def _frame(axes: Axes, bottom: float, top: float) -> None:
     axes.set(xlim=(bottom, top), ylim=(0, 1.12 * axes.get_ylim()[1]))
 
 
+def spins(case: Case, flows: npt.ArrayLike, p: Parameters) -> list[float]:
+    """omega_x^0, rad s-1, of NR (that of SR is the same) or NS at flows, also where they are formal."""
+    sets = [p.replace(omega_0=float(flow)) for flow in np.ravel(flows)]
+    return [float(bifurcation.wall_spin(analytic.solution(q, case, formal=True).state, q)) for q in sets]
+
+
 def lifted(omega_0: float, p: Parameters) -> float:
-    """omega_x^0 of SR and NR (35), (46), rad s-1."""
-    return p.g / (p.j * omega_0 * p.r)
+    """That of NR at one flow."""
+    return spins(Case.NR, omega_0, p)[0]
 
 
 def _rolling(
@@ -170,7 +178,7 @@ def _lifting(
     case: Case = Case.SR,
 ) -> None:
     omega = np.linspace(begin, end, 200)
-    style.curve(axes, case, omega, [lifted(w, p) for w in omega], text, place, line)
+    style.curve(axes, case, omega, spins(Case.NR, omega, p), text, place, line)
 
 
 def slipping(

@@ -42,6 +42,7 @@ def select(material: Material) -> tuple[Diagram, ...]:
 def select_figure_13(material: Material, figure: str) -> Diagram:
     """The settled states of a panel: left, those of a flow that is raised and lowered in held steps."""
     looped = [m for m in material.select("omega_c", "side") if m.conditions["side"] in _WAYS]
+    looped += material.select("edge_omega_c")
     settled = [m for m in material.select("omega_c", "case") if m.protocol == "settled"]
     return _diagram(figure, looped if figure == "fig-13-left" else settled)
 
@@ -74,7 +75,7 @@ def caption_figure_13(of: Diagram) -> str:
         else "The curves of RR, SR and NR lie on one line and are drawn side by side, joined by dots where they begin. "
         "Black dot: where a ball that is carried by the wall drops when the flow falls, see the figure of its fall."
     )
-    drawn = f"{text}{style.marks(of.states)} {style.named(p)}. Dashed: unstable."
+    drawn = f"{text}{style.edge(of.states)}{style.marks(of.states)} {style.named(p)}. Dashed: unstable."
     return f"Characteristic curve of the flowmeter. {drawn}"
 
 
@@ -114,7 +115,8 @@ def draw_figure_13(of: Diagram) -> Figure:
         _fold_curve(axes, p, top)
         _jumps(axes, p)
         for side, (mark, text) in _WAYS.items():
-            style.points(axes, [m for m in of.states if m.conditions["side"] == side], way=text, marker=mark)
+            style.points(axes, [m for m in of.states if m.conditions.get("side") == side], way=text, marker=mark)
+        style.points(axes, [m for m in of.states if "side" not in m.conditions], way=", edge", ms=3.5)
     else:
         lifts = {case: 0.045 * top * k for k, case in enumerate(("RR", "SR", "NR"))}
         _plain_curve(axes, p, top, lifts["SR"])

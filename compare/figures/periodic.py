@@ -72,8 +72,8 @@ def _diagram(axes: Axes, p: Parameters, quantity: Quantity, offset: tuple[float,
     slipping(axes, p, quantity)
     fast = p.replace(omega_0=0.95 * HIGH * edge)  # the branch goes on far beyond the frame
     for stable, text in ((True, "SS"), (False, "SS, unstable")):
-        x = analytic.solution(fast, Case.SS, stable=stable).x
-        style.name(axes, fast.omega_0, float(quantity(x[3], x[2])), text, offset, style.COLOURS[Case.SS])
+        end = analytic.solution(fast, Case.SS, stable=stable).state
+        style.name(axes, fast.omega_0, float(quantity(end.slip_x, end.omega_c)), text, offset, style.COLOURS[Case.SS])
     spins = {Case.NR: [lifted(w, p) for w in carried], Case.NS: p.eta / p.j * sinking * p.R / p.r}
     for case, x, text, place in (
         (Case.NR, carried, "SR, NR", (0.6, (-5, 5))),

@@ -69,6 +69,12 @@ def marks(states: Sequence[Measurement]) -> str:
     return many if states else ""
 
 
+def edge(states: Sequence[Measurement]) -> str:
+    """What a caption says of points on the unstable branch; nothing where there are none."""
+    between = any(m.quantity.startswith("edge_") for m in states)
+    return " On the unstable SS: the edge between two motions, which the engine was made to follow." * between
+
+
 def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:
     """Second scales, at the top and on the right if they are named: angular velocity in units of sqrt(g/R)."""
     unit = math.sqrt(p.g / p.R)

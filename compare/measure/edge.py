@@ -159,11 +159,11 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool:
     """Whether a ball ends up slipping: by which way it still goes, or where it has come to rest."""
     last = run.omega_c[tail(run, 0.2)]
     first, second = np.array_split(last, 2)
-    gap = float(edge.lifted[2] - edge.slipping[2])
+    gap = float(State.of(edge.lifted).omega_c - State.of(edge.slipping).omega_c)
     going = float(second.mean() - first.mean())
     if abs(going) > 1e-5 * gap:
         return going < 0
-    return float(second.mean() - edge.slipping[2]) < gap / 2
+    return float(second.mean() - State.of(edge.slipping).omega_c) < gap / 2
 
 
 def _onward(edge: Edge) -> Edge:
@@ -223,7 +223,7 @@ def _closing(lab: Lab, name: str, edges: Sequence[Edge]) -> Iterator[Measurement
         return
     omegas = np.array([edge.p.omega_0 for edge in edges])
     noise = max(float(_sure(edge)[2]) for edge in edges)
-    apart = [Measured(float(edge.crossing[2] - edge.lifted[2]), noise) for edge in edges]
+    apart = [Measured(float(State.of(edge.crossing).omega_c - State.of(edge.lifted).omega_c), noise) for edge in edges]
     place = vanishing(omegas, apart)
     if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
         tasks, by = [task for edge in edges for task in edge.tasks], "unstable slipping meets the lifted ball"

@@ -135,6 +135,8 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "ω₀₄ as under Stokes' drag": given(_by_stokes),
     },
     "slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04)},
+    "bifurcation.critical_drag": {"drag at which a fold is born 3 % high": scaled(1.03)},
+    "bifurcation.number_of_folds": {"a fold where there is none, none where there is one": answer(lambda n: 1 - n)},
     # Stability with respect to slipping, (53)-(83)
     "slip_stability.gamma": {"γ 3 % large": scaled(1.03)},
     "slip_stability.slip_rates": {"γ with μ and η exchanged": given(swapped)},
@@ -148,14 +150,18 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "lift out of RR, SR and SS with 2 % more inertia": given(other(j=1.02)),
         "lift with 2 % more wall friction": given(other(eta=1.02)),
     },
+    "slip_stability.lift_onset": {"lift begins 2 % late": scaled(1.02)},
+    "slip_stability.neutral_flow": {"slip is neutral at 1 % more flow": scaled(1.01)},
     "slip_stability.stability": {"Definitions 1-3 with 1 % more wall friction": given(other(eta=1.01))},
     "slip_bounds.nr_to_ns": {"(61) with 3 % more wall friction": given(other(eta=1.03))},
     "slip_bounds.rr_to_rs": {"(66) with μ, as printed": given(swapped)},
     "slip_bounds.rr_to_rs_stationary": {"(67) with 3 % more wall friction": given(other(eta=1.03))},
     "slip_bounds.rr_to_sr": {"(73) with 3 % more floor friction": given(other(mu=1.03))},
     "slip_bounds.rr_to_sr_stationary": {"(74) with 3 % more inertia": given(other(j=1.03))},
+    "slip_bounds.filippov_share": {"share of the sheets in (69) 5 % large": scaled(1.05)},
     "slip_bounds.rr_to_ss": {"(82), (83) with μ and η exchanged": given(swapped)},
     # Laws of drag
+    "stokes.sinking_speed": {"(10) 1 % large": scaled(1.01)},
     "drag.of_velocity": {"the drag's slope left out of the eigenvalues": answer(np.real)},
     "drag.law": {
         "Schiller and Naumann's wake 5 % strong": answer(fields(wake=times(1.05))),
@@ -166,6 +172,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "operating range up to ω₀₂": lambda right: lambda p: bifurcation.thresholds(p).omega_02,
     },
     "flowmeter.characteristic_slope": {"slope of the characteristic 5 % large": scaled(1.05)},
+    "flowmeter.slope_jump": {"the slope jumps by 3 % more": scaled(1.03)},
     "flowmeter.unloading_limit": {"unloading 2 % too high": scaled(1.02)},
     # Motions
     "simulation.simulate": {

@@ -185,7 +185,7 @@ def _end_of_rolling() -> Discipline:
 
     def score(runs: Runs) -> float:
         extrapolated = trials.onset([float(run.slip_z[-100:].mean()) for run in runs])
-        return abs(extrapolated - trials.onset([float(state.solution.x[5]) for state in states]))
+        return abs(extrapolated - trials.onset([float(state.solution.state.slip_z) for state in states]))
 
     return Discipline(
         ROLLING_ENDS, tuple((s.p, AT_REST, math.ceil(s.forgets), s.forgets / 1000) for s in states), score

@@ -92,7 +92,7 @@ def held(run: Trajectory, state: State, since: float) -> Held:
     )
     return Held(
         name=state.name,
-        omega_c=float(run.omega_c[last].mean() / x[2]) - 1,
+        omega_c=float(run.omega_c[last].mean() / state.solution.state.omega_c) - 1,
         slip=float(np.abs(run.x[last, 3:6].mean(axis=0) - x[3:6]).max()) * state.p.r,
         open=max(float(np.mean(normal <= 0)) for contact, _, normal in contacts if contact is not Contact.N),
         creep=max([float(speed.mean()) for contact, speed, _ in contacts if contact is Contact.R], default=0.0),

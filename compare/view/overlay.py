@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from compare.figures import style
 from compare.figures.style import FORCE, INK, SLIP
 from compare.view.motion import Moment
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.kinematics import slip_speeds
 
 
@@ -34,7 +34,7 @@ def compose(
     lines = (
         f"t = {moment.time:.3f} s   {note}",
         f"ω₀ = {float(moment.run.header.flow(moment.time)):.2f} rad/s",
-        f"ω_c = {moment.x[2]:.2f} rad/s",
+        f"ω_c = {State.of(moment.x).omega_c:.2f} rad/s",
         f"slip: floor {floor:.3f} m/s, wall {wall:.3f} m/s",
     )
     draw.multiline_text((margin, bottom), "\n".join(lines), INK, font=text, spacing=6 * unit)

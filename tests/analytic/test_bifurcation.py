@@ -220,7 +220,7 @@ def test_map_against_the_solutions(mu: float | None) -> None:
 
 def test_wall_spin() -> None:
     """(91) is the first coordinate of (4): g/(j omega_0 r) in SR, omega_0 R/r in RR."""
-    spins = {s.case: wall_spin(s, P) for s in stationary_solutions(P.replace(omega_0=35.0))}
+    spins = {s.case: wall_spin(s.state, P) for s in stationary_solutions(P.replace(omega_0=35.0))}
     assert spins[Case.SR] == pytest.approx(P.g / (P.j * 35.0 * P.r), rel=1e-12)
     assert spins[Case.RR] == pytest.approx(35.0 * P.R / P.r, rel=1e-12)
 
