@@ -45,13 +45,15 @@ def draw_where(record: Searched) -> Figure:
         with np.errstate(invalid="ignore"):
             share = axes.pcolormesh(*edges, 100 * (hopping / tried).T, cmap="Blues", vmin=0, zorder=0)
         figure.colorbar(share, ax=axes, label="sets that hop, %")
-        for simple, mark, colour in ((True, "o", "#D55E00"), (False, "^", "#000000")):
+        for simple, mark, colour in ((True, ".", "#D55E00"), (False, "^", "#000000")):
             own = [r for r in rows if (r["confirmed"]["landings"] == 1) is simple]
             label = "one landing a period" if simple else "several, or no period"
-            axes.plot([r[a] for r in own], [r[b] for r in own], mark, ms=3.2, mfc="none", color=colour, label=label)
+            axes.plot(
+                [r[a] for r in own], [r[b] for r in own], mark, ms=2.2, mew=0.5, mfc="none", color=colour, label=label
+            )
         x, y = ("log" if name in LOGARITHMIC else "linear" for name in (a, b))
         axes.set(xlabel=_AXES[a], ylabel=_AXES[b], xscale=x, yscale=y)
-    style.legend(figure.axes[0], loc="upper left", fontsize=7.5)
+    style.legend(figure.axes[0], loc="upper left", fontsize=7.5, markerscale=2)
     return figure
 
 
