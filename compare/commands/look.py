@@ -41,6 +41,9 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--seconds", type=options.number, default=6.0, help="length of a film (default 6)")
     command.add_argument("--speed", type=options.number, default=0.25, help="1 is real time (default 0.25)")
     command.add_argument("--rate", type=int, default=20, help="frames a second (default 20)")
+    for name, meaning in (("force", "a force m g"), ("slip", "the fastest slip")):
+        text = f"length of the arrow of {meaning}, radii of the ball (default 3)"
+        command.add_argument(f"--{name}-arrow", type=options.number, default=3.0, metavar="RADII", help=text)
 
     command = options.command(commands, "view", view, "the ball in MuJoCo's viewer, driven by the study's own loop")
     options.add_parameters(command)
@@ -90,7 +93,8 @@ def render(args: argparse.Namespace) -> int:
     from compare.view import render  # here, because drawing takes a second to load
 
     film = {name: getattr(args, name) for name in ("start", "seconds", "speed", "rate")}
-    print(render.write(storage.load(args.file), args.output, args.at, args.width, **film))
+    arrows = {name: getattr(args, name) for name in ("force_arrow", "slip_arrow")}
+    print(render.write(storage.load(args.file), args.output, args.at, args.width, arrows, **film))
     return 0
 
 

@@ -8,9 +8,10 @@ with the angular velocity it has, from an arbitrary beginning.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,20 +24,20 @@ from compare.view.stage import Stage
 from model import InputError, StorageError, Trajectory
 from model.arrays import Array
 from model.files import check_writable
-from model.parameters import POSITIVE, Range, check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
 
 WIDTHS = Range(160, 1920)
 """Of pictures, pixels."""
 _IN_RUN = "to be within the run it"
 
 
-def picture(run: Trajectory, at: float | None = None, width: int = 960) -> Image.Image:
-    """The run at a time in s, its end if None, in 16:10.
+def picture(run: Trajectory, at: float | None = None, width: int = 960, **arrows: Any) -> Image.Image:
+    """The run at a time in s, its end if None, in 16:10; `arrows` are `force_arrow` and `slip_arrow` of `Stage`.
 
     Raises `InputError` for a time outside the run, an empty run, or a machine without OpenGL.
     """
     time = float(run.time[-1]) if at is None and len(run.time) else at or 0.0
-    return next(_frames(run, np.array([time]), width))
+    return next(_frames(run, np.array([time]), width, **arrows))
 
 
 def film(
@@ -47,8 +48,11 @@ def film(
     speed: float = 0.25,
     rate: int = 20,
     width: int = 640,
+    **arrows: Any,
 ) -> int:
     """Write a GIF of so many seconds, or up to the end of the run, slowed down by `speed`; return the frames in it.
+
+    `arrows` as for `picture`.
 
     Raises as `picture`, and `StorageError` if the file can't be written.
     """
@@ -56,7 +60,7 @@ def film(
         check_number(name, value, unit, POSITIVE)
     check_number("from", start, "s", _within(run), _IN_RUN)
     end = min(start + seconds * speed, float(run.time[-1]))
-    images = _frames(run, np.arange(start, end + 1e-12, speed / rate), width, f"× {speed:g}")
+    images = _frames(run, np.arange(start, end + 1e-12, speed / rate), width, f"× {speed:.3g}", **arrows)
     first = next(images)
     palette = _palette(first)
     frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in itertools.chain([first], images)]
@@ -79,10 +83,17 @@ def _palette(image: Image.Image) -> Image.Image:
     return made
 
 
-def write(run: Trajectory, output: Path, at: float | None = None, width: int | None = None, **film_options: Any) -> str:
+def write(
+    run: Trajectory,
+    output: Path,
+    at: float | None = None,
+    width: int | None = None,
+    arrows: Mapping[str, Any] = MappingProxyType({}),
+    **film_options: Any,
+) -> str:
     """Write a picture (png) or a film (gif), as the name of the file says; return what was written, in words.
 
-    `film_options` are those of `film`, which a picture has no use for.
+    `arrows` as for `picture`; `film_options` are those of `film`, which a picture has no use for.
 
     Raises as `picture` and `film`; `InputError` for another kind of file.
     """
@@ -90,9 +101,9 @@ def write(run: Trajectory, output: Path, at: float | None = None, width: int | N
         raise InputError(f"cannot write {output}: a picture is a .png, a film a .gif")
     check_writable(output)
     if output.suffix == ".gif":
-        count = film(run, output, width=width or 640, **film_options)
+        count = film(run, output, width=width or 640, **film_options, **arrows)
         return f"{output}: {count} frames"
-    image = picture(run, at, width or 960)
+    image = picture(run, at, width or 960, **arrows)
     _save(image, output, optimize=True)
     return f"{output}: {image.width} × {image.height}"
 
@@ -110,9 +121,11 @@ def _within(run: Trajectory) -> Range:
     return Range(float(run.time[0]), float(run.time[-1]))
 
 
-def _frames(run: Trajectory, times: Array, width: int, note: str = "") -> Iterator[Image.Image]:
+def _frames(run: Trajectory, times: Array, width: int, note: str = "", **arrows: Any) -> Iterator[Image.Image]:
     check_number("time", times[0], "s", _within(run), _IN_RUN)
     check_number("width", width, "pixels", WIDTHS)
-    with closing(Stage(run, width)) as stage:
+    for name, radii in arrows.items():
+        check_number(name, radii, "radii", NOT_NEGATIVE)
+    with closing(Stage(run, width, **arrows)) as stage:
         for time in times:
             yield stage.show(float(time), note)

@@ -21,10 +21,8 @@ from model.kinematics import frame, slip_velocities
 
 _HIDDEN = 5
 """A group of geoms that isn't drawn."""
-_WEIGHT = 3.0
-"""Length of the arrow of a force m g, in radii of the ball."""
-_FASTEST = 3.0
-"""Length of the arrow of the fastest slip of the run, in radii of the ball."""
+ARROW = 3.0
+"""Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball, unless said."""
 _SPOTS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / math.sqrt(3)
 _LONGEST_TRAIL = 3.0
 """s."""
@@ -38,8 +36,9 @@ class Stage:
     Raises `InputError` if there is no OpenGL, or the run holds no scene with a ball.
     """
 
-    def __init__(self, run: Trajectory, width: int) -> None:
+    def __init__(self, run: Trajectory, width: int, force_arrow: float = ARROW, slip_arrow: float = ARROW) -> None:
         self._run, self._p = run, run.header.parameters
+        self._force_arrow, self._slip_arrow = force_arrow, slip_arrow
         self._size = (width, width * 10 // 16)
         self._inset = self._size[1] * 5 // 12
         spec = _spec(run)
@@ -117,10 +116,10 @@ class Stage:
         planes = (np.array([1.0, 0.0, 1.0]), np.array([0.0, 1.0, 1.0]))
         lift = (0.1 * p.r * axes[1], 0.1 * p.r * axes[0])
         for k, force in enumerate(now.forces):
-            arrow = force @ axes * (_WEIGHT * p.r / (p.m * p.g))
+            arrow = force @ axes * (self._force_arrow * p.r / (p.m * p.g))
             self._arrow(0.16 * p.r, contacts[k], contacts[k] + arrow, FORCE)
             if self._fastest > 0 and np.any(force):
-                slip = (planes[k] * slips[k]) @ axes * (_FASTEST * p.r / self._fastest)
+                slip = (planes[k] * slips[k]) @ axes * (self._slip_arrow * p.r / self._fastest)
                 self._arrow(0.13 * p.r, contacts[k] + lift[k], contacts[k] + lift[k] + slip, SLIP)
 
     def _arrow(self, width: float, begin: Array, end: Array, colour: str) -> None:

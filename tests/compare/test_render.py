@@ -49,6 +49,7 @@ def test_a_picture_shows_the_case_and_the_ball_moves(run: Trajectory) -> None:
     cases = [Case(run.case[np.searchsorted(run.time, 0.1)]), Case(run.case[-1])]
     assert [sign(early), sign(late)] == [style.COLOURS[case].lower() for case in cases]
     assert np.mean(np.asarray(early) != np.asarray(late)) > 0.01
+    assert render.picture(run, None, WIDTH, force_arrow=0.0, slip_arrow=0.0) != late
 
 
 @pytest.mark.usefixtures("draws")
