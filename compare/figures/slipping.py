@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from analytic import scenarios
+from analytic import bifurcation, scenarios
 from compare.figures import style
 from compare.figures.drawing import Material, Motion
 from model import Case, Parameters
@@ -32,7 +32,7 @@ def select(_: Material, figure: str) -> Motion:
 def caption(push: Motion) -> str:
     """Of either figure."""
     p = push.p
-    stable = p.eta * p.Omega_0**2 > 1
+    stable = p.omega_0 > bifurcation.thresholds(p).omega_02
     dies = "above ω₀₂: the slip dies out within finite time, and the ball rolls on the wall again"
     grows = "below ω₀₂: the slip grows, and the ball keeps slipping (NS)"
     return (
