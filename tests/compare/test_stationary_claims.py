@@ -15,9 +15,10 @@ from compare.claims import flowmeter, stationary
 from compare.claims.claim import Outcome
 from compare.claims.judge import judge
 from compare.measure.quantities import quantity
-from compare.measure.record import Measurement, Records
+from compare.measure.record import Records
 from compare.measure.settling import determined, family, scale
 from model import Case, Parameters
+from tests.measured import measured
 
 CLAIMS = (*stationary.CLAIMS, *stationary.DIAGRAMS, *flowmeter.CLAIMS)
 SETS = {
@@ -26,19 +27,6 @@ SETS = {
 }
 FLOWS = (0.6, 1.4, 1.7, 2.6, 4.2)
 """omega_0 sqrt(R/g); at 2.6 SS and NR last side by side in the first set, at 1.4 RR and NR in the second."""
-
-
-def _row(name: str, p: Parameters, protocol: str, q: str, value: float, fine: float, **conditions: Any) -> Measurement:
-    return Measurement(
-        protocol=protocol,
-        quantity=q,
-        value=value,
-        uncertainty=fine,
-        engine="mujoco",
-        set=name,
-        parameters=p,
-        conditions=conditions,
-    )
 
 
 def _ends(p: Parameters) -> Iterator[tuple[str, StationarySolution]]:
@@ -57,18 +45,18 @@ def _records(coarse: float = 0.1) -> Records:
         for q in (p.replace(omega_0=Omega_0 * np.sqrt(p.g / p.R)) for Omega_0 in FLOWS):
             for start, s in _ends(q):
                 at = {"case": s.case.name, "start": start}
-                rows.append(_row(name, q, "settled", "case", float(s.case), 0.0, **at))
+                rows.append(measured("settled", "case", float(s.case), 0.0, q, name, **at))
                 for what in determined(s.case):
                     sure = coarse * quantity(what).resolves / 3 * scale(what, q)
-                    rows.append(_row(name, q, "settled", what, stationary.number(what, s, q), sure, **at))
+                    rows.append(measured("settled", what, stationary.number(what, s, q), sure, q, name, **at))
             mask = sum(1 << case for case in {family(s.case) for s in stationary.lasting(q)})
-            rows.append(_row(name, q, "plane", "cases", float(mask), 0.0, figure="fig-7"))
+            rows.append(measured("plane", "cases", float(mask), 0.0, q, name, figure="fig-7"))
         still = p.replace(omega_0=0.0)
         resting = analytic.solution(still, Case.RS)
         for what in determined(Case.RS):
             sure = coarse * quantity(what).resolves / 3 * scale(what, still)
             value = stationary.number(what, resting, still)
-            rows.append(_row(name, still, "settled", what, value, sure, case="RN", start="spinning"))
+            rows.append(measured("settled", what, value, sure, still, name, case="RN", start="spinning"))
     return Records(tuple(rows))
 
 
@@ -206,8 +194,8 @@ class TestLoop:
         sure = 1e-9 * q.omega_0
         return Records(
             (
-                _row("slipping", q, "hysteresis", "case", float(case), 0.0, **at),
-                _row("slipping", q, "hysteresis", "omega_c", float(s.x[2]), sure, **at),
+                measured("hysteresis", "case", float(case), 0.0, q, "slipping", **at),
+                measured("hysteresis", "omega_c", float(s.x[2]), sure, q, "slipping", **at),
             )
         )
 
@@ -227,7 +215,7 @@ class TestSlope:
     p = SETS["slipping"].replace(omega_0=24.0)
 
     def _records(self, by: str, case: Case, value: float) -> Records:
-        return Records((_row("slipping", self.p, "slope", "slope", value, 1e-6, by=by, case=case.name),))
+        return Records((measured("slope", "slope", value, 1e-6, self.p, "slipping", by=by, case=case.name),))
 
     def test_slopes(self, monkeypatch: pytest.MonkeyPatch) -> None:
         right = analytic.characteristic_slope(self.p, Case.SS)
