@@ -25,7 +25,7 @@ def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArra
     InputError
         If SR has no stationary solution that leans: for mu = 0, omega_0 = 0, and at omega_03, where slip_x = 0.
     """
-    leaning = [s.state for s in stationary.stationary_solutions(p) if s.case is Case.SR and p.mu > 0]
+    leaning = [s.state for s in stationary.stationary_solutions(p, (Case.SR,)) if p.mu > 0]
     if not leaning:
         raise InputError(
             f"omega_0 = {p.omega_0:g} rad s-1, mu = {p.mu:g}: SR has no stationary solution that leans on the floor"

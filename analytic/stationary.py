@@ -8,6 +8,7 @@ speed at which the ball sinks in NS; all else goes round with the fluid, whateve
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -81,15 +82,16 @@ class StationarySolution:
         return bool(self.state.v_y != 0)
 
 
-def stationary_solutions(p: Parameters) -> list[StationarySolution]:
-    """All stationary solutions at p.omega_0, in the order of `Case`; SS in the order of |alpha|.
+def stationary_solutions(p: Parameters, cases: Collection[Case] = tuple(Case)) -> list[StationarySolution]:
+    """All stationary solutions at p.omega_0, or those of some cases, in the order of `Case`; SS by |alpha|.
 
     Solutions with inadmissible forces are listed with ``exists`` False. For omega_0 = 0 there are RR, RS and NS; for
     c = 0 RR, SR and NR, with omega_c undetermined in RR; SS needs mu, c > 0 and eta < j.
     """
     if p.omega_0 < 0:
-        return [_mirrored(s) for s in stationary_solutions(p.replace(omega_0=-p.omega_0))]
-    return [*_rr(p), *_rs(p), *_sr(p), *_ss(p), *_nr(p), *_ns(p)]
+        return [_mirrored(s) for s in stationary_solutions(p.replace(omega_0=-p.omega_0), cases)]
+    solvers = {Case.RR: _rr, Case.RS: _rs, Case.SR: _sr, Case.SS: _ss, Case.NR: _nr, Case.NS: _ns}
+    return [s for case, solve in solvers.items() if case in cases for s in solve(p)]
 
 
 def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = False) -> StationarySolution:
@@ -102,7 +104,7 @@ def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = F
     InputError
         If there is none, or more than one (two are unstable between the Hopf points of a very rough floor).
     """
-    those = [s for s in stationary_solutions(p) if s.case is case and s.stable == stable and (formal or s.exists)]
+    those = [s for s in stationary_solutions(p, (case,)) if s.stable == stable and (formal or s.exists)]
     if len(those) != 1:
         raise InputError(
             f"case {case.name} has {len(those) or 'no'} {'stable' if stable else 'unstable'} stationary "

@@ -92,7 +92,7 @@ def _residual(x: Array, p: Parameters) -> float:
 
 def _second_rate(p: Parameters) -> float:
     """The determinant of SR, whose sign is that of the eigenvalue that isn't the decay of omega_c."""
-    (state,) = (s for s in analytic.stationary_solutions(p) if s.case is Case.SR)
+    (state,) = analytic.stationary_solutions(p, (Case.SR,))
     return float(np.linalg.det(jacobian.jacobian(Case.SR, state.x, p)))
 
 

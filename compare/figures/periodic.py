@@ -12,7 +12,7 @@ import analytic
 from analytic import bifurcation, orbit_branch, orbits
 from analytic.orbit_branch import OrbitBranch
 from compare.figures import style
-from compare.figures.bifurcation_diagrams import Quantity, lifted, slipping, spin
+from compare.figures.bifurcation_diagrams import Quantity, lifted, slipping, spin, spins
 from compare.figures.drawing import Diagram, Material
 from model import Case, Parameters
 
@@ -68,18 +68,17 @@ def draw_branch(of: Diagram) -> Figure:
 def _diagram(axes: Axes, p: Parameters, quantity: Quantity, offset: tuple[float, float]) -> None:
     """The diagram of a quantity; the names of SS stand at an offset that is clear of the other curves."""
     edge = bifurcation.thresholds(p).omega_02
-    carried, sinking = np.linspace(edge, HIGH * edge, 100), np.array([LOW * edge, edge])
+    carried, sinking = np.linspace(edge, HIGH * edge, 100), np.array([LOW, 1 - 1e-9]) * edge
     slipping(axes, p, quantity)
     fast = p.replace(omega_0=0.95 * HIGH * edge)  # the branch goes on far beyond the frame
     for stable, text in ((True, "SS"), (False, "SS, unstable")):
         end = analytic.solution(fast, Case.SS, stable=stable).state
         style.name(axes, fast.omega_0, float(quantity(end.slip_x, end.omega_c)), text, offset, style.COLOURS[Case.SS])
-    spins = {Case.NR: [lifted(w, p) for w in carried], Case.NS: p.eta / p.j * sinking * p.R / p.r}
     for case, x, text, place in (
         (Case.NR, carried, "SR, NR", (0.6, (-5, 5))),
         (Case.NS, sinking, "NS", (0.5, (-3, 7))),
     ):
-        slip = np.asarray(spins[case]) - p.R / p.r * x
+        slip = np.asarray(spins(case, x, p)) - p.R / p.r * x
         style.curve(axes, case, x, quantity(slip, x), text, place)
     _hops(axes, quantity)
     axes.set(xlim=(LOW * edge, HIGH * edge), xlabel=style.OMEGA_0)

@@ -6,6 +6,7 @@ import dataclasses
 import io
 import math
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,9 @@ import pytest
 
 import analytic
 import mjsim
-from analytic import thresholds
+from analytic import orbit_branch, thresholds
 from compare.claims.catalogue import CLAIMS
-from compare.figures import bifurcation_diagrams, deviations, gallery, periodic, slipping, style, unloading, unsteady
+from compare.figures import bifurcation_diagrams, deviations, gallery, slipping, style, unloading, unsteady
 from compare.figures.drawing import Diagram, GapError, Material, Motion
 from compare.figures.registry import FIGURES, figures_of
 from compare.measure.check import Check
@@ -84,10 +85,8 @@ def no_engine(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(autouse=True, scope="module")
 def few_points() -> Iterator[None]:
     """Of the branch of hops a few orbits, and few frequencies of pulsation: theory takes about a second for each."""
-    flow = periodic.SET.omega_0 / thresholds(periodic.SET).omega_02
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(periodic, "LOW", 0.99 * flow)
-        patch.setattr(periodic, "HIGH", 1.01 * flow)
+        patch.setattr(orbit_branch, "follow", partial(orbit_branch.follow, most=2))
         patch.setattr(unsteady, "POINTS", 3)
         yield
 
