@@ -116,7 +116,7 @@ def draw_figure_13(of: Diagram) -> Figure:
         _jumps(axes, p)
         for side, (mark, text) in _WAYS.items():
             style.points(axes, [m for m in of.states if m.conditions.get("side") == side], way=text, marker=mark)
-        style.points(axes, [m for m in of.states if "side" not in m.conditions], way=", edge", ms=3.5)
+        style.points(axes, [m for m in of.states if m.protocol == "edge"], way=", edge", ms=3.5)
     else:
         lifts = {case: 0.045 * top * k for k, case in enumerate(("RR", "SR", "NR"))}
         _plain_curve(axes, p, top, lifts["SR"])

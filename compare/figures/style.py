@@ -71,7 +71,7 @@ def marks(states: Sequence[Measurement]) -> str:
 
 def edge(states: Sequence[Measurement]) -> str:
     """What a caption says of points on the unstable branch; nothing where there are none."""
-    between = any(m.quantity.startswith("edge_") for m in states)
+    between = any(m.protocol == "edge" for m in states)
     return " On the unstable SS: the edge between two motions, which the engine was made to follow." * between
 
 
