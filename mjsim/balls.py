@@ -189,6 +189,8 @@ class Balls:
         Positions are taken to where they belong with the acceleration of the last step. What is left of the softness of
         a closed contact goes with the step: stiffness with its inverse square, so that forces stay what they are.
         """
+        if len(runs) == 0:
+            return
         ahead = self.settings.midpoint
         before, after = self.steps[runs], ticks * (self.settings.timestep / TICKS)
         ratio = after / before
@@ -203,18 +205,18 @@ class Balls:
         self.margins[:, runs] = np.maximum(softness + closed * self.gaps[:, runs], 0.0)
         self.last[:, runs] = self.qvel[:, runs] - change * ratio
         self.ticks[runs] = ticks
-        self._set_steps()
+        self._set_steps(runs)
 
-    def _set_steps(self) -> None:
-        """Set all that goes with the steps alone."""
-        scale = self.ticks / TICKS
+    def _set_steps(self, runs: Runs) -> None:
+        """Set all that goes with the steps of some runs alone."""
+        scale = self.ticks[runs] / TICKS
         self._alike &= bool((scale == 1).all())
         if self._alike:
             return
         self.engine.set_timestep(self.steps)
-        self.solref[:] = np.resize(self.settings.spring, (4, 1)) / scale ** np.array([[2], [1]] * 2)
-        self.table[_FALL : _FALL + 2] = self._normal[_FALL : _FALL + 2] * scale
-        self.damp(np.arange(len(self.ticks)))
+        self.solref[:, runs] = np.resize(self.settings.spring, (4, 1)) / scale ** np.array([[2], [1]] * 2)
+        self.table[_FALL : _FALL + 2, runs] = self._normal[_FALL : _FALL + 2, runs] * scale
+        self.damp(runs)
 
     def damp(self, runs: Runs, load: Array | None = None) -> None:
         """Set the damping of friction: in proportion to the number of steps, as far as contacts stay continuous.
@@ -256,7 +258,7 @@ class Balls:
             values[...] = state[name].reshape(values.shape)
         # What the engine puts out can't be written back: until its next step, the copies stand in for it.
         self._contact = tuple(self._form.lean(state[name]) for name in _OUTPUTS)
-        self._set_steps()
+        self._set_steps(np.arange(len(self.ticks)))
 
     def _quantities(self, rows: Array) -> Any:
         """The rows of an array (n, runs) as quantities."""

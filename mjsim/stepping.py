@@ -147,10 +147,10 @@ class Polar(Stepper):
         pace = np.maximum(np.abs(balls.qvel[0, runs]), np.sqrt(g / radius))
         usual = balls.settings.timestep * pace * (g + balls.eta[runs] * radius * pace**2)
         allowed = _CHANGE * usual
-        balls.damp(runs)
         grows, shrinks = (change < allowed / 4) & (left % (2 * ticks) == 0), (change > allowed) & (ticks > 1)
-        balls.resize(runs[grows], 2 * ticks[grows])
-        balls.resize(runs[shrinks], ticks[shrinks] // 2)
+        stays = ~(grows | shrinks)
+        balls.damp(runs[stays])
+        balls.resize(runs[~stays], np.where(grows, 2 * ticks, ticks // 2)[~stays])
 
     def state(self) -> dict[str, Array]:
         return self._balls.state() | {"axis": self.axis.copy(), "steps": np.array(self._steps)}

@@ -74,3 +74,12 @@ def test_a_run_taken_up_between_landings_gives_the_same_bits(tmp_path: Path, bat
     list(islice(run(Journal(tmp_path, interval=0.0)), 2))
     again = np.concatenate([blocks[0] for blocks in run(Journal(tmp_path, interval=0.0))])
     np.testing.assert_array_equal(again, whole)
+
+
+def test_landings_do_not_depend_on_those_of_others_in_a_batch() -> None:
+    settings, higher = ContactSettings.for_problem(HOPS, 5e-4), [START[0] + 2e-5, *START[1:]]  # lands a little later
+    alone, beside = (
+        mjsim.simulate_many([HOPS] * len(x0s), x0s, LASTS, settings=settings, sample_interval=0.01)
+        for x0s in ([START], [START, higher])
+    )
+    np.testing.assert_array_equal(beside[0].x, alone[0].x)
