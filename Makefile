@@ -69,8 +69,8 @@ $(VENV)/installed-engines: requirements-engines.lock $(VENV)/installed
 	@touch $@
 
 lock:
-	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml -o requirements.lock
-	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --group dev -c requirements.lock -o requirements-dev.lock
+	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra fast -o requirements.lock
+	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra fast --group dev -c requirements.lock -o requirements-dev.lock
 	uv pip compile --universal --no-annotate --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra engines -c requirements.lock -o requirements-engines.lock
 
 clean:
