@@ -58,7 +58,7 @@ def simulate_many(
     parameters, flow : one for all, or one for each run; without flow each has its own omega_0
     x0s : starts, shape (runs, 6 or 8), or one for all
     t_end, sample_interval : s; a thousandth of t_end if None
-    settings : step and restitution count; one step for all where it is given
+    settings : timestep and restitution count; one step for all where it is given
     quiet : end a run in which nothing has landed for that long, s; its last state stands for the rest
     threads : number of threads, that of the cores if None
 

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from analytic.ensemble import simulate_many
 from analytic.fates import closed
-from analytic.settings import Settings
+from analytic.settings import Settings, fitting_step
 from analytic.simulation import simulate
-from model import Case, Contact, Parameters, State
+from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
 
 DURATION = 60.0
@@ -33,10 +33,9 @@ def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Ar
 
     One thread; p.c must be positive.
     """
-    settings, quiet = Settings(method="time-stepping", step=math.sqrt(p.R / p.g) / STEPS), QUIET / p.c
-    runs = simulate_many(
-        p, x0s, DURATION / p.c, settings=settings, sample_interval=quiet / LOOKS, quiet=quiet, threads=1
-    )
+    lasts, quiet = DURATION / p.c, QUIET / p.c
+    settings = Settings(timestep=fitting_step(STEPS, p, Flow.steady(p.omega_0), lasts))
+    runs = simulate_many(p, x0s, lasts, settings=settings, sample_interval=quiet / LOOKS, quiet=quiet, threads=1)
     failed = np.array([bool(each) for each in runs.failure])
     hops = np.any(runs.landings[:, -LOOKS:] > 0, axis=1) & ~failed
     return hops, runs.x[:, -1], int(failed.sum())

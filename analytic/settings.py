@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from model import InputError
+from analytic import drag
+from model import Flow, InputError, Parameters, time_scales
 from model.parameters import POSITIVE, Range, check_choice, check_number
 
 
@@ -25,8 +28,9 @@ class Settings:
     rtol: float = 1e-9
     """Relative tolerance of the integrator (event); the absolute one is a thousandth of it in natural units: lengths in
     R, times in sqrt(R/g), the ball's spin in that of a ball that rolls at sqrt(g R)."""
-    step: float | None = None
-    """Longest time step, s; sqrt(R/g)/500 if None (time-stepping)."""
+    timestep: float | None = None
+    """Longest time step, s, at most half of `model.time_scales.shortest_time`; `fitting_step` of 500 if None
+    (time-stepping)."""
     restitution: float = 0.0
     """Newton's coefficient of restitution e of both contacts, 0 <= e <= 1. A ball that hops in the corner is slow
     (event): a series of hops on the floor takes about ln(rtol)/ln(e) impacts, of which each takes about a millisecond,
@@ -45,5 +49,11 @@ class Settings:
             raise InputError(f"initial_impact = {self.initial_impact!r} must be true or false")
         check_number("rtol", self.rtol, "1", Range(100 * float(np.finfo(float).eps), 1e-2))
         check_number("restitution", self.restitution, "1", Range(0.0, 1.0))
-        if self.step is not None:
-            check_number("step", self.step, "s", POSITIVE)
+        if self.timestep is not None:
+            check_number("timestep", self.timestep, "s", POSITIVE)
+
+
+def fitting_step(steps: float, p: Parameters, flow: Flow, t_end: float) -> float:
+    """sqrt(R/g)/`steps`, or the longest step that the times of a run of t_end s allow if that is shorter; s."""
+    shortest, _ = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p))
+    return min(math.sqrt(p.R / p.g) / steps, shortest / 2)

@@ -17,7 +17,7 @@ compiles where it is installed (the extra `fast`).
 
 from __future__ import annotations
 
-import math
+from functools import partial
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -27,8 +27,8 @@ from analytic import drag, marching, rigid_body, stepping
 from analytic.contact_problem import NotConvergedError
 from analytic.records import Event, Recorder
 from analytic.rigid_body import NOTHING, Forces
-from analytic.settings import Settings
-from model import Case, Flow, Parameters, State
+from analytic.settings import Settings, fitting_step
+from model import Case, Flow, Parameters, State, time_scales
 from model.arrays import Array
 
 BLOCK = 256
@@ -95,12 +95,18 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
 def prepared(
     x: State, theta: float, p: Parameters, flow: Flow, settings: Settings, times: Array
 ) -> tuple[stepping.Ball, Stretches, marching.Flow, stepping.Constants]:
-    """What the compiled loops take: the ball in a state that no step has led to, its steps, the flow, and constants."""
+    """What the compiled loops take: the ball in a state that no step has led to, its steps, the flow, and constants.
+
+    Raises `InputError` if the time step is too large for the problem.
+    """
+    t_end = float(times[-1])
+    timestep = settings.timestep or fitting_step(500, p, flow, t_end)
+    time_scales.check_timestep(timestep, p, flow, t_end, partial(drag.coefficient, p=p))
     at = stepping.At(theta, x.y, x.h, rigid_body.velocities(x, p))
     given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution
     return (
         stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),
-        Stretches.of(times, flow, settings.step or math.sqrt(p.R / p.g) / 500),
+        Stretches.of(times, flow, timestep),
         marching.Flow(flow.start, flow.value, flow.slope, flow.waves),
         stepping.Constants(drag.law(p), *map(float, given)),  # an integer would be compiled for itself
     )

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,13 +18,14 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import Settings
+from analytic.settings import fitting_step
 from analytic.simulation import start_state
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MOREAU, MUJOCO
 from compare.runs.sweep import Axis
 from compare.runs.tasks import Task
 from mjsim import ContactSettings
-from model import Case, Contact, InputError, Parameters, State, Trajectory, storage
+from model import Case, Contact, Flow, InputError, Parameters, State, Trajectory, storage
 from model.arrays import Array
 from model.files import reading_json, write_text
 from model.kinematics import VARIABLES
@@ -115,7 +115,8 @@ def basins(
     states = np.tile(base, (len(y), len(x), 1))
     states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
-    fine = _tasks(states, MOREAU.name, p, Settings(method=MOREAU.name, step=math.sqrt(p.R / p.g) / STEPS))
+    step = fitting_step(STEPS, p, Flow.steady(p.omega_0), DURATION / p.c)
+    fine = _tasks(states, MOREAU.name, p, Settings(method=MOREAU.name, timestep=step))
     tasks = [*fine, *_tasks(few, MUJOCO.name, p, ContactSettings.for_problem(p, timestep))]
     broken = {failure.task.key for failure in campaign.complete(tasks)}
     files = [None if task.key in broken else campaign.path(task) for task in tasks]

@@ -160,11 +160,6 @@ def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, c
     )
 
 
-def _time_stepping(given: Mapping[str, float], p: Parameters) -> analytic.Settings:
-    named: dict[str, Any] = {{"timestep": "step"}.get(name, name): value for name, value in given.items()}
-    return analytic.Settings(method="time-stepping", **named)
-
-
 MUJOCO = Engine(
     name="mujoco",
     settings=ContactSettings,
@@ -202,7 +197,7 @@ MOREAU = replace(
     EVENT,
     name="time-stepping",
     options=("timestep", "rtol", "restitution"),
-    configure=_time_stepping,
+    configure=lambda given, p: analytic.Settings(method="time-stepping", **given),  # type: ignore[arg-type]
     simulate=partial(_theory, "time-stepping"),
     mark="^",
     colour="#009E73",

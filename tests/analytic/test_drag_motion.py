@@ -13,7 +13,7 @@ from model.drag import LAWS
 from tests.drag_laws import BY_LAW, resistance
 from tests.random_motions import random_start
 
-METHODS = [Settings(), Settings(method="time-stepping", step=1e-4)]
+METHODS = [Settings(), Settings(method="time-stepping", timestep=1e-4)]
 OTHERS = LAWS[1:]
 
 
@@ -70,7 +70,7 @@ def test_both_simulators_agree_and_balance_energy(law, seed):
         assert run.header.settings["energy_residual"] <= tolerance * run.header.settings["energy_scale"]
     exact, stepped = (run.omega_c[-1] for run in runs)
     assert runs[0].cases[-1] is runs[1].cases[-1]
-    assert stepped == pytest.approx(exact, abs=10 * METHODS[1].step * math.sqrt(p.g / p.R) * abs(p.omega_0))
+    assert stepped == pytest.approx(exact, abs=10 * METHODS[1].timestep * math.sqrt(p.g / p.R) * abs(p.omega_0))
 
 
 @pytest.mark.parametrize("law", OTHERS)
@@ -81,7 +81,7 @@ def test_slipping_converges_with_the_square_of_the_step(law):
     exact = simulate(p, start, t_end, rtol=1e-12)
     assert set(exact.cases) == {Case.SS}
     errors = [
-        simulate(p, start, t_end, method="time-stepping", step=step, sample_interval=0.01).omega_c[-1]
+        simulate(p, start, t_end, method="time-stepping", timestep=step, sample_interval=0.01).omega_c[-1]
         - exact.omega_c[-1]
         for step in (1e-3, 5e-4)
     ]

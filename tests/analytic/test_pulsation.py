@@ -97,7 +97,7 @@ def test_mean_error_of_fast_pulsations() -> None:
     assert pulsation.mean_error(p, 0.99 * onset, frequency) == 0.0
     expected = pulsation.mean_error(p, 1.5 * onset, frequency)
     x0, flow = [0, 0, p.omega_0 + expected, 0, 0, 0], Flow.sine(p.omega_0, 1.5 * onset, frequency)
-    run = simulate(p, x0, 20 / frequency, flow, method="time-stepping", step=1e-3, sample_interval=1 / frequency)
+    run = simulate(p, x0, 20 / frequency, flow, method="time-stepping", timestep=1e-3, sample_interval=1 / frequency)
     assert expected < -0.1
     assert (run.theta[-1] - run.theta[-2]) * frequency - p.omega_0 == pytest.approx(expected, rel=0.01)
 

@@ -122,7 +122,7 @@ def test_laws_hold_for_any_parameters(mu, eta, omega_0, c, omega_c, slips, e):
 @settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_time_stepping_obeys_coulomb_too(seed):
     p, x = random_run(seed)
-    run = simulate(p, x, 0.05, method="time-stepping", step=2e-4, initial_impact=True, sample_interval=1e-3)
+    run = simulate(p, x, 0.05, method="time-stepping", timestep=2e-4, initial_impact=True, sample_interval=1e-3)
     friction_A = np.hypot(run.force_A[:, 0], run.force_A[:, 2]) - p.mu * run.force_A[:, 1]
     friction_B = np.hypot(run.force_B[:, 1], run.force_B[:, 2]) - p.eta * run.force_B[:, 0]
     largest = max(np.abs(run.force_A).max(), np.abs(run.force_B).max(), p.m * p.g)
@@ -172,7 +172,7 @@ def test_progress_within_a_long_stretch(method, monkeypatch):
         monkeypatch.setattr(f"analytic.{between_two_reports}", 10)
     p, seen = P.replace(omega_0=25.0), []
     run = simulate(
-        p, [0, 0, 13.8, -4, 0.5, 10], 0.2, method=method, step=1e-3, sample_interval=0.2, progress=seen.append
+        p, [0, 0, 13.8, -4, 0.5, 10], 0.2, method=method, timestep=1e-3, sample_interval=0.2, progress=seen.append
     )
     assert not len(run.events)
     assert len(seen) > 5
@@ -183,8 +183,8 @@ def test_progress_within_a_long_stretch(method, monkeypatch):
 @pytest.mark.parametrize("method", METHODS)
 def test_settings_object_and_keywords_agree(method):
     x0 = [0, 0, 10, 1, 2, 3]
-    one = simulate(P, x0, 0.1, settings=Settings(method=method, step=1e-3, rtol=1e-7), sample_interval=0.01)
-    two = simulate(P, x0, 0.1, method=method, step=1e-3, rtol=1e-7, sample_interval=0.01)
+    one = simulate(P, x0, 0.1, settings=Settings(method=method, timestep=1e-3, rtol=1e-7), sample_interval=0.01)
+    two = simulate(P, x0, 0.1, method=method, timestep=1e-3, rtol=1e-7, sample_interval=0.01)
     np.testing.assert_array_equal(one.x, two.x)
 
 
@@ -193,7 +193,7 @@ def test_a_speed_into_a_closed_contact(method):
     x0 = [0, -0.1, 10, 0, 0, 0]
     with pytest.raises(InputError, match=r"v_y = -0.1 m s-1 .* floor .* initial_impact"):
         simulate(P, x0, 0.1, method=method)
-    run = simulate(P, x0, 0.1, method=method, initial_impact=True, restitution=0.5, step=1e-4)
+    run = simulate(P, x0, 0.1, method=method, initial_impact=True, restitution=0.5, timestep=1e-4)
     assert run.v_y[1] > 0 or run.cases[1].A is not Contact.N
 
 
@@ -210,7 +210,7 @@ def test_a_ball_locked_in_the_corner_does_not_rebound(method):
     """Where mu, eta > 1 a fall into the corner has no impulses that meet restitution at both contacts."""
     p = P.replace(mu=1.3, eta=1.3)
     run = simulate(
-        p, [0, -0.4, 0, 0, 0, 40, 0, -0.4], 0.05, method=method, restitution=0.5, initial_impact=True, step=1e-3
+        p, [0, -0.4, 0, 0, 0, 40, 0, -0.4], 0.05, method=method, restitution=0.5, initial_impact=True, timestep=1e-3
     )
     assert np.all(run.x[1:, [0, 1, 6, 7]] == 0)
 
@@ -234,8 +234,8 @@ def test_a_ball_locked_in_the_corner_does_not_rebound(method):
         ({"rtol": 1e-16}, r"rtol = 1e-16 1 is out of range: must be >= 2\.22\d*e-14 and <= 0\.01"),
         ({"restitution": 1.5}, "restitution = 1.5 .* <= 1"),
         ({"restitution": -0.1}, "restitution = -0.1"),
-        ({"step": 0.0}, "step = 0 s"),
-        ({"step": "fast"}, "step = 'fast' must be a number"),
+        ({"timestep": 0.0}, "timestep = 0 s"),
+        ({"timestep": "fast"}, "timestep = 'fast' must be a number"),
         ({"method": "events"}, "method = 'events' .*did you mean 'event'"),
         ({"leave_rolling": "never"}, "leave_rolling = 'never'"),
         ({"initial_impact": 1}, "initial_impact = 1"),
@@ -268,7 +268,7 @@ def test_interruption_keeps_what_there_is(method, monkeypatch):
     wrapped = getattr(importlib.import_module(module), attribute)
     monkeypatch.setattr(name, stop)
     p = P.replace(omega_0=25.0)
-    run = simulate(p, [0, 0, 13.8, -4, 0.5, 10], 4.0, method=method, step=1e-3, sample_interval=1e-3)
+    run = simulate(p, [0, 0, 13.8, -4, 0.5, 10], 4.0, method=method, timestep=1e-3, sample_interval=1e-3)
     assert not run.complete
     assert run.header.failure.startswith("interrupted at t = ")
     assert 0 < len(run.time) < 4001

@@ -100,7 +100,7 @@ def test_time_stepping_comes_to_the_orbit_of_theory() -> None:
     coarse, fine = (
         np.array([each.value for each in attractors.tops(run, 12.0, 16.0).values.values()])
         for run in (
-            analytic.simulate(HOPPING, orbit.loop.x, 16.0, method="time-stepping", step=step, sample_interval=1e-3)
+            analytic.simulate(HOPPING, orbit.loop.x, 16.0, method="time-stepping", timestep=step, sample_interval=1e-3)
             for step in (4e-6, 2e-6)
         )
     )

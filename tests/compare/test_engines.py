@@ -16,13 +16,13 @@ from compare.measure import settled
 from compare.measure.lab import Lab, Level
 from compare.measure.record import Records
 from compare.runs.campaign import Campaign
-from compare.runs.engines import ENGINES
-from compare.runs.tasks import Task, carry_out
+from compare.runs.engines import ENGINES, NEWCOMER
+from compare.runs.tasks import Task, carry_out, store
 from compare.scorecard import league, standings
 from compare.scorecard.contenders import Contestant
 from compare.scorecard.league import CASES, COST, Entry
 from compare.scorecard.trials import HITTING, LANDING, ROLLING, STATES
-from model import InputError, Parameters
+from model import InputError, Parameters, State
 from model.drag import LAWS
 from model.kinematics import Motion as World
 from model.kinematics import from_world, to_world
@@ -47,11 +47,25 @@ BEST = [name for name in ALL if ENGINES[name].as_it_comes != name]
 NEWCOMERS = [name for name in ALL if name not in BEST]
 
 
-def run(name, p, x0, t_end, step, interval=None):
+def task_of(name, p, x0, t_end, step, interval=None):
     settings = ENGINES[name].at(step, p)
-    task = Task(engine=name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval or step)
-    (trajectory,) = carry_out([task])
+    return Task(engine=name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval or step)
+
+
+def run(*given):
+    (trajectory,) = carry_out([task_of(*given)])
     return trajectory
+
+
+@pytest.mark.parametrize("name", [name for name, each in ENGINES.items() if "timestep" in each.options])
+def test_a_step_too_long_for_the_problem_is_refused_by_all(tmp_path, name):
+    """By the same rule, before anything is written, and whether or not the engine is installed."""
+    words = r"timestep = 0\.5 s is out of range: must be <= 0\.0357 s, half of sqrt\(R/g\), the shortest time of"
+    if name == NEWCOMER.name:
+        words = r"timestep = 0\.5 s is too large for the contact settings: .* allow at most 0\.009 s"
+    with pytest.raises(InputError, match=words):
+        store([task_of(name, REFERENCE, State(), 1.0, 0.5)], [tmp_path / "run.h5"])
+    assert not list(tmp_path.iterdir())
 
 
 @engines(*BEST)

@@ -28,7 +28,7 @@ def ends(seed):
     p, x0 = random_start(seed, on_wall=True)
     simulators = {
         "event": partial(analytic.simulate, settings=analytic.Settings()),
-        "time-stepping": partial(analytic.simulate, settings=analytic.Settings(method="time-stepping", step=STEP)),
+        "time-stepping": partial(analytic.simulate, settings=analytic.Settings(method="time-stepping", timestep=STEP)),
         "mujoco": partial(mjsim.simulate, settings=ContactSettings.for_problem(p, STEP)),
     }
     values, wrong = {}, []
