@@ -11,21 +11,27 @@ import h5py
 import numpy as np
 import pytest
 
+import analytic
 from compare.commands import cli
+from compare.engines import loop
+from compare.engines.adapter import Floats, Library, Touch
 from compare.measure import record
 from compare.measure.lab import Level
 from compare.measure.record import Measurement, Missing, Records
 from compare.report import results
 from compare.runs import collection
 from compare.runs.engines import ENGINES
-from model import InputError, Parameters, StorageError, storage
+from compare.view import inspection
+from model import Flow, InputError, Parameters, State, StorageError, Trajectory, storage
 from model.files import WholeFile
 
 ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.slow)])
 """Mutations of one file."""
 P = Parameters.named("reference")
-SIMULATORS = [name for name, engine in ENGINES.items() if not engine.needs]
-"""Engines that need no extra."""
+CHUNKS = "in chunks"
+"""A run file of many samples, which are kept in compressed chunks; those of few are not."""
+RUNS = [*ENGINES, CHUNKS]
+"""Run files."""
 
 
 def mutated(data: bytes, rng: np.random.Generator) -> bytes:
@@ -53,16 +59,45 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
     return bytes(content)
 
 
+class Resting:
+    """A ball that rests on the floor, in place of an engine that need not be installed."""
+
+    def __init__(self, library: Any, p: Parameters, settings: Any) -> None:
+        self.weight = p.m * p.g
+
+    def start(self, place: Floats, velocity: Floats) -> None:
+        self.now = place, velocity
+
+    def advance(self, force: Floats) -> tuple[Floats, Floats]:
+        return self.now
+
+    def touches(self) -> list[Touch]:
+        return [Touch(0, np.array([0.0, 0.0, self.weight]), -1e-6)]
+
+    def close(self) -> None:
+        pass
+
+
+def resting(name: str) -> Trajectory:
+    """A run with the header, settings and versions that the adapter of an engine writes."""
+    given = P, State(), 0.05, Flow.steady(P.omega_0), ENGINES[name].configure({}, P), None
+    return loop.simulate(name, Library(name, "math"), Resting, *given, lambda done: None)
+
+
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A file of every kind, by what it is."""
     made = tmp_path_factory.mktemp("whole")
-    kept = {name: made / "runs" / f"{name}.h5" for name in SIMULATORS} | {"collection": made / "all.h5"}
+    kept = {name: made / "runs" / f"{name}.h5" for name in RUNS} | {"collection": made / "all.h5"}
     kept |= {"measurements": made / "measurements" / "settled.h5"}
     (made / "runs").mkdir()
     (made / "measurements").mkdir()
-    for name in SIMULATORS:
-        assert cli.main(["simulate", "--engine", name, "--time", "0.05", "-o", str(kept[name]), "--json"]) == 0
+    for name, engine in ENGINES.items():
+        if engine.needs:
+            storage.save(resting(name), kept[name])
+        else:
+            assert cli.main(["simulate", "--engine", name, "--time", "0.05", "-o", str(kept[name]), "--json"]) == 0
+    storage.save(analytic.simulate(P, State(), 5.0, sample_interval=1e-3), kept[CHUNKS])
     collection.collect(made / "runs", kept["collection"])
     measured = [
         Measurement(
@@ -93,7 +128,7 @@ def parts(path: Path) -> list[dict[str, Any]]:
 
 
 READERS: list[tuple[str, Callable[[Path], Any]]] = [
-    *((name, read) for name in SIMULATORS for read in (whole, parts)),
+    *((name, read) for name in RUNS for read in (whole, parts)),
     ("collection", collection.is_collection),
     ("collection", collection.describe),
     ("measurements", record.load),
@@ -130,7 +165,7 @@ def results_of(measurements: Path) -> Path:
 @pytest.mark.parametrize(
     ("kind", "command"),
     [
-        *((name, "inspect FILE") for name in SIMULATORS),
+        *((name, "inspect FILE") for name in RUNS),
         ("event", "inspect FILE --plot DIRECTORY/plot.png"),
         ("event", "render FILE -o DIRECTORY/picture.png"),
         ("event", "collect RUNS -o DIRECTORY/all.h5"),
@@ -158,6 +193,26 @@ def test_every_command_names_the_damaged_file(
     assert out == ""
     reason = "it is damaged (its content does not match its checksum)"
     assert err == f"dualball: error: cannot read {path}: {reason}\n"
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_header_that_says_something_else(tmp_path: Path, files: dict[str, Path], engine: str, count: int) -> None:
+    """With a checksum that fits, so that what the header says is read: it is shown, or refused in one line."""
+    good, rng, path = files[engine].read_bytes(), np.random.default_rng(4), tmp_path / "run.h5"
+    refusals = []
+    for _ in range(count):
+        with WholeFile(path, good) as crafted:
+            name = str(rng.choice(["parameters", "flow", "settings", "versions"]))
+            text = mutated(crafted.file.attrs[name].encode(), rng).decode("utf-8", "replace")
+            crafted.file.attrs[name] = text.replace("\0", "?")
+            crafted.finish()
+        try:
+            inspection.table(inspection.describe(path))
+        except StorageError as error:
+            refusals.append(str(error))
+    assert len(refusals) > count / 4
+    assert all(str(path) in message and "\n" not in message for message in refusals)
 
 
 @pytest.mark.parametrize("count", [30, pytest.param(500, marks=pytest.mark.slow)])
