@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic import bifurcation, drag, slip_bounds, stationary
+from analytic import bifurcation, drag, slip_bounds
 from analytic.settings import Settings
 from analytic.simulation import simulate
 from analytic.two_point_rolling import MARGINS
-from model import Case, Flow, InputError, Parameters, SimulationError
+from model import Case, Flow, Parameters, SimulationError
 from model.arrays import Array
 from model.drag import STOKES
 
@@ -163,25 +163,3 @@ def mean_error(
         x = run.x[-1].copy()
         x[2:6] -= np.diff(ends, axis=0).T @ np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
     raise SimulationError(f"a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz doesn't become periodic", run)
-
-
-def slow_mean_error(p: Parameters, amplitude: float) -> float:
-    """The limit of `mean_error` for low frequencies: the mean of the characteristic curve, in RR and SS, over a period.
-
-    Raises `InputError` unless RR ends in SS and the flow stays between rest and the fold.
-    """
-    end = bifurcation.thresholds(p).omega_01
-    top = p.omega_0 + amplitude
-    if amplitude > p.omega_0 or p.omega_0 >= end:
-        raise InputError(
-            f"amplitude = {amplitude:g} rad s-1 about omega_0 = {p.omega_0:g} rad s-1 is out of range: "
-            f"the mean flow must be below omega_01 = {end:g} rad s-1, and the flow must not turn back"
-        )
-    if top <= end:
-        return 0.0
-    first = math.asin((end - p.omega_0) / amplitude)
-    nodes, weights = np.polynomial.legendre.leggauss(32)
-    half = math.pi / 2 - first  # the flow is above the end of RR for phases pi/2 ± half
-    flows = p.omega_0 + amplitude * np.cos(half * nodes)
-    lags = [stationary.solution(p.replace(omega_0=w), Case.SS).state.omega_c - w for w in flows.tolist()]
-    return float(half * (weights @ lags) / (2 * math.pi))

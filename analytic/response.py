@@ -15,13 +15,10 @@ from model import Case, InputError, Parameters, State
 from model.arrays import Array
 from model.cases import TRAITS
 from model.drag import STOKES
-from model.kinematics import VARIABLES
 
 AIRY_ZERO = 2.338107410459767
 """-z at the first zero of Airy's function Ai(z)."""
 _GRID = 20_000
-_SMALL = 1e-4
-"""Size of a difference of Jacobians, over the smallest variable."""
 _STEP = 1e-3
 """Step of differences along the branch at the fold: their errors are its square."""
 
@@ -62,25 +59,6 @@ def peak(p: Parameters, case: Case) -> tuple[float, float]:
     y = step_response(p, case, t) / np.real(transfer(p, case, 0.0))
     k = int(y.argmax())
     return (float(t[k]), float(y[k])) if y[k] > 1 else (np.inf, 1.0)
-
-
-def mean_shift(p: Parameters, case: Case, frequency: float) -> float:
-    """Mean change of omega_c over the square of the amplitude of a small pulsation, rad-1 s, frequency in Hz.
-
-    Of second order: with x = x_0 + a Im(v exp(i omega t)) + a^2 x_2, the mean of x_2 balances the curvature of the
-    vector field along v, J x_2 + (f''(v_r, v_r) + f''(v_i, v_i))/4 = 0. For slow pulsations it is a quarter of the
-    curvature of the characteristic; 0 in RR, where nothing is curved.
-    """
-    x, active = stationary.solution(p, case).x, [VARIABLES.index(name) for name in TRAITS[case].active]
-    J, b, own = _linear(p, case)
-    v = np.linalg.solve(2j * np.pi * frequency * np.eye(len(b)) - J, b)
-    size = _SMALL * np.abs(x[x != 0]).min() / np.abs(v).max()
-    curvature = np.zeros(len(b))
-    for part in (v.real, v.imag):
-        shift = np.zeros(len(x))
-        shift[active] = size * part
-        curvature += (jacobian.jacobian(case, x + shift, p) - jacobian.jacobian(case, x - shift, p)) @ part / (2 * size)
-    return float(np.linalg.solve(J, -curvature / 4)[own])
 
 
 def ramp_coefficient(p: Parameters) -> float:

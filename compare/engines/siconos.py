@@ -69,7 +69,7 @@ class _Installation(Library):
     def missing(self) -> str:
         """As in `Library`."""
         named = os.environ.get(_NAMED)
-        if _look(named)[0]:
+        if locate(named)[0]:
             return ""
         if named:
             return f"siconos is not installed for {named}, which {_NAMED} names"
@@ -78,13 +78,13 @@ class _Installation(Library):
     @property
     def version(self) -> str:
         """As in `Library`."""
-        return _look(os.environ.get(_NAMED))[1]
+        return locate(os.environ.get(_NAMED))[1]
 
     def load(self) -> str:
         """The Python that has it; `InputError` if there is none."""
         if self.missing:
             raise InputError(self.missing)
-        return _look(os.environ.get(_NAMED))[0]
+        return locate(os.environ.get(_NAMED))[0]
 
 
 LIBRARY = _Installation("siconos")
@@ -92,7 +92,7 @@ _NAMED = "DUALBALL_SICONOS_PYTHON"
 
 
 @functools.cache
-def _look(named: str | None) -> tuple[str, str]:
+def locate(named: str | None) -> tuple[str, str]:
     """The first Python that has Siconos and the version; an empty name if none does."""
     for python in [named] if named else [sys.executable, shutil.which("python3", path=os.defpath)]:
         command = [python or "", "-I", "-c", "import siconos; print(siconos.version)"]

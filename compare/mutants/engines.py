@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Any
 from unittest import mock
 
-import numpy as np
-
 import mjsim
 from compare.runs.engines import ENGINES, MUJOCO, Engine
-from mjsim import ContactSettings, contact_settings, scene
+from mjsim import ContactSettings, scene
 from model import Parameters
 
 LEAST = 1e-5
@@ -51,7 +50,7 @@ def _wrong(
 
 def _no_impacts() -> AbstractContextManager[Any]:
     """Landings are left to the engine's own contacts."""
-    return mock.patch.object(contact_settings, "_FALL", np.inf)
+    return mock.patch.object(ContactSettings, "slowest_fall", return_value=math.inf)
 
 
 def _smooth_floor() -> AbstractContextManager[Any]:

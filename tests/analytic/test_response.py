@@ -37,16 +37,12 @@ def test_rolling_is_a_first_order_lag_at_any_amplitude(frequency: float) -> None
 
 
 @pytest.mark.parametrize("frequency", [0.3, 1.1, 3.0])
-def test_slipping_follows_by_its_jacobian_and_shifts_by_its_curvature(frequency: float) -> None:
-    """What the linear theory leaves out goes with the square of the amplitude, in the ratio and in the shift."""
-    errors, shifts = [], []
-    for amplitude in (0.5, 0.25):
-        shift, ratio = pulsating(SLIPPING, Case.SS, amplitude, frequency)
-        errors.append(abs(ratio / response.transfer(SLIPPING, Case.SS, frequency) - 1))
-        shifts.append(shift / amplitude**2 / response.mean_shift(SLIPPING, Case.SS, frequency) - 1)
-    assert errors[1] < max(0.4 * errors[0], 1e-6)
-    assert abs(shifts[1]) < max(0.4 * abs(shifts[0]), 1e-5)
-    assert abs(shifts[1]) < 1e-3
+def test_slipping_follows_by_its_jacobian(frequency: float) -> None:
+    """What the linear theory leaves out goes with the square of the amplitude, and so does the shift of the mean."""
+    transfer = response.transfer(SLIPPING, Case.SS, frequency)
+    (much, high), (little, low) = (pulsating(SLIPPING, Case.SS, amplitude, frequency) for amplitude in (0.5, 0.25))
+    assert abs(low / transfer - 1) < max(0.4 * abs(high / transfer - 1), 1e-6)
+    assert little / much == pytest.approx(0.25, rel=1e-2)
 
 
 def test_slow_pulsations_follow_the_characteristic() -> None:
@@ -54,8 +50,6 @@ def test_slow_pulsations_follow_the_characteristic() -> None:
         return analytic.characteristic_slope(P.replace(omega_0=omega_0), Case.SS)
 
     assert response.transfer(SLIPPING, Case.SS, 0.0) == pytest.approx(slope(25.0), rel=1e-7)
-    assert response.mean_shift(SLIPPING, Case.SS, 0.0) == pytest.approx((slope(25.05) - slope(24.95)) / 0.4, rel=1e-4)
-    assert response.mean_shift(P, Case.RR, 0.3) == 0.0
 
 
 @pytest.mark.parametrize("omega_0", [18.0, 25.0, 35.0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -122,9 +123,8 @@ def test_a_killed_worker_costs_its_runs_in_flight_only(tmp_path: Path, undisturb
 
     def kill_one(doing: str, done: int, total: int, failed: int) -> None:
         if not killed and done:
-            processes = list(campaign._executor._processes)
-            killed.append(processes[0])
-            os.kill(processes[0], signal.SIGKILL)
+            killed.append(multiprocessing.active_children()[0])
+            killed[0].kill()
 
     with Campaign(tmp_path, workers=2, batch=1, report=kill_one) as campaign:
         assert campaign.complete(tasks()) == []

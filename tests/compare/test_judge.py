@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import pytest
 
-import compare.claims.judge
 from compare.claims.claim import Bearing, Claim, Outcome, Text
 from compare.claims.judge import judge, remembered, select
 from compare.measure.check import Relation
@@ -117,8 +116,7 @@ def test_resolving_power_is_the_error_of_theory_that_would_be_noticed() -> None:
         assert outcome(claim(wrong), records) is noticed
 
 
-def test_predictions_are_forgotten_between_judgements(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compare.claims.judge, "_remembered", [])
+def test_predictions_are_forgotten_between_judgements() -> None:
     theory = {"omega_c": P.omega_0}
     predict = remembered(lambda m: theory["omega_c"])
     of = claim(Bearing(protocol="settled", quantity="omega_c", predict=lambda m: predict(m.parameters)))

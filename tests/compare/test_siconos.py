@@ -20,11 +20,11 @@ ENGINE = ENGINES["siconos"]
 @pytest.fixture
 def elsewhere(monkeypatch):
     """No Siconos wherever this machine may have one."""
-    siconos._look.cache_clear()
+    siconos.locate.cache_clear()
     monkeypatch.delenv("DUALBALL_SICONOS_PYTHON", raising=False)
     monkeypatch.setattr(siconos.shutil, "which", lambda *_, **__: None)
     yield monkeypatch
-    siconos._look.cache_clear()
+    siconos.locate.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_a_process_that_fails_is_the_run_s_failure(program, says, tmp_path, monk
     popen = siconos.subprocess.Popen
     monkeypatch.setattr(siconos, "PROGRAM", script)
     monkeypatch.setattr(siconos, "PATIENCE", 0.5)
-    monkeypatch.setattr(siconos, "_look", lambda named: (sys.executable, "4.4.0"))
+    monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
     monkeypatch.setattr(siconos.subprocess, "Popen", start)
     task = Task(engine="siconos", parameters=REFERENCE, x0=(0.0,) * 6, t_end=0.01, settings=Settings())
     (run,) = carry_out([task])
