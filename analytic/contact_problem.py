@@ -41,6 +41,12 @@ WARY, BOLD = 1.0, 1.3
 """How far the change may rise from one sweep to the next before it counts as a setback, the two in turns from attempt
 to attempt. Wary where the sweeps swing; bold where impulses that hardly move the ball have to pile up in the corner
 until one of them finds the limit of friction."""
+SPAN, GROWTH, LONGEST = 1.0, 8.0, 1e10
+"""Length of the first step of the continuation, in sweeps; by which factor steps grow; and the longest, by when a step
+is one of Newton's."""
+SHORTER, CALMER, LEAST_GROWTH = 20.0, 0.7, 1.1
+"""A setback divides the length by the first; the growth is raised to the power of the second, and stays above the
+third."""
 MAX_SWEEPS = 2000
 
 
@@ -98,7 +104,7 @@ def solve(
     scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
     *_, n, s, t = start
     at_B = n / p.m, s / p.m, t / p.m
-    last, span, growth = math.inf, 1.0, 8.0
+    last, span, growth = math.inf, SPAN, GROWTH
     for count in range(1, max_sweeps + 1):
         at_A = _project(_left(a, at_B, k), p.mu, A.slip)
         need_B = _left(b, at_A, k)
@@ -112,11 +118,11 @@ def solve(
             at_B = swept
             continue
         if sweeps == 0:
-            span, growth = 1.0, 8.0
+            span, growth = SPAN, GROWTH
         if change <= last * (BOLD if attempt % 2 else WARY):
-            span = min(span * growth, 1e10)
+            span = min(span * growth, LONGEST)
         else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
-            span, growth = max(span / 20, 1 / (10 + p.mu * p.eta)), max(growth**0.7, 1.1)
+            span, growth = max(span / SHORTER, 1 / (10 + p.mu * p.eta)), max(growth**CALMER, LEAST_GROWTH)
         last = change
         rate_A = _projection_rate(_left(a, swept, k), p.mu, A.slip)
         rate = _projection_rate(need_B, p.eta, B.slip) @ coupling @ rate_A @ coupling

@@ -32,6 +32,12 @@ PLAIN_SWEEPS = 6
 """Sweeps before the continuation takes over."""
 ATTEMPT = 100
 """Sweeps after which the continuation starts again, from elsewhere."""
+DAMPED = 0.5
+"""Share of a sweep that is taken in all attempts but the first, before the continuation."""
+WARY, BOLD = 1.0, 1.3
+"""As in `contact_problem`, and so are the next."""
+SPAN, GROWTH, LONGEST = 1.0, 8.0, 1e8
+SHORTER, CALMER, LEAST_GROWTH = 20.0, 0.7, 1.1
 MAX_SWEEPS = 1000
 
 
@@ -158,11 +164,11 @@ def both(
         if change <= enough:
             return A, B, change
     A, B = start, start
-    change, last, span, growth = math.inf, math.inf, 1.0, 8.0
+    change, last, span, growth = math.inf, math.inf, SPAN, GROWTH
     for count in range(MAX_SWEEPS):
         attempt, sweeps = count // ATTEMPT, count % ATTEMPT
         if sweeps == 0:
-            last, span, growth = math.inf, 1.0, 8.0
+            last, span, growth = math.inf, SPAN, GROWTH
             B = Impulse(0.0, 0.0, 0.0) if attempt == 1 else B
         need_A = _less(a, B, k)
         A = project(need_A.n, need_A.s, need_A.t, mu)
@@ -172,14 +178,12 @@ def both(
         change = abs(step.n) + abs(step.s) + abs(step.t)
         if change <= enough:
             return A, after, change
-        pace = 0.5 if attempt else 1.0
+        pace = DAMPED if attempt else 1.0
         if sweeps >= PLAIN_SWEEPS * (1 + attempt):
-            # A change that rises is a setback where sweeps swing, but none where impulses have to pile up in the
-            # corner until one of them reaches its limit: attempts that take it for one take turns with others.
-            if change <= last * (1.3 if attempt % 2 else 1.0):
-                span = min(span * growth, 1e8)
+            if change <= last * (BOLD if attempt % 2 else WARY):
+                span = min(span * growth, LONGEST)
             else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
-                span, growth = max(span / 20, 1 / (10 + mu * eta)), max(growth**0.7, 1.1)
+                span, growth = max(span / SHORTER, 1 / (10 + mu * eta)), max(growth**CALMER, LEAST_GROWTH)
             step, pace = _continued(need_A, need_B, step, span, mu, eta, k), 1.0
         last = change
         B = Impulse(B.n + pace * step.n, B.s + pace * step.s, B.t + pace * step.t)

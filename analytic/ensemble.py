@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from analytic.settings import Settings
 from analytic.simulation import sample_times, start_state
-from model import Flow, InputError, Parameters
+from model import Flow, InputError, Parameters, State
 from model.arrays import Array
-from model.kinematics import VARIABLES
+from model.kinematics import TURNING, VARIABLES
 from model.parameters import POSITIVE, Range, check_number
 
 
@@ -113,11 +113,11 @@ def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
     rng = np.random.default_rng(seed)
     size = 2 * abs(p.omega_0) * np.array([1.0, *[p.R / p.r] * 3])
     x = np.zeros((count, len(VARIABLES)))
-    x[:, 2:6] = rng.uniform(-size, size, (count, 4))
+    x[:, TURNING] = rng.uniform(-size, size, (count, 4))
     flying = rng.random(count) < 0.5
-    x[:, 0] = np.where(flying, rng.uniform(0, p.R, count), 0.0)
-    x[:, 1] = np.where(flying, rng.uniform(-1, 1, count) * math.sqrt(p.g * p.R), 0.0)
-    return x
+    y = np.where(flying, rng.uniform(0, p.R, count), 0.0)
+    v_y = np.where(flying, rng.uniform(-1, 1, count) * math.sqrt(p.g * p.R), 0.0)
+    return State.of(x)._replace(y=y, v_y=v_y).stacked()
 
 
 def interval(hits: int, of: int) -> tuple[float, float]:

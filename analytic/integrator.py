@@ -68,8 +68,8 @@ class Stretch:
     def steps(self, first_step: float | None) -> Iterator[Step]:
         """Steps with the samples in them, the last of them ending at a guard or at `until`.
 
-        BDF while the slip is small, LSODA while it isn't. `first_step` in s for a motion that may soon end. A solver
-        whose steps become shorter than its time can resolve gives way to the other one, whose time starts from zero
+        BDF while the slip is small, LSODA while it isn't. `first_step` in s for a motion that may soon end. Where a
+        solver's steps become shorter than its time can resolve, the other one goes on with a time that starts from zero
         again. Raises `StalledError` after `MAX_RESTARTS`.
         """
         t, z, small = self.start, self.motion.start, self.motion.least_slip(self.motion.start) < ONSET_SLIP

@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 from analytic import dynamics
 from analytic.motion import natural_units
 from analytic.simulation import simulate
-from model import Case, InputError, Parameters, SimulationError, Trajectory
+from model import Case, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -78,9 +78,8 @@ class Loop:
         tops = 1 + np.flatnonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:]))
         if len(tops):
             top = int(tops[np.argmax(y[tops])])
-            state = run.x[top]
-            state[1] = 0.0
-            return cls(p, run.cases[top], state, period, VARIABLES.index("v_y"), size)
+            state = State.of(run.x[top])._replace(v_y=0.0)
+            return cls(p, run.cases[top], state.stacked(), period, VARIABLES.index("v_y"), size)
         stretches = [each for each in run.phases() if each[0] is not Case.RR]
         if not stretches:
             raise NoOrbitError(f"the ball rolls at both points all the time (period {period:g} s)")
@@ -108,7 +107,7 @@ class Loop:
         p, x = self.p, self.x.copy()
         x[self.free] += by[: len(self.free)] * scale(p)[self.free]
         if self.case is Case.RN:
-            x[5] = -x[7] / p.r
+            x = State.of(x)._replace(slip_z=-State.of(x).v_h / p.r).stacked()
         if varied:
             try:
                 p = p.replace(**{varied: getattr(p, varied) * math.exp(by[-1])})
@@ -135,7 +134,7 @@ class Loop:
                 raise NoOrbitError(f"after {self.period:g} s the ball is far from where it was")
             x = self._followed(x, short)
         changes = tuple((Case(a), Case(b)) for a, b in zip(run.events.from_case, run.events.to_case, strict=True))
-        turn = run.theta[-1] - run.theta[0] + late * (x[2] + run.x[-1][2]) / 2
+        turn = run.theta[-1] - run.theta[0] + late * (State.of(x).omega_c + run.omega_c[-1]) / 2
         return Return(x, float(self.period + late), changes, float(turn))
 
     def _followed(self, x: Array, duration: float) -> Array:

@@ -18,9 +18,10 @@ from analytic import bifurcation, drag, slip_bounds
 from analytic.settings import Settings
 from analytic.simulation import simulate
 from analytic.two_point_rolling import MARGINS
-from model import Case, Flow, Parameters, SimulationError
+from model import Case, Flow, Parameters, SimulationError, State
 from model.arrays import Array
 from model.drag import STOKES
+from model.kinematics import TURNING
 
 PHASES, CLOSER = 360, 32
 """Phases of a period at which slip is looked for, and twice more in the two cells around the least margin."""
@@ -149,17 +150,17 @@ def mean_error(
     times the flow. `rtol` and `leave_rolling` as in `Settings`. Raises `SimulationError` if it never does.
     """
     settings = Settings(rtol=rtol, leave_rolling=leave_rolling)
-    x, flow = np.zeros(8), Flow.sine(p.omega_0, amplitude, frequency)
-    x[2] = swing(p, amplitude, frequency, 0.0)[0]
+    flow = Flow.sine(p.omega_0, amplitude, frequency)
+    x = State(omega_c=swing(p, amplitude, frequency, 0.0)[0]).stacked()
     starts, ends = np.empty((0, 4)), np.empty((0, 4))
     for _ in range(ROUNDS):
         run = simulate(p, x, 1 / frequency, flow, settings, sample_interval=1 / frequency)
         if not len(starts) and not len(run.events.time) and run.case[0] == Case.RR:
             return 0.0
-        starts, ends = np.vstack([starts[-DEPTH:], x[2:6]]), np.vstack([ends[-DEPTH:], run.x[-1, 2:6]])
+        starts, ends = np.vstack([starts[-DEPTH:], x[TURNING]]), np.vstack([ends[-DEPTH:], run.x[-1, TURNING]])
         change = ends - starts
         if np.abs(change[-1]).max() <= settled * abs(p.omega_0):
             return float(run.theta[-1]) * frequency - p.omega_0
         x = run.x[-1].copy()
-        x[2:6] -= np.diff(ends, axis=0).T @ np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
+        x[TURNING] -= np.diff(ends, axis=0).T @ np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
     raise SimulationError(f"a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz doesn't become periodic", run)

@@ -73,12 +73,12 @@ def page(package: ModuleType) -> None:
     for each in (getattr(package, name) for name in getattr(package, "__all__", ())):
         summary = literal_bars(inspect.getdoc(each).split("\n")[0])
         lines += ["", f"* :py:obj:`~{each.__module__}.{each.__qualname__}`: {summary}"]
-    modules = [found for found in pkgutil.iter_modules(package.__path__) if not found.name.startswith("_")]
-    for found in modules:
-        if not found.ispkg:
-            name = f"{package.__name__}.{found.name}"
+    modules = [each for each in pkgutil.iter_modules(package.__path__) if not each.name.startswith("_")]
+    for module in modules:
+        if not module.ispkg:
+            name = f"{package.__name__}.{module.name}"
             lines += ["", name, "-" * len(name), "", f".. automodule:: {name}"]
-    rooms = [importlib.import_module(f"{package.__name__}.{found.name}") for found in modules if found.ispkg]
+    rooms = [importlib.import_module(f"{package.__name__}.{each.name}") for each in modules if each.ispkg]
     rooms = [room for room in rooms if any(pkgutil.iter_modules(room.__path__))]
     if rooms:
         lines += ["", ".. toctree::", "   :hidden:", "", *(f"   {room.__name__}" for room in rooms)]

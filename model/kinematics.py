@@ -66,6 +66,10 @@ class State(NamedTuple):
 
 
 VARIABLES = State._fields
+SLIP_XYZ = slice(VARIABLES.index("slip_x"), VARIABLES.index("slip_z") + 1)
+"""The slips among the columns of states."""
+TURNING = slice(VARIABLES.index("omega_c"), VARIABLES.index("slip_z") + 1)
+"""omega_c and the slips: all that moves in SS, where both contacts last."""
 UNITS = ("m", "m s-1", "rad s-1", "rad s-1", "rad s-1", "rad s-1", "m", "m s-1")
 
 

@@ -16,6 +16,7 @@ from compare.measure.record import Measurement
 from compare.statistics import COVERAGE
 from model import Case, Parameters, State
 from model.arrays import Array
+from model.kinematics import TURNING
 
 FORMAL = Parameters.named("reference").replace(eta=0.43)
 """eta so little above j that the branch of SS is whole once (12) is released."""
@@ -33,7 +34,7 @@ def _figure_12() -> Iterator[Check]:
     released = {name: float(value) * unit for name, value in curves.items()}
     s = np.linspace(-8.0, 8.0, 65)
     states, fluid = branch_stability.states(s, p)
-    ends, _ = branch_stability.states(np.array([-40.0, 40.0]), p)
+    ends = State.of(branch_stability.states(np.array([-40.0, 40.0]), p)[0])
     rates = max(_residual(x, p.replace(omega_0=float(w))) for x, w in zip(states, fluid, strict=True))
     pushed = slipping_branch.branch(s, p).A_y
     exchange = brentq(lambda w: _second_rate(p.replace(omega_0=w)), 0.8 * t.omega_03, 1.2 * t.omega_03, rtol=1e-14)
@@ -41,8 +42,8 @@ def _figure_12() -> Iterator[Check]:
     k = int(np.argmax(along))
     # The maximum lies between the neighbours of the largest value, which is lower by no more than they are.
     spacing = float(along[k] - min(along[k - 1], along[k + 1]))
-    yield _check("omega_01", "P3: ω_c where slip vanishes", float(ends[0, 2]), released["omega_01"])
-    yield _check("omega_02", "NF2: ω_c where w̃_z vanishes", float(ends[1, 2]), t.omega_02)
+    yield _check("omega_01", "P3: ω_c where slip vanishes", float(ends.omega_c[0]), released["omega_01"])
+    yield _check("omega_02", "NF2: ω_c where w̃_z vanishes", float(ends.omega_c[1]), t.omega_02)
     yield _check("omega_03", "NT1: ω₀ where SR turns stable", float(exchange), t.omega_03)
     yield _check("omega_04", "F: ω₀ where the branch turns", float(along[k]), released["omega_04"], spacing)
     yield _check("law", "greatest rate on the branch over g/r", rates, 0.0)
@@ -87,7 +88,7 @@ def _check(quantity: str, what: str, value: float, predicted: float, uncertainty
 
 def _residual(x: Array, p: Parameters) -> float:
     """Largest rate of slip in SS, in units of g/r, with (12) released."""
-    return float(np.abs(dynamics.rates(Case.SS, x.tolist(), p, p.omega_0)[2:6]).max() * p.r / p.g)
+    return float(np.abs(dynamics.rates(Case.SS, x.tolist(), p, p.omega_0)[TURNING]).max() * p.r / p.g)
 
 
 def _second_rate(p: Parameters) -> float:

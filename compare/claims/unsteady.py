@@ -10,11 +10,10 @@ from analytic import pulsation, response
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered, simulated
 from compare.measure.check import Relation
-from compare.measure.record import Measurement
+from compare.measure.record import Measurement, state
 from compare.measure.unsteady import caught_up
 from model import Case, Flow, Parameters
 from model.drag import STOKES
-from model.kinematics import VARIABLES
 
 PULSATION, UNSTEADY = "pulsation", "unsteady"
 FAR, SAMPLES = 3.0, 5_000
@@ -61,9 +60,7 @@ def ramp_end(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
 
 
 def _left(m: Measurement) -> float:
-    return ramp_end(
-        m.parameters, float(m.conditions["rate"]), tuple(float(m.conditions[name]) for name in VARIABLES[:6])
-    )
+    return ramp_end(m.parameters, float(m.conditions["rate"]), state(m))
 
 
 def _at_frequency(quantity: str, predict: Callable[[Measurement], float], by: str) -> Bearing:

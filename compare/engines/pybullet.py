@@ -1,8 +1,8 @@
 """PyBullet: projected Gauss-Seidel on the velocities of a multibody (Featherstone), contacts rigid within tolerances.
 
 Traps: its margins are absolute lengths and its solver stops at an absolute residual, both made for things the size of
-a man; joints have damping, motors and a velocity limit unless told otherwise; friction and inertia given in one call of
-`changeDynamics` leave friction at 0.5; friction is the product of both bodies' coefficients.
+a man; joints have damping, motors and a velocity limit unless they are switched off; friction and inertia given in one
+call of `changeDynamics` leave friction at 0.5; friction is the product of both bodies' coefficients.
 """
 
 from __future__ import annotations

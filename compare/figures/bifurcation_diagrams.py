@@ -91,7 +91,7 @@ def _figure_10(axes: Axes, p: Parameters) -> dict[str, float]:
     _lifting(axes, p, t.omega_02, top, "SR", (0.85, (-5, -5)))
     style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (-6, 4))
     style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-4, -6))
-    style.mark(axes, t.omega_04, _spin_of(fold_state(p), p), "F", (4, -6))
+    style.mark(axes, t.omega_04, float(bifurcation.wall_spin(fold_state(p), p)), "F", (4, -6))
     _frame(axes, 0.0, top)
     return {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_04")}
 
@@ -121,10 +121,10 @@ def _figure_12(axes: Axes, p: Parameters) -> dict[str, float]:
     style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
     style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (0, -8))
     style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-6, 4))
-    style.mark(axes, omega_04, _spin_of(fold_state(p, released=True), p), "F", (7, 0))
+    style.mark(axes, omega_04, float(bifurcation.wall_spin(fold_state(p, released=True), p)), "F", (7, 0))
     for s in branch_stability.hopf_places(p):
         x, omega_0 = branch_stability.states(s, p)
-        style.mark(axes, float(omega_0), _spin_of(x, p), "H", (5, -6))
+        style.mark(axes, float(omega_0), float(bifurcation.wall_spin(State.of(x), p)), "H", (5, -6))
     _frame(axes, bottom, top)
     axes.set_ylim(0.75 * t.omega_03 * p.R / p.r, 1.15 * omega_01 * p.R / p.r)
     return {"omega_01": omega_01, "omega_02": t.omega_02, "omega_03": t.omega_03, "omega_04": omega_04}
@@ -133,10 +133,6 @@ def _figure_12(axes: Axes, p: Parameters) -> dict[str, float]:
 def spin(p: Parameters, slip_x: Array, omega_c: Array) -> Array:
     """The spin on the wall (91), rad s-1."""
     return np.asarray(bifurcation.wall_spin(State(omega_c=omega_c, slip_x=slip_x), p))
-
-
-def _spin_of(x: Array, p: Parameters) -> float:
-    return float(bifurcation.wall_spin(State.of(x), p))
 
 
 def _frame(axes: Axes, bottom: float, top: float) -> None:
@@ -186,14 +182,14 @@ def slipping(
 ) -> None:
     """The branch of SS, its line by its eigenvalues; a name at each part that has a place for it."""
     s = np.linspace(-16.0, 16.0, 1601)
-    states, omega_0 = branch_stability.states(s, p)
+    x, omega_0 = branch_stability.states(s, p)
     grows = branch_stability.eigenvalues_at(s, p).real.max(axis=-1) > 0
-    values = quantity(states[:, 3], states[:, 2])
+    values = quantity(State.of(x).slip_x, State.of(x).omega_c)
     for part, line, text, place in ((~grows, "-", "SS", stable), (grows, UNSTABLE, "SS, unstable", unstable)):
         if part.any():
             style.curve(axes, Case.SS, omega_0, np.where(part, values, np.nan), text, place, line)
 
 
-def fold_state(p: Parameters, released: bool = False) -> Array:
-    """The state of SS at the fold, shape (8,)."""
-    return branch_stability.states(slipping_branch.fold(p, released=released), p)[0]
+def fold_state(p: Parameters, released: bool = False) -> State:
+    """The state of SS at the fold."""
+    return State.of(branch_stability.states(slipping_branch.fold(p, released=released), p)[0])

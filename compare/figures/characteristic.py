@@ -153,7 +153,8 @@ def _jumps(axes: Axes, p: Parameters) -> None:
     t = bifurcation.thresholds(p)
     slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
     look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
-    for x, begin, end in ((t.omega_04, fold_state(p)[2], t.omega_04), (t.omega_02, t.omega_02, slow.state.omega_c)):
+    jumps = (t.omega_04, fold_state(p).omega_c, t.omega_04), (t.omega_02, t.omega_02, slow.state.omega_c)
+    for x, begin, end in jumps:
         axes.annotate("", (x, float(end)), (x, float(begin)), arrowprops=look)
 
 

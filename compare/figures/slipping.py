@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from analytic import bifurcation, scenarios
 from compare.figures import style
 from compare.figures.drawing import Material, Motion
+from compare.runs.engines import EVENT
 from model import Case, Parameters
 
 BETA = 0.9
@@ -26,7 +27,7 @@ _LASTS = 0.012
 def select(_: Material, figure: str) -> Motion:
     """The motion of the event-driven simulation, which starts in the formal stationary state of NR."""
     p = FLOWS[figure]
-    return Motion(f"{SLIP}, {BETA}", "event", p, partial(scenarios.slip_perturbation, p, SLIP, BETA, t_end=_LASTS))
+    return Motion(f"{SLIP}, {BETA}", EVENT.name, p, partial(scenarios.slip_perturbation, p, SLIP, BETA, t_end=_LASTS))
 
 
 def caption(push: Motion) -> str:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from analytic import scenarios
 from compare.figures import style
 from compare.figures.drawing import GapError, Material, Motion
+from compare.runs.engines import EVENT
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 
@@ -35,7 +36,7 @@ def select(material: Material) -> Motion:
     for m in material.records.select("unloading", where=lambda m: m.set == SET):
         if m.conditions["start"] == "unloading" and (motions := material.motions(m)):
             return motions[-1]  # with the finest step
-    return Motion("held", "event", _P, partial(scenarios.unloading, _P, _HOLD))
+    return Motion("held", EVENT.name, _P, partial(scenarios.unloading, _P, _HOLD))
 
 
 def caption(fall: Motion) -> str:

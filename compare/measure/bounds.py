@@ -28,6 +28,7 @@ from compare.statistics import COVERAGE, Measured, settled_case, straight_line
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
+from model.kinematics import SLIP_XYZ
 
 AROUND = (0.7, 1.3)
 """Where the second two flows are, over the zero that the first two show."""
@@ -258,7 +259,7 @@ def watched(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 def _slight(lab: Lab, p: Parameters, case: Case, x: Array, n: Array) -> Task:
     """The run that shows what becomes of a slight slip."""
     x = x.copy()
-    x[3:6] += SLIGHT * math.sqrt(p.g * p.R) / p.r * n
+    x[SLIP_XYZ] += SLIGHT * math.sqrt(p.g * p.R) / p.r * n
     step = coarse_step(p) / 2
     lasts = LASTS_NR * time_unit(p) if case is Case.NR else LASTS_RR / p.c
     return lab.task(p, x, 64 * step * math.ceil(lasts / step / 64), step, samples=64)

@@ -25,6 +25,7 @@ from compare.statistics import Measured, tail
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import QUADRATIC
+from model.kinematics import SLIP_XYZ
 
 PROTOCOL = "edge"
 CLOSING = (0.1, 0.17, 0.26, 0.38)
@@ -124,7 +125,7 @@ def _lines(lab: Lab, flows: Sequence[tuple[str, Parameters]]) -> Iterator[Edge |
 
 def _grounded(x: Array) -> Array:
     """The state on the floor: a lifted ball knows nothing of its height."""
-    return np.asarray([0.0, 0.0, *x[2:6], 0.0, 0.0])
+    return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
 
 
 def _followed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
@@ -207,7 +208,8 @@ def _sure(edge: Edge) -> Array:
     """
     assert edge.bracket is not None
     assert edge.moved is not None
-    last, before = (0.0 if moved is None else float(np.linalg.norm(moved[3:6])) for moved in (edge.moved, edge.before))
+    sizes = (0.0 if moved is None else float(np.linalg.norm(moved[SLIP_XYZ])) for moved in (edge.moved, edge.before))
+    last, before = sizes
     ratio = min(last / before, 0.9) if before else 0.0
     onward, roll = _onward(edge), edge.p.R / edge.p.r
     alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])

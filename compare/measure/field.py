@@ -91,9 +91,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     kept = Counter[tuple[str, Case]]()
     for centre in CENTRES:
         for (name, p, _), pair, (coarse, fine) in zip(starts, tasks, runs, strict=True):
-            if not (found := _seen(coarse, fine, centre)) or kept[name, found[0]] == KEPT[lab.level]:
+            if not (sample := _seen(coarse, fine, centre)) or kept[name, sample[0]] == KEPT[lab.level]:
                 continue
-            case, seen = found
+            case, seen = sample
             values = dict(_values(case, seen, p))
             kept[name, case] += bool(values)
             for what, value in values.items():

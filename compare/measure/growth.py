@@ -27,6 +27,7 @@ from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
+from model.kinematics import SLIP_XYZ
 
 SEED, FAN_SEED = 61, 58
 PUSHES = {
@@ -102,7 +103,7 @@ class Push:
         """The run with one size of slip, in units of `start_unit`, and `times` as many steps."""
         p, step = self.p, coarse_step(self.p) / REFINED
         x = self.x.copy()
-        x[3:6] += size * start_unit(p, x) * self.n
+        x[SLIP_XYZ] += size * start_unit(p, x) * self.n
         return lab.task(p, x, STEPS * step, step / times, samples=STEPS * times)
 
     def tasks(self, lab: Lab) -> list[Task]:
@@ -115,7 +116,7 @@ class Push:
         alike = {self.outer, Case.RN} if self.by == "rest" else {self.outer}
         if not np.isin(run.case[SKIPPED * times :], list(alike)).all():
             return np.full(2, np.nan)
-        time, slip = run.time[SKIPPED * times :], run.x[SKIPPED * times :, 3:6] @ self.n
+        time, slip = run.time[SKIPPED * times :], run.x[SKIPPED * times :, SLIP_XYZ] @ self.n
         return np.array([polynomial(time, slip[:, None], degree, 0.0)[1][0] for degree in DEGREES])
 
     @property

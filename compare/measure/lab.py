@@ -28,7 +28,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class Lab:
-    """Where protocols run what they need: every run is carried out once and found again afterwards."""
+    """Where protocols run what they need: every run is carried out once and read from its file afterwards."""
 
     campaign: Campaign
     engine: Engine

@@ -245,9 +245,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator[
             period = (len(run.time) - 1) // PERIODS
             turns = np.diff(run.theta[::period]) * slipping[k][0].frequency
             means[k] += [float(turns[-2]), float(turns[-1])]
-            x = run.x[-1].copy()
-            x[2] = limit(run.omega_c[period::period])
-            states[k] = x
+            states[k] = State.of(run.x[-1])._replace(omega_c=limit(run.omega_c[period::period])).stacked()
             if n == ROUNDS - 2:
                 last[k] = run.x[-1 - period : -1 : period // ANEW]
     anew = [

@@ -22,6 +22,7 @@ from compare.statistics import Measured, peaks, top
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
+from model.kinematics import SLIP_XYZ
 
 PROTOCOL = "unsteady"
 ROLLS = 0.85
@@ -112,7 +113,7 @@ def _jumped(lab: Lab, trial: Trial) -> Iterator[Measurement | Missing]:
     for pair in trial.tasks:
         up, down = lab.run(pair)
         answers.append(_answer(up, down))
-    case, known = ("RR", ("jump_delay",)) if not trial.x0[3:6].any() else ("SS", ("jump_peak", "jump_height"))
+    case, known = ("RR", ("jump_delay",)) if not trial.x0[SLIP_XYZ].any() else ("SS", ("jump_peak", "jump_height"))
     for name in known:
         coarse, fine = (answer[name] for answer in answers)
         # Forces act in the middle of a step: a moment is known to half of the finer one, either way.

@@ -58,4 +58,4 @@ def svg(figure: Figure) -> str:
     canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
     text = re.sub(r"\s+", " ", re.sub(r"<!--.*?-->", "", out.getvalue().decode(), flags=re.DOTALL))
     # Hundredths of a point are fine enough, and half as long.
-    return re.sub(r' (?:d|x|y)="[^"]*"', lambda found: re.sub(r"(\.\d\d)\d+", r"\1", found[0]), text)
+    return re.sub(r' (?:d|x|y)="[^"]*"', lambda place: re.sub(r"(\.\d\d)\d+", r"\1", place[0]), text)

@@ -19,10 +19,11 @@ from rich.table import Table
 from analytic import stable_solutions
 from compare import pages
 from compare.runs.campaign import Campaign
+from compare.runs.engines import MUJOCO
 from compare.runs.tasks import Task, store
 from compare.runs.workers import Workers, dask, processes
 from mjsim import benchmark
-from model import Parameters
+from model import Parameters, State
 
 BATCH = 64
 REPEATS = 3
@@ -79,7 +80,7 @@ def table(figures: Figures) -> Table:
 def _tasks(count: int, t_end: float) -> list[Task]:
     """Runs from rest at different omega_0."""
     sets = [SLIPPING.replace(omega_0=15 + 10 * k / count) for k in range(count)]
-    return [Task(engine="mujoco", parameters=p, x0=(0.0,) * 8, t_end=t_end) for p in sets]
+    return [Task(engine=MUJOCO.name, parameters=p, x0=State(), t_end=t_end) for p in sets]
 
 
 def _campaigns() -> tuple[float, float, float]:

@@ -28,7 +28,7 @@ from compare.runs.progress import Show
 from compare.runs.sweep import sobol
 from compare.runs.tasks import sources
 from compare.runs.workers import Workers
-from model import Parameters, SimulationError
+from model import Parameters, SimulationError, State
 from model.arrays import Array
 from model.files import make_directory, reading_json, write_text
 
@@ -82,11 +82,11 @@ def random_starts(p: Parameters, count: int, seed: Sequence[int]) -> Array:
 
     Nearly twice as many of these come to a hop as of `ensemble.random_starts`, which throw balls and turn them back.
     """
-    rng, x = np.random.default_rng(seed), np.zeros((count, 8))
-    x[:, 0] = rng.uniform(0, p.R, count) * rng.integers(0, 2, count)
-    x[:, 2] = p.omega_0 * rng.uniform(-0.5, 2, count)
-    x[:, 3:6] = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, (count, 3))
-    return x
+    rng = np.random.default_rng(seed)
+    y = rng.uniform(0, p.R, count) * rng.integers(0, 2, count)
+    omega_c = p.omega_0 * rng.uniform(-0.5, 2, count)
+    slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, (count, 3))
+    return State(y, 0.0, omega_c, *slips.T).stacked()
 
 
 def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
@@ -108,8 +108,8 @@ def _confirmed(p: Parameters, states: Array) -> dict[str, Any]:
     broken = ""
     for x in states:
         try:
-            if found := hopping.confirm(p, x):
-                return {"confirmed": dataclasses.asdict(found)}
+            if hops := hopping.confirm(p, x):
+                return {"confirmed": dataclasses.asdict(hops)}
         except SimulationError as error:
             broken = str(error)
     return {"confirmed": None, "broken": broken}

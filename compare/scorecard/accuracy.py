@@ -16,18 +16,15 @@ from compare.runs.engines import MUJOCO
 from compare.scorecard import trials
 from compare.scorecard.contenders import Contestant
 from compare.scorecard.standings import number
-from compare.scorecard.trials import APPROACH, AT_REST, HITTING, LANDING, ROUGH, SMOOTH, WINDOW, State
+from compare.scorecard.trials import APPROACH, AT_REST, HITTING, LANDING, SMOOTH, STATES, WINDOW, Stationary
 from mjsim import ContactSettings
-from model import Case, Contact
-from model.arrays import Array
+from model import Case, Contact, State
 
 STEPS = (4e-3, 1e-3)
 """Time steps of stationary states, s."""
-REACHED = (
-    *(State(SMOOTH.replace(omega_0=omega_0), Case.RR) for omega_0 in (8.0, 12.0)),
-    *(State(SMOOTH.replace(omega_0=omega_0), Case.SS) for omega_0 in (14.5, 20.0, 25.0, 30.0)),
-    State(ROUGH.replace(omega_0=25.0), Case.NR),
-)
+_MORE = [Stationary(SMOOTH.replace(omega_0=w), case) for w, case in ((8.0, Case.RR), (20.0, Case.SS), (30.0, Case.SS))]
+REACHED = sorted([*STATES, *_MORE], key=lambda state: (state.case, state.p.omega_0))
+"""Stationary states: those of the other tables, and some between them."""
 OFF = 1.02
 """Start near a state, in units of its variables."""
 FINE = (4e-3, 2e-3, 1e-3, 4e-4, 2e-4, 1e-4)
@@ -39,7 +36,7 @@ def _at(step: float, settings: ContactSettings | None = None) -> Contestant:
     return Contestant(MUJOCO.name, MUJOCO, step, settings or ContactSettings.at(step))
 
 
-def reached(campaign: Campaign, states: Sequence[State] = REACHED, steps: Sequence[float] = STEPS) -> Rows:
+def reached(campaign: Campaign, states: Sequence[Stationary] = REACHED, steps: Sequence[float] = STEPS) -> Rows:
     """Errors of stationary states from rest and from near them, the worse of the two."""
     lasts = max(state.settles for state in states)
     tasks = {
@@ -59,11 +56,9 @@ def reached(campaign: Campaign, states: Sequence[State] = REACHED, steps: Sequen
     return rows
 
 
-def _near(state: State) -> Array:
+def _near(state: Stationary) -> State:
     """A start off the state in all of its variables; high over the floor where only the wall carries the ball."""
-    x = OFF * state.solution.x
-    x[0] = state.p.R if state.case is Case.NR else 0.0
-    return x
+    return State.of(OFF * state.solution.x)._replace(y=state.p.R if state.case is Case.NR else 0.0)
 
 
 def transient(campaign: Campaign, steps: Sequence[float] = FINE) -> Rows:
@@ -107,8 +102,8 @@ def force_split(campaign: Campaign, omegas: Sequence[float] = (6.0, 10.0, 13.0))
     for omega_0 in omegas:
         p = SMOOTH.replace(omega_0=omega_0)
         least, greatest = (float(end) for end in rolling_forces.admissible_interval(omega_0, p))
-        off = (0.0, 0.0, 0.88 * omega_0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        lasts = State(p, Case.RR).settles
+        off = State(omega_c=0.88 * omega_0)
+        lasts = Stationary(p, Case.RR).settles
         starts = (plain, off), (ours, off), (ours, AT_REST)
         runs = campaign.run([_at(s.timestep, s).task(p, x0, lasts, lasts / 1000) for s, x0 in starts])
         forces = [run.force_B[run.time >= (1 - WINDOW) * lasts, 1].mean() for run in runs]

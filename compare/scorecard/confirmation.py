@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.scorecard import trials
-from compare.scorecard.trials import AT_REST, EPS
+from compare.scorecard.trials import EPS
 from mjsim import ContactSettings, Run, simulate
-from model import Flow
+from model import Flow, State
 from model.arrays import Array
 
 ROLLING = trials.SMOOTH.replace(omega_0=10.0)
 SLIPPING = trials.SLIPPING.p
-SLIPPING_START = (0.0, 0.0, 13.85, -4.0, 0.0, 10.0)
+SLIPPING_START = State(omega_c=13.85, slip_x=-4.0, slip_z=10.0)
 """A start close enough to steady slipping to settle within a few seconds."""
 
 
@@ -63,12 +63,12 @@ def _at(timestep: float, solimp: float, damping: float = 0.5, **changes: float) 
 
 def _turning(timestep: float) -> float:
     """What steady slipping leaves out: the contact turns within a step, by an angle whose square counts."""
-    return (SLIPPING_START[2] * timestep) ** 2
+    return float(SLIPPING_START.omega_c * timestep) ** 2
 
 
 def _depths() -> Iterator[Row]:
     """Without servo a ball at rest on the floor sinks in by (1 - d) g tc^2, in slipping by less."""
-    still, inside = ROLLING.replace(omega_0=0.0), (*AT_REST[:6], 0.01, 0.0)
+    still, inside = ROLLING.replace(omega_0=0.0), State(h=0.01)
     for timestep, solimp in itertools.product((4e-3, 1e-3), (0.03, 0.3)):
         settings = _at(timestep, solimp, servo=0.0)
         setting = f"h = {timestep * 1e3:g} ms, d = {solimp:g}"

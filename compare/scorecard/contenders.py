@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from compare.runs.engines import Engine, Settings
+from compare.runs.engines import MUJOCO, Engine, Settings
 from compare.runs.tasks import Task, carry_out
 from compare.scorecard.native import Native
 from compare.scorecard.trials import APPROACH
@@ -62,7 +62,7 @@ class Contender:
         times = (before + every * np.arange(len(sound), dtype=float)) * h
         block = recorder.samples(times, sound, p)
         failure = "" if len(sound) == count else "diverged"
-        header = Header("mujoco", p, Flow.steady(p.omega_0), self.loop.to_mapping(), failure=failure)
+        header = Header(MUJOCO.name, p, Flow.steady(p.omega_0), self.loop.to_mapping(), failure=failure)
         return Trajectory.from_blocks(header, [block], Events())
 
     def clock(self, steps: int) -> Callable[[], float]:

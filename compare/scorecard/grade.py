@@ -18,7 +18,7 @@ from compare.scorecard import trials
 from compare.scorecard.advice import advice
 from compare.scorecard.contenders import NEWCOMER, OURS, PLAIN, Contender, Contestant, costs
 from compare.scorecard.native import Native
-from compare.scorecard.trials import AGREES, APPROACH, AT_REST, ROLLING, SCENARIOS, SLIPPING, STATES, Held, State
+from compare.scorecard.trials import AGREES, APPROACH, AT_REST, ROLLING, SCENARIOS, SLIPPING, STATES, Held, Stationary
 from compare.statistics import plain
 from mjsim import ContactSettings
 from model import Trajectory
@@ -56,7 +56,7 @@ class Column:
         """Time of a simulated second over that of our defaults."""
         return self.cost * ContactSettings.timestep / self.timestep
 
-    def of(self, state: State) -> Held:
+    def of(self, state: Stationary) -> Held:
         """What was measured of a state."""
         return next(each for each in self.stationary if each.name == state.name)
 
@@ -91,7 +91,7 @@ def grade(
 def _column(contender: Contender | Contestant, cost: float) -> Column:
     h = contender.step or ContactSettings.timestep
 
-    def settled(state: State) -> Trajectory:
+    def settled(state: Stationary) -> Trajectory:
         """From rest, sampled in every step once the start is forgotten."""
         return contender.run(state.p, AT_REST, state.forgets + WINDOW, h, skip=state.forgets)
 

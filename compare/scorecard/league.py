@@ -34,7 +34,7 @@ from compare.scorecard.trials import (
     WINDOW,
     Held,
     Motion,
-    State,
+    Stationary,
 )
 from compare.statistics import plain
 from model import Case, Parameters, Trajectory, storage
@@ -162,12 +162,12 @@ def cost(task: Task) -> float:
     return statistics.median(seconds(task) - seconds(half) for _ in range(REPEATS)) / half.t_end
 
 
-def _held(run: Trajectory, state: State) -> Held:
+def _held(run: Trajectory, state: Stationary) -> Held:
     """How far the end of a run from rest is from the state that it settles in."""
     return trials.held(run, state, (1 - WINDOW) * state.settles)
 
 
-def _stationary(state: State) -> Discipline:
+def _stationary(state: Stationary) -> Discipline:
     """Relative error of omega_c in a state that is settled in from rest."""
     runs, quick = ((state.p, AT_REST, state.settles, state.settles / 1000),), state in (ROLLING, SLIPPING)
     return Discipline(state.name, runs, lambda runs: abs(_held(runs[0], state).omega_c), quick)
@@ -199,9 +199,8 @@ def _wall_holds() -> Discipline:
     for margin in MARGINS:
         for sign in (1, -1):
             p = ROUGH.replace(omega_0=omega_02 * (1 + sign * margin))
-            riding = State(ROUGH.replace(omega_0=omega_02 * (1 + margin)), Case.NR).solution.x.copy()
-            riding[[0, 2]] = p.R, p.omega_0
-            runs.append((p, riding.tolist(), RIDES, RIDES / 100))
+            riding = Stationary(ROUGH.replace(omega_0=omega_02 * (1 + margin)), Case.NR).solution.state
+            runs.append((p, riding._replace(y=p.R, omega_c=p.omega_0), RIDES, RIDES / 100))
 
     def score(runs: Runs) -> float:
         holds = [bool(run.y[-1] > 0.9 * ROUGH.R) for run in runs]

@@ -31,7 +31,7 @@ CHOICES = {
     "cone": _constants(mujoco.mjtCone, "mjCONE_", "pyramidal", "elliptic"),
     "solver": _constants(mujoco.mjtSolver, "mjSOL_", "PGS", "CG", "Newton"),
 }
-"""What the engine can be told by name, and its numbers for it."""
+"""Options of the engine that are chosen by name, and its numbers for the names."""
 _NOTE = "{}: there is no {} that the ball can touch; the contact with its {} stands for both"
 _DOWN = 0.7
 """Least share of down in the way from the ball to its floor."""

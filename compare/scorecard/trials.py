@@ -17,19 +17,20 @@ import numpy.typing as npt
 
 import analytic
 from analytic import StationarySolution
-from model import Case, Contact, Parameters, Trajectory
+from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
+from model.kinematics import SLIP_XYZ
 
 EPS = float(np.finfo(float).eps)
 SMOOTH, ROUGH = Parameters.named("reference"), Parameters.named("high-wall-friction")
 WINDOW = 0.1
 """Last part of a settled run, which is averaged."""
-AT_REST = (0.0,) * 8
+AT_REST = State()
 """Start against the wall, on the floor."""
 
 
 @dataclass(frozen=True)
-class State:
+class Stationary:
     """A stationary state that a ball settles in."""
 
     p: Parameters
@@ -59,9 +60,10 @@ class State:
         return math.ceil(self.forgets / (1 - WINDOW))
 
 
-ROLLING = State(SMOOTH.replace(omega_0=12.0), Case.RR)
-SLIPPING = State(SMOOTH.replace(omega_0=25.0), Case.SS)
-STATES = (ROLLING, State(SMOOTH.replace(omega_0=14.5), Case.SS), SLIPPING, State(ROUGH.replace(omega_0=25.0), Case.NR))
+ROLLING = Stationary(SMOOTH.replace(omega_0=12.0), Case.RR)
+SLIPPING = Stationary(SMOOTH.replace(omega_0=25.0), Case.SS)
+BARELY, RIDING = Stationary(SMOOTH.replace(omega_0=14.5), Case.SS), Stationary(ROUGH.replace(omega_0=25.0), Case.NR)
+STATES = (ROLLING, BARELY, SLIPPING, RIDING)
 """Rolling, slipping little and much, and carried by the wall alone."""
 
 
@@ -81,7 +83,7 @@ class Held:
     """Largest mean slip speed at a contact that should roll, m s-1; 0 if none should."""
 
 
-def held(run: Trajectory, state: State, since: float) -> Held:
+def held(run: Trajectory, state: Stationary, since: float) -> Held:
     """Compare the samples of a run from a time in s with a state."""
     if not run.complete:
         return Held(state.name, *[math.nan] * 4)
@@ -93,7 +95,7 @@ def held(run: Trajectory, state: State, since: float) -> Held:
     return Held(
         name=state.name,
         omega_c=float(run.omega_c[last].mean() / state.solution.state.omega_c) - 1,
-        slip=float(np.abs(run.x[last, 3:6].mean(axis=0) - x[3:6]).max()) * state.p.r,
+        slip=float(np.abs(run.x[last, SLIP_XYZ].mean(axis=0) - x[SLIP_XYZ]).max()) * state.p.r,
         open=max(float(np.mean(normal <= 0)) for contact, _, normal in contacts if contact is not Contact.N),
         creep=max([float(speed.mean()) for contact, speed, _ in contacts if contact is Contact.R], default=0.0),
     )
@@ -105,7 +107,7 @@ class Motion:
 
     name: str
     p: Parameters
-    x0: tuple[float, ...]
+    x0: State
     lasts: float
     course: str = ""
     """What happens, in words."""
@@ -119,24 +121,25 @@ class Motion:
     def errors(self, time: Array, x: Array) -> tuple[float, float]:
         """Relative rms errors of omega_c and of the slip, in units of its largest component, of states x (n, 8)."""
         truth = np.stack([np.interp(time, self.exact.time, column) for column in self.exact.x.T], axis=-1)
-        slip = np.sqrt(np.mean(np.sum((x - truth)[:, 3:6] ** 2, axis=-1))) / np.abs(truth[:, 3:6]).max()
-        return float(np.sqrt(np.mean((x[:, 2] / truth[:, 2] - 1) ** 2))), float(slip)
+        slip = np.sqrt(np.mean(np.sum((x - truth)[:, SLIP_XYZ] ** 2, axis=-1))) / np.abs(truth[:, SLIP_XYZ]).max()
+        omega_c = State.of(x).omega_c / State.of(truth).omega_c - 1
+        return float(np.sqrt(np.mean(omega_c**2))), float(slip)
 
 
-KICKED = (0.0, 0.0, 14.35, -1.0, 2.0, 7.0, 0.0, 0.0)
+KICKED = State(omega_c=14.35, slip_x=-1.0, slip_y=2.0, slip_z=7.0)
 """From here the ball slips at both points all the time."""
 APPROACH = Motion("approach to " + SLIPPING.name, SLIPPING.p, KICKED, 2.0)
 LANDING = Motion(
     "lands on the floor",
     SMOOTH,
-    (0.02, -0.2, 12.0, 30.0, -10.0, 20.0, 0.0, 0.0),
+    State(y=0.02, v_y=-0.2, omega_c=12.0, slip_x=30.0, slip_y=-10.0, slip_z=20.0),
     0.7,
     "slides down the wall, lands, slips at both points, sticks",
 )
 HITTING = Motion(
     "hits the wall",
     SMOOTH,
-    (0.0, 0.0, 10.0, 1.0, 2.0, 3.0, 0.002, -0.3),
+    State(omega_c=10.0, slip_x=1.0, slip_y=2.0, slip_z=3.0, h=0.002, v_h=-0.3),
     0.7,
     "slides on the floor, hits the wall, is lifted, lands, sticks",
 )
@@ -146,10 +149,10 @@ ONSET = (1.02, 1.05, 1.1)
 
 
 @functools.cache
-def beyond_rolling() -> tuple[State, ...]:
+def beyond_rolling() -> tuple[Stationary, ...]:
     """The states at `ONSET`."""
     omega_01 = analytic.thresholds(SMOOTH).omega_01
-    return tuple(State(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in ONSET)
+    return tuple(Stationary(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in ONSET)
 
 
 def onset(slips: Sequence[float]) -> float:
@@ -170,16 +173,19 @@ SLIDES = 0.01
 """Slip speed, in units of sqrt(g R), from which a contact counts as slipping."""
 CARRIES = 0.01
 """Normal force, in units of m g, from which it counts as closed."""
-SCENARIOS: dict[Case, tuple[Parameters, tuple[float, ...]]] = {
-    Case.RR: (SMOOTH.replace(omega_0=12.0), (0, 0, 12.0, 0, 0, 0)),
-    Case.RS: (SMOOTH.replace(omega_0=12.0), (0, 0, 6.0, 0, -30.0, 0)),
-    Case.RN: (SMOOTH.replace(omega_0=12.0), (0, 0, 4.0, 0, 0, 0, 0.4 * SMOOTH.R, 0)),
-    Case.SR: (ROUGH, (0, 0, 8.0, -40.0, 0, 0)),
+SCENARIOS: dict[Case, tuple[Parameters, State]] = {
+    Case.RR: (ROLLING.p, State(omega_c=12.0)),
+    Case.RS: (ROLLING.p, State(omega_c=6.0, slip_y=-30.0)),
+    Case.RN: (ROLLING.p, State(omega_c=4.0, h=0.4 * SMOOTH.R)),
+    Case.SR: (ROUGH, State(omega_c=8.0, slip_x=-40.0)),
     Case.SS: (SLIPPING.p, KICKED),
-    Case.SN: (SMOOTH.replace(omega_0=12.0), (0, 0, 4.0, 40.0, 0, 40.0, 0.4 * SMOOTH.R, 0)),
-    Case.NR: (ROUGH.replace(omega_0=25.0), (ROUGH.R, 0, 25.0, -27.0, 0, 0)),
-    Case.NS: (SMOOTH.replace(omega_0=12.0), (SMOOTH.R, 0, 12.0, 0, 0, -10.0)),
-    Case.NN: (SMOOTH.replace(omega_0=12.0), (0.5 * SMOOTH.R, 0, 4.0, 5.0, 5.0, 5.0, 0.4 * SMOOTH.R, 0)),
+    Case.SN: (ROLLING.p, State(omega_c=4.0, slip_x=40.0, slip_z=40.0, h=0.4 * SMOOTH.R)),
+    Case.NR: (ROUGH.replace(omega_0=25.0), State(y=ROUGH.R, omega_c=25.0, slip_x=-27.0)),
+    Case.NS: (ROLLING.p, State(y=SMOOTH.R, omega_c=12.0, slip_z=-10.0)),
+    Case.NN: (
+        ROLLING.p,
+        State(y=0.5 * SMOOTH.R, omega_c=4.0, slip_x=5.0, slip_y=5.0, slip_z=5.0, h=0.4 * SMOOTH.R),
+    ),
 }
 """For each case parameters and a state from which the ball is in it for a while."""
 
