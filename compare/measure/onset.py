@@ -172,7 +172,7 @@ def folded(
         x = states[name, "turning"][0].mean
         around = Bracket(top.value * (1 - width), top.value * (1 + width))
         stay = (lambda p, omega, x=x: x), units, questions.settles
-        searches[name, "fold"] = _search(lab, sets[name], around, stay, width * top.value)
+        searches[name, "fold"] = _search(lab, sets[name], around, stay, FOLD_WIDTH[lab.level] * top.value)
     return _narrowed(lab, searches, careful=False)
 
 

@@ -22,7 +22,9 @@ from model.drag import STOKES
 
 SPAN = 40.0
 """Least length of a round in units of 1/c, the time in which the fluid stops a free ball."""
-ROUNDS = 4
+ROUNDS = (1.0, 2.0, 2.0)
+"""What follows each other, in units of that length. The later rounds last longer: a ball on the wall that goes on from
+its mean begins to swing anew, if less, and that has to die out, too."""
 SOONER = (1 / 64, 1 / 8)
 """Rounds before those, in parts of one, where the law isn't Stokes': what lags or sinks is dragged harder than by
 c, and settles sooner. In such a part it may drift only that part of what it may in a whole round."""
@@ -140,7 +142,7 @@ def settle(
     """
     states: dict[int, Settled] = {}
     todo = dict(enumerate(starts))
-    left = [[*(SOONER if start.p.drag != STOKES else ()), *[1.0] * ROUNDS] for start in starts]
+    left = [[*(SOONER if start.p.drag != STOKES else ()), *ROUNDS] for start in starts]
     while todo:
         parts = {n: left[n].pop(0) for n in todo}
         tasks = {n: _task(lab, start, refine, span * parts[n]) for n, start in todo.items()}
@@ -151,7 +153,7 @@ def settle(
                 states[n] = Settled(starts[n], Case.NN, {}, starts[n].x0, task, failure=f"the run {run}")
                 continue
             states[n] = judged(starts[n], task, run, loose)
-            if left[n] and states[n].excess > parts[n] * min(loose, sharp):
+            if left[n] and states[n].excess > min(parts[n], 1.0) * min(loose, sharp):
                 # A part of a round may end on the way to where the ball settles: it goes on as it is.
                 todo[n] = replace(starts[n], x0=run.x[-1]) if parts[n] < 1 else _onward(states[n])
     return [states[n] for n in range(len(starts))]
@@ -174,7 +176,7 @@ def duration(p: Parameters, span: float = SPAN) -> float:
 
 def high(p: Parameters) -> float:
     """A height in m from which a ball that sinks as fast as it may freely doesn't land within a round."""
-    return 1.25 * dragged_speed(p) * duration(p)
+    return 1.25 * dragged_speed(p) * duration(p, max(ROUNDS) * SPAN)
 
 
 def _task(lab: Lab, start: Start, refine: int, span: float) -> Task:

@@ -15,7 +15,8 @@ from model.files import write_text
 def main() -> int:
     """Return 0 if enough faults were noticed, 1 if not, 2 where there is nothing to judge."""
     parser = argparse.ArgumentParser(prog="python -m compare.mutants", description=trial.__doc__)
-    parser.add_argument("directory", type=Path, metavar="DIR", help="results of 'dualball validate --quick'")
+    results = "results of 'dualball validate'; those of a second one are judged until a claim notices the theory"
+    parser.add_argument("directories", type=Path, nargs="+", metavar="DIR", help=results)
     parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
     page = "page to write; else a theory is judged until a claim notices it"
     parser.add_argument("--page", type=Path, metavar="FILE", help=page)
@@ -23,14 +24,16 @@ def main() -> int:
     parser.add_argument("--least", type=float, default=1.0, metavar="SHARE", help="to be noticed (default 1: all)")
     args = parser.parse_args()
     try:
-        level = trial.judged(args.directory, args.workers, whole=bool(args.page))
-        measured = trial.wrong_engines(args.directory, args.workers) if args.engines else []
+        first, *others = args.directories
+        levels = [trial.judged(first, args.workers, whole=bool(args.page))]
+        levels += [trial.judged(each, args.workers, whole=False) for each in others]
+        measured = trial.wrong_engines(first, args.workers) if args.engines else []
         if args.page:
-            write_text(args.page, trial.page(level, measured))
+            write_text(args.page, trial.page(levels, measured))
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    trials = [*level.trials, *measured]
+    trials = [*(trial for level in levels for trial in level.trials), *measured]
     missed, count = [each.what for each in trials if not each.noticed], len(trials)
     print(f"{count - len(missed)} of {count} faults were noticed")
     for what in missed:

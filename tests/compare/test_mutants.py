@@ -116,10 +116,17 @@ def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(
 
 
 def test_the_page_names_what_nobody_noticed() -> None:
-    tried = [trial.Trial("ω₀₁ high", {}), trial.Trial("ω₀₂ high", {"table-5-P2": Outcome.REFUTED})]
-    page = trial.page(trial.Judged("quick", tried, {"omega_01": 3e-6}), [])
-    assert "the quick level" in page
-    assert "## Wrong theories: 1 of 2 noticed" in page
-    assert "| ω₀₁ | 0.0001 | 3e-06 |" in page
-    assert "| ω₀₁ high | **nobody** |" in page
-    assert "| ω₀₂ high | table-5-P2 |" in page
+    whats, refuted = ("ω₀₁ high", "ω₀₂ high"), {"table-5-P2": Outcome.REFUTED}
+    quick, default = [{}, refuted], [{"table-5-P3": Outcome.REFUTED}, refuted]
+    powers = [(3e-5, "rough-wall", "table-5-P3"), (4e-6, "reference", "table-5-P3"), (1e-6, "wake", "table-5-P3")]
+    levels = [
+        trial.Judged(name, [*map(trial.Trial, whats, noticed)], {"omega_01": powers})
+        for name, noticed in (("quick", quick), ("default", default))
+    ]
+    page = trial.page(levels, [trial.Trial("no drag", refuted)])
+    assert "## Wrong theories, 2: noticed 1 at quick, 2 at default" in page
+    assert "| ω₀₁ high | **nobody** | table-5-P3 |" in page
+    assert "| ω₀₂ high | table-5-P2 | table-5-P2 |" in page
+    assert "## Wrong engines, 1: noticed 1 at quick" in page
+    numbers = "3e-05 | 4e-06 | 67%"
+    assert f"| ω₀₁ | 0.0001 | {numbers} | {numbers} | rough-wall, table-5-P3 |" in page

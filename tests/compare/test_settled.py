@@ -72,7 +72,7 @@ class TestSettled:
 
     def test_what_does_not_settle_is_missing(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(settled, "QUICK", (0.6,))
-        monkeypatch.setattr(settling, "ROUNDS", 1)
+        monkeypatch.setattr(settling, "ROUNDS", (1.0,))
         monkeypatch.setattr(settling, "SOLVED", 1e-3)
         measured = Records.of(settled.measure(lab, {"thick": THICK}, Records()))
         assert not measured.measurements
