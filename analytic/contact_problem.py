@@ -75,7 +75,6 @@ def solve(
     p: Parameters,
     start: Forces = NOTHING,
     tolerance: float = 4e-15,
-    max_sweeps: int = MAX_SWEEPS,
 ) -> tuple[Velocities, Forces]:
     """Velocities and impulses that obey Coulomb's law at both contacts.
 
@@ -90,7 +89,7 @@ def solve(
     Raises
     ------
     NotConvergedError
-        After `max_sweeps`.
+        After `MAX_SWEEPS`.
     """
     a, b = _needs(free, A, B, p)
     if A is None or B is None:  # a contact alone is solved exactly
@@ -105,7 +104,7 @@ def solve(
     *_, n, s, t = start
     at_B = n / p.m, s / p.m, t / p.m
     last, span, growth = math.inf, SPAN, GROWTH
-    for count in range(1, max_sweeps + 1):
+    for count in range(1, MAX_SWEEPS + 1):
         at_A = _project(_left(a, at_B, k), p.mu, A.slip)
         need_B = _left(b, at_A, k)
         swept = _project(need_B, p.eta, B.slip)
@@ -130,7 +129,7 @@ def solve(
         n, s, t = (at_B + step).tolist()
         at_B = n, s, t
     raise NotConvergedError(
-        f"contact problem: still a change of {change:g} m s-1 after {max_sweeps} sweeps, asked for {enough:g} m s-1"
+        f"contact problem: still a change of {change:g} m s-1 after {MAX_SWEEPS} sweeps, asked for {enough:g} m s-1"
     )
 
 

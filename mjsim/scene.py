@@ -23,13 +23,6 @@ _ELEMENTS = {
 }
 _MAXFORCE = 2
 """Code of reduce="maxforce" in a contact sensor."""
-_INTEGRATORS = {
-    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
-    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
-    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
-    "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
-}
-_CONES = {"elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC, "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL}
 
 
 def spec(p: Parameters, settings: ContactSettings) -> Any:
@@ -68,8 +61,8 @@ def _set_options(option: Any, p: Parameters, settings: ContactSettings) -> None:
     option.gravity = (0.0, 0.0, -p.g)
     for name in ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations"):
         setattr(option, name, getattr(settings, name))
-    option.cone = _CONES[settings.cone]
-    option.integrator = _INTEGRATORS[settings.integrator]
+    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
 
 
 def _set_geometry(body: dict[str, Any], geom: dict[str, Any], joint: dict[str, Any], p: Parameters) -> None:

@@ -111,7 +111,7 @@ def test_locked_in_the_corner():
     """
     p, e, v = P.replace(mu=1.3, eta=1.3), 0.5, 0.4
     u = (-v, -v, 0.0, 0.0, 0.0, 0.0)
-    with pytest.raises(NotConvergedError) as caught:
+    with pytest.raises(NotConvergedError, match=r"still a change of .* after 2000 sweeps") as caught:
         solve(u, Closed(e * v), Closed(e * v), p)
     after, _ = assert_solves(u, *[unlocked(caught.value, p)] * 2, p)
     np.testing.assert_allclose(np.multiply(after, [1.0] * 3 + [p.r] * 3), 0.0, atol=4 * EPS)
@@ -157,11 +157,6 @@ def test_work_of_impulses_is_the_change_of_energy(u, guess, mu, eta):
     before_J, after_J = energy(0.0, u, p), energy(0.0, after, p)
     work = contact_work(mean(u, after), impulse, p)
     assert after_J - before_J == pytest.approx(work, abs=1e-13 * (before_J + after_J))
-
-
-def test_giving_up_says_so():
-    with pytest.raises(NotConvergedError, match="after 1 sweeps"):
-        solve((-1.0, -1.0, 0.3, 10.0, -20.0, 5.0), Closed(), Closed(), P, max_sweeps=1)
 
 
 @given(speeds, st.floats(0, 0.04))
