@@ -63,7 +63,7 @@ def validate(
     output, chosen = Path(output), [each for each in select(CLAIMS, claims) if claims or each.level <= level]
     sets = sets_of(level) if sets is None else sets
     results.open_directory(output)
-    kept = programme.directory(output, engine, level, sets)
+    kept = {each.name: programme.directory(output, each.engine or engine, level, sets) for each in PROTOCOLS}
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
     todo, verdicts, records = list(chosen), dict[str, Verdict](), Records()
     broken: dict[str, str] = {}
@@ -81,7 +81,7 @@ def validate(
             protocol = ahead.pop(0)
             campaign.doing = f"measuring {protocol.name}"
             try:
-                records += programme.carry_out(protocol, lab, sets, records, kept)
+                records += programme.carry_out(protocol, lab, sets, records, kept[protocol.name])
             except StorageError:  # a full disk, or a file that was touched, is for the user to mend
                 raise
             except Exception as error:  # a protocol that breaks down takes its own claims with it, and no others
@@ -89,7 +89,7 @@ def validate(
         if level > Level.QUICK and claims is None:
             campaign.doing = "ladder of settings, error against cost"
             scores.write(campaign, output)
-    files = [path for protocol in PROTOCOLS if (path := kept / f"{protocol.name}.h5").exists()]
+    files = [path for name, where in kept.items() if (path := where / f"{name}.h5").exists()]
     _write(output, level, files, report, verdicts)
     return [verdicts[claim.id] for claim in chosen]
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
 import analytic
-from analytic import orbits
+from analytic import orbit_branch, orbits
+from analytic.orbit_branch import Bifurcation
 from analytic.orbits import Orbit
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered, simulated
-from compare.measure.attractors import hops
+from compare.measure import attractors, hopping
 from compare.measure.lab import Level
 from compare.measure.record import Measurement, state
 from model import Parameters, Trajectory
@@ -27,8 +29,13 @@ def _orbit(p: Parameters, x: tuple[float, ...], period: float) -> Orbit:
     return orbits.refine(p, x, period)
 
 
-def _hops(m: Measurement) -> float:
-    return hops(simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
+def _left_alone(protocol: str, decide: Callable[[Trajectory], float]) -> Bearing:
+    """Whether the ball hops on that theory lets go in the same state for as long."""
+
+    def of(m: Measurement) -> float:
+        return decide(simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
+
+    return Bearing(protocol, "hops", of, by="analytic.simulate")
 
 
 def _orbiting(protocol: str, quantity: str, predict: Callable[[Orbit], float]) -> Bearing:
@@ -39,6 +46,19 @@ def _orbiting(protocol: str, quantity: str, predict: Callable[[Orbit], float]) -
         return predict(_orbit(m.parameters, x, float(m.conditions["period"])))
 
     return Bearing(protocol, quantity, of, by="analytic.orbits.refine")
+
+
+_ORBIT: dict[str, Callable[[Orbit], float]] = {
+    "orbit_period": lambda orbit: orbit.period,
+    "orbit_omega_c": lambda orbit: orbit.turn / orbit.period,
+    "orbit_height": lambda orbit: float(orbit.cycle.y.max()),
+}
+
+
+def _death(orbit: Orbit) -> float:
+    """Where multipliers leave the unit circle, on the branch from an orbit along rougher walls."""
+    branch = orbit_branch.follow(orbit, "eta", orbit.p.eta, 1.1 * orbit.p.eta)
+    return next((place.value for place in branch.places if place.kind is Bifurcation.TORUS), math.nan)
 
 
 def _after_rest(quantity: str, predict: Callable[[Trajectory], float]) -> Bearing:
@@ -63,11 +83,12 @@ CLAIMS = (
     Claim(
         "hopping",
         _PERIODIC,
-        "A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on the wall.",
-        (
-            _orbiting("recurrent", "orbit_period", lambda orbit: orbit.period),
-            _orbiting("recurrent", "orbit_omega_c", lambda orbit: orbit.turn / orbit.period),
-            _orbiting("recurrent", "orbit_height", lambda orbit: float(orbit.cycle.y.max())),
+        "A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on the wall. The engine "
+        "and Moreau-Jean time stepping come to the closed orbit of the event-driven simulation.",
+        tuple(
+            _orbiting(protocol, quantity, predict)
+            for protocol in ("recurrent", "stepped")
+            for quantity, predict in _ORBIT.items()
         ),
     ),
     Claim(
@@ -92,7 +113,7 @@ CLAIMS = (
         "calm",
         _PERIODIC,
         "In strong drag, κ > 2, no ball was found that hops on.",
-        (Bearing("calm", "hops", _hops, by="analytic.simulate"),),
+        (_left_alone("calm", attractors.hops),),
         level=Level.DEFAULT,
     ),
     Claim(
@@ -107,6 +128,13 @@ CLAIMS = (
                 by="analytic.thresholds: omega_02",
             ),
         ),
+        level=Level.DEFAULT,
+    ),
+    Claim(
+        "hopping-death",
+        _PERIODIC,
+        "Along rougher walls hopping ends where a pair of Floquet multipliers leaves the unit circle.",
+        (_orbiting("followed", "orbit_death", _death), _left_alone("followed", hopping.lands)),
         level=Level.DEFAULT,
     ),
 )

@@ -1,50 +1,29 @@
-"""Motions that last although nothing settles, and what strong drag and rough floors make of them, on sets of their own.
+"""A swing that lasts although nothing settles, and what strong drag and rough floors do, on sets of their own.
 
-* A ball that hops for ever, through flows that become slower until it hardly hops. It starts near its hop; then the
-  flow is lowered in held steps. At each the tops of the hops say period, height and orbit; how the heights settle says
-  by what factor a disturbance shrinks from hop to hop; and the flow at which the height would be zero is extrapolated.
 * A ball that swings for ever beside a Hopf point: it slips at both points, and goes round now faster and now slower. It
   is left alone until its turning points repeat.
 * Balls in strong drag, followed until drag has had its time: do they go on hopping?
 * Floors so rough (mu > 1) that rolling and slipping are both consistent with the forces: rolling on for as long as
   forces allow would lead to a cycle of sticking and slipping that never settles.
 
-Hops and swings are measured with two time steps: an engine may locate a landing to a step only, and the difference is
-then the error of the finer one.
+Swings are measured with two time steps; the difference is taken for the error of the finer one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.stats import qmc
 
 from compare.measure.field import constrained
+from compare.measure.hopping import SAMPLE, finer
 from compare.measure.lab import Lab, Level, coarse_step, time_unit
-from compare.measure.record import Measurement, Missing, Records, if_sure, measurement, state_of
+from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.measure.settling import Start, settle
-from compare.statistics import Measured, peaks, top
-from model import Case, Flow, Parameters, State, Trajectory
-from model.arrays import Array
-
-TOP = (6.4e-3, 0.0, 57.3, -106.0, 0.0, 0.0)
-"""A state near the top of a hop of the set `hopping`."""
-FLOWS = {
-    Level.QUICK: (1.0,),
-    Level.DEFAULT: (1.0, 0.95, 0.91, 0.87, 0.83, 0.80),
-    Level.FULL: (1.0, 0.97, 0.94, 0.91, 0.88, 0.85, 0.82, 0.80),
-}
-"""Flows of the staircase in units of that of the set."""
-HOLD, LAST, LATER = 12.0, 3.0, 2.0
-"""How long each is held, the last part of it in which the motion is measured, and the first in which disturbances are
-too large to be linear, s."""
-HOP_REFINED = 8, 16
-"""Steps in one of `coarse_step`."""
-SAMPLE = 1e-3
-"""Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
+from compare.statistics import peaks, top
+from model import Case, Parameters, State, Trajectory
 
 VERY_ROUGH = {"mu": 2.5, "eta": 0.38, "c": 1.0, "omega_0": 24.648}
 """A floor on which a ball swings, in SI."""
@@ -71,98 +50,6 @@ ROUGH = {
 """mu, eta, j, r/R, kappa, omega_0 sqrt(R/g). The second is left to the higher levels: its contacts hover for long."""
 
 
-class Hops(NamedTuple):
-    """The tops of the hops in part of a run: times and angles (n,), and states (n, 8)."""
-
-    time: Array
-    theta: Array
-    x: Array
-
-    @property
-    def values(self) -> dict[str, Measured]:
-        """Period, mean angular velocity and height, uncertain by half the range over single hops.
-
-        Disturbances swing while they die out, so that means of parts may agree by chance.
-        """
-        span, periods, height = self.time[-1] - self.time[0], np.diff(self.time), self.x[:, 0]
-        values = {
-            "orbit_period": (span / len(periods), periods),
-            "orbit_omega_c": ((self.theta[-1] - self.theta[0]) / span, np.diff(self.theta) / periods),
-            "orbit_height": (height.mean(), height),
-        }
-        return {name: Measured(float(mean), float(np.ptp(hops)) / 2) for name, (mean, hops) in values.items()}
-
-
-def hopping(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would begin."""
-    protocol, name, p = "recurrent", "hopping", Parameters.named("hopping")
-    flows = [share * p.omega_0 for share in FLOWS[lab.level]]
-    flow, lasts = Flow.staircase(flows, HOLD), HOLD * len(flows)
-    samples = round(lasts / SAMPLE)
-    tasks = [lab.task(p, TOP, lasts, coarse_step(p) / refined, flow=flow, samples=samples) for refined in HOP_REFINED]
-    runs, births = lab.attempt(tasks), []
-    if isinstance(runs, str):
-        yield Missing(protocol, name, f"the run {runs}")
-        return
-    for k, omega_0 in enumerate(flows):
-        q, end = p.replace(omega_0=omega_0), (k + 1) * HOLD
-        last = [tops(run, end - LAST, end) for run in runs]
-        at = f"at omega_0 = {omega_0:.4g} rad/s"
-        if any(len(each.time) < 6 for each in last):
-            yield Missing(protocol, name, f"{at} the ball does not hop any more")
-            break
-        coarse, fine = (each.values for each in last)
-        births.append((omega_0, coarse["orbit_height"].value, fine["orbit_height"].value))
-        conditions = {**state_of(constrained(Case.NR, last[1].x[-1], q)), "period": fine["orbit_period"].value}
-        for quantity, value in fine.items():
-            error = math.hypot(value.value - coarse[quantity].value, value.uncertainty)
-            yield measurement(lab, protocol, name, q, quantity, Measured(value.value, error), tasks, **conditions)
-        if k:
-            parts = (runs[0], LATER), (runs[1], LATER), (runs[1], 2 * LATER)
-            factor = _uncertain(*(shrinking(tops(run, k * HOLD + after, end - LAST).x, q) for run, after in parts))
-            row = measurement(lab, protocol, name, q, "orbit_multiplier", factor, tasks, **conditions)
-            yield if_sure(row, 1.0, f"how disturbances shrink {at} is too uncertain")
-    if len(births) >= 3:
-        yield measurement(lab, protocol, name, p, "orbit_birth", birth(births[-3:]), tasks)
-
-
-def _uncertain(coarse: float, fine: float, other: float) -> Measured:
-    """What the finer step shows, uncertain by what the step changes, and another part of the run."""
-    return Measured(fine, math.hypot(fine - coarse, fine - other))
-
-
-def tops(run: Trajectory, start: float, end: float) -> Hops:
-    """The tops of the hops between two times; a ball that stays within a tenth of the highest has none."""
-    t, y = run.time, run.y
-    k, late = peaks(y)
-    inside = (t[k] > start) & (t[k] < end)
-    high = inside & (y[k] > y[k][inside].max(initial=0.0) / 2)
-    k, late = k[high], late[high]
-    x, by = run.x, late * (t[1] - t[0])
-    states = x[k] + late[:, None] * (x[k + 1] - x[k - 1]) / 2
-    states[:, 0], states[:, 1] = top(y, k, late), 0.0
-    return Hops(t[k] + by, run.theta[k] + by * run.omega_c[k], states)
-
-
-def shrinking(states: Array, p: Parameters) -> float:
-    """Factor by which disturbances shrink from one hop to the next, from states (n, 8) at tops that settle.
-
-    What changes from hop to hop obeys a linear map of height, omega_c and slip_x; its eigenvalue of largest modulus.
-    """
-    units = np.array([p.R, 1 / time_unit(p), math.sqrt(p.g * p.R) / p.r])
-    changes = np.diff(states[:, [0, 2, 3]] / units, axis=0)
-    weight = 1 / np.linalg.norm(changes[:-1], axis=1, keepdims=True)
-    matrix = np.linalg.lstsq(weight * changes[:-1], weight * changes[1:])[0]
-    return float(np.abs(np.linalg.eigvals(matrix)).max())
-
-
-def birth(rows: Sequence[tuple[float, ...]]) -> Measured:
-    """Flow at which the height would be zero: parabolas through flows and heights, of the coarse and the fine step."""
-    flows, *heights = np.array(rows).T
-    coarse, fine = (float(np.polyfit(each, flows, 2)[-1]) for each in heights)
-    return _uncertain(coarse, fine, float(np.polyfit(heights[1][-2:], flows[-2:], 1)[-1]))
-
-
 def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Period, mean and size of the swing of omega_c."""
     p, end = sets["reference"].replace(**VERY_ROUGH), SWINGS - SWUNG
@@ -178,7 +65,7 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         coarse, fine, before = (_swung(runs[n], since) for n, since in ((0, end), (1, end), (1, end - SWUNG)))
         conditions = {**state_of(constrained(Case.SS, runs[1].x[-1], p)), "period": fine["swing_period"]}
         for name, value in fine.items():
-            sure = _uncertain(coarse[name], value, before[name])
+            sure = finer(coarse[name], value, before[name])
             yield measurement(lab, "swing", "reference", p, name, sure, tasks, **conditions)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import KW_ONLY, asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from compare.measure import (
     edge,
     field,
     growth,
+    hopping,
     laws,
     lift,
     motions,
@@ -34,7 +35,7 @@ from compare.measure import (
 )
 from compare.measure.lab import Lab, Level, coarse_step
 from compare.measure.record import Measurement, Missing, Records
-from compare.runs.engines import Engine
+from compare.runs.engines import MOREAU, Engine
 from compare.runs.tasks import sources
 from model import Parameters
 from model.files import make_directory
@@ -45,6 +46,7 @@ MOST = 3e4
 """Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c at a time; and contact
 forces are solved to 1e-12 in each step, so that all that adds up in 1/c is three times that: as much as `omega_c` may
 be off in a state that counts as settled."""
+HOPS = "hops that last are those of the set hopping"
 Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
 
 
@@ -63,6 +65,8 @@ class Protocol:
     """Whether it waits for motions to settle."""
     reference: str = ""
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
+    engine: Engine | None = None
+    """Who measures, where it isn't the engine on trial."""
 
 
 PROTOCOLS = (
@@ -84,7 +88,9 @@ PROTOCOLS = (
     Protocol("watched", bounds.watched, ("thresholds",)),
     Protocol("motions", motions.measure, waits=False),
     Protocol("impacts", motions.impacts, waits=False),
-    Protocol("recurrent", attractors.hopping, reference="hops that last are those of the set hopping"),
+    Protocol("recurrent", hopping.hopping, reference=HOPS),
+    Protocol("stepped", hopping.stepped, engine=MOREAU, reference=HOPS),
+    Protocol("followed", hopping.followed, level=Level.DEFAULT, reference=HOPS),
     Protocol(
         "swing",
         attractors.swing,
@@ -129,7 +135,7 @@ def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], befo
     Raises `StorageError` where measurements can't be read or written; a run that breaks down raises
     `SimulationError`, as far as the protocol can't go on without it.
     """
-    path = kept / f"{protocol.name}.h5"
+    path, lab = kept / f"{protocol.name}.h5", replace(lab, engine=protocol.engine or lab.engine)
     if not path.exists():
         weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
         strong = {name: p for name, p in sets.items() if name not in weak}

@@ -17,7 +17,7 @@ from compare.measure.programme import UNDAMPED, Measure, Protocol
 from compare.measure.record import Measurement, Missing, Records
 from compare.report import results
 from compare.runs.campaign import Campaign
-from compare.runs.engines import MUJOCO
+from compare.runs.engines import EVENT, MUJOCO
 from model import InputError, Parameters, SimulationError, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")
@@ -122,6 +122,17 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path: Path) -> None:
             assert [m.set for m in missing] == ["air"] * waits
             assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in missing)
     assert seen == ["steel-in-water", "air", "steel-in-water"]
+
+
+def test_another_engine_may_measure(tmp_path: Path) -> None:
+    """Its measurements name it, whoever is on trial."""
+    with Campaign(tmp_path / "runs", workers=0) as campaign:
+        lab = Lab(campaign, MUJOCO, Level.QUICK)
+        named = {"mine": SETS["mine"]}
+        for name, engine in (("on trial", None), ("other", EVENT)):
+            protocol = Protocol(name, going_round, engine=engine)
+            (row,) = programme.carry_out(protocol, lab, named, Records(), tmp_path / "kept").measurements
+            assert row.engine == (engine or MUJOCO).name
 
 
 def test_what_only_the_reference_shows_is_missing_without_it(tmp_path: Path) -> None:
