@@ -10,8 +10,9 @@ from analytic.compiling import compiled
 from analytic.corner import Impulse, both, project
 from analytic.rigid_body import Forces, Velocities
 
-TOLERANCE = 1e-14
-"""Change of an impulse per mass in a sweep at which it stops, relative to sqrt(g R) or to the fastest velocity."""
+TOLERANCE, BARELY = 1e-14, 1e-11
+"""Change of an impulse per mass in a sweep at which it stops, relative to sqrt(g R) or the fastest velocity; and what
+does where friction only just holds a rolling ball: two solutions meet there, good to the root of it at best."""
 MAX_ITERATIONS = 100
 ROUGH = 1e-4
 """How well an iteration solves the contacts, relative to the last change of velocities."""
@@ -22,7 +23,7 @@ LANDINGS = 20
 SLIDES = 4.0
 """A contact slides on through a step if it takes more than this many times the load of the step to stop it."""
 ZERO_SLIP = 1e-9
-"""Sliding speed relative to sqrt(g R) up to which a contact is called rolling: well above what the iteration leaves."""
+"""Sliding speed relative to sqrt(g R) up to which a contact is called rolling: above what iterations leave."""
 LANDED = 1e-3
 """Speed relative to sqrt(g R) from which a landing counts: less is settling, or round-off."""
 ROLLS, SLIPS, OPEN = 0, 1, 2
@@ -92,13 +93,29 @@ def solve(
 ) -> Solved:
     """Velocities after dt, 0 for an impact, with closed contacts A, B whose normal velocities aim at to_A, to_B.
 
-    Smooth forces, at the mean of old and new velocity, and the contacts are iterated together; `start` is a first
-    guess of the impulses.
+    Smooth forces, at the mean of both velocities, and contacts are iterated together; `start` guesses the impulses.
     """
+    s = _solved(at, dt, omega_0, in_A, in_B, to_A, to_B, start, p, TOLERANCE)
+    return s if s.residual == 0 else _solved(at, dt, omega_0, in_A, in_B, to_A, to_B, start, p, BARELY)
+
+
+@compiled
+def _solved(
+    at: At,
+    dt: float,
+    omega_0: float,
+    in_A: bool,
+    in_B: bool,
+    to_A: float,
+    to_B: float,
+    start: Forces,
+    p: Constants,
+    tolerance: float,
+) -> Solved:
     v_h, v_y, v_k, o_x, o_y, o_z = old = at.u
     m, r, j = p.m, p.r, p.j
     fastest = max(abs(v_h), abs(v_y), abs(v_k), r * max(abs(o_x), abs(o_y), abs(o_z)))
-    enough = TOLERANCE * max(math.sqrt(p.g * p.R), fastest)
+    enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
     still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
     rest = j / (1 + j)  # share of m that a tangential impulse feels at the contact point
     # Slip to come is added to what there is: half of that is the mean, which friction opposes where a contact slides
@@ -274,8 +291,7 @@ def _collided(at: At, in_A: bool, in_B: bool, dt: float, p: Constants) -> Solved
 @compiled
 def _case(in_A: bool, in_B: bool, s: Solved, p: Constants) -> int:
     """What the solution says of the contacts: open if it leaves with a velocity, rolling if nothing slides."""
-    v_h, v_y, v_k, o_x, o_y, o_z = s.new
-    still, A, B = ZERO_SLIP * math.sqrt(p.g * p.R), OPEN, OPEN
+    (v_h, v_y, v_k, o_x, o_y, o_z), still, A, B = s.new, ZERO_SLIP * math.sqrt(p.g * p.R), OPEN, OPEN
     if in_A and (s.P.A_y > 0 or v_y <= 0):
         A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
     if in_B and (s.P.B_x > 0 or v_h <= 0):

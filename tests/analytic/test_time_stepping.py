@@ -109,6 +109,25 @@ def test_finds_the_end_of_two_point_rolling_by_itself(side):
     assert run.cases[-1] is (Case.RR if side < 1 else Case.SS)
 
 
+@pytest.mark.parametrize(
+    ("omega_c", "given"),
+    [
+        ((-3.9, -3.4), {"r": 0.024, "j": 0.653, "mu": 0.5, "eta": 0.349, "c": 0.42, "omega_0": 59.6}),
+        ((5.0, 20.0), {"r": 0.00224, "j": 0.515, "mu": 0.208, "eta": 1.028, "c": 3.59, "omega_0": 41.0}),
+    ],
+)
+def test_a_step_in_which_friction_only_just_holds_the_ball(omega_c, given):
+    """Where rolling ends two solutions of Coulomb's law meet: a bisection comes as near to that as numbers go."""
+    p, dt, (rolls, slips) = P.replace(**given), 1e-3, omega_c
+    while abs(rolls - slips) > 4e-16 * abs(slips):
+        middle = (rolls + slips) / 2
+        rolling = State(omega_c=middle), 0.0, p, Flow.steady(p.omega_0), Settings(), np.array([0.0, dt])
+        ball, _, _, constants = prepared(*rolling)
+        after = step(ball, dt, p.omega_0, constants)
+        assert after.residual == 0
+        rolls, slips = (middle, slips) if after.case == Case.RR else (rolls, middle)
+
+
 ALL_NINE = [
     # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
     (12.0, State(0.022, 0.042, 33.0, 39.6, 8.5, 1.5, 0.034, 0.178), ["NN", "SN", "RN", "NS", "SS", "RS", "RR"]),
