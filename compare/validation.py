@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Outcome, Verdict
-from compare.claims.judge import judge, select
+from compare.claims.judge import forget, judge, select, verdict
 from compare.figures.drawing import Material
 from compare.measure import programme, record
 from compare.measure.lab import Lab, Level
@@ -21,7 +23,7 @@ from compare.report.results import Summary
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MUJOCO, Engine
 from compare.runs.progress import Show
-from compare.runs.workers import Workers
+from compare.runs.workers import Workers, processes
 from compare.scorecard import scores
 from model import Parameters, StorageError
 
@@ -94,16 +96,34 @@ def validate(
     return [verdicts[claim.id] for claim in chosen]
 
 
-def judge_stored(directory: str | Path, claims: Sequence[str] | None = None) -> list[Verdict]:
+def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, workers: int = 0) -> list[Verdict]:
     """Judge the measurements of the last validation in a directory again, and write summary and report anew.
 
-    Raises `StorageError` if a file is missing, damaged, or was changed; `InputError` for an unknown claim.
+    On so many processes; 0 is this one. Raises `StorageError` if a file is missing, damaged, or was changed;
+    `InputError` for an unknown claim.
     """
     directory = Path(directory)
     chosen = {claim.id for claim in select(CLAIMS, claims)}
     summary = results.load(directory)
+    summary.records(directory)  # what can't be read is said before anything is judged
+    forget()
+    _stored.cache_clear()
+    with processes(workers).start() as pool:  # the last claims first: they take longest
+        found = pool.map(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
+        verdicts = {claim.id: Verdict(claim=claim, **each) for claim, each in zip(CLAIMS[::-1], found, strict=True)}
     files = [directory / name for name in summary.measurements]
-    return [v for v in _write(directory, Level[summary.level], files, True, {}) if v.claim.id in chosen]
+    return [v for v in _write(directory, Level[summary.level], files, True, verdicts) if v.claim.id in chosen]
+
+
+def _judged(directory: Path, number: int) -> dict[str, Any]:
+    """What there is to say of a claim; claims themselves don't go from process to process."""
+    judged = verdict(CLAIMS[number], _stored(directory))
+    return {name: value for name, value in vars(judged).items() if name != "claim"}
+
+
+@cache
+def _stored(directory: Path) -> Records:
+    return results.load(directory).records(directory)
 
 
 def material(directory: Path, verdicts: Sequence[Verdict], records: Records) -> Material:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from compare.commands import options, running
@@ -57,7 +58,7 @@ def report(args: argparse.Namespace) -> int:
     """Judge the stored measurements anew and write the page."""
     from compare import validation  # here, because drawing takes a second to load
 
-    validation.judge_stored(args.directory)
+    validation.judge_stored(args.directory, workers=os.cpu_count() or 1)
     print(args.directory / results.REPORT)
     return 0
 

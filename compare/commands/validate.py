@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -34,6 +35,8 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "judge", judge, "judge the stored measurements of a validation again")
     command.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR")
+    number, processes = os.cpu_count() or 1, "processes of this machine (0: this one)"
+    command.add_argument("--workers", type=int, default=number, metavar="N", help=processes)
     _add_shared(command)
 
 
@@ -65,7 +68,7 @@ def judge(args: argparse.Namespace) -> int:
     """Judge what is stored."""
     from compare import validation  # here, because it loads everything there is
 
-    console, verdicts = Console(quiet=args.json), validation.judge_stored(args.output, args.claim)
+    console, verdicts = Console(quiet=args.json), validation.judge_stored(args.output, args.claim, args.workers)
     for verdict in verdicts:
         console.print(tables.line(verdict), soft_wrap=True)
     return _finish(verdicts, [v for v in verdicts if v.outcome is not Outcome.NOT_RUN], args, console)

@@ -207,7 +207,7 @@ def test_the_command_line(command: str, tmp_path: Path, counted: list[str], caps
     assert "of-round" in shown
     assert "it can't be done" in shown
     assert len(shown.splitlines()) < 12
-    again = ["judge", str(tmp_path)] if command == "judge" else validate
+    again = ["judge", str(tmp_path), "--workers", "0"] if command == "judge" else validate
     cli.main([*again, "--json"])
     verdicts = json.loads(capsys.readouterr().out)
     assert verdicts[0]["id"] == "of-round"
