@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         rows.append(row)
     data = {"engine": args.engine.name, "seed": args.seed, "sets": rows}
     if args.page:
-        write_text(args.page, f"# {args.page.stem.capitalize()}: what balls come to\n\n{_page(data)}")
+        write_text(args.page, page(args.page.stem.capitalize(), args.words, options.parameters(args), data))
     options.show(data, _table, args.json)
     return 0
 
@@ -132,9 +134,16 @@ def _table(data: dict[str, Any]) -> Table:
     return pages.table(f"What balls come to ({data['engine']})", _rows(data), caption=caption)
 
 
-def _page(data: dict[str, Any]) -> str:
-    """The same in Markdown, with the orbits of each branch."""
-    lines = [pages.markdown(_rows(data))]
+def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) -> str:
+    """The same in Markdown, with the parameters, the command that writes it and the orbits of each branch."""
+    values = (f"{f.metadata['symbol']} = {getattr(p, f.name):.5g} {f.metadata['unit']}" for f in p.quantities())
+    given = ", ".join(value.removesuffix(" 1") for value in values)
+    lines = [
+        f"# {title}: what balls come to",
+        "",
+        f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}.",
+    ]
+    lines += ["Written by", "", "```sh", shlex.join(words), "```", "", pages.markdown(_rows(data))]
     for branch in (branch for each in data["sets"] for branch in each["branches"]):
         name = branch["parameter"]
         lines += ["", f"## Followed in {name}", ""]

@@ -23,6 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = [re.sub(r"^-(?=\.?\d|inf|nan)", " -", word) for word in (sys.argv[1:] if argv is None else argv)]
     args = _parser(words).parse_args(words)
     try:
+        args.words = ["dualball", *(word.strip() for word in words)]  # a page says with what it was written
         return int(args.run(args))
     except InputError as error:
         print(f"dualball: error: {error}", file=sys.stderr)

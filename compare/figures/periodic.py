@@ -22,6 +22,8 @@ TOP, PERIOD = (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222
 LOW, HIGH = 0.9, 1.4
 """Flows shown, in units of omega_02."""
 COLOUR = "#7B3294"
+Offset = tuple[float, float]
+"""Of a name from its curve, in points."""
 
 
 def select(material: Material) -> Diagram:
@@ -56,8 +58,8 @@ def draw_branch(of: Diagram) -> Figure:
     p, edge = of.p, bifurcation.thresholds(of.p).omega_02
     figure = style.figure(9.0, 4.2)
     orbit, wall = figure.subplots(1, 2)
-    _diagram(orbit, p, lambda slip_x, omega_c: omega_c, (-5, -5))
-    _diagram(wall, p, functools.partial(spin, p), (-5, 5))
+    _diagram(orbit, p, lambda slip_x, omega_c: omega_c, (-5, -7), (-5, 7), (-5, 12))
+    _diagram(wall, p, functools.partial(spin, p), (-5, 7), (-60, -50), (-18, -80))
     orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * HIGH * edge))
     wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, p)))
     style.points(orbit, of.states)
@@ -65,8 +67,8 @@ def draw_branch(of: Diagram) -> Figure:
     return figure
 
 
-def _diagram(axes: Axes, p: Parameters, quantity: Quantity, offset: tuple[float, float]) -> None:
-    """The diagram of a quantity; the names of SS stand at an offset that is clear of the other curves."""
+def _diagram(axes: Axes, p: Parameters, quantity: Quantity, offset: Offset, riding: Offset, hopping: Offset) -> None:
+    """The diagram of a quantity; names stand at offsets that are clear of the curves: of SS, SR and NR, hopping."""
     edge = bifurcation.thresholds(p).omega_02
     carried, sinking = np.linspace(edge, HIGH * edge, 100), np.array([LOW, 1 - 1e-9]) * edge
     slipping(axes, p, quantity)
@@ -75,17 +77,17 @@ def _diagram(axes: Axes, p: Parameters, quantity: Quantity, offset: tuple[float,
         end = analytic.solution(fast, Case.SS, stable=stable).state
         style.name(axes, fast.omega_0, float(quantity(end.slip_x, end.omega_c)), text, offset, style.COLOURS[Case.SS])
     for case, x, text, place in (
-        (Case.NR, carried, "SR, NR", (0.6, (-5, 5))),
-        (Case.NS, sinking, "NS", (0.5, (-3, 7))),
+        (Case.NR, carried, "SR, NR", (0.6, riding)),
+        (Case.NS, sinking, "NS", (0.5, (-3, 9))),
     ):
         slip = np.asarray(spins(case, x, p)) - p.R / p.r * x
         style.curve(axes, case, x, quantity(slip, x), text, place)
-    _hops(axes, quantity)
+    _hops(axes, quantity, hopping)
     axes.set(xlim=(LOW * edge, HIGH * edge), xlabel=style.OMEGA_0)
     style.guides(axes, {"omega_02": edge})
 
 
-def _hops(axes: Axes, quantity: Quantity) -> None:
+def _hops(axes: Axes, quantity: Quantity, offset: Offset) -> None:
     """The periodic branch: mean, least and greatest of a quantity over a period."""
     branch = _branch()
     cycles = [quantity(orbit.cycle.slip_x, orbit.cycle.omega_c) for orbit in branch.orbits]
@@ -94,11 +96,11 @@ def _hops(axes: Axes, quantity: Quantity) -> None:
     axes.fill_between(branch.values, low, high, color=COLOUR, alpha=0.25, lw=0)
     for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
         axes.plot(branch.values, np.where(part, mean, np.nan), color=COLOUR, ls=line, lw=2)
-    style.name(axes, float(branch.values[-3]), float(mean[-3]), "hopping", (0, -8), COLOUR)
+    style.name(axes, float(branch.values[-3]), float(mean[-3]), "hopping", offset, COLOUR)
     for place in branch.places:
         if place.kind is orbit_branch.Bifurcation.BIRTH:
             at = float(quantity(place.orbit.mean[3], place.orbit.mean[2]))
-            style.mark(axes, place.value, at, "birth", (-6, -8))
+            style.mark(axes, place.value, at, "birth", (-10, -30))
 
 
 def caption_orbit(of: Diagram) -> str:

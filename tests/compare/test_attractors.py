@@ -31,6 +31,10 @@ def test_undecided_with_what_it_did_last(capsys: pytest.CaptureFixture[str], tmp
         (only,) = each["attractors"]
         assert only["kind"] == "undecided"
         assert only["low"]["omega_c"] <= only["mean"]["omega_c"] <= only["high"]["omega_c"]
+    head = page.read_text("utf-8").split("| omega_0", 1)[0]
+    assert "μ = 0.45554, η = 0.072543" in head
+    assert "ω₀ = 69.211 rad s-1" in head
+    assert f"dualball attractors {' '.join(given)} --json" in head
     rows = [line for line in page.read_text("utf-8").splitlines() if line.startswith("|")]
     assert len(rows) == 2 + 2
     assert len({row.replace("\\|", "").count("|") for row in rows}) == 1
