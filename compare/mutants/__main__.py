@@ -33,7 +33,7 @@ def main() -> int:
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    trials = [*(trial for level in levels for trial in level.trials), *measured]
+    trials = [*(trial for level in levels for trial in level.trials if trial.tried), *measured]
     missed, count = [each.what for each in trials if not each.noticed], len(trials)
     print(f"{count - len(missed)} of {count} faults were noticed")
     for what in missed:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from compare.measure.lab import Level
 from model import Case, Parameters
 
 Function = Callable[..., Any]
@@ -33,6 +34,8 @@ class WrongTheory:
     module: str
     function: str
     wrong: Fault
+    level: Level = Level.QUICK
+    """The least level whose measurements can show it."""
 
 
 @contextmanager
@@ -77,14 +80,19 @@ def given(change: Callable[[Parameters], Parameters]) -> Fault:
     return taking
 
 
-def in_case(case: Case, fault: Fault) -> Fault:
-    """The fault shows only where the first argument is this case."""
+def where(test: Callable[[Any], bool], fault: Fault) -> Fault:
+    """The fault shows only where the first argument passes a test."""
 
     def wrong(right: Function) -> Function:
         faulty = fault(right)
-        return lambda first, *rest, **named: (faulty if first is case else right)(first, *rest, **named)
+        return lambda first, *rest, **named: (faulty if test(first) else right)(first, *rest, **named)
 
     return wrong
+
+
+def in_case(case: Case, fault: Fault) -> Fault:
+    """The fault shows only where the first argument is this case."""
+    return where(lambda first: first is case, fault)
 
 
 def other(**factors: float) -> Callable[[Parameters], Parameters]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from analytic import bifurcation
+from analytic.orbit_branch import Place
+from compare.measure.lab import Level
 from compare.mutants.exchange import (
     Change,
     Fault,
@@ -22,6 +26,7 @@ from compare.mutants.exchange import (
     scaled,
     swapped,
     times,
+    where,
 )
 from model import Case, Flow, Parameters, State
 from model.drag import STOKES
@@ -64,6 +69,14 @@ def _fold_everywhere(curves: dict[str, Any]) -> dict[str, Any]:
     """A fold at omega_02 where there is none."""
     folds, instead = curves["omega_04"], 1.2 * np.nan_to_num(curves["omega_02"])
     return curves | {"omega_04": np.where(np.isnan(folds), instead, folds)}
+
+
+def _hopping(p: Parameters) -> bool:
+    return p == Parameters.named("hopping")
+
+
+def _late(places: Sequence[Place]) -> tuple[Place, ...]:
+    return tuple(replace(place, value=1.01 * place.value) for place in places)
 
 
 def _ramped(right: Function) -> Function:
@@ -198,8 +211,19 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "pulsation.mean_error": {"mean reading of a pulsation with 2 % more floor friction": given(other(mu=1.02))},
 }
 """By function of `analytic`, and what is wrong with it."""
+_FAULTS_OF_ATTRACTORS: dict[str, dict[str, Fault]] = {
+    "orbits.refine": {
+        "a swing with 0.1 % more floor friction": where(lambda p: p.mu > 1, given(other(mu=1.001))),
+        "Floquet multipliers of two periods": answer(fields(derivative=lambda derivative: derivative @ derivative)),
+    },
+    "bifurcation.thresholds": {"hopping begins 1 % late": where(_hopping, answer(fields(omega_02=times(1.01))))},
+    "orbit_branch.follow": {"hopping ends 1 % late": answer(fields(places=_late))},
+    "simulation.simulate": {"strong drag in minutes": where(lambda p: p.kappa > 2, given(other(c=1 / 60)))},
+}
+"""The same, of what is measured from the default level on."""
 THEORIES = tuple(
-    WrongTheory(what, f"analytic.{where.partition('.')[0]}", where.partition(".")[2], wrong)
-    for where, faults in _FAULTS.items()
+    WrongTheory(what, f"analytic.{module}", function, wrong, level)
+    for level, table in ((Level.QUICK, _FAULTS), (Level.DEFAULT, _FAULTS_OF_ATTRACTORS))
+    for (module, _, function), faults in ((name.partition("."), faults) for name, faults in table.items())
     for what, wrong in faults.items()
 )

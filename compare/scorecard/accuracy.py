@@ -5,6 +5,7 @@ Each function runs what it needs in a campaign and returns the rows of one table
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,7 +19,7 @@ from compare.scorecard.contenders import Contestant
 from compare.scorecard.standings import number
 from compare.scorecard.trials import APPROACH, AT_REST, HITTING, LANDING, SMOOTH, STATES, WINDOW, Stationary
 from mjsim import ContactSettings
-from model import Case, Contact, State
+from model import Case, Contact, Events, State, Trajectory
 
 STEPS = (4e-3, 1e-3)
 """Time steps of stationary states, s."""
@@ -29,6 +30,8 @@ OFF = 1.02
 """Start near a state, in units of its variables."""
 FINE = (4e-3, 2e-3, 1e-3, 4e-4, 2e-4, 1e-4)
 """Time steps of the transient, s; from the last three it is extrapolated."""
+
+KINDS = CLOSE, STICK = "close", "stick"
 
 
 def _at(step: float, settings: ContactSettings | None = None) -> Contestant:
@@ -81,18 +84,49 @@ def transient(campaign: Campaign, steps: Sequence[float] = FINE) -> Rows:
 
 
 def event_times(campaign: Campaign, steps: Sequence[float] = (1e-3, 5e-4, 2.5e-4, 1e-4)) -> Rows:
-    """Largest error of the times at which the case changes."""
-    rows = [["motion", "h", "changes", "largest error", "in steps"]]
+    """Largest error of the moments at which contacts close, and at which they stick, and orders from step to step."""
+    rows = [["motion", "h", *(name for kind in KINDS for name in (f"contacts {kind}", "order"))]]
     for motion in (LANDING, HITTING):
-        exact = motion.exact.events
+        exact, before = _moments(motion.exact.events), dict.fromkeys(KINDS, (math.nan, math.nan))
         runs = campaign.run([_at(step).task(motion.p, motion.x0, motion.lasts, step) for step in steps])
         for step, run in zip(steps, runs, strict=True):
-            cells = ["another sequence of cases", ""]
-            if run.events.to_case.tolist() == exact.to_case.tolist():
-                error = float(np.abs(run.events.time - exact.time).max())
-                cells = [f"{1e3 * error:.2g} ms", f"{error / step:.1f}"]
-            rows.append([motion.course, _milliseconds(step), str(len(exact)), *cells])
+            cells, seen = [], _moments(run.events)
+            for kind in KINDS:
+                these = [(at, time) for at, time in exact.items() if at[1] == kind]
+                error = max(abs(_located(run, *at, seen[at]) - time) if at in seen else math.inf for at, time in these)
+                order = math.log(before[kind][1] / error) / math.log(before[kind][0] / step)
+                cells += [f"{1e6 * error:.2g} µs", "" if math.isnan(order) else f"{order:.1f}"]
+                before[kind] = step, error
+            rows.append([motion.course, _milliseconds(step), *cells])
     return rows
+
+
+def _moments(events: Events) -> dict[tuple[str, str], float]:
+    """When contacts close and when they stick, by contact and kind, s; the last time of each."""
+    moments = {}
+    for time, *cases in zip(events.time.tolist(), events.from_case, events.to_case, strict=True):
+        for contact in "AB":
+            before, after = (getattr(Case(case), contact) for case in cases)
+            if before is Contact.N is not after:
+                moments[contact, CLOSE] = time
+            elif before is Contact.S and after is Contact.R:
+                moments[contact, STICK] = time
+    return moments
+
+
+def _located(run: Trajectory, contact: str, kind: str, time: float) -> float:
+    """When gap or slip speed vanishes, by the parabola through the three last samples before; a sample is a step.
+
+    The last steps of a sliding contact are left out in which the engine has it stick: those in which it is slower than
+    three times its change in a step.
+    """
+    gaps = {"A": run.y, "B": run.h}
+    values = gaps[contact] if kind == CLOSE else getattr(run, f"slip_speed_{contact}")
+    k = int(np.searchsorted(run.time, time)) - 1
+    while kind == STICK and values[k] < 3 * (values[k - 1] - values[k]):
+        k -= 1
+    parabola = np.polynomial.Polynomial.fit(run.time[k - 2 : k + 1], values[k - 2 : k + 1], 2)
+    return float(min(parabola.roots().real, key=lambda root: abs(root - time)))
 
 
 def force_split(campaign: Campaign, omegas: Sequence[float] = (6.0, 10.0, 13.0)) -> Rows:

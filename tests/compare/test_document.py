@@ -55,6 +55,15 @@ def test_the_transient_converges_and_is_extrapolated(tmp_path: Path) -> None:
     assert len(head) == len(last)
 
 
+def test_landings_are_located_to_second_order(tmp_path: Path) -> None:
+    with Campaign(tmp_path, workers=0) as campaign:
+        _, *rows = accuracy.event_times(campaign, (1e-3, 5e-4))
+    for (_, _, coarse, *_), (_, _, fine, order, *_) in zip(rows[::2], rows[1::2], strict=True):
+        coarse, fine = (float(cell.removesuffix(" µs")) for cell in (coarse, fine))
+        assert float(order) == pytest.approx(math.log2(coarse / fine), abs=0.05 + 0.1 / math.log(2))
+        assert float(order) > 1.8
+
+
 def test_states_are_reached_from_rest_and_from_near(tmp_path: Path) -> None:
     with Campaign(tmp_path, workers=0) as campaign:
         head, row = accuracy.reached(campaign, REACHED[:1], [4e-3])
