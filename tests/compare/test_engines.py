@@ -52,8 +52,8 @@ def task_of(name, p, x0, t_end, step, interval=None):
     return Task(engine=name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=interval or step)
 
 
-def run(*given):
-    (trajectory,) = carry_out([task_of(*given)])
+def run(*given, **more):
+    (trajectory,) = carry_out([task_of(*given, **more)])
     return trajectory
 
 
