@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
+SOURCES = ("compiling", "corner", "drag", "marching", "rigid_body", "stepping")
+"""Modules of this package that what is compiled is made of, its named tuples included."""
 
 try:
     import numba
@@ -20,8 +22,8 @@ except ImportError:
 else:
     # What is compiled is kept on disk. Of itself numba compiles a function again when its own file has changed; it
     # must also do so when one of those has that it calls.
-    _SOURCES = [path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py"))]
-    _STAMP = hashlib.sha256(b"".join(source for source in _SOURCES if b"compiled" in source)).hexdigest()
+    _CODE = b"".join(Path(__file__).with_name(f"{name}.py").read_bytes() for name in SOURCES)
+    _STAMP = hashlib.sha256(_CODE).hexdigest()
 
     def compiled(function: F) -> F:
         """The function, compiled at its first call; threads can run it at once."""

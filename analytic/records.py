@@ -14,8 +14,7 @@ from analytic import rigid_body
 from analytic.rigid_body import NOTHING, Forces
 from model import Case, Events, Header, Parameters, State, Trajectory
 from model.arrays import Array
-from model.kinematics import slip_speeds
-from model.trajectory import SAMPLE
+from model.trajectory import samples
 
 REPORT_EVERY = 1000
 """Steps after which a simulator notes how far it is, even if there is no sample to take."""
@@ -53,14 +52,9 @@ class Recorder:
         Shapes: time, theta (n,), states x (n, 8), forces (n, 6) in the order A_x … B_z, case (n,) or a single one;
         work is that of drag and contacts since the start (n,), J.
         """
-        block = np.empty(len(time), SAMPLE)
-        block["time"], block["theta"], block["case"] = time, theta, case
         state = State(*x.T)
-        for name, column in state._asdict().items():
-            block[name] = column
-        block["force_A"], block["force_B"] = forces[:, :3], forces[:, 3:]
-        block["slip_speed_A"], block["slip_speed_B"] = slip_speeds(x, self.p)
-        block["gap_A"], block["gap_B"] = state.y, state.h
+        block = samples(time, theta, state, self.p)
+        block["force_A"], block["force_B"], block["case"] = forces[:, :3], forces[:, 3:], case
         self._blocks.append(block)
         self.taken += len(block)
         self._balance(rigid_body.energy(state.y, rigid_body.velocities(state, self.p), self.p), work)

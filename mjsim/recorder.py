@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from model import Parameters, State
+from model import Parameters, State, trajectory
 from model.arrays import Array
-from model.kinematics import frame, rotated, slip_speeds
-from model.trajectory import SAMPLE
+from model.kinematics import frame, rotated
 
 NQ, NV, NSENSOR = 7, 6, 28
 """Sizes of the scene: (azimuth, inward, upward, quaternion), their velocities, two contact sensors."""
@@ -46,18 +45,13 @@ def samples(time: Array, raw: Array, p: Parameters) -> npt.NDArray[np.void]:
     qpos, qvel, sensors, lead = np.split(raw, [NQ, SENSORS, COLUMNS - 1], axis=1)
     axes = frame(qpos[:, 0])
     qpos = np.concatenate([qpos[:, :3] - lead * qvel[:, :3], qpos[:, 3:]], axis=1)
-    block = np.zeros(len(time), SAMPLE)
-    x = state(qpos, qvel, p)
-    block["time"], block["theta"] = time, qpos[:, 0]
-    for name, column in x._asdict().items():
-        block[name] = column
-    contacts = zip("AB", np.split(sensors, 2, axis=1), (x.y, x.h), slip_speeds(x.stacked(), p), strict=True)
-    for contact, sensor, distance, speed in contacts:
-        touches = sensor[:, _COUNT] > 0
+    block = trajectory.samples(time, qpos[:, 0], state(qpos, qvel, p), p)
+    for contact, sensor in zip("AB", np.split(sensors, 2, axis=1), strict=True):
+        gap, speed, touches = block[f"gap_{contact}"], block[f"slip_speed_{contact}"], sensor[:, _COUNT] > 0
         force, normal, tangent = sensor[:, _FORCE, None], sensor[:, _NORMAL], sensor[:, _TANGENT]
         in_world = force[:, 0] * normal + force[:, 1] * tangent + force[:, 2] * np.cross(normal, tangent)
         block[f"force_{contact}"] = np.einsum("nab,nb->na", axes, in_world)
         # Apart, the engine has no contact to report on: the coordinates say how far, and how fast.
-        block[f"gap_{contact}"] = np.where(touches, sensor[:, _DIST], distance)
-        block[f"slip_speed_{contact}"] = np.where(touches, np.hypot(*sensor[:, _SLIP].T), speed)
+        gap[touches] = sensor[touches, _DIST]
+        speed[touches] = np.hypot(*sensor[touches, _SLIP].T)
     return block

@@ -21,7 +21,7 @@ from model.arrays import Array
 from model.cases import Case
 from model.errors import InputError
 from model.flow import Flow
-from model.kinematics import VARIABLES, State
+from model.kinematics import VARIABLES, State, slip_speeds
 from model.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -61,10 +61,11 @@ def version(package: str) -> str:
 @functools.cache
 def current_commit() -> str:
     """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""
-    describe = ["git", "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"]
+    # Without locks: git leaves them in the checkout if it takes too long and is killed.
+    git = ["git", "--no-optional-locks", "describe", "--always", "--dirty=+", "--abbrev=40", "--exclude=*"]
     here = Path(__file__).resolve().parent
     try:
-        return subprocess.check_output(describe, cwd=here, stderr=subprocess.DEVNULL, text=True, timeout=10).strip()
+        return subprocess.check_output(git, cwd=here, stderr=subprocess.DEVNULL, text=True, timeout=10).strip()
     except (OSError, subprocess.SubprocessError):
         return ""
 
@@ -213,6 +214,20 @@ def event_name(column: str) -> str:
 
 SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in columns(Trajectory).items()])
 """One sample as a structured dtype; simulators yield blocks of these."""
+
+
+def samples(time: Array, theta: Array, x: State, p: Parameters) -> npt.NDArray[np.void]:
+    """Samples (n,) of dtype `SAMPLE` with gaps and slip speeds as the states say; forces and case are for the caller.
+
+    time, theta and the columns of x have shape (n,).
+    """
+    block = np.zeros(len(time), SAMPLE)
+    block["time"], block["theta"] = time, theta
+    for name, column in x._asdict().items():
+        block[name] = column
+    block["gap_A"], block["gap_B"] = x.y, x.h
+    block["slip_speed_A"], block["slip_speed_B"] = slip_speeds(x, p)
+    return block
 
 
 class SimulationError(RuntimeError):

@@ -29,9 +29,9 @@ from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
 from model import Flow, Header, Parameters, State, Trajectory
 from model.arrays import Array
-from model.kinematics import Motion, frame, from_world, slip_speeds, to_world
+from model.kinematics import Motion, frame, from_world, to_world
 from model.parameters import Range, check_number
-from model.trajectory import SAMPLE, current_versions
+from model.trajectory import current_versions, samples
 
 _HUGE = 1e8
 """A coordinate, velocity or force beyond this, in SI units, has diverged."""
@@ -191,14 +191,9 @@ class _Run:
 def _samples(time: Array, rows: Array, coordinates: Coordinates, p: Parameters) -> npt.NDArray[np.void]:
     """Samples of dtype `SAMPLE`, shape (n,), all but the case."""
     theta, place, velocity, *contacts = np.split(rows, [1, 4, 10, 15], axis=1)
-    x = coordinates.states(place, velocity, p)
     axes = frame(np.zeros(len(rows)) if coordinates.turning else theta[:, 0])
-    block = np.zeros(len(time), SAMPLE)
-    block["time"], block["theta"] = time, theta[:, 0]
-    for name, column in x._asdict().items():
-        block[name] = column
-    for name, own, distance, speed in zip("AB", contacts, (x.y, x.h), slip_speeds(x.stacked(), p), strict=True):
+    block = samples(time, theta[:, 0], coordinates.states(place, velocity, p), p)
+    for name, own in zip("AB", contacts, strict=True):
         block[f"force_{name}"] = np.einsum("nab,nb->na", axes, own[:, 1:4])
-        block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], distance)
-        block[f"slip_speed_{name}"] = speed
+        block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], block[f"gap_{name}"])
     return block
