@@ -16,6 +16,9 @@ LEAST_GAIN = 0.2
 """By how much one more point improves a polynomial at best, whatever the points before it seem to say."""
 SLOWEST_GAIN = 0.9
 """And at worst, where one improvement after the other goes the same way."""
+FAR = 10.0
+"""Distance of a maximum from the nearest point, over that of the farthest, beyond which it is none: the polynomials say
+nothing any more of what is there, and the round-off of a line has a maximum somewhere, too."""
 
 
 def vanishing(where: Array, order: Sequence[Measured]) -> Measured:
@@ -46,7 +49,7 @@ def turning(where: Array, order: Sequence[Measured]) -> Measured:
         scaled = values[:count] / np.abs(values).max()
         fit = np.polynomial.Polynomial.fit(scaled, where[:count], count - 1)
         roots = [root.real for root in fit.deriv().roots() if abs(root.imag) < 1e-9]
-        beyond = [root for root in roots if (root - scaled[0]) * (scaled[0] - scaled[-1]) > 0]
+        beyond = [root for root in roots if 0 < (root - scaled[0]) / (scaled[0] - scaled[-1]) < FAR]
         return float(fit(min(beyond, key=lambda root: abs(root - scaled[0])))) if beyond else math.nan
 
     return _converged(maximum, order)
