@@ -222,16 +222,19 @@ class Balls:
         """Set the damping of friction: in proportion to the number of steps, as far as contacts stay continuous.
 
         A contact that slides fast hovers with more than it needs. It bears the weight or, in an impact, a given `load`
-        (k,), m s-2.
+        (k,), m s-2. Slip is part of the load: what the damping takes from it, the margin of a closed contact gives.
         """
         self._alike &= load is None
         if self._alike:
             return
         times = np.broadcast_to(TICKS / self.ticks[runs], (2, len(runs)))
-        bears = np.maximum(self.g[runs] if load is None else load, _LEAST)
-        enough = _CONTINUOUS / np.maximum(self.hover(runs) / bears, _LEAST)
+        bears, hover = np.maximum(self.g[runs] if load is None else load, _LEAST), self.hover(runs)
+        enough = _CONTINUOUS / np.maximum(hover / bears, _LEAST)
         damping = np.where((times == 1) & (load is None), 1.0, np.minimum(enough, times))
-        self.engine.array("pair_solreffriction")[:4:2, runs] = self.settings.solreffriction / damping
+        reference = self.engine.array("pair_solreffriction")[:4:2]
+        less = (self.settings.solreffriction / reference[:, runs] - damping) * hover / self.stiffness[runs]
+        self.margins[:, runs] = np.maximum(self.margins[:, runs] + (self.loads[:, runs] > 0) * less, 0.0)
+        reference[:, runs] = self.settings.solreffriction / damping
         self.table[_MEMORY:_LAG, runs] = self._normal[_MEMORY:_LAG, runs] / damping
         if self.settings.friction_lag:
             self.table[_LAG:_HOVER, runs] = (self._normal[_LAG:_HOVER, runs] + 0.5) * times / damping - 0.5

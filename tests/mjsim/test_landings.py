@@ -61,6 +61,20 @@ def test_a_start_that_comes_down_on_the_floor_lands_at_once() -> None:
     assert np.max(speeds) < HOPS.g * settings.timestep * HOPS.omega_0 * settings.timestep
 
 
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_ball_that_slides_down_the_wall_lands_anywhere_in_a_step(share: float) -> None:
+    """Friction is damped less in short steps, which by itself takes a tenth of the load from the wall at this speed."""
+    p, x0, h = Parameters.named("reference"), [0.02, -0.2, 12.0, 30.0, -10.0, 20.0, 0.0, 0.0], 2.5e-4
+    landing = float(analytic.simulate(p, x0, 0.06, rtol=1e-12).events.time[0])
+    begin = landing - (2 + share) * h
+    start = analytic.simulate(p, x0, begin, sample_interval=begin, rtol=1e-12).x[-1]
+    exact = analytic.simulate(p, start, 4 * h, sample_interval=h, rtol=1e-12)
+    run = mjsim.simulate(p, start, 4 * h, settings=ContactSettings.at(h), sample_interval=h)
+    speeds = p.R * np.abs(run.omega_c - exact.omega_c), p.r * np.abs(run.x - exact.x)[:, 3:6]
+    # What forces of the size of the weight do in a step, times the angle by which they turn.
+    assert max(each.max() for each in speeds) < p.g * h * p.omega_0 * h
+
+
 @pytest.mark.parametrize("batched", [False, True])
 def test_a_run_taken_up_between_landings_gives_the_same_bits(tmp_path: Path, batched: bool) -> None:
     def run(journal: Journal | None) -> Run:
