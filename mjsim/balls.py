@@ -86,7 +86,7 @@ class Balls:
         self._outputs = array(_OUTPUTS[0]), self.sensors[NORMALS]
         self._latest = self._contact = tuple(lean(output) for output in self._outputs)
         self._written = self.last, self.qpos, self.margins, *self._driven
-        carried = ("qpos", "qvel", "qacc_warmstart", "pair_margin", "geom_surfacevel")
+        carried = ("qpos", "qvel", "qacc_warmstart", "pair_margin", "pair_solreffriction", "geom_surfacevel")
         self._carried = {name: array(name) for name in carried} | {"last": self.last}
 
     @property

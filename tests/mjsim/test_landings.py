@@ -10,8 +10,10 @@ import pytest
 
 import analytic
 import mjsim
-from mjsim import ContactSettings, Run
+from mjsim import ContactSettings, Run, scene
+from mjsim.balls import TICKS
 from mjsim.journal import Journal
+from mjsim.stepping import Polar
 from model import Flow, Parameters
 
 HOPS = Parameters(
@@ -88,6 +90,19 @@ def test_a_run_taken_up_between_landings_gives_the_same_bits(tmp_path: Path, bat
     list(islice(run(Journal(tmp_path, interval=0.0)), 2))
     again = np.concatenate([blocks[0] for blocks in run(Journal(tmp_path, interval=0.0))])
     np.testing.assert_array_equal(again, whole)
+
+
+def test_a_state_amid_short_steps_is_taken_up_to_the_bit() -> None:
+    settings, omega_0 = ContactSettings.for_problem(HOPS, 5e-4), np.array([HOPS.omega_0])
+    model, _ = scene.build(HOPS, settings)
+    one, other = (Polar([model], [HOPS], settings, [START], 0.0, omega_0) for _ in range(2))
+    while one.state()["ticks"][0] == TICKS:
+        one.advance([omega_0])
+    other.restore(one.state())
+    for polar in (one, other):
+        polar.advance([omega_0] * 5)
+    for name, values in one.state().items():
+        np.testing.assert_array_equal(other.state()[name], values, err_msg=name)
 
 
 def test_landings_do_not_depend_on_those_of_others_in_a_batch() -> None:
