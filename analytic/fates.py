@@ -162,7 +162,7 @@ def settle(
             seen = [*seen[-1:], now]
     except SimulationError as error:
         return Fate(Kind.UNDECIDED, error.trajectory, failure=str(error))
-    return _aperiodic(seen[-1]) if len(seen) == 2 and _alike(*seen) else Fate(Kind.UNDECIDED, seen[-1])
+    return _aperiodic(seen[-1], run) if len(seen) == 2 and _alike(*seen) else Fate(Kind.UNDECIDED, seen[-1])
 
 
 def _decided(
@@ -247,17 +247,19 @@ def _state(last: Trajectory) -> Array:
     return np.where([name in held for name in VARIABLES], 0.0, last.x[k])
 
 
-def _aperiodic(last: Trajectory) -> Fate:
+def _aperiodic(last: Trajectory, run: Run) -> Fate:
     """A recurrent motion that no stable orbit is found for."""
     p, unit = last.header.parameters, natural_units(last.header.parameters)[0]
     try:
-        exponent, error = lyapunov(p, _state(last), GROWING * unit, unit)
+        exponent, error = lyapunov(p, _state(last), GROWING * unit, unit, run=run)
     except (SimulationError, InputError) as reason:
         return Fate(Kind.UNDECIDED, last, failure=str(reason))
     return Fate(Kind.CHAOTIC if exponent > 3 * error else Kind.QUASI_PERIODIC, last, exponent=exponent)
 
 
-def lyapunov(p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, seed: int = 0) -> tuple[float, float]:
+def lyapunov(
+    p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, seed: int = 0, run: Run = event_driven
+) -> tuple[float, float]:
     """Largest Lyapunov exponent of the motion from x over a duration, and its standard error, s-1.
 
     A second motion starts beside the first, a distance `APART` away in natural units, and is brought back to that
@@ -265,15 +267,15 @@ def lyapunov(p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, s
     (Benettin's method). The error is that of the mean of ten parts of the duration.
     """
     first = full_state(x)
-    case = event_driven(p, first, renewed, renewed).cases[0]
+    case = run(p, first, renewed, renewed).cases[0]
     active = [VARIABLES.index(name) for name in TRAITS[case].active]
     push = np.zeros(8)
     push[active] = np.random.default_rng(seed).normal(size=len(active))
     second = first + push * scale(p) * APART / np.linalg.norm(push)
     growth, before = [], APART
     for _ in range(math.ceil(duration / renewed)):
-        runs = [event_driven(p, each, renewed, renewed) for each in (first, second)]
-        first, second = (run.x[-1] for run in runs)
+        runs = [run(p, each, renewed, renewed) for each in (first, second)]
+        first, second = (each.x[-1] for each in runs)
         apart = second - first
         distance = float(np.linalg.norm(apart / scale(p)))
         if distance == 0:

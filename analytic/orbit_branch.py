@@ -52,7 +52,7 @@ class Bifurcation(StrEnum):
     BIRTH = "nonsmooth birth"
     """It shrinks to a stationary motion at which cases meet: its extent falls linearly, not like a root."""
     LOST = "lost"
-    """No orbit is found any further."""
+    """It isn't followed any further, for a reason that is given."""
     RANGE = "end of the range"
 
 
@@ -135,11 +135,11 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
         if there is None:
             yield Place(Bifurcation.LOST, getattr(here.p, name), here, reason)
             return
+        met = _between(here, there, step * along, name, matrix)
+        yield from (place for place in met if span[0] <= place.value <= span[1])
         if not span[0] <= getattr(there.p, name) <= span[1]:
-            there = _at_edge(here, there, name, span)
-            yield from (there, Place(Bifurcation.RANGE, getattr(there.p, name), there)) if there else ()
+            yield from _edge(here, there, name, span)
             return
-        yield from _between(here, there, step * along, name, matrix)
         yield there
         step = min(LONGEST, 1.5 * step if there.steps <= EASY else 0.7 * step)
         here, along = _renewed(there, along)
@@ -171,15 +171,18 @@ def _renewed(orbit: Orbit, along: Array) -> tuple[Orbit, Array]:
     return fresh, np.append(np.zeros(len(fresh.loop.free)), along[-1])
 
 
-def _at_edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) -> Orbit | None:
-    """The orbit where the branch leaves a range, from those on both sides; None if there is none."""
-    value = min(max(getattr(there.p, name), span[0]), span[1])
-    for orbit in (there, here):
-        try:
-            return close(replace(orbit.loop, p=orbit.p.replace(**{name: value})))
-        except NoOrbitError:
-            continue
-    return None
+def _edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) -> Iterator[Orbit | Place]:
+    """The orbit where the branch leaves a range, between the last within it and the first outside."""
+    inside, outside = getattr(here.p, name), getattr(there.p, name)
+    value = min(max(outside, span[0]), span[1])
+    share = (value - inside) / (outside - inside)
+    x, period = (a + share * (b - a) for a, b in ((here.loop.x, there.loop.x), (here.period, there.period)))
+    try:
+        orbit = close(replace(here.loop, p=here.p.replace(**{name: value}), x=x, period=period))
+    except NoOrbitError as error:
+        yield Place(Bifurcation.LOST, inside, here, str(error))
+    else:
+        yield from (orbit, Place(Bifurcation.RANGE, value, orbit))
 
 
 def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:

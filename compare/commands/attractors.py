@@ -15,6 +15,7 @@ from rich.table import Table
 import analytic
 from analytic import orbit_branch
 from analytic.fates import LASTING, Attractor
+from analytic.orbits import Orbit
 from compare import pages
 from compare.commands import options, running
 from compare.runs.engines import EVENT
@@ -101,9 +102,10 @@ def attractor_data(of: Attractor) -> dict[str, Any]:
 
 
 def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
-    """A branch as JSON-able data, SI."""
-    orbits = [
-        {
+    """A branch as JSON-able data, SI; each place with the orbit there or nearest to it."""
+
+    def data(orbit: Orbit) -> dict[str, Any]:
+        return {
             branch.name: getattr(orbit.p, branch.name),
             "period": orbit.period,
             "omega_c": float(orbit.mean[VARIABLES.index("omega_c")]),
@@ -112,10 +114,12 @@ def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
             "multipliers": [[v.real, v.imag] for v in orbit.multipliers],
             "x": orbit.loop.x.tolist(),
         }
-        for orbit in branch.orbits
+
+    places = [
+        {"kind": place.kind.value, "value": place.value, "reason": place.reason, "orbit": data(place.orbit)}
+        for place in branch.places
     ]
-    places = [{"kind": place.kind.value, "value": place.value, "reason": place.reason} for place in branch.places]
-    return {"parameter": branch.name, "places": places, "orbits": orbits}
+    return {"parameter": branch.name, "places": places, "orbits": list(map(data, branch.orbits))}
 
 
 _COLUMNS = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
@@ -141,13 +145,14 @@ def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) 
     lines = [
         f"# {title}: what balls come to",
         "",
-        f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}.",
+        f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by",
+        "",
     ]
-    lines += ["Written by", "", "```sh", shlex.join(words), "```", "", pages.markdown(_rows(data))]
+    lines += ["```sh", shlex.join(words), "```", "", pages.markdown(_rows(data))]
     for branch in (branch for each in data["sets"] for branch in each["branches"]):
         name = branch["parameter"]
         lines += ["", f"## Followed in {name}", ""]
-        lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}" for p in branch["places"]), ""]
+        lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}".rstrip() for p in branch["places"]), ""]
         rows = [[name, "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"]]
         for orbit in branch["orbits"]:
             numbers = orbit[name], orbit["period"], orbit["omega_c"], 1e3 * orbit["height"], _largest(orbit)

@@ -1,8 +1,15 @@
-"""Beyond the paper: the ball that hops for ever, and Figs. 9, 10 and 13 with the branch of such motions."""
+"""Beyond the paper: the ball that hops for ever, and Figs. 9, 10 and 13 with the branch of such motions.
+
+The branch along rougher walls takes a quarter of an hour; it is kept in `compare.runs`, as the command in
+docs/attractors/walls.md gives it.
+"""
 
 from __future__ import annotations
 
 import functools
+from importlib import resources
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +22,7 @@ from compare.figures import style
 from compare.figures.bifurcation_diagrams import Quantity, lifted, slipping, spin, spins
 from compare.figures.drawing import Diagram, Material
 from model import Case, Parameters
+from model.files import reading_json
 
 SET = Parameters.named("hopping")
 TOP, PERIOD = (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222
@@ -128,3 +136,52 @@ def draw_orbit(of: Diagram) -> Figure:
     axes[0].set_ylabel("y (mm)")
     style.legend(axes[0], loc="lower right", markerscale=4)
     return figure
+
+
+def walls() -> dict[str, Any]:
+    """The kept branch of hops over the friction of the wall."""
+    path = Path(str(resources.files("compare.runs"))) / "hopping-walls.json"
+    with reading_json(path, "branch") as data:
+        branch: dict[str, Any] = data["sets"][0]["branches"][0]
+        return branch
+
+
+def select_walls(material: Material) -> Diagram:
+    """The measured end of hopping."""
+    return Diagram("hopping-walls", SET, tuple(material.select("orbit_death")))
+
+
+def draw_walls(of: Diagram) -> Figure:
+    """Height and mean omega_c of the hops over the friction of the wall."""
+    branch = walls()
+    orbits, ends = branch["orbits"], [place for place in branch["places"] if place["kind"] != "lost"]
+    figure = style.figure(9.0, 3.8)
+    shown = {"height": ("height of the hops (mm)", 1e3), "omega_c": ("mean " + style.OMEGA_C, 1.0)}
+    for axes, (quantity, (label, unit)) in zip(figure.subplots(1, 2), shown.items(), strict=True):
+        for rows, line in ((orbits, style.UNSTABLE), ([row for row in orbits if row["stable"]], style.STABLE)):
+            axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=COLOUR, ls=line, lw=2)
+        for place in ends:
+            at = place["value"], unit * place["orbit"][quantity]
+            axes.plot(*at, **style.POINT)
+            if place["kind"] in _NAMED:
+                style.name(axes, *at, *_NAMED[place["kind"]])
+        for m in of.states:
+            low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
+            axes.axvspan(low, high, color=style.mark_of(m.engine)["color"], alpha=0.4, label=f"{m.engine}: hops end")
+        axes.set(xlabel="η", ylabel=label)
+        axes.margins(x=0.12)
+    style.legend(figure.axes[0], loc="upper left")
+    return figure
+
+
+_NAMED = {"torus": ("torus", (8.0, 4.0)), "fold": ("fold", (8.0, 4.0)), "nonsmooth birth": ("birth", (-8.0, 5.0))}
+"""Names of places, and where they stand, in points."""
+
+
+def caption_walls(of: Diagram) -> str:
+    """What happens along the branch."""
+    places = "; ".join(f"{place['kind']} at η = {place['value']:.4g}" for place in walls()["places"])
+    mark = " Shaded: the wall from which hops don't last, as measured." if of.states else ""
+    groups = style.named(of.p, "mu", "j", "kappa", "omega_0")
+    what = f"Height and mean ω_c of the hopping ball over the friction of the wall: {places}"
+    return f"{what}. {groups} rad/s. Dashed: unstable.{mark}"

@@ -84,6 +84,13 @@ FIGURES: dict[str, Drawing] = {
         periodic.caption_branch,
         ("hopping-birth",),
     ),
+    "hopping-walls": Drawing(
+        "Beyond the paper: hops along rougher walls",
+        periodic.select_walls,
+        periodic.draw_walls,
+        periodic.caption_walls,
+        ("hopping-death",),
+    ),
     "hopping": Drawing(
         "Beyond the paper: where the ball hops for ever",
         hopping.where,

@@ -1,11 +1,16 @@
 """What motions come to, from many starts."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from analytic import attractors, ensemble, fates, orbits, stable_solutions
-from analytic.fates import Kind
-from model import InputError, Parameters
+from analytic.fates import Kind, Run
+from model import Case, Events, Flow, Header, InputError, Parameters, Trajectory
+from model.arrays import Array
+from model.trajectory import SAMPLE
 
 HOPPING = Parameters.named("hopping")
 HOPS, SLIPS, RIDES = (6.37e-3, 0, 57.3, -106.2, 0, 0), (0, 0, 20, 0, 0, 0), (0.03, 0, 69, -100, 0, 0)
@@ -70,3 +75,47 @@ def test_lyapunov_exponent_of_an_orbit_is_zero() -> None:
     # The first of the ten parts has the decay of what lies across, with the modulus of the largest multiplier.
     decay = -np.log(np.abs(hop.multipliers[0])) / hop.period
     assert abs(exponent) <= 3 * error + 0.1 * decay
+
+
+def torus(time: float, z: Array) -> Array:
+    """Two harmonic oscillators whose frequencies are in the golden ratio."""
+    return 3 * np.array([-z[1], z[0], -(1 + 5**0.5) / 2 * z[3], (1 + 5**0.5) / 2 * z[2]])
+
+
+def lorenz(time: float, z: Array) -> Array:
+    """Lorenz's equations, five times as fast, in a tenth of their variables; the largest exponent is 5 times 0.906."""
+    _, x, y, w = z
+    return 5 * np.array([0.0, 10 * (y - x), x * (28 - 10 * w) - y, 10 * x * y - 8 / 3 * w])
+
+
+def slipping_by(rates: Callable[[float, Array], Array]) -> Run:
+    """A simulator of a ball that slips at both points, with omega_c and slips of these rates in natural units."""
+
+    def run(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
+        size, unit = orbits.scale(p)[2:6], (p.R / p.g) ** 0.5
+        time = np.arange(round(duration / interval) + 1) * interval
+        z = solve_ivp(rates, (0, time[-1] / unit), x0[2:6] / size, "DOP853", time / unit, rtol=1e-10, atol=1e-12).y
+        block = np.zeros(len(time), SAMPLE)
+        block["time"], block["case"] = time, Case.SS
+        for name, values in zip(("omega_c", "slip_x", "slip_y", "slip_z"), size[:, None] * z, strict=True):
+            block[name] = values
+        return Trajectory.from_blocks(Header("made up", p, Flow.steady(p.omega_0)), [block], Events())
+
+    return run
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rates", "kind", "exponent"), [(torus, Kind.QUASI_PERIODIC, 0.0), (lorenz, Kind.CHAOTIC, 5 * 0.906)]
+)
+def test_recurrent_motions_that_do_not_close(
+    rates: Callable[[float, Array], Array], kind: Kind, exponent: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Flows whose largest Lyapunov exponents are known."""
+    monkeypatch.setattr(fates, "GROWING", 100.0)
+    unit = (HOPPING.R / HOPPING.g) ** 0.5
+    start = np.concatenate([[0, 0], np.array([0.5, 1.0, 1.0, 2.0]) * orbits.scale(HOPPING)[2:6]])
+    (only,) = attractors(HOPPING, start, lasting=3 * fates.WINDOW * unit, run=slipping_by(rates))
+    assert only.fate.kind is kind
+    # The growth in a turn of a tenth of a unit scatters by about itself: over 100 units its mean by some 3 %.
+    assert only.fate.exponent * unit == pytest.approx(exponent, rel=0.1, abs=1e-6)

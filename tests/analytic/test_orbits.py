@@ -73,6 +73,14 @@ def test_a_branch_ends_at_the_range(hop: Orbit) -> None:
     assert np.all(np.diff([orbit.cycle.y.max() for orbit in branch.orbits]) > 0)
 
 
+def test_a_branch_says_where_it_is_given_up(hop: Orbit) -> None:
+    """One orbit further each way, far from the ends of the range."""
+    branch = orbit_branch.follow(hop, "omega_0", 40.0, 100.0, most=1)
+    assert [place.kind for place in branch.places] == [Bifurcation.LOST] * 2
+    assert [place.value for place in branch.places] == branch.values[[0, -1]].tolist()
+    assert all("not followed beyond 1 orbits" in str(place) for place in branch.places)
+
+
 @pytest.mark.slow
 def test_hopping_is_born_where_the_wall_begins_to_carry() -> None:
     """Down in omega_0 the hops become ever lower and vanish at omega_02; the multipliers don't tell of it."""
