@@ -1,6 +1,6 @@
 """Beyond the paper: the ball that hops for ever, and Figs. 9, 10 and 13 with the branch of such motions.
 
-The branch along rougher walls takes a quarter of an hour; it is kept in `compare.runs`, as the command in
+The branch along rougher walls takes minutes; it is kept in `compare.runs`, as the command in
 docs/attractors/walls.md gives it.
 """
 
@@ -154,17 +154,21 @@ def select_walls(material: Material) -> Diagram:
 def draw_walls(of: Diagram) -> Figure:
     """Height and mean omega_c of the hops over the friction of the wall."""
     branch = walls()
-    orbits, ends = branch["orbits"], [place for place in branch["places"] if place["kind"] != "lost"]
+    orbits, places = branch["orbits"], branch["places"]
+    for k, beside in ((0, orbits[:2]), (-1, orbits[:-3:-1])):  # hops of no height are none: both ends are extrapolated
+        if places[k]["kind"] == "nonsmooth birth":
+            end = places[k]["orbit"] = _at(places[k]["value"], *beside)
+            orbits.insert(len(orbits) if k else 0, end)
     figure = style.figure(9.0, 3.8)
     shown = {"height": ("height of the hops (mm)", 1e3), "omega_c": ("mean " + style.OMEGA_C, 1.0)}
     for axes, (quantity, (label, unit)) in zip(figure.subplots(1, 2), shown.items(), strict=True):
         for rows, line in ((orbits, style.UNSTABLE), ([row for row in orbits if row["stable"]], style.STABLE)):
             axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=COLOUR, ls=line, lw=2)
-        for place in ends:
-            at = place["value"], unit * place["orbit"][quantity]
-            axes.plot(*at, **style.POINT)
-            if place["kind"] in _NAMED:
-                style.name(axes, *at, *_NAMED[place["kind"]])
+        for place in places:
+            axes.plot(place["value"], unit * place["orbit"][quantity], **style.POINT)
+        for kind, (name, offset) in _NAMED.items():
+            place = next(place for place in places if place["kind"] == kind)
+            style.name(axes, place["value"], unit * place["orbit"][quantity], name, offset)
         for m in of.states:
             low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
             axes.axvspan(low, high, color=style.mark_of(m.engine)["color"], alpha=0.4, label=f"{m.engine}: hops end")
@@ -172,6 +176,13 @@ def draw_walls(of: Diagram) -> Figure:
         axes.margins(x=0.12)
     style.legend(figure.axes[0], loc="upper left")
     return figure
+
+
+def _at(eta: float, one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+    """Where the line through two orbits is at another wall."""
+    share = (eta - one["eta"]) / (other["eta"] - one["eta"])
+    quantities = {name: one[name] + share * (other[name] - one[name]) for name in ("height", "omega_c")}
+    return {"eta": eta, "stable": one["stable"], **quantities}
 
 
 _NAMED = {"torus": ("torus", (8.0, 4.0)), "fold": ("fold", (8.0, 4.0)), "nonsmooth birth": ("birth", (-8.0, 5.0))}
