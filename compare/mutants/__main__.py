@@ -15,17 +15,17 @@ from model.files import write_text
 def main() -> int:
     """Return 0 if enough faults were noticed, 1 if not, 2 where there is nothing to judge."""
     parser = argparse.ArgumentParser(prog="python -m compare.mutants", description=trial.__doc__)
-    results = "results of 'dualball validate'; those of a second one are judged until a claim notices the theory"
+    results = "results of 'dualball validate'; a theory is judged on them until a claim notices it, the quickest first"
     parser.add_argument("directories", type=Path, nargs="+", metavar="DIR", help=results)
     parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
-    page = "page to write; else a theory is judged until a claim notices it"
-    parser.add_argument("--page", type=Path, metavar="FILE", help=page)
+    parser.add_argument("--whole", action="store_true", help="judge by all claims on the first of them: takes an hour")
+    parser.add_argument("--page", type=Path, metavar="FILE", help="page to write")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     parser.add_argument("--least", type=float, default=1.0, metavar="SHARE", help="to be noticed (default 1: all)")
     args = parser.parse_args()
     try:
         first, *others = args.directories
-        levels = [trial.judged(first, args.workers, whole=bool(args.page))]
+        levels = [trial.judged(first, args.workers, whole=args.whole)]
         levels += [trial.judged(each, args.workers, whole=False) for each in others]
         measured = trial.wrong_engines(first, args.workers) if args.engines else []
         if args.page:

@@ -41,7 +41,7 @@ _PAGE = """\
 # What the verdicts notice
 
 Every verdict must be able to be lost. Here the theory is replaced by slightly wrong ones, one at a time,
-and stored measurements are judged again: those of the {first} level by all claims{others}. Then MuJoCo is
+and stored measurements are judged again: {levels}. Then MuJoCo is
 replaced by slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim changes.
 Written by `make mutants`.
 {trials}
@@ -96,6 +96,13 @@ class Judged:
     """Of all wrong theories."""
     power: Mapping[str, Sequence[Resolved]]
     """By quantity what its checks resolve, the coarsest first."""
+    whole: bool = True
+    """Whether by all claims, or by the quickest ones first and only until one notices."""
+
+    @property
+    def how(self) -> str:
+        """How it was judged."""
+        return f"those of the {self.name} level by {'all claims' if self.whole else 'the quickest claim that notices'}"
 
 
 def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
@@ -109,7 +116,8 @@ def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
             for check in each.checks:
                 power[check.measurement.quantity].append((check.resolves, check.measurement.set, each.claim.id))
     tried = _tried(functools.partial(_theory, directory, whole), len(THEORIES), workers)
-    return Judged(results.load(directory).level.lower(), tried, {q: sorted(rows)[::-1] for q, rows in power.items()})
+    name, coarsest_first = results.load(directory).level.lower(), {q: sorted(rows)[::-1] for q, rows in power.items()}
+    return Judged(name, tried, coarsest_first, whole)
 
 
 def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
@@ -136,10 +144,9 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial]) -> str:
             cells = [_power([each[0] for each in level.power.get(name, ())], quantity.resolves) for level in levels]
             where = "{1}, {2}".format(*levels[-1].power[name][0])
             rows.append([quantity.symbol, f"{quantity.resolves:.1g}", *itertools.chain(*cells), where])
-    others = "".join(f", those of the {level.name} level until a claim notices" for level in levels[1:])
     tables = _table("theories", {level.name: level.trials for level in levels})
     tables += _table("engines", {"quick": measured}) if measured else ""
-    return _PAGE.format(first=levels[0].name, others=others, trials=tables, powers=pages.markdown(rows))
+    return _PAGE.format(levels=", ".join(level.how for level in levels), trials=tables, powers=pages.markdown(rows))
 
 
 def _power(values: Sequence[float], ceiling: float) -> tuple[str, ...]:
