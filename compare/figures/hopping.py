@@ -43,14 +43,14 @@ def draw_where(record: Searched) -> Figure:
         tried, *_ = np.histogram2d(points[a], points[b], edges)
         hopping, *_ = np.histogram2d([r[a] for r in rows], [r[b] for r in rows], edges)
         with np.errstate(invalid="ignore"):
-            share = axes.pcolormesh(*edges, 100 * (hopping / tried).T, cmap="Blues", vmin=0, zorder=0)
+            ground = 100 * (hopping / tried).T
+        share = axes.pcolormesh(*edges, ground, cmap="Blues", vmin=0, zorder=0, rasterized=True)
         figure.colorbar(share, ax=axes, label="sets that hop, %")
         for simple, mark, colour in ((True, ".", "#D55E00"), (False, "^", "#000000")):
             own = [r for r in rows if (r["confirmed"]["landings"] == 1) is simple]
             label = "one landing a period" if simple else "several, or no period"
-            axes.plot(
-                [r[a] for r in own], [r[b] for r in own], mark, ms=2.2, mew=0.5, mfc="none", color=colour, label=label
-            )
+            look: dict[str, Any] = {"ms": 2.2, "mew": 0.5, "mfc": "none", "color": colour, "rasterized": True}
+            axes.plot([r[a] for r in own], [r[b] for r in own], mark, label=label, **look)
         x, y = ("log" if name in LOGARITHMIC else "linear" for name in (a, b))
         axes.set(xlabel=_AXES[a], ylabel=_AXES[b], xscale=x, yscale=y)
     style.legend(figure.axes[0], loc="upper left", fontsize=7.5, markerscale=2)
