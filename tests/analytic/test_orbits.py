@@ -116,7 +116,7 @@ def test_a_torus_bifurcation_and_a_fold(hop: Orbit) -> None:
     torus = branch.places[kinds.index(Bifurcation.TORUS)]
     assert np.abs(torus.orbit.multipliers[:2]) == pytest.approx(1.0, abs=1e-5)
     fold = branch.places[kinds.index(Bifurcation.FOLD)]
-    assert branch.values.max() == pytest.approx(fold.value, rel=1e-3)
+    assert branch.values.max() <= fold.value == pytest.approx(branch.values.max(), rel=1e-2)
 
 
 def test_no_orbit_and_bad_input(hop: Orbit) -> None:
