@@ -41,8 +41,9 @@ _PAGE = """\
 # What the verdicts notice
 
 Every verdict must be able to be lost. Here the theory is replaced by slightly wrong ones, one at a time,
-and stored measurements are judged again: {levels}. Then MuJoCo is
-replaced by slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim changes.
+and measurements stored at the levels {levels} are judged again{until}.
+Then MuJoCo is replaced by slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim
+changes.
 Written by `make mutants`.
 {trials}
 ## Resolving power
@@ -99,11 +100,6 @@ class Judged:
     whole: bool = True
     """Whether by all claims, or by the quickest ones first and only until one notices."""
 
-    @property
-    def how(self) -> str:
-        """How it was judged."""
-        return f"those of the {self.name} level by {'all claims' if self.whole else 'the quickest claim that notices'}"
-
 
 def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
     """Every wrong theory judged on the measurements stored in a results directory, and their resolving power.
@@ -146,7 +142,11 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial]) -> str:
             rows.append([quantity.symbol, f"{quantity.resolves:.1g}", *itertools.chain(*cells), where])
     tables = _table("theories", {level.name: level.trials for level in levels})
     tables += _table("engines", {"quick": measured}) if measured else ""
-    return _PAGE.format(levels=", ".join(level.how for level in levels), trials=tables, powers=pages.markdown(rows))
+    names, partly = (
+        " and ".join(level.name for level in each) for each in (levels, [e for e in levels if not e.whole])
+    )
+    until = f" (at {partly} until a claim notices it, the quickest first)" if partly else ""
+    return _PAGE.format(levels=names, until=until, trials=tables, powers=pages.markdown(rows))
 
 
 def _power(values: Sequence[float], ceiling: float) -> tuple[str, ...]:
