@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
@@ -16,7 +17,8 @@ from model import SimulationError
 from tests.random_motions import random_start
 
 SETS = int(os.environ.get("DUALBALL_SETS", "250"))
-DURATION, STEP = 2.0, 5e-4
+DURATION, STEP = 2.0, 1.25e-4
+"""s; with 0.5 ms five sets differ, three of them (117, 135, 225) by what that step is in error."""
 AGREE = 0.005
 """Difference of omega_c at the end, in units of omega_0, up to which simulators agree."""
 BY_CHANCE = 2
@@ -32,6 +34,7 @@ def ends(seed):
         "mujoco": partial(mjsim.simulate, settings=ContactSettings.for_problem(p, STEP)),
     }
     values, wrong = {}, []
+    warnings.simplefilter("ignore", UserWarning)  # of contacts that chatter: what comes of it is to be seen
     for name, simulate in simulators.items():
         try:
             values[name] = float(simulate(p, x0, DURATION, sample_interval=DURATION / 100).omega_c[-1]) / p.omega_0
