@@ -92,7 +92,7 @@ def validate(
             campaign.doing = "ladder of settings, error against cost"
             scores.write(campaign, output)
     files = [path for name, where in kept.items() if (path := where / f"{name}.h5").exists()]
-    _write(output, level, files, report, verdicts)
+    _write(output, level, files, sum(map(record.load, files), Records()), report, verdicts)
     return [verdicts[claim.id] for claim in chosen]
 
 
@@ -105,24 +105,26 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
     directory = Path(directory)
     chosen = {claim.id for claim in select(CLAIMS, claims)}
     summary = results.load(directory)
-    summary.records(directory)  # what can't be read is said before anything is judged
+    stored.cache_clear()
     forget()
-    _stored.cache_clear()
+    records = stored(directory)  # what can't be read is said before anything is judged
     with processes(workers).start() as pool:  # the last claims first: they take longest
         found = pool.map(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
         verdicts = {claim.id: Verdict(claim=claim, **each) for claim, each in zip(CLAIMS[::-1], found, strict=True)}
     files = [directory / name for name in summary.measurements]
-    return [v for v in _write(directory, Level[summary.level], files, True, verdicts) if v.claim.id in chosen]
+    written = _write(directory, Level[summary.level], files, records, True, verdicts)
+    return [v for v in written if v.claim.id in chosen]
 
 
 def _judged(directory: Path, number: int) -> dict[str, Any]:
     """What there is to say of a claim; claims themselves don't go from process to process."""
-    judged = verdict(CLAIMS[number], _stored(directory))
+    judged = verdict(CLAIMS[number], stored(directory))
     return {name: value for name, value in vars(judged).items() if name != "claim"}
 
 
 @cache
-def _stored(directory: Path) -> Records:
+def stored(directory: Path) -> Records:
+    """The measurements of the last validation in a directory, read once in a process."""
     return results.load(directory).records(directory)
 
 
@@ -140,10 +142,14 @@ def stored_material(directory: Path) -> Material:
 
 
 def _write(
-    directory: Path, level: Level, files: Sequence[Path], report: bool, known: Mapping[str, Verdict]
+    directory: Path,
+    level: Level,
+    files: Sequence[Path],
+    records: Records,
+    report: bool,
+    known: Mapping[str, Verdict],
 ) -> list[Verdict]:
     """Judge what isn't known yet, and write summary and report; return the verdicts on all claims."""
-    records = sum((record.load(path) for path in files), Records())
     others = {v.claim.id: v for v in judge([claim for claim in CLAIMS if claim.id not in known], records)}
     verdicts = [known.get(claim.id) or others[claim.id] for claim in CLAIMS]
     summary = Summary.of(directory, verdicts, level, files)

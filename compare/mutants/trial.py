@@ -107,7 +107,7 @@ def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
     By all claims; unless `whole`, by the quickest ones first and only until one notices it.
     """
     power = defaultdict[str, list[Resolved]](list)
-    for each in judge(CLAIMS, _records(directory)):
+    for each in judge(CLAIMS, validation.stored(directory)):
         if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
             for check in each.checks:
                 power[check.measurement.quantity].append((check.resolves, check.measurement.set, each.claim.id))
@@ -164,17 +164,12 @@ def _table(what: str, tried: Mapping[str, Sequence[Trial]]) -> str:
 
 
 @functools.cache
-def _records(directory: Path) -> Records:
-    return results.load(directory).records(directory)
-
-
-@functools.cache
 def _right(directory: Path) -> tuple[Outcomes, Sequence[Claim]]:
     """The outcomes of the right theory, and the claims, those that are judged quickest first."""
     outcomes, took = Outcomes(), dict[str, float]()
     for claim in CLAIMS:
         begun = time.process_time()
-        outcomes[claim.id] = verdict(claim, _records(directory)).outcome
+        outcomes[claim.id] = verdict(claim, validation.stored(directory)).outcome
         took[claim.id] = time.process_time() - begun
     return outcomes, sorted(CLAIMS, key=lambda claim: took[claim.id])
 
@@ -187,7 +182,7 @@ def _theory(directory: Path, whole: bool, number: int) -> Trial:
     forget()
     with believed(wrong):
         for claim in CLAIMS if whole else quickest_first:
-            noticed |= _changed(right, [_patiently(claim, _records(directory))])
+            noticed |= _changed(right, [_patiently(claim, validation.stored(directory))])
             if noticed and not whole:
                 break
     return Trial(wrong.what, noticed)
