@@ -91,10 +91,15 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     """Options that say where runs are carried out."""
     group = parser.add_argument_group("workers")
     choice = group.add_mutually_exclusive_group()
-    here, all_of_them = "processes of this machine (0: this one)", os.cpu_count() or 1
-    choice.add_argument("--workers", type=int, default=all_of_them, metavar="N", help=here)
+    add_processes(choice)
     choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
     group.add_argument("--limit", type=number, default=math.inf, metavar="s", help="longest real time a run may take")
+
+
+def add_processes(options: Any) -> None:
+    """The option that says how many processes of this machine take part, for a parser or a group of one."""
+    here, all_of_them = "processes of this machine (0: this one)", os.cpu_count() or 1
+    options.add_argument("--workers", type=int, default=all_of_them, metavar="N", help=here)
 
 
 @contextmanager

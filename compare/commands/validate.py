@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -35,8 +34,7 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "judge", judge, "judge the stored measurements of a validation again")
     command.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR")
-    number, processes = os.cpu_count() or 1, "processes of this machine (0: this one)"
-    command.add_argument("--workers", type=int, default=number, metavar="N", help=processes)
+    running.add_processes(command)
     _add_shared(command)
 
 
