@@ -43,9 +43,9 @@ from model.files import make_directory
 DIRECTORY = "measurements"
 UNDAMPED = "without drag (c = 0 s-1) no motion settles, and nothing can be measured"
 MOST = 3e4
-"""Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c at a time; and contact
-forces are solved to 1e-12 in each step, so that all that adds up in 1/c is three times that: as much as `omega_c` may
-be off in a state that counts as settled."""
+"""Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or more at a time; and
+contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c is three times that: as much as
+`omega_c` may be off in a state that counts as settled."""
 HOPS = "hops that last are those of the set hopping"
 Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
 

@@ -18,8 +18,8 @@ however well the numbers agree. The ceilings follow from what each protocol can 
   Both together, three times, are 1.7e-3 of omega_c. Hops are as high as the flow is above the one where they begin, a
   sixteenth of it where they are lowest: sixteen times as much of the height, 2.7e-2. The time in the air goes with the
   root of the height: half as much of the period. A multiplier comes from the ten hops in which a disturbance is neither
-  too large nor lost in that. Along rougher walls it rises by 0.5 times the
-  relative change of eta; known to 4e-3, it shows where it is 1 to 8e-3, three times which is to be resolved;
+  too large nor lost in that. Along rougher walls it rises by half of the relative change of eta: known to 4e-3, it
+  says to 8e-3 along which wall it is 1, and three times that is to be resolved;
 * what a pulsation or a jump does is compared at two time steps, to a part in a thousand of itself; the onset of slip is
   bracketed to that, and slip begins within a time step, a few hundredths of a period, near a maximum; the mean reading
   and the flow by which a ramp passes a fold are small differences of flows;
