@@ -26,7 +26,7 @@ from mjsim import benchmark
 from model import Parameters, State
 
 BATCH = 64
-REPEATS = 3
+REPEATS = 5
 FINISHED = 10_000
 COUNT = 20_000_000
 SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
@@ -84,27 +84,30 @@ def _tasks(count: int, t_end: float) -> list[Task]:
 
 
 def _campaigns() -> tuple[float, float, float]:
-    """Ratios of medians over `REPEATS`, taken in turn: one process over two, of campaigns and of bare arithmetic; and
-    two processes over two Dask workers."""
-    tasks = _tasks(2 * BATCH, 2.0)
+    """Throughputs, as medians of ratios of times next to each other: two processes over one, of campaigns and of bare
+    arithmetic; then two Dask workers over two processes, apart, since a scheduler takes its share of the time."""
+    tasks = _tasks(4 * BATCH, 2.0)  # a few seconds, against which the last batch to end counts little
+    kinds = processes(1), processes(2)
+    times = [[*(_timed(kind, tasks) for kind in kinds), *map(_computing, kinds)] for _ in range(REPEATS)]
+    two_over_one = statistics.median(one / two for one, two, _, _ in times)
+    machine = statistics.median(alone / both for _, _, alone, both in times)
     with ExitStack() as stack:
-        kinds: list[Workers] = [processes(1), processes(2), *_dask(stack)]
-        times = [[*map(_computing, kinds[:2]), *(_timed(kind, tasks) for kind in kinds)] for _ in range(REPEATS)]
-    alone, both, one, two, *others = (statistics.median(column) for column in zip(*times, strict=True))
-    return one / two, alone / both, two / others[0] if others else math.nan
+        cluster = _dask(stack)
+        ratios = [_timed(kinds[1], tasks) / _timed(cluster, tasks) for _ in range(REPEATS)] if cluster else [math.nan]
+    return two_over_one, machine, statistics.median(ratios)
 
 
-def _dask(stack: ExitStack) -> list[Workers]:
+def _dask(stack: ExitStack) -> Workers | None:
     try:
         from distributed import LocalCluster
     except ImportError:
-        return []
+        return None
     quiet: dict[str, Any] = {"host": "127.0.0.1", "dashboard_address": None, "silence_logs": 50}
     cluster: Any = LocalCluster(n_workers=2, threads_per_worker=1, **quiet)  # type: ignore[no-untyped-call]
     stack.enter_context(cluster)
     kind = dask(cluster.scheduler_address)
     stack.callback(kind.stop, kind.start(), False)
-    return [kind]
+    return kind
 
 
 def _computing(kind: Workers) -> float:
