@@ -30,7 +30,7 @@ _GAIN, _FALL, _MEMORY, _LAG, _HOVER = (
 """Rows of `Balls.table`."""
 
 _OUTPUTS = "qfrc_constraint", "sensordata"
-_CONTINUOUS = 0.005
+_CONTINUOUS = 0.02
 """Hover number of contacts in short steps: they open with as much less than the weight."""
 _LEAST = 1e-9
 """Stands in for zero where a quotient would be infinite."""
