@@ -77,6 +77,17 @@ def test_a_ball_that_slides_down_the_wall_lands_anywhere_in_a_step(share: float)
     assert max(each.max() for each in speeds) < p.g * h * p.omega_0 * h
 
 
+@pytest.mark.parametrize("step", [5e-4, 1.25e-4, 3.125e-5])
+def test_a_ball_that_slips_fast_lands_at_any_step(step: float) -> None:
+    """On a rough floor, whose contact is too much damped at small steps to be held."""
+    p = Parameters.named("reference").replace(mu=2.0, r=0.0055, omega_0=70.0)
+    x0, lasts = [1e-4, -0.65, 80.0, -400.0, 0.0, 35.0, 0.0, 0.0], 0.5e-3
+    exact = analytic.simulate(p, x0, lasts, sample_interval=lasts)
+    run = mjsim.simulate(p, x0, lasts, settings=ContactSettings.for_problem(p, step), sample_interval=lasts)
+    # What forces of the size of the weight do in a step, times the angle by which they turn.
+    assert np.abs(run.v_y - exact.v_y).max() < p.g * step * p.omega_0 * step
+
+
 @pytest.mark.parametrize("batched", [False, True])
 def test_a_run_taken_up_between_landings_gives_the_same_bits(tmp_path: Path, batched: bool) -> None:
     def run(journal: Journal | None) -> Run:
