@@ -21,7 +21,7 @@ from analytic.orbit_branch import OrbitBranch
 from compare.figures import style
 from compare.figures.bifurcation_diagrams import Quantity, lifted, slipping, spin, spins
 from compare.figures.drawing import Diagram, Material
-from model import Case, Parameters
+from model import Case, Parameters, State
 from model.files import reading_json
 
 SET = Parameters.named("hopping")
@@ -99,7 +99,8 @@ def _hops(axes: Axes, quantity: Quantity, offset: Offset) -> None:
     """The periodic branch: mean, least and greatest of a quantity over a period."""
     branch = _branch()
     cycles = [quantity(orbit.cycle.slip_x, orbit.cycle.omega_c) for orbit in branch.orbits]
-    mean = np.array([quantity(orbit.mean[3], orbit.mean[2]) for orbit in branch.orbits])
+    means = State(*np.transpose([orbit.mean for orbit in branch.orbits]))
+    mean = quantity(means.slip_x, means.omega_c)
     low, high = [c.min() for c in cycles], [c.max() for c in cycles]
     axes.fill_between(branch.values, low, high, color=COLOUR, alpha=0.25, lw=0)
     for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
@@ -107,8 +108,8 @@ def _hops(axes: Axes, quantity: Quantity, offset: Offset) -> None:
     style.name(axes, float(branch.values[-3]), float(mean[-3]), "hopping", offset, COLOUR)
     for place in branch.places:
         if place.kind is orbit_branch.Bifurcation.BIRTH:
-            at = float(quantity(place.orbit.mean[3], place.orbit.mean[2]))
-            style.mark(axes, place.value, at, "birth", (-10, -30))
+            born = State(*place.orbit.mean)
+            style.mark(axes, place.value, float(quantity(born.slip_x, born.omega_c)), "birth", (-10, -30))
 
 
 def caption_orbit(of: Diagram) -> str:

@@ -223,7 +223,7 @@ def test_a_single_rolling_contact_holds_or_gives_way(rolls):
 
 
 def fault(seed):
-    """What is wrong with a run of 60/c; empty if nothing is. Each change of case, or hop, has to take its time."""
+    """What is wrong with a run of 60/c; empty if nothing is. Changes of case take their time: a hop has some five."""
     p, x0 = random_start(seed)
     try:
         run = simulate(p, x0, 60 / p.c, sample_interval=1 / p.c)
@@ -231,7 +231,8 @@ def fault(seed):
         return f"seed {seed}: {error}"
     settings = run.header.settings
     balanced = settings["energy_residual"] <= 1e-6 * settings["energy_scale"]
-    return "" if balanced and len(run.events) < 100 + 60 / p.c * UNIT else f"seed {seed}: {settings}, {len(run.events)}"
+    calm = len(run.events) < 100 + 5 * 60 / p.c * UNIT
+    return "" if balanced and calm else f"seed {seed}: {settings}, {len(run.events)} events"
 
 
 @pytest.mark.parametrize("seed", range(30, 40))
