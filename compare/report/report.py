@@ -23,7 +23,7 @@ from compare.report.results import Summary
 from model.errors import StorageError
 from model.files import make_directory, write_text
 
-ROWS = 50
+ROWS = 40
 """Checks of a claim that are listed, the worst first; a longer page would open slowly."""
 REASONS = 12
 """Reasons for what was not measured that are listed for a claim."""
