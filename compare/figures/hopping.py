@@ -100,7 +100,9 @@ def draw_plane(basins: Basins) -> Figure:
             handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
         handles += axes.plot([], [], "o", ms=4, color="white", mec="k", mew=0.6, label="MuJoCo")
     axes.set(xlabel=f"{_VARIABLES[basins.across]} at the start", ylabel=f"{_VARIABLES[basins.up]} at the start")
-    axes.legend(handles=handles, fontsize=8, loc="upper left", framealpha=0.95)
+    axes.legend(
+        handles=handles, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(handles), frameon=False
+    )
     return figure
 
 
@@ -126,5 +128,5 @@ def caption_plane(basins: Basins) -> str:
     far = basins.differences()
     text += f" Dots: MuJoCo at {1e3 * basins.timestep:g} ms; {len(far)} of {basins.mujoco.size} differ"
     if len(far):
-        text += f", {np.sum(far <= 1)} of them next to a boundary, the others up to {far.max():g} cells away"
+        text += ", next to a boundary" if far.max() <= 1 else f", up to {far.max():g} cells from a boundary"
     return text + "."

@@ -76,7 +76,7 @@ def _hopping(p: Parameters) -> bool:
 
 
 def _late(places: Sequence[Place]) -> tuple[Place, ...]:
-    return tuple(replace(place, value=1.01 * place.value) for place in places)
+    return tuple(replace(place, value=1.02 * place.value) for place in places)
 
 
 def _ramped(right: Function) -> Function:
@@ -217,7 +217,7 @@ _FAULTS_OF_ATTRACTORS: dict[str, dict[str, Fault]] = {
         "Floquet multipliers of two periods": answer(fields(derivative=lambda derivative: derivative @ derivative)),
     },
     "bifurcation.thresholds": {"hopping begins 1 % late": where(_hopping, answer(fields(omega_02=times(1.01))))},
-    "orbit_branch.follow": {"hopping ends 1 % late": answer(fields(places=_late))},
+    "orbit_branch.follow": {"hopping ends 2 % late": answer(fields(places=_late))},
     "simulation.simulate": {"strong drag in minutes": where(lambda p: p.kappa > 2, given(other(c=1 / 60)))},
 }
 """The same, of what is measured from the default level on."""
