@@ -23,7 +23,7 @@ Quantity = Any
 _SLIDES = 9.0
 """A contact slides if its speed squared is over this times that of its change in a step; slip that ends dies faster."""
 _FEW = 16.0
-"""Steps of its load that make the speed at which a contact that hovers has the ball back; one by itself takes 1.2."""
+"""A contact that hovers throws the ball off, and has it back at up to 1.2 times the speed its load makes in a step."""
 
 
 class Ball(NamedTuple):
