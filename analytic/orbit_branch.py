@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic.orbits import Changes, Loop, NoOrbitError, Orbit, close, extent, jacobian
+from analytic.orbits import Changes, Loop, NoOrbitError, Orbit, close, closed, extent, jacobian
 from model import Contact, InputError, Parameters, State
 from model.arrays import Array
 from model.parameters import check_names, check_number
@@ -120,7 +120,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
     along = np.append(np.zeros(len(start.loop.free)), sign)
     for _ in range(most):
         try:
-            matrix = jacobian(here.loop, name)
+            matrix = jacobian(here.loop, here.derivative, name)
         except NoOrbitError as error:
             yield Place(Bifurcation.LOST, getattr(here.p, name), here, str(error))
             return
@@ -199,22 +199,26 @@ def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -
         except (NoOrbitError, ValueError):  # where the sequence of cases changes, too, the test may jump
             orbit = there
         yield Place(kind, getattr(orbit.p, name), orbit)
-    if _sequence(here) != _sequence(there):
+    if _sequence(here.changes) != _sequence(there.changes):
         yield _change(here, there, step, name, matrix)
 
 
 def _change(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Place:
     """Where the sequence of cases changes, by halving as far as orbits are found."""
-    low, high, orbit = 0.0, 1.0, there
+    low, high, loop, before = 0.0, 1.0, there.loop, _sequence(here.changes)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         try:
-            orbit = _beside(here, middle * step, name, matrix)
+            loop, back, _ = closed(here.loop.moved(middle * step, name), name, matrix)
         except NoOrbitError:
             break
-        low, high = (middle, high) if _sequence(orbit) == _sequence(here) else (low, middle)
-    grazing = _landings(here) != _landings(there)
-    return Place(Bifurcation.GRAZING if grazing else Bifurcation.PERSISTENCE, getattr(orbit.p, name), orbit)
+        low, high = (middle, high) if _sequence(back.changes) == before else (low, middle)
+    try:
+        nearest = close(loop)
+    except NoOrbitError:  # disturbances there land where others don't
+        nearest = there
+    kind = Bifurcation.PERSISTENCE if _landings(here) == _landings(there) else Bifurcation.GRAZING
+    return Place(kind, getattr(loop.p, name), nearest)
 
 
 def _birth(name: str, last: Sequence[Orbit]) -> Place:
@@ -225,9 +229,9 @@ def _birth(name: str, last: Sequence[Orbit]) -> Place:
     return Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), last[-1])
 
 
-def _sequence(orbit: Orbit) -> Changes:
+def _sequence(changes: Changes) -> Changes:
     """The changes of case of a period, from wherever it is the least in order."""
-    turns = [orbit.changes[k:] + orbit.changes[:k] for k in range(len(orbit.changes))]
+    turns = [changes[k:] + changes[:k] for k in range(len(changes))]
     return min(turns, default=())
 
 

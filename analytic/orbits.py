@@ -144,13 +144,18 @@ class Loop:
         tolerance = RTOL * scale(self.p)
         return np.asarray(solve_ivp(rates, (0.0, duration), x, "DOP853", rtol=RTOL, atol=tolerance).y[:, -1])
 
-    def derivative(self, varied: str | None = None) -> Array:
-        """Derivative (d - 1, d - 1) of the return map; with one more column by the logarithm of a parameter."""
-        shift, columns = SHIFT * self.extent, []
-        for unit in np.eye(len(self.free) + bool(varied)):
-            high, low = (self.moved(sign * shift * unit, varied).back().x for sign in (1, -1))
-            columns.append(self.coordinates(high - low) / (2 * shift))
-        return np.stack(columns, axis=-1)
+    def derivative(self) -> Array:
+        """Derivative (d - 1, d - 1) of the return map."""
+        return np.stack([self._slope(unit) for unit in np.eye(len(self.free))], axis=-1)
+
+    def slope(self, varied: str) -> Array:
+        """Derivative (d - 1,) of the return map by the logarithm of a parameter."""
+        return self._slope(np.eye(len(self.free) + 1)[-1], varied)
+
+    def _slope(self, along: Array, varied: str | None = None) -> Array:
+        shift = SHIFT * self.extent
+        high, low = (self.moved(sign * shift * along, varied).back().x for sign in (1, -1))
+        return self.coordinates(high - low) / (2 * shift)
 
 
 class Return(NamedTuple):
@@ -237,6 +242,12 @@ def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None)
     There is then one unknown more than equations: the place on a branch. Newton's step is the shortest one (Moore and
     Penrose), across the branch. The `jacobian` of a neighbour, if given, does until the defect falls slowly.
     """
+    loop, back, steps = closed(loop, varied, neighbour)
+    return Orbit(loop, back.changes, back.turn, steps, loop.derivative())
+
+
+def closed(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> tuple[Loop, Return, int]:
+    """The loop of `close`, what it comes to, and the steps that Newton's method took."""
     before = math.inf
     for step in range(ITERATIONS + 1):
         back = loop.back()
@@ -244,21 +255,21 @@ def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None)
         defect = loop.coordinates(back.x - loop.x)
         size = float(np.abs(defect).max())
         if size <= CLOSED:
-            return Orbit(loop, back.changes, back.turn, step, loop.derivative())
+            return loop, back, step
         if size > before / FAST:
             neighbour = None
         before = size
-        matrix = jacobian(loop, varied) if neighbour is None else neighbour
+        matrix = jacobian(loop, loop.derivative(), varied) if neighbour is None else neighbour
         loop = loop.moved(np.asarray(-np.linalg.lstsq(matrix, defect)[0], dtype=float), varied)
     raise NoOrbitError(
         f"after {ITERATIONS} steps an orbit of period {loop.period:g} s is open by {size:.1e} in natural units"
     )
 
 
-def jacobian(loop: Loop, varied: str | None = None) -> Array:
+def jacobian(loop: Loop, derivative: Array, varied: str | None = None) -> Array:
     """Derivative (d - 1, d - 1) of the defect of a loop; with one more column if a parameter is varied."""
-    derivative = loop.derivative(varied)
-    return np.asarray(derivative - np.eye(*derivative.shape))
+    by_state = derivative - np.eye(len(derivative))
+    return np.column_stack([by_state, loop.slope(varied)]) if varied else by_state
 
 
 def extent(run: Trajectory) -> float:

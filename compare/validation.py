@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -23,7 +24,7 @@ from compare.report.results import Summary
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MUJOCO, Engine
 from compare.runs.progress import Show
-from compare.runs.workers import Workers, processes
+from compare.runs.workers import Spread, Workers, spread
 from compare.scorecard import scores
 from model import Parameters, StorageError
 
@@ -92,7 +93,10 @@ def validate(
             campaign.doing = "ladder of settings, error against cost"
             scores.write(campaign, output)
     files = [path for name, where in kept.items() if (path := where / f"{name}.h5").exists()]
-    _write(output, level, files, sum(map(record.load, files), Records()), report, verdicts)
+    count = workers if isinstance(workers, int) else workers.count
+    progress("drawing figures", 0, 1, 0)
+    with spread(min(count, os.cpu_count() or 1)) as over:
+        _write(output, level, files, sum(map(record.load, files), Records()), verdicts, over if report else None)
     return [verdicts[claim.id] for claim in chosen]
 
 
@@ -108,11 +112,11 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
     stored.cache_clear()
     forget()
     records = stored(directory)  # what can't be read is said before anything is judged
-    with processes(workers).start() as pool:  # the last claims first: they take longest
-        found = pool.map(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
-        verdicts = {claim.id: Verdict(claim=claim, **each) for claim, each in zip(CLAIMS[::-1], found, strict=True)}
     files = [directory / name for name in summary.measurements]
-    written = _write(directory, Level[summary.level], files, records, True, verdicts)
+    with spread(workers) as over:  # the last claims first: they take longest
+        found = over(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
+        verdicts = {claim.id: Verdict(claim=claim, **each) for claim, each in zip(CLAIMS[::-1], found, strict=True)}
+        written = _write(directory, Level[summary.level], files, records, verdicts, over)
     return [v for v in written if v.claim.id in chosen]
 
 
@@ -146,17 +150,20 @@ def _write(
     level: Level,
     files: Sequence[Path],
     records: Records,
-    report: bool,
     known: Mapping[str, Verdict],
+    over: Spread | None,
 ) -> list[Verdict]:
-    """Judge what isn't known yet, and write summary and report; return the verdicts on all claims."""
+    """Judge what isn't known yet, and write the summary, and the report with what is to draw figures, if anything.
+
+    Return the verdicts on all claims.
+    """
     others = {v.claim.id: v for v in judge([claim for claim in CLAIMS if claim.id not in known], records)}
     verdicts = [known.get(claim.id) or others[claim.id] for claim in CLAIMS]
     summary = Summary.of(directory, verdicts, level, files)
-    if report:
+    if over:
         from compare.report import report as page  # here, because drawing takes a second to load
 
-        page.write(material(directory, verdicts, records), verdicts, summary)
+        page.write(material(directory, verdicts, records), verdicts, summary, over)
     else:
         results.save(summary, directory)
     return verdicts

@@ -72,7 +72,7 @@ def batch(models: Sequence[Any]) -> Backend:
     for name in MODEL_FIELDS:
         owner, _, field = name.rpartition(".")
         values = [np.asarray(getattr(getattr(model, owner) if owner else model, field)) for model in models]
-        if any(not np.array_equal(values[0], value) for value in values[1:]):
+        if len({value.tobytes() for value in values}) > 1:
             made.expand(name)[:] = np.stack(values)
 
     def array(name: str) -> Array:

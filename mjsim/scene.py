@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 import math
 from pathlib import Path
 from typing import Any
@@ -43,10 +45,16 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
 
 
 def build(p: Parameters, settings: ContactSettings) -> tuple[Any, str]:
-    """The scene compiled to an `mujoco.MjModel`, and as the MJCF text that is simulated.
+    """The scene compiled to an `mujoco.MjModel` of its own, and as the MJCF text that is simulated.
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
+    model, text = _compiled(p, settings)
+    return copy.copy(model), text
+
+
+@functools.lru_cache(maxsize=256)
+def _compiled(p: Parameters, settings: ContactSettings) -> tuple[Any, str]:
     filled = spec(p, settings)
     try:
         model = filled.compile()

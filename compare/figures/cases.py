@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -143,7 +144,15 @@ def _arrow(axes: Axes, inner: Case, outer: Case, line: str, shift: float = 0.0) 
 
 def _explaining(title: str, draw: Callable[[object], Figure], text: str) -> Drawing:
     """A figure of the model itself, which depends on no parameter and no result."""
-    return Drawing(title, lambda _: None, draw, lambda _: text, background=True)
+    return Drawing(title, _nothing, draw, partial(_text, text), background=True)
+
+
+def _nothing(_: object) -> None:
+    """What is selected of results."""
+
+
+def _text(text: str, _: object) -> str:
+    return text
 
 
 FIGURE_2 = _explaining(

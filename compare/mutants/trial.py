@@ -30,7 +30,7 @@ from compare.mutants.engines import WRONG_ENGINES
 from compare.mutants.exchange import believed
 from compare.mutants.theories import THEORIES
 from compare.report import results
-from compare.runs.workers import processes
+from compare.runs.workers import spread
 
 Outcomes = dict[str, Outcome]
 PROVING = frozenset({"settled", "laws", "field", "impacts"})
@@ -124,8 +124,8 @@ def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
 def _tried(one: Callable[[int], Trial], count: int, workers: int) -> list[Trial]:
     """The trials by number, each shown on standard error as soon as it is there."""
     tried = []
-    with processes(workers).start() as pool:
-        for trial in pool.map(one, range(count)):
+    with spread(workers) as over:
+        for trial in over(one, range(count)):
             print(f"{trial.what}: {trial.by}", file=sys.stderr, flush=True)
             tried.append(trial)
     return tried

@@ -24,20 +24,30 @@ _KEPT = " !$'()*+,-./:;<=>?@_~"
 """What needs no escape in an address between double quotes."""
 
 
-def kept(path: Path, drawing: Drawing, data: Any) -> tuple[str, str]:
-    """The address of a picture that is its own content, as a browser looks into it only to show it; and its caption.
-
-    The picture in the SVG file `path`, which describes itself by the caption, is taken if it was made from the same
-    data by the same program, else drawn and written there. Raises what drawing raises, and `StorageError` if it can't
-    be written.
-    """
-    made_from = "\n".join([repr(data), drawing.title, matplotlib.__version__, sources(*_PROGRAM)])
-    mark = f"<!-- {hashlib.sha256(made_from.encode()).hexdigest()} -->"
+def kept(path: Path, drawing: Drawing, data: Any) -> tuple[str, str] | None:
+    """The address and the caption of the picture in an SVG file, if it was made from the same data by this program."""
     picture = path.read_text("utf-8") if path.is_file() else ""
-    if not picture.endswith(mark):
-        caption = f"<desc>{html.escape(drawing.caption(data))}</desc>"
-        picture = svg(drawing.draw(data)).replace("<defs>", f"{caption}<defs>", 1) + mark
-        write_text(path, picture)
+    return _shown(picture) if picture.endswith(_mark(drawing, data)) else None
+
+
+def drawn(path: Path, drawing: Drawing, data: Any) -> tuple[str, str]:
+    """The same of a picture that is drawn and written into the file, where it describes itself by the caption.
+
+    Raises what drawing raises, and `StorageError` if it can't be written.
+    """
+    caption = f"<desc>{html.escape(drawing.caption(data))}</desc>"
+    picture = svg(drawing.draw(data)).replace("<defs>", f"{caption}<defs>", 1) + _mark(drawing, data)
+    write_text(path, picture)
+    return _shown(picture)
+
+
+def _mark(drawing: Drawing, data: Any) -> str:
+    made_from = "\n".join([repr(data), drawing.title, matplotlib.__version__, sources(*_PROGRAM)])
+    return f"<!-- {hashlib.sha256(made_from.encode()).hexdigest()} -->"
+
+
+def _shown(picture: str) -> tuple[str, str]:
+    """The address of a picture that is its own content, as a browser looks into it only to show it; and its caption."""
     before, _, caption_on = picture.partition("<desc>")
     caption, _, after = caption_on.partition("</desc>")
     return address(before + after), html.unescape(caption)

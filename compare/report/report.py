@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import operator
 import re
 from collections.abc import Mapping, Sequence
-from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from compare.measure.lab import Level
 from compare.measure.record import Records
 from compare.report import pictures, results, wording
 from compare.report.results import Summary
+from compare.runs.workers import Spread
 from model.errors import StorageError
 from model.files import make_directory, write_text
 
@@ -27,33 +29,36 @@ ROWS = 40
 """Checks of a claim that are listed, the worst first; a longer page would open slowly."""
 REASONS = 12
 """Reasons for what was not measured that are listed for a claim."""
+Shown = dict[str, Any]
+"""What the page shows of a figure."""
 _OPTIONS = {Level.QUICK: " --quick", Level.DEFAULT: "", Level.FULL: " --full"}
 
 
-def write(material: Material, verdicts: Sequence[Verdict], summary: Summary) -> Path:
+def write(material: Material, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map) -> Path:
     """Write ``summary.json`` and ``report.html`` into the material's results directory; return the page's path.
 
-    Raises `model.StorageError` if it can't be written.
+    Figures are drawn by what `spread` makes of a `map`. Raises `model.StorageError` if it can't be written.
     """
     directory = material.directory
     results.save(summary, directory)
     make_directory(directory / results.FIGURES)
     path = directory / results.REPORT
-    write_text(path, render(material, verdicts, summary))
+    write_text(path, render(material, verdicts, summary, spread))
     return path
 
 
-def render(material: Material, verdicts: Sequence[Verdict], summary: Summary) -> str:
+def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map) -> str:
     """The page as text; what was not run is named in one line, a figure that can't be drawn is a gap."""
     directory, ran = material.directory, [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     option = _OPTIONS[Level[summary.level]]
-    rows = [_row(material, verdict, option) for verdict in ran]
     judged, sections = {verdict.claim.id for verdict in ran}, dict.fromkeys(verdict.claim.section for verdict in ran)
     free = {name: each for name, each in FIGURES.items() if not judged & set(each.claims)}
-    drawn = [
-        _figure(material, name, each) | {"background": each.background or bool(each.claims)}
-        for name, each in free.items()
+    beside = {verdict.claim.id: figures_of(verdict.claim.id) for verdict in ran if verdict.checks}
+    figures = _figures(material, functools.reduce(operator.or_, beside.values(), free), spread)
+    rows = [
+        _row(material, verdict, option, [figures[name] for name in beside.get(verdict.claim.id, ())]) for verdict in ran
     ]
+    drawn = [figures[name] | {"background": each.background or bool(each.claims)} for name, each in free.items()]
     return pages.render(
         "compare.report",
         "report.html",
@@ -75,7 +80,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary) ->
     )
 
 
-@cache
+@functools.cache
 def errata() -> str:
     """The errata of the paper as HTML; links into the source tree, which a page by itself can't follow, are text."""
     text = (resources.files("compare.report") / "templates" / "errata.md").read_text("utf-8")
@@ -89,11 +94,10 @@ def errata() -> str:
     return made.replace("</table>", "</table></div>")
 
 
-def _row(material: Material, verdict: Verdict, option: str) -> dict[str, Any]:
+def _row(material: Material, verdict: Verdict, option: str, figures: Sequence[Shown]) -> dict[str, Any]:
     """What the page shows of a claim besides claim and verdict themselves."""
     claim = verdict.claim
     mark, symbol = wording.MARKS[verdict.outcome]
-    figures = figures_of(claim.id) if verdict.checks else {}
     missing = verdict.missing[:REASONS]
     more = len(verdict.missing) - len(missing)
     return {
@@ -104,21 +108,38 @@ def _row(material: Material, verdict: Verdict, option: str) -> dict[str, Any]:
         "predicted": list(dict.fromkeys(bearing.by for bearing in claim.bearings if bearing.by)),
         "missing": [*missing, f"and {more} more, see {results.SUMMARY}"] if more else missing,
         "checks": wording.ranked(verdict.checks)[:ROWS],
-        "figures": [_figure(material, name, figure) for name, figure in figures.items()],
+        "figures": figures,
         "repeat": f"dualball validate --claim {claim.id}{option} -o {material.directory}",
     }
 
 
-def _figure(material: Material, name: str, drawing: Drawing) -> dict[str, Any]:
-    """A picture with its caption, or why there is none."""
-    shown = {"id": f"figure-{name}", "title": drawing.title, "caption": "", "picture": "", "gap": ""}
-    try:
-        data = drawing.select(material)
+def _figures(material: Material, drawings: Mapping[str, Drawing], spread: Spread) -> dict[str, Shown]:
+    """Every figure: a picture with its caption, or why there is none."""
+    shown, new = {}, []
+    for name, drawing in drawings.items():
         path = material.directory / results.FIGURES / f"{name}.svg"
-        shown["picture"], shown["caption"] = pictures.kept(path, drawing, data)
+        try:
+            data = drawing.select(material)
+        except GapError as error:
+            shown[name] = _figure(path, drawing, gap=str(error))
+        else:
+            if kept := pictures.kept(path, drawing, data):
+                shown[name] = _figure(path, drawing, *kept)
+            else:
+                new.append((path, drawing, data))
+    new.reverse()  # the last ones take longest
+    return shown | {path.stem: figure for (path, *_), figure in zip(new, spread(_drawn, new), strict=True)}
+
+
+def _drawn(new: tuple[Path, Drawing, Any]) -> Shown:
+    try:
+        return _figure(*new[:2], *pictures.drawn(*new))
     except (GapError, StorageError) as error:
-        shown["gap"] = str(error)
-    return shown
+        return _figure(*new[:2], gap=str(error))
+
+
+def _figure(path: Path, drawing: Drawing, picture: str = "", caption: str = "", gap: str = "") -> Shown:
+    return {"id": f"figure-{path.stem}", "title": drawing.title, "picture": picture, "caption": caption, "gap": gap}
 
 
 def _lead(ran: Sequence[Verdict]) -> str:

@@ -72,7 +72,9 @@ class Campaign:
         make_directory(self.directory)
         self._executor: Executor | None = None
         self._failed: dict[str, Failure] = {}
+        self._listed = -1
         self._held: dict[str, Trajectory] = {}
+        self._samples = 0
         remove_leftovers(self.directory)
 
     def __enter__(self) -> Self:
@@ -125,8 +127,9 @@ class Campaign:
             failures += failed
             self.report(self.doing, done, len(unique), len(failures))
         self._failed |= {failure.task.key: failure for failure in failures}
-        if self._failed or (self.directory / FAILURES).exists():
+        if len(self._failed) != self._listed and (self._failed or (self.directory / FAILURES).exists()):
             write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
+        self._listed = len(self._failed)
         return failures
 
     def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[int, list[Failure]]]:
@@ -181,8 +184,9 @@ class Campaign:
                 failures.append(Failure(task, outcome.failure))
             elif outcome.run:
                 self._held[task.key] = outcome.run
-        while sum(len(run.time) for run in self._held.values()) > self.memory:
-            del self._held[next(iter(self._held))]
+                self._samples += len(outcome.run.time)
+        while self._samples > self.memory:
+            self._samples -= len(self._held.pop(next(iter(self._held))).time)
         return len(batch) - len(failures), failures
 
     def _stop(self, at_once: bool) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import analytic
@@ -91,8 +91,12 @@ STUDY_SLIP = 2.0
 
 def _mujoco_study(step: float, p: Parameters) -> ContactSettings:
     """One of two settings for all parameter sets, so that runs of a step share a batch."""
-    rough = Parameters.named("reference").replace(mu=1.0, eta=0.0)
-    return ContactSettings.for_problem(rough, step, STUDY_SLIP).suited(p)
+    return _rough(step).suited(p)
+
+
+@cache
+def _rough(step: float) -> ContactSettings:
+    return ContactSettings.for_problem(Parameters.named("reference").replace(mu=1.0, eta=0.0), step, STUDY_SLIP)
 
 
 def newcomer(step: float) -> ContactSettings:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -21,7 +22,10 @@ from typing import Any, TypeVar
 from model import InputError
 from model.parameters import Range, check_number
 
+S = TypeVar("S")
 T = TypeVar("T")
+Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
+"""What does as `map` does."""
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -59,6 +63,26 @@ def processes(count: int) -> Workers:
         executor.shutdown(wait=True, cancel_futures=True)
 
     return Workers(count, start, stop, (BrokenProcessPool,))
+
+
+@contextmanager
+def spread(count: int) -> Iterator[Spread]:
+    """A `map` over that many processes of this machine; what a process that died was to do is done by this one."""
+    if count < 2:
+        yield map
+        return
+
+    def over(one: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
+        left = deque(items)
+        try:
+            for result in pool.map(one, tuple(left)):
+                left.popleft()
+                yield result
+        except BrokenProcessPool:
+            yield from map(one, left)
+
+    with processes(count).start() as pool:
+        yield over
 
 
 class _Here(Executor):

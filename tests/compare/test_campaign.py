@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import multiprocessing
 import os
@@ -17,7 +18,7 @@ import pytest
 
 from compare.runs.campaign import FAILURES, Campaign, Failure, run_batch
 from compare.runs.tasks import Task
-from compare.runs.workers import dask
+from compare.runs.workers import dask, spread
 from model import InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 
@@ -194,6 +195,19 @@ def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
     stored = data(tmp_path)
     assert len(stored) == 8
     assert stored.items() <= undisturbed.items()
+
+
+def square(parent: int, number: int) -> int:
+    if number == 3 and os.getpid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number**2
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_what_a_killed_process_was_to_do_is_done_here(count: int) -> None:
+    with spread(count) as over:
+        assert list(over(functools.partial(square, os.getpid()), range(8))) == [k**2 for k in range(8)]
+        assert list(over(abs, [-1, -2])) == [1, 2]
 
 
 def test_a_full_disk_is_reported_for_each_task(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import base64
 import itertools
 import json
 import math
+import pickle
 import re
 import shutil
 import subprocess
@@ -21,12 +22,14 @@ from matplotlib.figure import Figure
 
 from compare.claims.claim import Bearing, Claim, Outcome, Text, Verdict
 from compare.figures.drawing import Drawing, GapError, Material
+from compare.figures.registry import FIGURES
 from compare.measure import record
 from compare.measure.check import Check, Relation
 from compare.measure.lab import Level
 from compare.measure.record import Measurement, Records
 from compare.report import pictures, report, results, wording
 from compare.report.results import Summary
+from compare.runs.workers import spread
 from model import Case, Parameters, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")
@@ -247,33 +250,36 @@ def test_a_missing_summary_names_the_command(tmp_path: Path) -> None:
 
 
 def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
-    drawn = []
-
-    def draw(data: object) -> Figure:
-        drawn.append(data)
-        return Figure(figsize=(1, 1))
-
-    drawing = Drawing("t", lambda _: None, draw, lambda data: f"{len(drawn)} <&> {data}")
+    drawing = Drawing("t", lambda _: None, lambda _: Figure(figsize=(1, 1)), lambda data: f"<&> {data}")
     path = tmp_path / "made.svg"
-    first, caption = pictures.kept(path, drawing, ("a", 1.0))
-    assert caption == "0 <&> ('a', 1.0)"
+    assert pictures.kept(path, drawing, ("a", 1.0)) is None
+    first, caption = pictures.drawn(path, drawing, ("a", 1.0))
+    ElementTree.parse(path)
+    assert first.startswith("data:image/svg+xml,<?xml versi")
+    assert caption == "<&> ('a', 1.0)"
     assert "desc" not in first
     assert pictures.kept(path, drawing, ("a", 1.0)) == (first, caption)
-    assert len(drawn) == 1
+    assert pictures.kept(path, drawing, ("a", 2.0)) is None
     path.write_text("something else")
-    assert pictures.kept(path, drawing, ("a", 1.0))[0][:30] == first[:30] == "data:image/svg+xml,<?xml versi"
-    pictures.kept(path, drawing, ("a", 2.0))
-    assert len(drawn) == 3
-    ElementTree.parse(path)
+    assert pictures.kept(path, drawing, ("a", 1.0)) is None
 
 
 def test_a_picture_is_drawn_again_when_the_program_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn = []
-    drawing = Drawing("t", lambda _: None, lambda d: drawn.append(d) or Figure(), str)
-    pictures.kept(tmp_path / "made.svg", drawing, 1)
+    drawing = Drawing("t", lambda _: None, lambda _: Figure(), str)
+    pictures.drawn(tmp_path / "made.svg", drawing, 1)
+    assert pictures.kept(tmp_path / "made.svg", drawing, 1)
     monkeypatch.setattr(pictures, "sources", lambda *packages: " ".join(packages))
-    pictures.kept(tmp_path / "made.svg", drawing, 1)
-    assert len(drawn) == 2
+    assert not pictures.kept(tmp_path / "made.svg", drawing, 1)
+
+
+def test_processes_draw_every_figure(tmp_path: Path) -> None:
+    for name, drawing in FIGURES.items():
+        assert pickle.loads(pickle.dumps(drawing)).title == drawing.title, name
+    summary = Summary.of(tmp_path, VERDICTS, Level.QUICK, [])
+    with spread(2) as over:
+        pages = [report.render(Material(directory=tmp_path), VERDICTS, summary, how) for how in (over, map)]
+    assert pages[0] == pages[1]
+    assert "Fig. 3: sections of the state space" in pages[0]
 
 
 def test_a_figure_that_can_not_be_drawn_is_a_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
