@@ -1,7 +1,8 @@
 """Steps of the integrator through one chart, up to the first guard that fires.
 
 LSODA does the work, except where a slip sets in, or stays small: its direction is stiff then, which LSODA doesn't
-notice where hardly anything else moves. BDF takes over as long as the slip is small.
+notice where hardly anything else moves. BDF takes over as long as the slip is small. Where nothing but round-off is
+left to solve, neither gets on: the motion goes on as it is.
 """
 
 from __future__ import annotations
@@ -73,10 +74,12 @@ class Stretch:
         again. Raises `StalledError` after `MAX_RESTARTS`.
         """
         t, z, small = self.start, self.motion.start, self.motion.least_slip(self.motion.start) < ONSET_SLIP
-        watch, failures = Watch(self.motion, t, self.absolute, self.relative), 0
+        watch, failures, slow = Watch(self.motion, t, self.absolute, self.relative), 0, 0
+        if self._touches and (last := self._straight(t, z)):
+            yield last
+            return
         while t < self.until:
             try:
-                slow = 0
                 for step in self._solve(BDF if small else LSODA, t, z, first_step, watch):
                     yield step
                     t, z, first_step = step.time, step.z, None
@@ -84,13 +87,42 @@ class Stretch:
                         return
                     grown = self.motion.least_slip(z) > SMALL_SLIP
                     slow = 0 if grown else slow + 1
+                    if slow % PATIENCE == PATIENCE - 1 and (last := self._straight(t, z)):
+                        yield last
+                        return
                     if grown if small else slow > PATIENCE:
+                        slow = 0
                         break
             except _SolverError as error:
                 failures += 1
                 if failures > MAX_RESTARTS:
                     raise StalledError(str(error)) from error
             small = not small
+
+    @property
+    def _touches(self) -> bool:
+        """Whether a gap has yet to open."""
+        motion = self.motion
+        return any(
+            name in GAPS and gap == 0
+            for name, gap in zip(motion.ends, motion.guards(self.start, motion.start), strict=True)
+        )
+
+    def _straight(self, t: float, z: Sequence[float]) -> Step | None:
+        """All the rest, if a straight line solves the equations to the tolerance and no guard fires; else None.
+
+        What moves by less than the tolerance is taken to rest.
+        """
+        motion, left = self.motion, self.until - t
+        here, rates, enough = np.array(z), np.array(motion.rates(t, z)), self.relative * np.array(self.motion.scale)
+        rates[left * np.abs(rates) < enough] = 0.0
+        for ahead in (left / 2, left):
+            there = (here + ahead * rates).tolist()
+            bent = left * np.abs(motion.rates(t + ahead, there) - rates)
+            if np.any(bent > enough) or min(motion.guards(t + ahead, there)) < 0:
+                return None
+        due = self.times[slice(*np.searchsorted(self.times, [t, self.until], side="right"))]
+        return Step(self.until, there, due.tolist(), (here + np.outer(due - t, rates)).tolist())
 
     def _solve(
         self, method: Any, start: float, z: list[float], first_step: float | None, watch: Watch

@@ -235,8 +235,9 @@ def fault(seed):
     return "" if balanced and calm else f"seed {seed}: {settings}, {len(run.events)} events"
 
 
-@pytest.mark.parametrize("seed", range(30, 40))
+@pytest.mark.parametrize("seed", [*range(30, 40), 1736, 2340, 6867])
 def test_long_random_runs_end(seed):
+    """The last three come to rest: no solver crawls through round-off, and no ball hops by it."""
     assert not fault(seed)
 
 
