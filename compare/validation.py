@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Outcome, Verdict
+from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import forget, judge, select, verdict
 from compare.figures.drawing import Material
 from compare.measure import programme, record
@@ -68,17 +69,19 @@ def validate(
     results.open_directory(output)
     kept = {each.name: programme.directory(output, each.engine or engine, level, sets) for each in PROTOCOLS}
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
-    todo, verdicts, records = list(chosen), dict[str, Verdict](), Records()
-    broken: dict[str, str] = {}
-    with Campaign(output / results.RUNS, workers, limit=limit, memory=HELD, report=progress) as campaign:
+    todo, records, broken = list(chosen), Records(), dict[str, str]()
+    judged: dict[str, Future[Verdict]] = {}
+    with (
+        ThreadPoolExecutor(1) as bench,  # judges while the next protocol's runs are on their way
+        Campaign(output / results.RUNS, workers, limit=limit, memory=HELD, report=progress) as campaign,
+    ):
         lab = Lab(campaign, engine, level)
         ahead = [p for p in programme.needed(PROTOCOLS, names) if p.level <= level]
         while True:
             waiting = {protocol.name for protocol in ahead}
             for claim in [each for each in todo if not waiting & each.protocols]:
                 todo.remove(claim)
-                verdicts[claim.id] = _verdict(judge([claim], records)[0], broken)
-                announce(verdicts[claim.id])
+                judged[claim.id] = bench.submit(_announced, claim, records, dict(broken), announce)
             if not ahead:
                 break
             protocol = ahead.pop(0)
@@ -92,6 +95,7 @@ def validate(
         if level > Level.QUICK and claims is None:
             campaign.doing = "ladder of settings, error against cost"
             scores.write(campaign, output)
+    verdicts = {name: future.result() for name, future in judged.items()}
     files = [path for name, where in kept.items() if (path := where / f"{name}.h5").exists()]
     count = workers if isinstance(workers, int) else workers.count
     progress("drawing figures", 0, 1, 0)
@@ -169,7 +173,10 @@ def _write(
     return verdicts
 
 
-def _verdict(judged: Verdict, broken: Mapping[str, str]) -> Verdict:
+def _announced(claim: Claim, records: Records, broken: Mapping[str, str], announce: Announce) -> Verdict:
     """The verdict, or that one of the protocols of its claim broke down."""
-    errors = [why for name, why in broken.items() if name in judged.claim.protocols]
-    return replace(judged, outcome=Outcome.ERROR, error="; ".join(errors)) if errors else judged
+    (judged,) = judge([claim], records)
+    if errors := [why for name, why in broken.items() if name in claim.protocols]:
+        judged = replace(judged, outcome=Outcome.ERROR, error="; ".join(errors))
+    announce(judged)
+    return judged

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
 
 from compare import validation
-from compare.claims.claim import Bearing, Claim, Outcome
+from compare.claims.claim import Bearing, Claim, Outcome, Verdict
 from compare.commands import cli
 from compare.measure import programme
 from compare.measure.lab import Lab, Level
@@ -94,10 +95,26 @@ def test_only_what_a_claim_needs_is_measured(tmp_path: Path, counted: list[str])
     assert counted == ["round", "after"]
 
 
-def test_verdicts_are_announced_as_they_come(tmp_path: Path, counted: list[str]) -> None:
-    seen: list[tuple[str, int]] = []
-    run(tmp_path, announce=lambda verdict: seen.append((verdict.claim.id, len(counted))))
-    assert seen == [("of-round", 1), ("of-broken", 2), ("of-after", 3)]
+def test_verdicts_are_announced_as_they_come(
+    tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In order, each while other protocols measure."""
+    seen: list[str] = []
+    first = threading.Event()
+
+    def announce(verdict: Verdict) -> None:
+        seen.append(verdict.claim.id)
+        first.set()
+
+    def waiting(lab: Lab, sets: Mapping[str, Parameters], before: Records) -> Rows:
+        assert first.wait(30)
+        yield from ()
+
+    protocols = *validation.PROTOCOLS, Protocol("waiting", waiting)
+    monkeypatch.setattr(validation, "PROTOCOLS", protocols)
+    monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, claim("of-waiting", "waiting")))
+    assert run(tmp_path, announce=announce)["of-waiting"] == "not run"
+    assert seen == ["of-round", "of-broken", "of-after", "of-waiting"]
 
 
 def test_a_set_that_never_settles_is_named(tmp_path: Path, counted: list[str]) -> None:
