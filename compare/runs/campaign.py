@@ -215,11 +215,11 @@ def run_batch(tasks: Sequence[Task], directory: Path, limit: float, hand_over: b
 
 
 def _batches(tasks: Iterable[Task], size: int, workers: int) -> Iterator[tuple[Task, ...]]:
-    """Tasks that can run together, in the order of their first appearance, shared out evenly among the workers."""
+    """Tasks that can run together, shared out evenly among the workers: the longest first, so that all end together."""
     groups: dict[str, list[Task]] = {}
     for task in tasks:
         groups.setdefault(task.batch_key, []).append(task)
-    for group in groups.values():
+    for group in sorted(groups.values(), key=lambda group: -group[0].steps * len(group)):
         share = min(size, math.ceil(len(group) / workers))
         for start in range(0, len(group), share):
             yield tuple(group[start : start + share])

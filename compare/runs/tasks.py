@@ -20,7 +20,6 @@ import numpy.typing as npt
 import mjsim
 from compare.runs import engines
 from compare.runs.engines import Engine, Settings
-from mjsim import ContactSettings
 from mjsim.engine import Blocks
 from mjsim.journal import Journal
 from model import Flow, InputError, Parameters, State, Trajectory, storage
@@ -89,10 +88,14 @@ class Task:
         return self.settings or self.simulator.configure({}, self.parameters)
 
     @property
+    def steps(self) -> float:
+        """Time steps; 1 for an engine that has none."""
+        return self.t_end / (self.chosen_settings.timestep or self.t_end)
+
+    @property
     def long(self) -> bool:
         """Whether the run hands out its samples and takes more than `LONG` steps."""
-        settings = self.chosen_settings
-        return isinstance(settings, ContactSettings) and self.t_end / settings.timestep > LONG
+        return self.simulator.stream is not None and self.steps > LONG
 
     @property
     def batch_key(self) -> str:

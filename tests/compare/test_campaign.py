@@ -61,6 +61,15 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
     assert seen[-1] == ("it", 4, 4, 0)
 
 
+def test_the_longest_go_first(tmp_path: Path) -> None:
+    """Else a worker may be left with one of them when the others have nothing to do any more."""
+    given = [*tasks(1, 0.1), *tasks(1, 0.4)]
+    with Campaign(tmp_path, workers=0) as campaign:
+        campaign.complete(given)
+        short, long = (campaign.path(task).stat().st_mtime_ns for task in given)
+    assert long < short
+
+
 @pytest.mark.parametrize("workers", [0, 1])
 def test_what_is_handed_over_is_what_the_file_holds(tmp_path: Path, workers: int) -> None:
     with Campaign(tmp_path, workers, memory=10_000) as campaign:
