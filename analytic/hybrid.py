@@ -151,7 +151,8 @@ class _Simulator:
         lands, until = motion.landing <= until, min(until, motion.landing)
         times, states = [at.time], [motion.start]
         sampled, guard = [self.recorder.taken == 0], None
-        stretch = Stretch(motion, at.time, until, self.recorder.times, self.settings.rtol, self.absolute)
+        tolerances = self.settings.rtol, self.absolute
+        stretch = Stretch(motion, at.time, until, self.recorder.times, *tolerances, fluid.steady)
         hop = self._hop(motion, at, fluid)
         try:
             for count, step in enumerate(stretch.steps(hop / 20 if hop < until - at.time else None), 1):

@@ -65,6 +65,8 @@ class Stretch:
     relative: float
     absolute: float
     """Tolerances, the second in natural units."""
+    steady: bool
+    """Whether the flow stays what it is."""
 
     def steps(self, first_step: float | None) -> Iterator[Step]:
         """Steps with the samples in them, the last of them ending at a guard or at `until`.
@@ -113,6 +115,8 @@ class Stretch:
 
         What moves by less than the tolerance is taken to rest.
         """
+        if not self.steady:
+            return None
         motion, left = self.motion, self.until - t
         here, rates, enough = np.array(z), np.array(motion.rates(t, z)), self.relative * np.array(self.motion.scale)
         rates[left * np.abs(rates) < enough] = 0.0

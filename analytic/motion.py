@@ -30,6 +30,11 @@ class Fluid:
             omega_0 = omega_0 + amplitude * sin(omega * t + phase)
         return omega_0
 
+    @property
+    def steady(self) -> bool:
+        """Whether omega_0 stays what it is up to the next knot."""
+        return not self.slope and not self.waves
+
     @classmethod
     def of(cls, flow: Flow, start: float) -> Self:
         """That of a flow from one of its knots, or from 0, on."""

@@ -67,7 +67,11 @@ def processes(count: int) -> Workers:
 
 @contextmanager
 def spread(count: int) -> Iterator[Spread]:
-    """A `map` over that many processes of this machine; what a process that died was to do is done by this one."""
+    """A `map` over that many processes of this machine; what a process that died was to do is done by this one.
+
+    Raises `InputError` for a bad count.
+    """
+    workers = processes(count)
     if count < 2:
         yield map
         return
@@ -81,7 +85,7 @@ def spread(count: int) -> Iterator[Spread]:
         except BrokenProcessPool:
             yield from map(one, left)
 
-    with processes(count).start() as pool:
+    with workers.start() as pool:
         yield over
 
 
