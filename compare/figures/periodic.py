@@ -71,7 +71,7 @@ def draw_branch(of: Diagram) -> Figure:
     orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * HIGH * edge))
     wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, p)))
     style.points(orbit, of.states)
-    style.legend(orbit, loc="center left")
+    style.legend(orbit, loc="center right")
     return figure
 
 
