@@ -91,7 +91,7 @@ def draw(plane: Plane) -> Figure:
         axes.plot([point.eta], [point.omega_0], **style.POINT)
         axes.axvline(point.eta, ymax=point.omega_0 / fastest, **style.GUIDE)
         name = "$j$" if point.eta == p.j else "$\\eta_{cr}$"
-        axes.annotate(name, (point.eta, 0), xytext=(2, 2), textcoords="offset points", fontsize=9)
+        axes.annotate(name, (point.eta, 0), xytext=(3, 5), textcoords="offset points", fontsize=9)
     for section, text in () if plane.equal else _SECTIONS.items():
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
         axes.text(section, 0.985 * fastest, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3")

@@ -174,7 +174,7 @@ def draw_walls(of: Diagram) -> Figure:
             low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
             axes.axvspan(low, high, color=style.mark_of(m.engine)["color"], alpha=0.4, label=f"{m.engine}: hops end")
         axes.set(xlabel="η", ylabel=label)
-        axes.margins(x=0.12)
+        axes.margins(0.2, 0.1)
     style.legend(figure.axes[0], loc="upper left")
     return figure
 
