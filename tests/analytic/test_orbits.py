@@ -6,7 +6,7 @@ import pytest
 from analytic import branch_stability, orbit_branch, orbits, simulate, thresholds
 from analytic.orbit_branch import Bifurcation
 from analytic.orbits import NoOrbitError, Orbit
-from model import Case, InputError, Parameters
+from model import Case, InputError, Parameters, State
 
 HOPPING = Parameters.named("hopping")
 TOP = (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0)
@@ -117,6 +117,22 @@ def test_a_torus_bifurcation_and_a_fold(hop: Orbit) -> None:
     assert np.abs(torus.orbit.multipliers[:2]) == pytest.approx(1.0, abs=1e-5)
     fold = branch.places[kinds.index(Bifurcation.FOLD)]
     assert branch.values.max() <= fold.value == pytest.approx(branch.values.max(), rel=1e-2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("eta", "faster", "hops"), [(0.0905, 4e-4, True), (0.0905, 1e-3, False), (0.0915, 1e-4, False)]
+)
+def test_no_torus_attracts_beyond_the_torus_bifurcation(hop: Orbit, eta: float, faster: float, hops: bool) -> None:
+    """It is subcritical: ever smaller disturbances end the hops before it, and beyond it any does."""
+    orbit = orbit_branch.follow(hop, "eta", 0.0725, eta).orbits[-1]
+    assert orbit.p.eta == pytest.approx(eta)
+    assert orbit.stable is (eta < 0.0913)
+    x = State.of(orbit.loop.x)
+    run = simulate(orbit.p, x._replace(omega_c=x.omega_c * (1 + faster)).stacked(), 300.0, sample_interval=1.0)
+    assert bool((run.events.time > 290.0).any()) is hops
+    if not hops:
+        assert run.cases[-1] is Case.NR
 
 
 def test_no_orbit_and_bad_input(hop: Orbit) -> None:
