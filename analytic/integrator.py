@@ -1,8 +1,8 @@
 """Steps of the integrator through one chart, up to the first guard that fires.
 
 LSODA does the work, except where a slip sets in, or stays small: its direction is stiff then, which LSODA doesn't
-notice where hardly anything else moves. BDF takes over as long as the slip is small. Where nothing but round-off is
-left to solve, neither gets on: the motion goes on as it is.
+notice where hardly anything else moves. BDF takes over as long as the slip is small. Where only round-off is left to
+solve, both crawl; the motion then goes on as it is.
 """
 
 from __future__ import annotations
@@ -76,12 +76,13 @@ class Stretch:
         again. Raises `StalledError` after `MAX_RESTARTS`.
         """
         t, z, small = self.start, self.motion.start, self.motion.least_slip(self.motion.start) < ONSET_SLIP
-        watch, failures, slow = Watch(self.motion, t, self.absolute, self.relative), 0, 0
-        if self._touches and (last := self._straight(t, z)):
+        watch, failures = Watch(self.motion, t, self.absolute, self.relative), 0
+        if watch.touches and (last := self._straight(t, z)):
             yield last
             return
         while t < self.until:
             try:
+                slow = 0
                 for step in self._solve(BDF if small else LSODA, t, z, first_step, watch):
                     yield step
                     t, z, first_step = step.time, step.z, None
@@ -93,22 +94,12 @@ class Stretch:
                         yield last
                         return
                     if grown if small else slow > PATIENCE:
-                        slow = 0
                         break
             except _SolverError as error:
                 failures += 1
                 if failures > MAX_RESTARTS:
                     raise StalledError(str(error)) from error
             small = not small
-
-    @property
-    def _touches(self) -> bool:
-        """Whether a gap has yet to open."""
-        motion = self.motion
-        return any(
-            name in GAPS and gap == 0
-            for name, gap in zip(motion.ends, motion.guards(self.start, motion.start), strict=True)
-        )
 
     def _straight(self, t: float, z: Sequence[float]) -> Step | None:
         """All the rest, if a straight line solves the equations to the tolerance and no guard fires; else None.
@@ -179,6 +170,8 @@ class Watch:
         self._motion = motion
         self._arm = [0.0 if name in GAPS else arm for name in motion.ends]
         values = motion.guards(start, motion.start)
+        self.touches = any(gap == 0 for gap, name in zip(values, motion.ends, strict=True) if name in GAPS)
+        """Whether a gap has yet to open."""
         self._level = [0.0 if value > arm else -slack for value, arm in zip(values, self._arm, strict=True)]
 
     def fired(self, t: float, z: list[float]) -> list[int]:

@@ -153,7 +153,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
 def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
     """The orbit of the branch a step further; `NoOrbitError` also where a long step comes to other landings."""
     orbit = close(here.loop.moved(by, name), name, matrix)
-    if np.linalg.norm(by) > GRAZING and _landings(orbit) != _landings(here):
+    if _strays(here, by, orbit.changes):
         raise NoOrbitError("the nearest orbit is one of another branch")
     return orbit
 
@@ -209,15 +209,18 @@ def _change(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) ->
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         try:
-            loop, back, _ = closed(here.loop.moved(middle * step, name), name, matrix)
+            found, back, _ = closed(here.loop.moved(middle * step, name), name, matrix)
         except NoOrbitError:
             break
+        if _strays(here, middle * step, back.changes):
+            break
+        loop = found
         low, high = (middle, high) if _sequence(back.changes) == before else (low, middle)
     try:
         nearest = close(loop)
     except NoOrbitError:  # disturbances there land where others don't
         nearest = there
-    kind = Bifurcation.PERSISTENCE if _landings(here) == _landings(there) else Bifurcation.GRAZING
+    kind = Bifurcation.PERSISTENCE if _landings(here.changes) == _landings(there.changes) else Bifurcation.GRAZING
     return Place(kind, getattr(loop.p, name), nearest)
 
 
@@ -235,8 +238,13 @@ def _sequence(changes: Changes) -> Changes:
     return min(turns, default=())
 
 
-def _landings(orbit: Orbit) -> int:
-    return sum(before.A is Contact.N is not after.A for before, after in orbit.changes)
+def _strays(here: Orbit, by: Array, changes: Changes) -> bool:
+    """Whether a long step came to other landings than those of the orbit it began at."""
+    return bool(np.linalg.norm(by) > GRAZING) and _landings(changes) != _landings(here.changes)
+
+
+def _landings(changes: Changes) -> int:
+    return sum(before.A is Contact.N is not after.A for before, after in changes)
 
 
 def _outside(orbit: Orbit) -> int:

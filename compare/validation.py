@@ -98,7 +98,8 @@ def validate(
     verdicts = {name: future.result() for name, future in judged.items()}
     files = [path for name, where in kept.items() if (path := where / f"{name}.h5").exists()]
     count = workers if isinstance(workers, int) else workers.count
-    progress("drawing figures", 0, 1, 0)
+    if report:
+        progress("drawing figures", 0, 1, 0)
     with spread(min(count, os.cpu_count() or 1)) as over:
         _write(output, level, files, sum(map(record.load, files), Records()), verdicts, over if report else None)
     return [verdicts[claim.id] for claim in chosen]

@@ -23,7 +23,7 @@ Quantity = Any
 _SLIDES = 9.0
 """A contact slides if its speed squared is over this times that of its change in a step; slip that ends dies faster."""
 _FEW = 16.0
-"""A contact that hovers throws the ball off, and has it back at up to 1.2 times the speed its load makes in a step."""
+"""Steps in which its load makes the speed from which a hovering contact lands; merely hovering, it closes at 1.2."""
 
 
 class Ball(NamedTuple):

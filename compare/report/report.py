@@ -132,10 +132,11 @@ def _figures(material: Material, drawings: Mapping[str, Drawing], spread: Spread
 
 
 def _drawn(new: tuple[Path, Drawing, Any]) -> Shown:
+    path, drawing, data = new
     try:
-        return _figure(*new[:2], *pictures.drawn(*new))
+        return _figure(path, drawing, *pictures.drawn(path, drawing, data))
     except (GapError, StorageError) as error:
-        return _figure(*new[:2], gap=str(error))
+        return _figure(path, drawing, gap=str(error))
 
 
 def _figure(path: Path, drawing: Drawing, picture: str = "", caption: str = "", gap: str = "") -> Shown:
