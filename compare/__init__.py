@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from compare.claims.claim import Claim, Outcome, Verdict
     from compare.measure.check import Check
-    from compare.measure.lab import Level
+    from compare.measure.levels import Level
     from compare.validation import validate
 
 __all__ = ["Check", "Claim", "Level", "Outcome", "Verdict", "validate"]

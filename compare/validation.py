@@ -16,7 +16,8 @@ from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import forget, judge, select, verdict
 from compare.figures.drawing import Material
 from compare.measure import programme, record
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab
+from compare.measure.levels import Level
 from compare.measure.programme import PROTOCOLS
 from compare.measure.record import Records
 from compare.measure.sets import sets as sets_of

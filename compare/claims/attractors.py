@@ -14,7 +14,7 @@ from analytic.orbits import Orbit
 from compare.claims.claim import Bearing, Claim
 from compare.claims.judge import remembered, simulated
 from compare.measure import attractors, hopping
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, state
 from model import Parameters, Trajectory
 from model.kinematics import VARIABLES

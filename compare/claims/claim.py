@@ -13,7 +13,7 @@ from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
 
 from compare.measure.check import Check, Relation
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.measure.quantities import quantity
 from compare.measure.record import Condition, Measurement
 from compare.statistics import Measured

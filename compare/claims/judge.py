@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import analytic
 from analytic.orbits import NoOrbitError
@@ -18,6 +18,8 @@ from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
 
 F = TypeVar("F", bound=Callable[..., Any])
+P = ParamSpec("P")
+R = TypeVar("R")
 _remembered: list[Any] = []
 RTOL = 1e-7
 """Relative tolerance of simulations that predict: what most of them predict is measured to 1e-4 at best."""
@@ -30,6 +32,21 @@ def remembered(function: F) -> F:
     cached = functools.lru_cache(maxsize=None)(function)
     _remembered.append(cached)
     return cached  # type: ignore[return-value]
+
+
+@remembered
+def _computed(function: Callable[..., Any], args: tuple[Any, ...], options: tuple[tuple[str, Any], ...]) -> Any:
+    return function(*args, **dict(options))
+
+
+def theory(function: Callable[P, R], *args: P.args, **options: P.kwargs) -> R:
+    """A function of `analytic` at arguments that can be hashed, computed once a judgement.
+
+    Name the function through its module where it is called, as in ``theory(pulsation.slip_onset, p, f)``: then a theory
+    that was exchanged is the one that is asked.
+    """
+    result: R = _computed(function, args, tuple(sorted(options.items())))
+    return result
 
 
 @remembered

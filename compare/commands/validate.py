@@ -12,7 +12,7 @@ from rich.console import Console
 from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Outcome, Verdict
 from compare.commands import options, running, tables
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.report import results
 from compare.runs import progress
 from model import Parameters

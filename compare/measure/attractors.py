@@ -19,9 +19,11 @@ from scipy.stats import qmc
 
 from compare.measure.field import constrained
 from compare.measure.hopping import SAMPLE, finer
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.lab import Lab, coarse_step, time_unit
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
-from compare.measure.settling import Start, settle
+from compare.measure.settling import settle
+from compare.measure.trials import Start
 from compare.statistics import peaks, top
 from model import Case, Parameters, State, Trajectory
 

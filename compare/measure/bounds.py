@@ -19,7 +19,8 @@ import numpy as np
 
 from compare.measure.field import DOUBT, LIMIT, floor, slip_unit
 from compare.measure.growth import SMOOTH, Push, direction
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.lab import Lab, coarse_step, time_unit
+from compare.measure.levels import Level
 from compare.measure.quantities import quantity
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of
 from compare.measure.settling import Settled, begin, family, settle

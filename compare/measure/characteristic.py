@@ -15,9 +15,11 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.lab import Lab, coarse_step
+from compare.measure.levels import Level
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement
-from compare.measure.settling import STEPS_A_SAMPLE, Settled, Start, duration, family, high, judged, settle_groups
+from compare.measure.settling import STEPS_A_SAMPLE, Settled, duration, family, high, judged, settle_groups
+from compare.measure.trials import Start
 from compare.runs.tasks import Task
 from compare.statistics import Measured
 from model import Case, Flow, Parameters, State, Trajectory

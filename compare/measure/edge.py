@@ -16,7 +16,8 @@ import numpy as np
 
 from compare.measure.brackets import Bracket, Care, Search, narrow
 from compare.measure.extrapolation import vanishing
-from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.lab import Lab, coarse_step
+from compare.measure.levels import Level
 from compare.measure.questions import lasting
 from compare.measure.record import Measurement, Missing, Records, if_sure, measurement, sure_enough
 from compare.measure.settling import begin, family, rotation_scale, settle_groups, taper

@@ -14,8 +14,9 @@ from itertools import product
 
 import numpy as np
 
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.laws import PRESSES
+from compare.measure.levels import Level
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
 from compare.statistics import COVERAGE, Measured

@@ -20,7 +20,8 @@ import numpy as np
 
 from compare.measure import field
 from compare.measure.field import DOUBT, LIMIT, polynomial, random_state, slope_weights
-from compare.measure.lab import Lab, Level, coarse_step, dragged_speed, time_unit
+from compare.measure.lab import Lab, coarse_step, dragged_speed, time_unit
+from compare.measure.levels import Level
 from compare.measure.quantities import quantity
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
 from compare.runs.tasks import Task

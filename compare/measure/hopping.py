@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from compare.measure.field import constrained
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.lab import Lab, coarse_step, time_unit
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, if_sure, measurement, state_of
 from compare.runs.tasks import Task
 from compare.statistics import Measured, peaks, top

@@ -5,25 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from compare.measure import levels
+from compare.measure.levels import Level
 from compare.runs.campaign import Campaign, Failure
 from compare.runs.engines import Engine
 from compare.runs.tasks import Task
 from model import Flow, Parameters, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
-
-
-class Level(IntEnum):
-    """How much is measured."""
-
-    QUICK = 0
-    DEFAULT = 1
-    FULL = 2
 
 
 @dataclass(frozen=True)
@@ -33,6 +27,10 @@ class Lab:
     campaign: Campaign
     engine: Engine
     level: Level
+
+    def effort(self, name: str) -> Any:
+        """How much of something is measured at this level, see `compare.measure.levels`."""
+        return levels.effort(name, self.level)
 
     def task(
         self,

@@ -13,7 +13,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.lab import Lab, coarse_step, time_unit
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, if_sure, measurement
 from compare.runs.tasks import Task
 from compare.statistics import Measured

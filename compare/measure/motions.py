@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from compare.measure.field import constrained
-from compare.measure.lab import Lab, Level, coarse_step, state_units, time_unit
+from compare.measure.lab import Lab, coarse_step, state_units, time_unit
+from compare.measure.levels import Level
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.statistics import Measured
 from model import Case, Contact, Parameters, State, Trajectory

@@ -13,10 +13,12 @@ import numpy as np
 
 from compare.measure import questions
 from compare.measure.brackets import Answer, Bracket, Care, Search, narrow
-from compare.measure.lab import Lab, Level, time_unit
+from compare.measure.lab import Lab, time_unit
 from compare.measure.laws import PRESSES
+from compare.measure.levels import Level
 from compare.measure.questions import From, held
-from compare.measure.settling import Settled, Start, family, high, settle_groups
+from compare.measure.settling import Settled, family, high, settle_groups
+from compare.measure.trials import Start
 from compare.runs.tasks import Task
 from compare.statistics import Measured, settled_case, tail
 from model import Case, Parameters

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 from scipy.stats import qmc
 
-from compare.measure.lab import Lab, Level, time_unit
+from compare.measure.lab import Lab, time_unit
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, measurement
 from compare.measure.settling import Settled, begin, family, settle_groups
 from model import Parameters

@@ -33,7 +33,8 @@ from compare.measure import (
     unloading,
     unsteady,
 )
-from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.lab import Lab, coarse_step
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records
 from compare.runs.engines import MOREAU, Engine
 from compare.runs.tasks import sources

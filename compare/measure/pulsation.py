@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compare.measure.brackets import Bracket, Care, Search, narrow
-from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.lab import Lab, coarse_step
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
 from compare.runs.tasks import Task
 from compare.statistics import Measured

@@ -20,7 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 import model
-from compare.measure.lab import Lab, Level, coarse_step, state_units, time_unit
+from compare.measure.lab import Lab, coarse_step, state_units, time_unit
+from compare.measure.levels import Level
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.measure.settled import SPIN
 from compare.measure.settling import SOLVED, family, high

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from scipy.stats import qmc
 
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from model import Parameters
 from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 

@@ -12,9 +12,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 
-from compare.measure.lab import Lab, Level, time_unit
+from compare.measure.lab import Lab, time_unit
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, measurement
-from compare.measure.settling import GROUPS, Settled, Start, begin, duration, family, judged, scale, settle
+from compare.measure.settling import GROUPS, Settled, begin, duration, family, judged, scale, settle
+from compare.measure.trials import Start
 from compare.runs import engines
 from compare.statistics import Measured
 from model import Parameters, State

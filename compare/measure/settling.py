@@ -14,6 +14,7 @@ import numpy as np
 
 from compare.measure.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.measure.quantities import quantity
+from compare.measure.trials import Start
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
 from model import Case, Contact, Parameters, State, Trajectory
@@ -51,16 +52,6 @@ SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
 """What mechanics determine of the forces where both contacts roll: the rest is a family of one parameter."""
 GROUPS = (("omega_c",), ("slip_x", "slip_y", "slip_z", "wall_spin"), ("v_y",), (*FORCES, *SUMS[2:]))
 """Quantities whose errors have the same causes, and are taken to be as large as the largest of them."""
-
-
-@dataclass(frozen=True, eq=False)
-class Start:
-    """From where a run begins."""
-
-    set: str
-    p: Parameters
-    name: str
-    x0: Array
 
 
 @dataclass(frozen=True, eq=False)

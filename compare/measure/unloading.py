@@ -15,7 +15,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.lab import Lab, coarse_step
+from compare.measure.levels import Level
 from compare.measure.onset import LOOSE
 from compare.measure.questions import lasting
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of

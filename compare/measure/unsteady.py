@@ -13,10 +13,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from compare.measure.lab import Lab, Level, coarse_step
+from compare.measure.lab import Lab, coarse_step
+from compare.measure.levels import Level
 from compare.measure.questions import lasting, rolling
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of, sure_enough
-from compare.measure.settling import Settled, Start, settle
+from compare.measure.settling import Settled, settle
+from compare.measure.trials import Start
 from compare.runs.tasks import Task
 from compare.statistics import Measured, peaks, top
 from model import Case, Flow, Parameters, State, Trajectory

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from model import Case, Parameters
 
 Function = Callable[..., Any]

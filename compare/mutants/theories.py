@@ -10,7 +10,7 @@ import numpy as np
 
 from analytic import bifurcation
 from analytic.orbit_branch import Place
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.mutants.exchange import (
     Change,
     Fault,

@@ -22,7 +22,7 @@ from compare import pages, validation
 from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Claim, Outcome, Text, Verdict
 from compare.claims.judge import forget, judge, verdict
-from compare.measure import lab
+from compare.measure import levels
 from compare.measure.quantities import QUANTITIES
 from compare.measure.record import Records
 from compare.mutants import engines
@@ -176,7 +176,7 @@ def _right(directory: Path) -> tuple[Outcomes, Sequence[Claim]]:
 
 def _theory(directory: Path, whole: bool, number: int) -> Trial:
     wrong, noticed = THEORIES[number], Outcomes()
-    if wrong.level > lab.Level[results.load(directory).level]:
+    if wrong.level > levels.Level[results.load(directory).level]:
         return Trial(wrong.what, noticed, tried=False)
     right, quickest_first = _right(directory)
     forget()
@@ -206,7 +206,9 @@ def _engine(directory: Path, number: int) -> Trial:
     engines.register()
     wrong, apart = WRONG_ENGINES[number], directory / "wrong-engines" / f"{number}"
     claims = [claim.id for claim in CLAIMS if claim.protocols and claim.protocols <= PROVING]
-    verdicts = validation.validate(apart, level=lab.Level.QUICK, claims=claims, engine=wrong, workers=0, report=False)
+    verdicts = validation.validate(
+        apart, level=levels.Level.QUICK, claims=claims, engine=wrong, workers=0, report=False
+    )
     return Trial(wrong.name, _changed(_right(directory)[0], verdicts))
 
 

@@ -17,7 +17,7 @@ from compare import pages
 from compare.claims.claim import Outcome, Verdict
 from compare.figures.drawing import Drawing, GapError, Material
 from compare.figures.registry import FIGURES, figures_of
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.measure.record import Records
 from compare.report import pictures, results, wording
 from compare.report.results import Summary

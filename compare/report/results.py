@@ -15,7 +15,7 @@ from typing import Any
 from compare.claims.claim import Verdict
 from compare.measure import record
 from compare.measure.check import Check
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.measure.record import Records
 from compare.statistics import plain
 from model.errors import StorageError

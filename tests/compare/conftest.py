@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import pytest
 
 from compare.figures.registry import FIGURES
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab
+from compare.measure.levels import Level
 from compare.report import report
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MUJOCO

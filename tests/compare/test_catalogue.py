@@ -6,7 +6,7 @@ from collections import Counter
 
 from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Text
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.measure.programme import PROTOCOLS, needed
 from compare.measure.sets import COUNT, sets
 

@@ -13,7 +13,8 @@ from scipy.integrate import solve_ivp
 import analytic
 from compare.commands import cli
 from compare.measure import settled
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab
+from compare.measure.levels import Level
 from compare.measure.record import Records
 from compare.runs.campaign import Campaign
 from compare.runs.engines import ENGINES, NEWCOMER

@@ -16,7 +16,7 @@ from compare.commands import cli
 from compare.engines import loop
 from compare.engines.adapter import Floats, Library, Touch
 from compare.measure import record
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records
 from compare.report import results
 from compare.runs import collection

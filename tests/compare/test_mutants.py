@@ -13,7 +13,8 @@ from analytic import dynamics, stationary
 from compare.claims import stationary as claims
 from compare.claims.claim import Outcome
 from compare.measure.field import constrained
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab
+from compare.measure.levels import Level
 from compare.mutants import engines, trial
 from compare.mutants.engines import WRONG_ENGINES
 from compare.mutants.exchange import WrongTheory, believed, scaled

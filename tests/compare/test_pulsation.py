@@ -11,7 +11,8 @@ from compare.claims import unsteady as claims
 from compare.claims.claim import Outcome
 from compare.claims.judge import judge
 from compare.measure import pulsation, unsteady
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Records
 from compare.measure.sets import sets
 from compare.mutants.exchange import believed

@@ -25,7 +25,7 @@ from compare.figures.drawing import Drawing, GapError, Material
 from compare.figures.registry import FIGURES
 from compare.measure import record
 from compare.measure.check import Check, Relation
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.measure.record import Measurement, Records
 from compare.report import pictures, report, results, wording
 from compare.report.results import Summary

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from compare.measure import characteristic, plane, settled, settling
-from compare.measure.lab import Lab, Level, coarse_step, time_unit
+from compare.measure.lab import Lab, coarse_step, time_unit
+from compare.measure.levels import Level
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records
 from compare.measure.sets import sets

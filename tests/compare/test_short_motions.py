@@ -15,7 +15,8 @@ from compare.claims import cases, equations, formal, slipping
 from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import judge
 from compare.measure import bounds, field, growth, lift, motions
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab
+from compare.measure.levels import Level
 from compare.measure.record import Records
 from compare.measure.sets import sets
 from compare.measure.thresholds import birth

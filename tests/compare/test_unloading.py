@@ -9,7 +9,7 @@ from compare.claims import unloading as claims
 from compare.claims.claim import Outcome
 from compare.claims.judge import forget, judge
 from compare.measure import unloading
-from compare.measure.lab import Level
+from compare.measure.levels import Level
 from compare.measure.record import Records
 from compare.measure.sets import sets
 from tests.measured import thresholds

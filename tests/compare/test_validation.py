@@ -13,7 +13,8 @@ from compare import validation
 from compare.claims.claim import Bearing, Claim, Outcome, Verdict
 from compare.commands import cli
 from compare.measure import programme
-from compare.measure.lab import Lab, Level
+from compare.measure.lab import Lab
+from compare.measure.levels import Level
 from compare.measure.programme import UNDAMPED, Measure, Protocol
 from compare.measure.record import Measurement, Missing, Records
 from compare.report import results
