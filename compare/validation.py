@@ -20,7 +20,6 @@ from compare.measure.lab import Lab
 from compare.measure.levels import Level
 from compare.measure.programme import PROTOCOLS
 from compare.measure.record import Records
-from compare.measure.sets import sets as sets_of
 from compare.report import results
 from compare.report.results import Summary
 from compare.runs.campaign import Campaign
@@ -28,7 +27,7 @@ from compare.runs.engines import MUJOCO, Engine
 from compare.runs.progress import Show
 from compare.runs.workers import Spread, Workers, spread
 from compare.scorecard import scores
-from model import Parameters, StorageError
+from model import Parameters
 
 HELD = 2**19
 """Samples of new runs that are held in memory, some 100 MB: most are looked at soon after, and once."""
@@ -66,38 +65,36 @@ def validate(
         If the directory can't be written or holds results of another version.
     """
     output, chosen = Path(output), [each for each in select(CLAIMS, claims) if claims or each.level <= level]
-    sets = sets_of(level) if sets is None else sets
     results.open_directory(output)
-    kept = {each.name: programme.directory(output, each.engine or engine, level, sets) for each in PROTOCOLS}
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
-    todo, records, broken = list(chosen), Records(), dict[str, str]()
+    todo = [protocol for protocol in programme.needed(PROTOCOLS, names) if protocol.level <= level]
+    waiting, records, broken = {protocol.name for protocol in todo}, Records(), dict[str, str]()
     judged: dict[str, Future[Verdict]] = {}
-    with (
-        ThreadPoolExecutor(1) as bench,  # judges while the next protocol's runs are on their way
-        Campaign(output / results.RUNS, workers, limit=limit, memory=HELD, report=progress) as campaign,
-    ):
-        lab = Lab(campaign, engine, level)
-        ahead = [p for p in programme.needed(PROTOCOLS, names) if p.level <= level]
-        while True:
-            waiting = {protocol.name for protocol in ahead}
-            for claim in [each for each in todo if not waiting & each.protocols]:
-                todo.remove(claim)
+    whole = Whole(progress, {protocol.name: protocol.cost for protocol in todo}, len(chosen))
+
+    def judge_what_is_there() -> None:
+        for claim in chosen:
+            if claim.id not in judged and not waiting & claim.protocols:
                 judged[claim.id] = bench.submit(_announced, claim, records, dict(broken), announce)
-            if not ahead:
-                break
-            protocol = ahead.pop(0)
-            campaign.doing = f"measuring {protocol.name}"
-            try:
-                records += programme.carry_out(protocol, lab, sets, records, kept[protocol.name])
-            except StorageError:  # a full disk, or a file that was touched, is for the user to mend
-                raise
-            except Exception as error:  # a protocol that breaks down takes its own claims with it, and no others
-                broken[protocol.name] = f"{protocol.name}: {type(error).__name__}: {error}"
+                judged[claim.id].add_done_callback(lambda _: whole.judged())
+
+    with (
+        ThreadPoolExecutor(1) as bench,  # judges while the next protocols' runs are on their way
+        Campaign(output / results.RUNS, workers, limit=limit, memory=HELD, report=whole.measuring) as campaign,
+    ):
+        judge_what_is_there()
+        for protocol, found in programme.run(todo, Lab(campaign, engine, level), sets, output):
+            waiting.remove(protocol.name)
+            whole.measured(protocol.name)
+            if isinstance(found, Records):
+                records += found
+            else:  # a protocol that breaks down takes its own claims with it, and no others
+                broken[protocol.name] = f"{protocol.name}: {type(found).__name__}: {found}"
+            judge_what_is_there()
         if level > Level.QUICK and claims is None:
-            campaign.doing = "ladder of settings, error against cost"
             scores.write(campaign, output)
     verdicts = {name: future.result() for name, future in judged.items()}
-    files = [path for name, where in kept.items() if (path := where / f"{name}.h5").exists()]
+    files = [path for each in PROTOCOLS if (path := programme.file(each, output, engine, level, sets)).exists()]
     count = workers if isinstance(workers, int) else workers.count
     if report:
         progress("drawing figures", 0, 1, 0)

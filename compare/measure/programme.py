@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import KW_ONLY, asdict, dataclass, replace
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 from compare.measure import (
@@ -36,9 +38,10 @@ from compare.measure import (
 from compare.measure.lab import Lab, coarse_step
 from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records
+from compare.measure.sets import sets
 from compare.runs.engines import MOREAU, Engine
 from compare.runs.tasks import sources
-from model import Parameters
+from model import Parameters, StorageError
 from model.files import make_directory
 
 DIRECTORY = "measurements"
@@ -49,6 +52,13 @@ contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c
 `omega_c` may be off in a state that counts as settled."""
 HOPS = "hops that last are those of the set hopping"
 Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
+ONE = ("reference",)
+"""For what one ball shows as well as seven, or the paper draws for one."""
+TWO = ("reference", "high-wall-friction")
+"""One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
+SEVEN = (*TWO, "thick-fluid", "heavy-core", "wake", "blunt", "rubber-wall")
+"""Each for a reason: the two above; drag so strong that nothing folds, or the inertia so small that nothing could; two
+other laws of drag; and friction of the wall above that of the floor and above the inertia."""
 
 
 @dataclass(frozen=True)
@@ -60,46 +70,54 @@ class Protocol:
     needs: tuple[str, ...] = ()
     """Protocols whose measurements it goes out from."""
     _: KW_ONLY
+    quick: tuple[str, ...] = SEVEN
+    """The sets it measures at the quick level; at the others all of them."""
+    cost: float = 1.0
+    """Processor time at the quick level, s on some machine: what of the whole is done, and what begins first."""
     level: Level = Level.QUICK
     """The least level of which it is a part."""
     waits: bool = True
     """Whether it waits for motions to settle."""
-    reference: str = ""
+    alone: str = ""
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
     engine: Engine | None = None
     """Who measures, where it isn't the engine on trial."""
 
+    def measures(self, level: Level) -> dict[str, Parameters]:
+        """The sets that it measures at a level, by name."""
+        return {name: p for name, p in sets(level).items() if level > Level.QUICK or name in self.quick}
+
 
 PROTOCOLS = (
     Protocol("settled", settled.measure),
-    Protocol("newcomer", settled.newcomer, reference="the engine's own settings are measured on reference only"),
-    Protocol("plane", plane.measure, reference="the planes of Figs. 7 and 8 are those of reference only"),
-    Protocol("hysteresis", characteristic.hysteresis, ("settled",)),
+    Protocol("newcomer", settled.newcomer, alone="the engine's own settings are measured on reference only"),
+    Protocol("plane", plane.measure, alone="the planes of Figs. 7 and 8 are those of reference only"),
+    Protocol("hysteresis", characteristic.hysteresis, ("settled",), quick=ONE),
     Protocol("rates", rates.measure, ("settled",)),
     Protocol("laws", laws.measure, waits=False),
     Protocol("thresholds", thresholds.measure),
-    Protocol("edge", edge.measure, ("thresholds",)),
+    Protocol("edge", edge.measure, ("thresholds",), quick=ONE),
     Protocol("birth", thresholds.birth, ("thresholds",)),
-    Protocol("unloading", unloading.measure, ("thresholds",)),
+    Protocol("unloading", unloading.measure, ("thresholds",), quick=TWO),
     Protocol("field", field.measure, waits=False),
     Protocol("growth", growth.measure, waits=False),
     Protocol("steepest", growth.steepest, waits=False),
     Protocol("lift", lift.measure, waits=False),
     Protocol("bounds", bounds.measure, ("thresholds",)),
     Protocol("watched", bounds.watched, ("thresholds",)),
-    Protocol("motions", motions.measure, waits=False),
-    Protocol("impacts", motions.impacts, waits=False),
-    Protocol("recurrent", hopping.hopping, reference=HOPS),
-    Protocol("stepped", hopping.stepped, engine=MOREAU, reference=HOPS),
-    Protocol("followed", hopping.followed, level=Level.DEFAULT, reference=HOPS),
+    Protocol("motions", motions.measure, quick=ONE, waits=False),
+    Protocol("impacts", motions.impacts, quick=TWO, waits=False),
+    Protocol("recurrent", hopping.hopping, alone=HOPS),
+    Protocol("stepped", hopping.stepped, engine=MOREAU, alone=HOPS),
+    Protocol("followed", hopping.followed, level=Level.DEFAULT, alone=HOPS),
     Protocol(
         "swing",
         attractors.swing,
         level=Level.DEFAULT,
-        reference="swings that last are those of reference on a very rough floor",
+        alone="swings that last are those of reference on a very rough floor",
     ),
-    Protocol("calm", attractors.calm, level=Level.DEFAULT, reference="strong drag is tried on sets of its own"),
-    Protocol("choice", attractors.choice, reference="the choice is that of sets of its own with mu > 1"),
+    Protocol("calm", attractors.calm, level=Level.DEFAULT, alone="strong drag is tried on sets of its own"),
+    Protocol("choice", attractors.choice, alone="the choice is that of sets of its own with mu > 1"),
     Protocol("pulsation", pulsation.measure, ("thresholds",)),
     Protocol("unsteady", unsteady.measure, ("thresholds",)),
     Protocol("slope", characteristic.slope, ("settled", "thresholds")),
@@ -107,10 +125,14 @@ PROTOCOLS = (
 """Every protocol there is, in the order in which they measure; each goes out only from those before it."""
 
 
-def directory(results: Path, engine: Engine, level: Level, sets: Mapping[str, Parameters]) -> Path:
-    """Where measurements of one engine, level and choice of sets are kept: others, and other programs', are apart."""
+def file(
+    protocol: Protocol, results: Path, engine: Engine, level: Level, chosen: Mapping[str, Parameters] | None
+) -> Path:
+    """Where measurements are kept; those of another engine, level, choice of sets, or program are apart."""
+    engine, sets = protocol.engine or engine, protocol.measures(level) if chosen is None else chosen
     identity = [engine.name, level.name, {name: asdict(p) for name, p in sets.items()}, _program(engine)]
-    return results / DIRECTORY / hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
+    apart = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
+    return results / DIRECTORY / apart / f"{protocol.name}.h5"
 
 
 @cache
@@ -130,22 +152,61 @@ def needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol
     return [protocol for name, protocol in known.items() if name in wanted]
 
 
-def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], before: Records, kept: Path) -> Records:
-    """What a protocol measures after others; what `kept` holds already is read, not measured again.
+def run(
+    protocols: Sequence[Protocol], lab: Lab, chosen: Mapping[str, Parameters] | None, results: Path
+) -> Iterator[tuple[Protocol, Records | Exception]]:
+    """Carry out protocols, some at once if they need nothing of each other; yield each as it ends, with its records.
+
+    A protocol that breaks down comes with its exception, and takes no other with it: those that need it go without.
+    The sets are those `chosen`, or each protocol's own. Raises `StorageError` where files can't be read or written.
+    """
+    known = {protocol.name: protocol for protocol in protocols}
+    order = TopologicalSorter({p.name: [name for name in p.needs if name in known] for p in protocols})
+    order.prepare()
+    found: dict[str, Records] = {}
+    running: dict[Future[Records], Protocol] = {}
+    with ThreadPoolExecutor(lab.campaign.at_once) as threads:
+        try:
+            while order.is_active():
+                for protocol in sorted((known[name] for name in order.get_ready()), key=protocols.index):
+                    before = sum((found[name] for name in protocol.needs if name in found), Records())
+                    running[threads.submit(carry_out, protocol, lab, chosen, before, results)] = protocol
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    protocol, error = running.pop(future), future.exception()
+                    order.done(protocol.name)
+                    if error is None:
+                        found[protocol.name] = future.result()
+                        yield protocol, future.result()
+                    elif isinstance(error, StorageError) or not isinstance(error, Exception):
+                        raise error  # a full disk, or a file that was touched, is for the user to mend
+                    else:
+                        yield protocol, error
+        except BaseException:
+            lab.campaign.give_up()  # else the threads would wait for runs that nobody wants any more
+            threads.shutdown(cancel_futures=True)
+            raise
+
+
+def carry_out(
+    protocol: Protocol, lab: Lab, chosen: Mapping[str, Parameters] | None, before: Records, results: Path
+) -> Records:
+    """What a protocol measures after others, on the sets `chosen` or its own; what is kept is not measured again.
 
     Raises `StorageError` where measurements can't be read or written; a run that breaks down raises
     `SimulationError`, as far as the protocol can't go on without it.
     """
-    path, lab = kept / f"{protocol.name}.h5", replace(lab, engine=protocol.engine or lab.engine)
+    path = file(protocol, results, lab.engine, lab.level, chosen)
+    lab = replace(lab, engine=protocol.engine or lab.engine, protocol=protocol.name)
     if not path.exists():
+        sets = protocol.measures(lab.level) if chosen is None else chosen
         weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
         strong = {name: p for name, p in sets.items() if name not in weak}
         rows: list[Measurement | Missing] = [Missing(protocol.name, name, why) for name, why in weak.items()]
-        if protocol.reference and "reference" not in strong:
-            rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.reference))
+        if protocol.alone and "reference" not in strong:
+            rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.alone))
         else:
             rows = [*protocol.measure(lab, strong, before), *rows]
-        make_directory(kept)
+        make_directory(path.parent)
         about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
         record.save(Records.of(rows), path, about)
     return record.load(path)

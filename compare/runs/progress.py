@@ -1,62 +1,115 @@
-"""How far a campaign is: one live line on a terminal, plain lines elsewhere, nothing when quiet."""
+"""How far a program is: one live line on a terminal, a plain line every ten seconds elsewhere, nothing when quiet."""
 
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-PLAIN_INTERVAL = 10.0
+INTERVAL = 10.0
 """Seconds between plain lines."""
-
+DRAWING = 0.1
+"""Share of a validation's time that drawing its figures takes, about."""
 Show = Callable[[str, int, int, int], None]
-"""Called with what is being done, runs done, runs in all, runs failed."""
+"""Called with what is being done, in words, how much of it is done, of how much in all, and how much failed."""
+
+
+def nowhere(what: str, done: int, total: int, failed: int) -> None:
+    """Shows nothing."""
 
 
 @contextmanager
 def shown(quiet: bool = False) -> Iterator[Show]:
-    """A function to report progress to, on standard error."""
+    """A function to report progress to, on standard error; it is never silent for longer than `INTERVAL`."""
     if quiet:
-        yield lambda what, done, total, failed: None
+        yield nowhere
     elif sys.stderr.isatty():
-        with _live() as show:
+        times = TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn()
+        columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), *times
+        with Progress(*columns, console=Console(stderr=True)) as bar:
+            line = bar.add_task("", total=None)
+
+            def show(what: str, done: int, total: int, failed: int) -> None:
+                failures = f" [red]{failed} failed[/]" if failed else ""
+                bar.update(line, description=what + failures, completed=done, total=total)
+
             yield show
     else:
-        yield _plain()
+        with _plain() as plain:
+            yield plain
 
 
 @contextmanager
-def _live() -> Iterator[Show]:
-    counts = BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}")
-    times = TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn()
-    with Progress(TextColumn("{task.description}"), *counts, *times, console=Console(stderr=True)) as bar:
-        line = bar.add_task("", total=None, failed="")
-
-        def show(what: str, done: int, total: int, failed: int) -> None:
-            failures = f"[red]{failed} failed" if failed else ""
-            bar.update(line, description=what, completed=done, total=total, failed=failures)
-
-        yield show
-
-
-def _plain() -> Show:
-    doing, start, first, last = "", 0.0, 0, 0.0
+def _plain() -> Iterator[Show]:
+    """Prints what is being done at once, and how far it is every `INTERVAL`, whatever happens."""
+    began, ended = time.monotonic(), threading.Event()
+    before, last = -1, ("starting", 0, 0, 0)
 
     def show(what: str, done: int, total: int, failed: int) -> None:
-        nonlocal doing, start, first, last
-        now = time.monotonic()
-        if what != doing:  # the rate is that of what is being done now, and of this session
-            doing, start, first, last = what, now, done, now
-            print(what, file=sys.stderr)
-            return
-        if now - last < PLAIN_INTERVAL:  # many short campaigns make up one thing that is being done
-            return
-        last = now
-        eta = f", about {(now - start) / (done - first) * (total - done):.0f} s to go" if first < done < total else ""
-        print(f"{what}: {done}/{total} runs{f', {failed} failed' if failed else ''}{eta}", file=sys.stderr)
+        nonlocal before, last
+        if before < 0:
+            before = done  # what an earlier session did is no measure of how fast this one is
+            print(what, file=sys.stderr, flush=True)
+        last = what, done, total, failed
 
-    return show
+    def tell() -> None:
+        while not ended.wait(INTERVAL):
+            what, done, total, failed = last
+            rate = (time.monotonic() - began) / (done - before) if done > before >= 0 else 0.0
+            left = f", about {rate * (total - done):.0f} s to go" if rate and total > done else ""
+            share = f", {done / total:.0%}" if total else ""
+            bad = f", {failed} failed" if failed else ""
+            print(f"{time.monotonic() - began:.0f} s: {what}{share}{bad}{left}", file=sys.stderr, flush=True)
+
+    thread = threading.Thread(target=tell, daemon=True)
+    thread.start()
+    try:
+        yield show
+    finally:
+        ended.set()
+        thread.join()
+
+
+@dataclass
+class Whole:
+    """How far a validation is: claims judged, protocols measured, runs of those under way."""
+
+    show: Show
+    costs: Mapping[str, float]
+    """Processor time of each protocol, in any unit."""
+    claims: int
+    _under_way: dict[str, tuple[int, int, int]] = field(default_factory=dict)
+    _measured: float = 0.0
+    _judged: int = 0
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def measuring(self, protocol: str, done: int, total: int, failed: int) -> None:
+        """So many runs of a protocol are done, of so many that are known so far, and so many failed."""
+        with self._lock:
+            self._under_way[protocol] = done, total, failed
+            self._tell()
+
+    def measured(self, protocol: str) -> None:
+        """A protocol is done."""
+        with self._lock:
+            self._under_way.pop(protocol, None)
+            self._measured += self.costs[protocol]
+            self._tell()
+
+    def judged(self) -> None:
+        """One more claim is judged."""
+        with self._lock:
+            self._judged += 1
+            self._tell()
+
+    def _tell(self) -> None:
+        runs = [f"{name} {done}/{total}" for name, (done, total, _) in self._under_way.items()]
+        what = f"{self._judged} of {self.claims} claims judged; measuring {', '.join(runs)}"
+        all_, done = sum(self.costs.values()), (1 - DRAWING) * self._measured
+        self.show(what, round(1000 * done / (all_ or 1.0)), 1000, sum(bad for *_, bad in self._under_way.values()))
