@@ -30,8 +30,6 @@ from compare.runs.workers import Spread, Workers, spread
 from compare.scorecard import scores
 from model import Parameters, StorageError
 
-HELD = 2**19
-"""Samples of new runs that are held in memory, some 100 MB: most are looked at soon after, and once."""
 Announce = Callable[[Verdict], None]
 """Called with every verdict as soon as it is there."""
 
@@ -74,7 +72,7 @@ def validate(
     judged: dict[str, Future[Verdict]] = {}
     with (
         ThreadPoolExecutor(1) as bench,  # judges while the next protocol's runs are on their way
-        Campaign(output / results.RUNS, workers, limit=limit, memory=HELD, report=progress) as campaign,
+        Campaign(output / results.RUNS, workers, limit=limit, report=progress) as campaign,
     ):
         lab = Lab(campaign, engine, level)
         ahead = [p for p in programme.needed(PROTOCOLS, names) if p.level <= level]
@@ -94,8 +92,9 @@ def validate(
             except Exception as error:  # a protocol that breaks down takes its own claims with it, and no others
                 broken[protocol.name] = f"{protocol.name}: {type(error).__name__}: {error}"
         if level > Level.QUICK and claims is None:
-            campaign.doing = "ladder of settings, error against cost"
+            campaign.doing, campaign.label = "ladder of settings, error against cost", "ladder"
             scores.write(campaign, output)
+            campaign.drop("ladder")
     verdicts = {name: future.result() for name, future in judged.items()}
     files = [path for name, where in kept.items() if (path := where / f"{name}.h5").exists()]
     count = workers if isinstance(workers, int) else workers.count

@@ -27,6 +27,8 @@ class Lab:
     campaign: Campaign
     engine: Engine
     level: Level
+    keeps: bool = True
+    """Whether runs are kept when what was measured from them is stored."""
 
     def effort(self, name: str) -> Any:
         """How much of something is measured at this level, see `compare.measure.levels`."""
@@ -83,9 +85,9 @@ class Lab:
         return self.campaign.complete(tasks)
 
     def file(self, task: Task) -> str:
-        """Name of the task's run file, relative to the results directory."""
-        path = self.campaign.path(task)
-        return f"{path.parent.name}/{path.name}"
+        """Where the task's run is, in the results directory: FILE/KEY, or its key alone where runs are not kept."""
+        directory = self.campaign.directory.parent
+        return self.campaign.path(task).relative_to(directory).as_posix() if self.keeps else task.key
 
 
 def time_unit(p: Parameters) -> float:

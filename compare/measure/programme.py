@@ -68,6 +68,8 @@ class Protocol:
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
     engine: Engine | None = None
     """Who measures, where it isn't the engine on trial."""
+    drawn: bool = False
+    """Whether figures draw its runs, which are then kept; those of others are dropped once what they show is stored."""
 
 
 PROTOCOLS = (
@@ -80,7 +82,7 @@ PROTOCOLS = (
     Protocol("thresholds", thresholds.measure),
     Protocol("edge", edge.measure, ("thresholds",)),
     Protocol("birth", thresholds.birth, ("thresholds",)),
-    Protocol("unloading", unloading.measure, ("thresholds",)),
+    Protocol("unloading", unloading.measure, ("thresholds",), drawn=True),
     Protocol("field", field.measure, waits=False),
     Protocol("growth", growth.measure, waits=False),
     Protocol("steepest", growth.steepest, waits=False),
@@ -101,7 +103,7 @@ PROTOCOLS = (
     Protocol("calm", attractors.calm, level=Level.DEFAULT, reference="strong drag is tried on sets of its own"),
     Protocol("choice", attractors.choice, reference="the choice is that of sets of its own with mu > 1"),
     Protocol("pulsation", pulsation.measure, ("thresholds",)),
-    Protocol("unsteady", unsteady.measure, ("thresholds",)),
+    Protocol("unsteady", unsteady.measure, ("thresholds",), drawn=True),
     Protocol("slope", characteristic.slope, ("settled", "thresholds")),
 )
 """Every protocol there is, in the order in which they measure; each goes out only from those before it."""
@@ -133,10 +135,13 @@ def needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol
 def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], before: Records, kept: Path) -> Records:
     """What a protocol measures after others; what `kept` holds already is read, not measured again.
 
+    Its measurement file is the record of what is done: once it is there, runs that no figure draws are removed.
+
     Raises `StorageError` where measurements can't be read or written; a run that breaks down raises
     `SimulationError`, as far as the protocol can't go on without it.
     """
-    path, lab = kept / f"{protocol.name}.h5", replace(lab, engine=protocol.engine or lab.engine)
+    path, lab = kept / f"{protocol.name}.h5", replace(lab, engine=protocol.engine or lab.engine, keeps=protocol.drawn)
+    lab.campaign.label = f"{protocol.name}-{kept.name}"
     if not path.exists():
         weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
         strong = {name: p for name, p in sets.items() if name not in weak}
@@ -148,6 +153,8 @@ def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], befo
         make_directory(kept)
         about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
         record.save(Records.of(rows), path, about)
+    if not protocol.drawn:
+        lab.campaign.drop(lab.campaign.label)
     return record.load(path)
 
 

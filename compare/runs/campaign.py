@@ -1,16 +1,20 @@
-"""Many runs on an executor: each is computed once, none is lost, and order or number of workers change nothing.
+"""Many runs on an executor: each task is carried out once; results do not depend on order or number of workers.
 
-A run's file is named by the hash of all that determines it (`compare.runs.tasks.Task.key`) and appears only when it is
-whole, so the directory itself is the record of what is done: whatever stops a campaign, starting it again does the
-rest. A run that broke down is stored as ``KEY.failed.h5`` with the samples it has and the reason.
+The runs of a batch are one file, ``LABEL-ID.h5``, in which the name of each is `Task.key`, the hash of all that
+determines it. A file appears only when it is whole, so the directory itself is the record of what is done: whatever
+stops a campaign, starting it again does the rest. A run too long for memory has a file of its own, ``LABEL-KEY.h5``,
+and so has one that broke down, ``LABEL-KEY.failed.h5``, with the samples it has and the reason.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
-from collections import Counter, deque
+import re
+import sys
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, field
@@ -19,17 +23,22 @@ from types import TracebackType
 from typing import Any, Self
 
 from compare.runs.progress import Show
-from compare.runs.tasks import Outcome, OutOfTimeError, Task, failed_path, store
+from compare.runs.tasks import Deadline, OutOfTimeError, Task, carry_out, failed_path, store
 from compare.runs.workers import Workers, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
 from model.files import make_directory, remove_leftovers, write_text
 from model.parameters import POSITIVE, Range, check_number
+from model.trajectory import current_versions
 
 BATCH = 64
 """Runs in one MuJoCo batch: where the engine's cost a step stops falling."""
-ATTEMPTS = 2
-"""How often a task alone may take its worker down with it before it is given up."""
+HELD = 2**18
+"""Most samples of a batch, some 60 MB; a run that has more is written as it comes."""
+READ = 2**19
+"""Samples of runs read last that are held in memory: most are looked at several times, soon after."""
 FAILURES = "failures.json"
+_NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
+"""Label, ID, and whether it broke down; files of earlier versions have no label."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +47,16 @@ class Failure:
 
     task: Task
     reason: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a task in a worker."""
+
+    failure: str
+    """Why its run is not whole; empty if it is."""
+    file: Path | None
+    """Where what there is was stored."""
 
 
 @dataclass
@@ -50,18 +69,18 @@ class Campaign:
     workers : number of processes, or `Workers` of another kind; 0 runs everything in this process
     batch : most runs in one MuJoCo batch
     limit : longest time a run may take, s; a run that takes longer is reported as failed
-    memory : most samples of new runs that are kept in memory, so that `run` needn't read them from their files
     report : called after every batch with `doing`, and how many runs are done, in all, and failed
     doing : what the campaign is about
+    label : what the names of new files begin with, see `drop`
     """
 
     directory: Path
     workers: int | Workers = field(default_factory=lambda: os.cpu_count() or 1)
     batch: int = BATCH
     limit: float = math.inf
-    memory: int = 0
     report: Show = lambda what, done, total, failed: None
     doing: str = ""
+    label: str = "runs"
 
     def __post_init__(self) -> None:
         self._workers = processes(self.workers) if isinstance(self.workers, int) else self.workers
@@ -70,12 +89,11 @@ class Campaign:
             check_number("limit", self.limit, "s", POSITIVE)
         self.directory = Path(self.directory).resolve()
         make_directory(self.directory)
-        self._executor: Executor | None = None
-        self._failed: dict[str, Failure] = {}
-        self._listed = -1
-        self._held: dict[str, Trajectory] = {}
-        self._samples = 0
         remove_leftovers(self.directory)
+        self._executor: Executor | None = None
+        self._files: dict[str, Path] = dict(_stored(self.directory))
+        self._failed: dict[str, Failure] = {}
+        self._read: dict[Path, dict[str, Trajectory]] = {}
 
     def __enter__(self) -> Self:
         return self
@@ -87,8 +105,20 @@ class Campaign:
         remove_leftovers(self.directory)
 
     def path(self, task: Task) -> Path:
-        """Where the task's run is, or will be."""
-        return self.directory / f"{task.key}.h5"
+        """Where the run of a task is, or would be in a file of its own, as `model.storage.load` takes it."""
+        file = self._files.get(task.key, self.directory / f"{self.label}-{task.key}.h5")
+        return file if task.key in file.name else file / task.key
+
+    def load(self, task: Task) -> Trajectory:
+        """The run of a task that was carried out; raises `StorageError` if it can't be read."""
+        file = self._files[task.key]
+        if file not in self._read:
+            self._read[file] = storage.load_runs(file)
+            held = [sum(len(run.time) for run in runs.values()) for runs in self._read.values()]
+            while len(held) > 1 and sum(held) > READ:
+                del self._read[next(iter(self._read))], held[0]
+        runs = self._read[file]
+        return runs[task.key] if task.key in runs else runs[""]
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
@@ -96,98 +126,92 @@ class Campaign:
         Raises `SimulationError` for the first task that failed, `InputError` if it could not even start: use
         `complete` where failures are expected.
         """
-        failed = {failure.task.key: failure.reason for failure in self.complete(tasks)}
-        for task in tasks:
-            if task.key in failed:
-                kept = failed_path(self.path(task))
-                if kept.exists():
-                    raise SimulationError(f"the run {task.key} {failed[task.key]}", storage.load(kept))
-                raise InputError(f"the run {task.key} failed: {failed[task.key]}")
-        return [self._held.get(task.key) or storage.load(self.path(task)) for task in tasks]
+        for task, reason in ((failure.task, failure.reason) for failure in self.complete(tasks)[:1]):
+            if task.key in self._files:
+                raise SimulationError(f"the run {task.key} {reason}", self.load(task))
+            raise InputError(f"the run {task.key} failed: {reason}")
+        return [self.load(task) for task in tasks]
 
     def complete(self, tasks: Iterable[Task]) -> list[Failure]:
-        """Carry out every task that has no file yet; return those that failed, now or earlier.
+        """Carry out every task that has no run yet; return those that failed, now or earlier.
 
         The directory's `FAILURES` lists all that have failed in this campaign, for programs.
         """
-        unique = list({task.key: task for task in tasks}.values())
-        new = [task for task in unique if task.key not in self._held]
-        there = {entry.name for entry in os.scandir(self.directory)} if new else set()
-        todo, failures = [], []
-        for task in new:
-            kept = failed_path(self.path(task))
-            if kept.name in there:
-                failures.append(Failure(task, storage.load(kept).header.failure))
-            elif self.path(task).name not in there:
-                todo.append(task)
+        unique = {task.key: task for task in tasks}
+        todo = [task for key, task in unique.items() if key not in self._files]
+        failures = [
+            Failure(task, self.load(task).header.failure)
+            for key, task in unique.items()
+            if key in self._files and _broke_down(self._files[key])
+        ]
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
-        for finished, failed in self._carry_out(_batches(todo, self.batch, self._workers.count)):
-            done += finished
-            failures += failed
+        for batch, outcomes in self._carry_out(_batches(todo, self.batch, self._workers.count)):
+            for task, outcome in zip(batch, outcomes, strict=True):
+                if outcome.file:
+                    self._files[task.key] = outcome.file
+                if outcome.failure:
+                    failures.append(Failure(task, outcome.failure))
+                else:
+                    done += 1
             self.report(self.doing, done, len(unique), len(failures))
+        listed_before = len(self._failed)
         self._failed |= {failure.task.key: failure for failure in failures}
-        if len(self._failed) != self._listed and (self._failed or (self.directory / FAILURES).exists()):
+        if len(self._failed) > listed_before:
             write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
-        self._listed = len(self._failed)
         return failures
 
-    def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[int, list[Failure]]]:
-        """Yield, for each batch that ends, how many of its runs are whole and those that failed."""
+    def drop(self, label: str) -> None:
+        """Remove the files under a label, once what was measured from their runs is kept; not those of failed runs."""
+        gone = {
+            file for file in self._files.values() if file.name.rpartition("-")[0] == label and not _broke_down(file)
+        }
+        for file in gone:
+            file.unlink(missing_ok=True)
+            self._read.pop(file, None)
+        self._files = {key: file for key, file in self._files.items() if file not in gone}
+
+    def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[tuple[Task, ...], Sequence[Outcome]]]:
+        """Yield each batch that ends, with what became of its tasks.
+
+        A worker that dies takes all batches under way with it. Their tasks are tried again at the end, one at a time;
+        one that then loses its worker, too, has failed.
+        """
         pending: dict[Future[list[Outcome]], tuple[Task, ...]] = {}
-        # A worker that dies takes other batches down with it. Those are tried again one by one, alone, so that it
-        # shows which is to blame; a batch to blame is taken apart.
-        suspects: deque[tuple[Task, ...]] = deque()
-        blamed: Counter[str] = Counter()
+        again: deque[Task] = deque()
         while True:
             # No more than a few batches wait at the executor, so that memory stays flat however long the list.
             while len(pending) < 2 * self._workers.count and (batch := next(fresh, ())):
                 pending[self._submit(batch)] = batch
             alone = not pending
             if alone:
-                if not suspects:
+                if not again:
                     return
-                batch = suspects.popleft()
+                batch = (again.popleft(),)
                 pending[self._submit(batch)] = batch
             ended, _ = wait(pending, return_when=FIRST_COMPLETED)
             for future in ended:
                 batch = pending.pop(future)
                 error = future.exception()
                 if error is None:
-                    yield self._tally(batch, future.result())
+                    yield batch, future.result()
                 elif not isinstance(error, self._workers.lost):
                     raise error
+                elif alone:
+                    yield batch, [Outcome("its worker died (killed, or out of memory)", None)]
                 else:
-                    self._stop(at_once=True)
-                    if alone and len(batch) > 1:
-                        suspects.extend((task,) for task in batch)
-                    elif alone and (blamed.update([batch[0].key]) or blamed[batch[0].key]) >= ATTEMPTS:
-                        yield 0, [Failure(batch[0], "its worker died (killed, or out of memory)")]
-                    else:
-                        suspects.append(batch)
+                    again.extend(batch)
 
     def _submit(self, batch: tuple[Task, ...]) -> Future[list[Outcome]]:
+        """Give a batch to the executor, or to a new one if its workers were lost."""
         for _ in range(2):
             if self._executor is None:
                 self._executor = self._workers.start()
             try:
-                return self._executor.submit(run_batch, batch, self.directory, self.limit, self.memory > 0)
+                return self._executor.submit(run_batch, batch, self.directory, self.label, self.limit)
             except self._workers.lost:
                 self._stop(at_once=True)
         raise StorageError("workers die as soon as they are started")
-
-    def _tally(self, batch: Sequence[Task], outcomes: Sequence[Outcome]) -> tuple[int, list[Failure]]:
-        """How many runs of a batch are whole, and the others; whole ones are held, as long as there is memory."""
-        failures = []
-        for task, outcome in zip(batch, outcomes, strict=True):
-            if outcome.failure:
-                failures.append(Failure(task, outcome.failure))
-            elif outcome.run:
-                self._held[task.key] = outcome.run
-                self._samples += len(outcome.run.time)
-        while self._samples > self.memory:
-            self._samples -= len(self._held.pop(next(iter(self._held))).time)
-        return len(batch) - len(failures), failures
 
     def _stop(self, at_once: bool) -> None:
         if self._executor is not None:
@@ -200,18 +224,63 @@ def listed(failures: Iterable[Failure]) -> list[dict[str, Any]]:
     return [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures]
 
 
-def run_batch(tasks: Sequence[Task], directory: Path, limit: float, hand_over: bool = False) -> list[Outcome]:
-    """Carry out tasks and store each; `hand_over` the runs themselves, too.
+def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) -> list[Outcome]:
+    """Carry out tasks and store their runs under a label; raises `StorageError` if that can't be done.
 
     Where a batch can't be carried out as a whole, its tasks are tried one by one.
     """
+    first = directory / f"{label}-{tasks[0].key}.h5"
     try:
-        outcomes = store(tasks, [directory / f"{task.key}.h5" for task in tasks], limit)
-    except (InputError, OutOfTimeError, MemoryError) as error:  # StorageError, a full disk, is an InputError
+        if len(tasks) == 1 and (tasks[0].long or tasks[0].samples > HELD):
+            failure = store(tasks[0], first, limit)
+            return [Outcome(failure, failed_path(first) if failure else first)]
+        runs = carry_out(tasks, Deadline(limit * len(tasks)))
+    except StorageError:  # a full disk is for the user to mend
+        raise
+    except (InputError, OutOfTimeError, MemoryError) as error:
         if len(tasks) > 1:
-            return [outcome for task in tasks for outcome in run_batch([task], directory, limit, hand_over)]
-        return [Outcome(str(error) or "out of memory")]
-    return outcomes if hand_over else [Outcome(outcome.failure) for outcome in outcomes]
+            return [outcome for task in tasks for outcome in run_batch([task], directory, label, limit)]
+        return [Outcome(str(error) or "out of memory", None)]
+    whole = {task.key: run for task, run in zip(tasks, runs, strict=True) if run.complete}
+    file = directory / f"{label}-{hashlib.sha256(' '.join(whole).encode()).hexdigest()[:24]}.h5"
+    if whole:
+        storage.save_batch(whole, file)
+    outcomes = []
+    for task, run in zip(tasks, runs, strict=True):
+        kept = file if run.complete else failed_path(directory / f"{label}-{task.key}.h5")
+        if not run.complete:
+            storage.save(run, kept)
+        outcomes.append(Outcome(run.header.failure, kept))
+    return outcomes
+
+
+def _stored(directory: Path) -> Iterator[tuple[str, Path]]:
+    """The runs that the files of a directory hold, by key.
+
+    A file that was cut or changed is set aside, so that its runs are carried out again; those of other versions of the
+    program are left alone. Both are said on standard error.
+    """
+    others, ours = 0, current_versions()["dualball"]
+    for file in sorted(directory.glob("*.h5")):
+        name = _NAME.fullmatch(file.name)
+        if name and name[1] is None:
+            others += 1
+        elif name:
+            try:
+                version, keys = storage.contents(file)
+            except StorageError as error:
+                file.replace(file.with_suffix(".damaged"))
+                print(f"dualball: {error}; it is set aside, its runs are carried out again", file=sys.stderr)
+                continue
+            others += version != ours
+            if version == ours:
+                yield from ((key, file) for key in keys or [name[2]])
+    if others:
+        print(f"dualball: {others} files of runs of other versions are left alone in {directory}", file=sys.stderr)
+
+
+def _broke_down(file: Path) -> bool:
+    return file.name.endswith(".failed.h5")
 
 
 def _batches(tasks: Iterable[Task], size: int, workers: int) -> Iterator[tuple[Task, ...]]:
@@ -220,6 +289,7 @@ def _batches(tasks: Iterable[Task], size: int, workers: int) -> Iterator[tuple[T
     for task in tasks:
         groups.setdefault(task.batch_key, []).append(task)
     for group in sorted(groups.values(), key=lambda group: -group[0].steps * len(group)):
-        share = min(size, math.ceil(len(group) / workers))
+        most = min(size, math.ceil(len(group) / workers), int(HELD / group[0].samples))
+        share = 1 if group[0].long else max(1, most)
         for start in range(0, len(group), share):
             yield tuple(group[start : start + share])
