@@ -160,8 +160,7 @@ def test_pieces_of_motions_end_in_the_predicted_cases(lab: Lab) -> None:
 
 def test_pieces_keep_away_from_changes_of_case(lab: Lab) -> None:
     measured = Records.of(motions.measure(lab, SETS, Records()))
-    path = Path(lab.campaign.directory) / Path(measured.measurements[0].runs[0]).name
-    run = storage.load(path)
+    run = storage.load(lab.campaign.directory.parent / measured.measurements[0].runs[0])
     changes = np.flatnonzero(np.diff(run.case)) + 1
     for first in motions.pieces(run, 12):
         for end in (first, first + motions.LENGTH):
