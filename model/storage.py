@@ -43,6 +43,7 @@ BATCH, BATCH_VERSION = "dualball-batch", 1
 _CHUNK = 1024
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
+_TEXTS = tuple(field.name for field in dataclasses.fields(Header))
 
 
 def save(trajectory: Trajectory, path: str | Path) -> None:
@@ -107,18 +108,15 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
         for name in headers[0]:
             file.create_dataset(name, data=[header[name] for header in headers], dtype=_TEXT)
             file[name].dims[0].attach_scale(file["run"])
-        tables: dict[str, tuple[Any, list[Any]]] = {
-            "sample": (Trajectory, list(runs.values())),
-            "event": (Events, [run.events for run in runs.values()]),
-        }
-        for dimension, (of, each) in tables.items():
-            counts = [len(table.time) for table in each]
+        for dimension, of in (("sample", Trajectory), ("event", Events)):
+            tables: list[Any] = [run.events if of is Events else run for run in runs.values()]
+            counts = [len(table.time) for table in tables]
             file.create_dataset(f"{dimension}s", data=counts).dims[0].attach_scale(file["run"])
             file.create_dataset(dimension, data=np.arange(max(counts))).make_scale(dimension)
             for column, name, meta in _columns(of):
                 empty = -1 if meta["dtype"] is np.int8 else np.nan
-                values = np.full((len(each), max(counts), *meta["shape"]), empty, meta["dtype"])
-                for row, count, table in zip(values, counts, each, strict=True):
+                values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
+                for row, count, table in zip(values, counts, tables, strict=True):
                     row[:count] = getattr(table, column)
                 _create(file, name, meta, ("run", dimension, "axis"), data=values)
         whole.finish()
@@ -158,7 +156,7 @@ def contents(path: str | Path) -> tuple[str, list[str]]:
     Raises `StorageError` as `load` does.
     """
     with reading(path) as file:
-        version = str(_json(_attributes(file), "versions").get("dualball"))
+        version = str(_json(file.attrs, "versions").get("dualball"))
         return version, _texts(file, "run") if is_batch(file) else []
 
 
@@ -177,21 +175,18 @@ def load_runs(path: str | Path) -> dict[str, Trajectory]:
     with reading(path) as file:
         if not is_batch(file):
             return {"": _read(file, slice(None))}
-        _check_version(file, BATCH, BATCH_VERSION)
+        _check_schema(file, BATCH, BATCH_VERSION)
         texts = {name: _texts(file, name) for name in _TEXTS}
-        tables = [_table(file, of, 2) for of in (Trajectory, Events)]
-        ends = [dataset(file, name)[...].tolist() for name in ("samples", "events")]
+        samples, events = _table(file, Trajectory, 2), _table(file, Events, 2)
+        counts = zip(dataset(file, "samples")[...].tolist(), dataset(file, "events")[...].tolist(), strict=True)
         runs = {}
-        for k, name in enumerate(_texts(file, "run")):
-            of_run = [
-                {column: values[k, : end[k]].copy() for column, values in table.items()}
-                for table, end in zip(tables, ends, strict=True)
-            ]
-            runs[name] = _trajectory({key: values[k] for key, values in texts.items()}, *of_run)
+        for k, (name, (n, m)) in enumerate(zip(_texts(file, "run"), counts, strict=True)):
+            runs[name] = _trajectory(
+                {key: values[k] for key, values in texts.items()},
+                {column: values[k, :n].copy() for column, values in samples.items()},
+                {column: values[k, :m].copy() for column, values in events.items()},
+            )
         return runs
-
-
-_TEXTS = tuple(field.name for field in dataclasses.fields(Header))
 
 
 def _columns(of: type[Trajectory] | type[Events]) -> list[tuple[str, str, Mapping[str, Any]]]:
@@ -221,12 +216,12 @@ def _read(file: h5py.File, part: slice) -> Trajectory:
     """Part of the samples of a file of one run, with all events."""
     if is_batch(file):
         raise StorageError("it holds the runs of a batch: name one of them, as FILE/NAME")
-    _check_version(file, SCHEMA, SCHEMA_VERSION)
-    texts = _attributes(file) | {"mjcf": dataset(file, "mjcf").asstr()[()]}
+    _check_schema(file, SCHEMA, SCHEMA_VERSION)
+    texts = dict(file.attrs) | {"mjcf": dataset(file, "mjcf").asstr()[()]}
     return _trajectory(texts, _table(file, Trajectory, 1, part), _table(file, Events, 1))
 
 
-def _check_version(file: h5py.File, name: str, newest: int) -> None:
+def _check_schema(file: h5py.File, name: str, newest: int) -> None:
     schema, version = file.attrs.get("schema"), file.attrs.get("schema_version")
     if schema != name:
         raise StorageError(f"it is an HDF5 file, but not a {name}")
@@ -250,10 +245,6 @@ def _trajectory(
     if not np.isin(codes, list(Case)).all():
         raise StorageError("it holds a case that does not exist")
     return Trajectory(header=Header(**values), events=Events(**events), **samples)
-
-
-def _attributes(file: h5py.File) -> dict[str, Any]:
-    return dict(file.attrs)
 
 
 def _text(texts: Mapping[str, Any], name: str) -> str:
@@ -285,9 +276,7 @@ def _table(
     values = {}
     for column, name, meta in _columns(of):
         stored = dataset(file, name)
-        if stored.shape is None or len(stored.shape) != leading + len(meta["shape"]):
-            raise StorageError(f"{name!r} has shape {stored.shape}")
-        if stored.shape[leading:] != meta["shape"]:
+        if len(stored.shape or ()) != leading + len(meta["shape"]) or stored.shape[leading:] != meta["shape"]:
             raise StorageError(f"{name!r} has shape {stored.shape}")
         if stored.dtype.kind != np.dtype(meta["dtype"]).kind:
             raise StorageError(f"{name!r} has type {stored.dtype}")
