@@ -94,7 +94,7 @@ def validate(
         if level > Level.QUICK and claims is None:
             campaign.doing, campaign.label = "ladder of settings, error against cost", "ladder"
             scores.write(campaign, output)
-            campaign.drop("ladder")
+            campaign.reduce("ladder")
     verdicts = {name: future.result() for name, future in judged.items()}
     files = [path for name, where in kept.items() if (path := where / f"{name}.h5").exists()]
     count = workers if isinstance(workers, int) else workers.count

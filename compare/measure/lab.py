@@ -27,8 +27,6 @@ class Lab:
     campaign: Campaign
     engine: Engine
     level: Level
-    keeps: bool = True
-    """Whether runs are kept when what was measured from them is stored."""
 
     def effort(self, name: str) -> Any:
         """How much of something is measured at this level, see `compare.measure.levels`."""
@@ -83,11 +81,6 @@ class Lab:
     def complete(self, tasks: Sequence[Task]) -> list[Failure]:
         """Carry out the tasks and return those that failed."""
         return self.campaign.complete(tasks)
-
-    def file(self, task: Task) -> str:
-        """Where the task's run is, in the results directory: FILE/KEY, or its key alone where runs are not kept."""
-        directory = self.campaign.directory.parent
-        return self.campaign.path(task).relative_to(directory).as_posix() if self.keeps else task.key
 
 
 def time_unit(p: Parameters) -> float:

@@ -68,8 +68,8 @@ class Protocol:
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
     engine: Engine | None = None
     """Who measures, where it isn't the engine on trial."""
-    drawn: bool = False
-    """Whether figures draw its runs, which are then kept; those of others are dropped once what they show is stored."""
+    drawn: Callable[[Measurement], bool] = lambda m: False
+    """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is stored."""
 
 
 PROTOCOLS = (
@@ -82,7 +82,7 @@ PROTOCOLS = (
     Protocol("thresholds", thresholds.measure),
     Protocol("edge", edge.measure, ("thresholds",)),
     Protocol("birth", thresholds.birth, ("thresholds",)),
-    Protocol("unloading", unloading.measure, ("thresholds",), drawn=True),
+    Protocol("unloading", unloading.measure, ("thresholds",), drawn=lambda m: m.conditions["start"] == "unloading"),
     Protocol("field", field.measure, waits=False),
     Protocol("growth", growth.measure, waits=False),
     Protocol("steepest", growth.steepest, waits=False),
@@ -103,7 +103,7 @@ PROTOCOLS = (
     Protocol("calm", attractors.calm, level=Level.DEFAULT, reference="strong drag is tried on sets of its own"),
     Protocol("choice", attractors.choice, reference="the choice is that of sets of its own with mu > 1"),
     Protocol("pulsation", pulsation.measure, ("thresholds",)),
-    Protocol("unsteady", unsteady.measure, ("thresholds",), drawn=True),
+    Protocol("unsteady", unsteady.measure, ("thresholds",), drawn=lambda m: m.quantity == "jump_height"),
     Protocol("slope", characteristic.slope, ("settled", "thresholds")),
 )
 """Every protocol there is, in the order in which they measure; each goes out only from those before it."""
@@ -135,13 +135,14 @@ def needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol
 def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], before: Records, kept: Path) -> Records:
     """What a protocol measures after others; what `kept` holds already is read, not measured again.
 
-    Its measurement file is the record of what is done: once it is there, runs that no figure draws are removed.
+    Its measurement file is the record of what is done: once it is there, only the runs that a figure draws are kept.
 
     Raises `StorageError` where measurements can't be read or written; a run that breaks down raises
     `SimulationError`, as far as the protocol can't go on without it.
     """
-    path, lab = kept / f"{protocol.name}.h5", replace(lab, engine=protocol.engine or lab.engine, keeps=protocol.drawn)
-    lab.campaign.label = f"{protocol.name}-{kept.name}"
+    path, lab = kept / f"{protocol.name}.h5", replace(lab, engine=protocol.engine or lab.engine)
+    campaign, label = lab.campaign, f"{protocol.name}-{kept.name}"
+    campaign.label = label
     if not path.exists():
         weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
         strong = {name: p for name, p in sets.items() if name not in weak}
@@ -152,10 +153,14 @@ def carry_out(protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], befo
             rows = [*protocol.measure(lab, strong, before), *rows]
         make_directory(kept)
         about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
+        place = f"{campaign.directory.name}/{label}.h5"
+        for k, row in enumerate(rows):
+            if isinstance(row, Measurement) and protocol.drawn(row):
+                rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
         record.save(Records.of(rows), path, about)
-    if not protocol.drawn:
-        lab.campaign.drop(lab.campaign.label)
-    return record.load(path)
+    records = record.load(path)
+    campaign.reduce(label, {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run})
+    return records
 
 
 def _too_weak(p: Parameters, protocol: Protocol) -> str:

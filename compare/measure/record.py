@@ -1,7 +1,7 @@
 """Measurements as data, and the file that keeps them.
 
 A measurement is a number with its standard uncertainty and all that it belongs to: what was measured, by which engine,
-with which parameters, under which named conditions, in which run files. Labels and sentences are made from it and never
+with which parameters, under which named conditions, in which runs. Labels and sentences are made from it and never
 read back. A file holds the measurements of one protocol as columns, one row a measurement: it opens with
 ``xarray.open_dataset(path, engine="h5netcdf").to_dataframe()``.
 """
@@ -52,7 +52,7 @@ class Measurement:
     conditions: Mapping[str, Condition] = field(default_factory=dict)
     """What else it depends on, by name; SI units."""
     runs: tuple[str, ...] = ()
-    """Run files, relative to the results directory."""
+    """Keys of its runs; where they are kept, FILE/KEY, relative to the results directory."""
 
     def __post_init__(self) -> None:
         quantity(self.quantity)
@@ -86,7 +86,7 @@ def measurement(
         set=set,
         parameters=p,
         conditions=conditions,
-        runs=tuple(lab.file(task) for task in tasks),
+        runs=tuple(task.key for task in tasks),
     )
 
 

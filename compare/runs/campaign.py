@@ -15,7 +15,7 @@ import os
 import re
 import sys
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -71,7 +71,7 @@ class Campaign:
     limit : longest time a run may take, s; a run that takes longer is reported as failed
     report : called after every batch with `doing`, and how many runs are done, in all, and failed
     doing : what the campaign is about
-    label : what the names of new files begin with, see `drop`
+    label : what the names of new files begin with, see `reduce`
     """
 
     directory: Path
@@ -111,14 +111,17 @@ class Campaign:
 
     def load(self, task: Task) -> Trajectory:
         """The run of a task that was carried out; raises `StorageError` if it can't be read."""
-        file = self._files[task.key]
+        return self._load(task.key)
+
+    def _load(self, key: str) -> Trajectory:
+        file = self._files[key]
         if file not in self._read:
             self._read[file] = storage.load_runs(file)
             held = [sum(len(run.time) for run in runs.values()) for runs in self._read.values()]
             while len(held) > 1 and sum(held) > READ:
                 del self._read[next(iter(self._read))], held[0]
         runs = self._read[file]
-        return runs[task.key] if task.key in runs else runs[""]
+        return runs[key] if key in runs else runs[""]
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
@@ -161,11 +164,14 @@ class Campaign:
             write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
         return failures
 
-    def drop(self, label: str) -> None:
-        """Remove the files under a label, once what was measured from their runs is kept; not those of failed runs."""
-        gone = {
-            file for file in self._files.values() if file.name.rpartition("-")[0] == label and not _broke_down(file)
-        }
+    def reduce(self, label: str, keys: Collection[str] = ()) -> None:
+        """Once what was measured under a label is stored: keep the runs of these keys, in one file, ``LABEL.h5``.
+
+        All other files of the label are removed, but for those of runs that broke down.
+        """
+        gone = {f for f in self._files.values() if f.name.rpartition("-")[0] == label and not _broke_down(f)}
+        if keys and all(self._files.get(key) in gone for key in keys):
+            storage.save_batch({key: self._load(key) for key in sorted(keys)}, self.directory / f"{label}.h5")
         for file in gone:
             file.unlink(missing_ok=True)
             self._read.pop(file, None)

@@ -103,15 +103,18 @@ def test_no_more_is_held_than_there_is_memory_for(tmp_path: Path, monkeypatch: p
     assert len(loaded) == 2 + 4
 
 
-def test_what_is_measured_is_dropped_by_its_label(tmp_path: Path) -> None:
+def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path: Path) -> None:
     wild = Task(engine="mujoco", parameters=Parameters.named("reference"), x0=(0, 0, 1e9, 0, 0, 0), t_end=0.2)
     with Campaign(tmp_path, workers=0, batch=2, label="first") as campaign:
         campaign.complete([*tasks(3), wild])
         campaign.label = "first-and-more"
         campaign.complete(tasks(4))
-        campaign.drop("first")
+        campaign.reduce("first", [tasks(2)[1].key])
         kept = sorted((*path.name.rsplit("-", 1)[:1], *path.suffixes) for path in tmp_path.glob("*.h5"))
-        assert kept == [("first", ".failed", ".h5"), ("first-and-more", ".h5")]
+        assert kept == [("first", ".failed", ".h5"), ("first-and-more", ".h5"), ("first.h5", ".h5")]
+        campaign.reduce("first", [tasks(2)[1].key])  # again, as after a kill: what is kept stays
+        assert list(storage.load_runs(tmp_path / "first.h5")) == [tasks(2)[1].key]
+        (tmp_path / "first.h5").unlink()
         assert campaign.complete(tasks(4)) == []
     assert len(data(tmp_path)) == 5
 
