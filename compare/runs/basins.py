@@ -120,7 +120,7 @@ def basins(
     tasks = [*fine, *_tasks(few, MUJOCO.name, p, ContactSettings.for_problem(p, timestep))]
     broken = {failure.task.key for failure in campaign.complete(tasks)}
     undecided = FATES.index("undecided")
-    fates = np.array([undecided if task.key in broken else _fate(campaign.load(task)) for task in tasks])
+    fates = np.array([undecided if task.key in broken else _fate(campaign.load(task.key)) for task in tasks])
     by_stepping, by_mujoco = fates[: len(fine)].reshape(states.shape[:2]), fates[len(fine) :].reshape(few.shape[:2])
     return Basins(p, tuple(base.tolist()), across.name, up.name, x, y, by_stepping, coarse, by_mujoco, timestep)
 

@@ -37,6 +37,8 @@ HELD = 2**18
 READ = 2**19
 """Samples of runs read last that are held in memory: most are looked at several times, soon after."""
 FAILURES = "failures.json"
+Outcome = tuple[str, Path | None]
+"""Why a run is not whole, empty if it is; and the file that holds what there is of it."""
 _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 """Label, ID, and whether it broke down; files of earlier versions have no label."""
 
@@ -47,16 +49,6 @@ class Failure:
 
     task: Task
     reason: str
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a task in a worker."""
-
-    failure: str
-    """Why its run is not whole; empty if it is."""
-    file: Path | None
-    """Where what there is was stored."""
 
 
 @dataclass
@@ -104,16 +96,8 @@ class Campaign:
         self._stop(at_once=kind is not None)
         remove_leftovers(self.directory)
 
-    def path(self, task: Task) -> Path:
-        """Where the run of a task is, or would be in a file of its own, as `model.storage.load` takes it."""
-        file = self._files.get(task.key, self.directory / f"{self.label}-{task.key}.h5")
-        return file if task.key in file.name else file / task.key
-
-    def load(self, task: Task) -> Trajectory:
-        """The run of a task that was carried out; raises `StorageError` if it can't be read."""
-        return self._load(task.key)
-
-    def _load(self, key: str) -> Trajectory:
+    def load(self, key: str) -> Trajectory:
+        """The run of a task that was carried out, by its key; raises `StorageError` if it can't be read."""
         file = self._files[key]
         if file not in self._read:
             self._read[file] = storage.load_runs(file)
@@ -131,9 +115,9 @@ class Campaign:
         """
         for task, reason in ((failure.task, failure.reason) for failure in self.complete(tasks)[:1]):
             if task.key in self._files:
-                raise SimulationError(f"the run {task.key} {reason}", self.load(task))
+                raise SimulationError(f"the run {task.key} {reason}", self.load(task.key))
             raise InputError(f"the run {task.key} failed: {reason}")
-        return [self.load(task) for task in tasks]
+        return [self.load(task.key) for task in tasks]
 
     def complete(self, tasks: Iterable[Task]) -> list[Failure]:
         """Carry out every task that has no run yet; return those that failed, now or earlier.
@@ -142,25 +126,17 @@ class Campaign:
         """
         unique = {task.key: task for task in tasks}
         todo = [task for key, task in unique.items() if key not in self._files]
-        failures = [
-            Failure(task, self.load(task).header.failure)
-            for key, task in unique.items()
-            if key in self._files and _broke_down(self._files[key])
-        ]
+        earlier = [key for key in unique if key in self._files and _broke_down(self._files[key])]
+        failures = [Failure(unique[key], self.load(key).header.failure) for key in earlier]
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
         for batch, outcomes in self._carry_out(_batches(todo, self.batch, self._workers.count)):
-            for task, outcome in zip(batch, outcomes, strict=True):
-                if outcome.file:
-                    self._files[task.key] = outcome.file
-                if outcome.failure:
-                    failures.append(Failure(task, outcome.failure))
-                else:
-                    done += 1
+            self._files |= {task.key: file for task, (_, file) in zip(batch, outcomes, strict=True) if file}
+            failed = [Failure(task, reason) for task, (reason, _) in zip(batch, outcomes, strict=True) if reason]
+            failures, done = failures + failed, done + len(batch) - len(failed)
             self.report(self.doing, done, len(unique), len(failures))
-        listed_before = len(self._failed)
-        self._failed |= {failure.task.key: failure for failure in failures}
-        if len(self._failed) > listed_before:
+        if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
+            self._failed |= new
             write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
         return failures
 
@@ -171,7 +147,7 @@ class Campaign:
         """
         gone = {f for f in self._files.values() if f.name.rpartition("-")[0] == label and not _broke_down(f)}
         if keys and all(self._files.get(key) in gone for key in keys):
-            storage.save_batch({key: self._load(key) for key in sorted(keys)}, self.directory / f"{label}.h5")
+            storage.save_batch({key: self.load(key) for key in sorted(keys)}, self.directory / f"{label}.h5")
         for file in gone:
             file.unlink(missing_ok=True)
             self._read.pop(file, None)
@@ -204,7 +180,7 @@ class Campaign:
                 elif not isinstance(error, self._workers.lost):
                     raise error
                 elif alone:
-                    yield batch, [Outcome("its worker died (killed, or out of memory)", None)]
+                    yield batch, [("its worker died (killed, or out of memory)", None)]
                 else:
                     again.extend(batch)
 
@@ -235,29 +211,27 @@ def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) 
 
     Where a batch can't be carried out as a whole, its tasks are tried one by one.
     """
-    first = directory / f"{label}-{tasks[0].key}.h5"
+    paths = [directory / f"{label}-{task.key}.h5" for task in tasks]
     try:
         if len(tasks) == 1 and (tasks[0].long or tasks[0].samples > HELD):
-            failure = store(tasks[0], first, limit)
-            return [Outcome(failure, failed_path(first) if failure else first)]
+            failure = store(tasks[0], paths[0], limit)
+            return [(failure, failed_path(paths[0]) if failure else paths[0])]
         runs = carry_out(tasks, Deadline(limit * len(tasks)))
     except StorageError:  # a full disk is for the user to mend
         raise
     except (InputError, OutOfTimeError, MemoryError) as error:
         if len(tasks) > 1:
             return [outcome for task in tasks for outcome in run_batch([task], directory, label, limit)]
-        return [Outcome(str(error) or "out of memory", None)]
+        return [(str(error) or "out of memory", None)]
     whole = {task.key: run for task, run in zip(tasks, runs, strict=True) if run.complete}
-    file = directory / f"{label}-{hashlib.sha256(' '.join(whole).encode()).hexdigest()[:24]}.h5"
+    together = directory / f"{label}-{hashlib.sha256(' '.join(whole).encode()).hexdigest()[:24]}.h5"
     if whole:
-        storage.save_batch(whole, file)
-    outcomes = []
-    for task, run in zip(tasks, runs, strict=True):
-        kept = file if run.complete else failed_path(directory / f"{label}-{task.key}.h5")
+        storage.save_batch(whole, together)
+    files = [together if run.complete else failed_path(path) for run, path in zip(runs, paths, strict=True)]
+    for run, file in zip(runs, files, strict=True):
         if not run.complete:
-            storage.save(run, kept)
-        outcomes.append(Outcome(run.header.failure, kept))
-    return outcomes
+            storage.save(run, file)
+    return [(run.header.failure, file) for run, file in zip(runs, files, strict=True)]
 
 
 def _stored(directory: Path) -> Iterator[tuple[str, Path]]:

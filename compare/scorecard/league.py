@@ -118,7 +118,7 @@ def scored(
         for discipline, tasks in zip(asked, row, strict=True):
             reasons = [failed[task.key] for task in tasks if task.key in failed]
             entry.failures.update({discipline.name: reasons[0]} if reasons else {})
-            runs = [] if reasons else [campaign.load(task) for task in tasks]
+            runs = [] if reasons else [campaign.load(task.key) for task in tasks]
             entry.scores[discipline.name] = discipline.score(runs) if runs else math.nan
         if cost:
             campaign.report(f"cost of {each.name}", number, len(those), 0)

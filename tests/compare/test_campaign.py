@@ -72,7 +72,8 @@ def test_the_longest_go_first(tmp_path: Path) -> None:
     given = [*tasks(1, 0.1), *tasks(1, 0.4)]
     with Campaign(tmp_path, workers=0) as campaign:
         campaign.complete(given)
-        short, long = (campaign.path(task).parent.stat().st_mtime_ns for task in given)
+    at = {key: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5") for key in storage.contents(path)[1]}
+    short, long = (at[task.key] for task in given)
     assert long < short
 
 
@@ -80,7 +81,6 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path: Path) -> None:
     with Campaign(tmp_path, workers=0) as campaign:
         runs = campaign.run(tasks(3))
         (path,) = tmp_path.iterdir()
-        assert [campaign.path(task) for task in tasks(3)] == [path / task.key for task in tasks(3)]
     assert storage.contents(path)[1] == [task.key for task in tasks(3)]
     for run, task in zip(runs, tasks(3), strict=True):
         assert np.array_equal(run.omega_c, storage.load(path / task.key).omega_c)
@@ -131,7 +131,7 @@ def edited(content: bytes) -> bytes:
 def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path: Path, undisturbed, capsys, damage) -> None:
     with Campaign(tmp_path, workers=0, batch=3) as campaign:
         campaign.complete(tasks())
-        path = campaign.path(tasks()[0]).parent
+    path = min(tmp_path.iterdir())
     path.write_bytes(damage(path.read_bytes()))
     untouched = {each: each.stat().st_mtime_ns for each in tmp_path.iterdir() if each != path}
     with Campaign(tmp_path, workers=0, batch=3) as campaign:
@@ -403,7 +403,6 @@ if __name__ == "__main__":
     )
     with Campaign({directory!r}, workers=0) as campaign:
         campaign.complete([task])
-    print(campaign.path(task))
 """
 
 
