@@ -24,13 +24,11 @@ from compare.report import results
 from compare.report.results import Summary
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MUJOCO, Engine
-from compare.runs.progress import Show
+from compare.runs.progress import Show, Whole, nowhere
 from compare.runs.workers import Spread, Workers, spread
 from compare.scorecard import scores
 from model import Parameters
 
-HELD = 2**19
-"""Samples of new runs that are held in memory, some 100 MB: most are looked at soon after, and once."""
 Announce = Callable[[Verdict], None]
 """Called with every verdict as soon as it is there."""
 
@@ -44,7 +42,7 @@ def validate(
     engine: Engine = MUJOCO,
     workers: int | Workers = 1,
     limit: float = math.inf,
-    progress: Show = lambda what, done, total, failed: None,
+    progress: Show = nowhere,
     announce: Announce = lambda verdict: None,
     report: bool = True,
 ) -> list[Verdict]:
@@ -80,7 +78,7 @@ def validate(
 
     with (
         ThreadPoolExecutor(1) as bench,  # judges while the next protocols' runs are on their way
-        Campaign(output / results.RUNS, workers, limit=limit, memory=HELD, report=whole.measuring) as campaign,
+        Campaign(output / results.RUNS, workers, limit=limit, report=whole.measuring) as campaign,
     ):
         judge_what_is_there()
         for protocol, found in programme.run(todo, Lab(campaign, engine, level), sets, output):
@@ -92,7 +90,9 @@ def validate(
                 broken[protocol.name] = f"{protocol.name}: {type(found).__name__}: {found}"
             judge_what_is_there()
         if level > Level.QUICK and claims is None:
-            scores.write(campaign, output)
+            ladder = campaign.under("ladder", "ladder of settings, error against cost")
+            scores.write(ladder, output)
+            ladder.reduce("ladder")
     verdicts = {name: future.result() for name, future in judged.items()}
     files = [path for each in PROTOCOLS if (path := programme.file(each, output, engine, level, sets)).exists()]
     count = workers if isinstance(workers, int) else workers.count

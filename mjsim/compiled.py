@@ -22,24 +22,25 @@ from model.arrays import Array
 
 for each in (source.slip, source.resistance, source.lands, source.hovering):  # the others call them
     register_jitable(each)
-# What is compiled is kept on disk. Of itself numba compiles a function again when its own file has changed; it must
-# also do so when that of the functions has which it calls.
-_STAMP = hashlib.sha256(b"".join(Path(each).read_bytes() for each in (__file__, source.__file__))).hexdigest()
-
-
-def _kept(function: Callable[..., Any]) -> Any:
-    dispatcher = numba.njit(cache=True)(function)
-    dispatcher._cache._cache_file._source_stamp = _STAMP
-    return dispatcher
-
-
-_corrections, _eventful, _followed = (_kept(each) for each in (source.corrections, source.eventful, source.followed))
+_corrections, _eventful, _followed = map(numba.njit(cache=True), (source.corrections, source.eventful, source.followed))
 _BALL, _VELOCITY = len(Ball._fields), len(Velocity._fields)
 _ROWS = types.Array(types.float64, 2, "A")
 _GIVEN = types.Array(types.float64, 2, "A", readonly=True)
 
 
-@_kept
+def _named_after_source(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function whose name contains the digest of `mjsim.corrections`.
+
+    Numba keeps what it compiles on disk by name, and compiles it again when the function's own file has changed, but
+    not when that of a function has which it calls.
+    """
+    digest = hashlib.sha256(Path(source.__file__).read_bytes()).hexdigest()
+    function.__qualname__ += f"_{digest[:16]}"
+    return function
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@_named_after_source
 def drive(
     watched: bool, whole: bool, omega_0: Array, balls: Array, qvel: Array, contact: Array, normals: Array,
     last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,

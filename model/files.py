@@ -33,24 +33,18 @@ _DAMAGE = OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeEr
 class WholeFile:
     """An HDF5 file under construction; a context manager.
 
-    It has a temporary name until `finish`; leaving the context without that removes it. ``file`` is the h5py file:
-    empty, or a copy of `template`, the bytes of an HDF5 file.
+    It has a temporary name until `finish`; leaving the context without that removes it. ``file`` is the h5py file.
     Raises `StorageError`, in one line, when it can't be written (no such directory, no permission, disk full).
     """
 
-    def __init__(self, path: str | Path, template: bytes = b"") -> None:
+    def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._temporary = _temporary(self.path)
         try:
             self._disk = _Disk(self._temporary, "w+b")
         except OSError as error:
             raise StorageError(f"cannot write {self.path}: {error.strerror}") from error
-        self._disk.write(template)
-        if self._disk.error:
-            self._disk.close()
-            self._temporary.unlink(missing_ok=True)
-            self._check()
-        self.file = h5py.File(self._disk, "r+" if template else "w", track_order=True)
+        self.file = h5py.File(self._disk, "w", track_order=True)
         self._finished = False
 
     def __enter__(self) -> Self:
@@ -74,7 +68,7 @@ class WholeFile:
         self.file.close()
         self._check()
         try:
-            self._disk.write(_SEAL + _checksum(self._disk, self._disk.seek(0, os.SEEK_END)))
+            seal(self._disk)
             self._check()
             os.fsync(self._disk.fileno())
             self._disk.close()
@@ -144,6 +138,11 @@ def dataset(file: h5py.File, name: str) -> h5py.Dataset:
     if not isinstance(stored, h5py.Dataset) or stored.external or stored.is_virtual:
         raise StorageError(f"{name!r} is not a dataset of its own")
     return stored
+
+
+def seal(content: BinaryIO) -> None:
+    """Add its checksum to an HDF5 file, open for reading and writing, that has none."""
+    content.write(_SEAL + _checksum(content, content.seek(0, os.SEEK_END)))
 
 
 def _check_seal(content: BinaryIO) -> None:

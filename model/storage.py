@@ -1,21 +1,18 @@
-"""The HDF5 form of a trajectory: one run a file, flat, whole or not there at all.
+"""The HDF5 form of trajectories, flat, whole or not there at all: one run a file, or the runs of a batch in one.
 
 `TrajectoryWriter` appends blocks of samples while a simulation runs, to a temporary name that becomes the final one
-only when the file is whole. `save` writes a short trajectory at once, into the bytes of an empty file of its length:
-campaigns write thousands of those. `load` and `parts` trust nothing they read: links that lead out of the file are
+only when the file is whole. `save_batch` writes many short runs at once, along a dimension ``run`` where each has a
+name: ``FILE/NAME`` is read as if it were a file of its own. Readers trust nothing: links that lead out of the file are
 refused, and so is a file that is damaged, foreign, or written by a newer version.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
-import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import h5py
 import numpy as np
@@ -37,122 +34,105 @@ from model.trajectory import (
     Trajectory,
     attributes,
     columns,
+    current_versions,
     event_name,
 )
 
+BATCH, BATCH_VERSION = "dualball-batch", 1
+"""What a file of many runs says of itself."""
 _CHUNK = 1024
-_AT_ONCE = 4096
-"""Most samples that are stored without chunks and compression: those pay from there on."""
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
+_TEXTS = tuple(field.name for field in dataclasses.fields(Header))
 
 
 def save(trajectory: Trajectory, path: str | Path) -> None:
     """Write a whole trajectory; raises `StorageError` if that can't be done, leaving nothing behind."""
-    count = len(trajectory.time)
-    content, places = _empty(count if count <= _AT_ONCE else None)
-    image = bytearray(content)
-    for name, place in places.items():
-        values = np.ascontiguousarray(getattr(trajectory, name)).tobytes()
-        image[place : place + len(values)] = values
-    with TrajectoryWriter(path, trajectory.header, bytes(image)) as writer:
-        if not places:
-            samples = np.empty(count, SAMPLE)
-            for name in columns(Trajectory):
-                samples[name] = getattr(trajectory, name)
-            writer.append(samples)
-        writer.finish(trajectory.events, trajectory.header.failure)
+    samples = np.empty(len(trajectory.time), SAMPLE)
+    for name in columns(Trajectory):
+        samples[name] = getattr(trajectory, name)
+    with TrajectoryWriter(path, trajectory.header) as writer:
+        writer.append(samples)
+        writer.end(trajectory.events, trajectory.header.failure)
 
 
-class TrajectoryWriter:
-    """Writes a trajectory block by block; use as a context manager and call `finish` at the end.
+class TrajectoryWriter(WholeFile):
+    """Writes a trajectory block by block; use as a context manager and call `end` at the end.
 
-    Leaving the context without `finish` removes the temporary file, so that `path` exists only when it is whole.
+    Leaving the context without `end` removes the temporary file, so that `path` exists only when it is whole.
     Every method raises `StorageError`, in one line, when the file can't be written (no such directory, no
-    permission, disk full). `template` is an empty file of another layout than that of many samples.
+    permission, disk full).
     """
 
-    def __init__(self, path: str | Path, header: Header, template: bytes = b"") -> None:
-        self._whole = WholeFile(path, template or _empty(None)[0])
-        self._file = self._whole.file
-        try:
-            for name, text in header.attributes().items():
-                self._file.attrs[name] = text
-            self._file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
-            self._whole.flush()
-        except BaseException as error:
-            self.__exit__(type(error), error, error.__traceback__)
-            raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._whole.__exit__(kind, error, traceback)
+    def __init__(self, path: str | Path, header: Header) -> None:
+        super().__init__(path)
+        _begin(self.file, SCHEMA, SCHEMA_VERSION)
+        self.file.attrs.update(header.attributes())
+        self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
+        for of, time in ((Trajectory, "time"), (Events, "event_time")):
+            for _, name, meta in _columns(of):
+                sizes = {"shape": (0, *meta["shape"]), "maxshape": (None, *meta["shape"])}
+                layout = {"chunks": (_CHUNK, *meta["shape"]), "compression": "gzip", "shuffle": True}
+                _create(self.file, name, meta, (time, "axis"), **sizes, **layout)
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
         """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush it."""
         for name in columns(Trajectory):
-            column = self._file[name]
+            column = self.file[name]
             n = column.shape[0]
             column.resize(n + len(samples), axis=0)
             column[n:] = samples[name]
-        self._whole.flush()
+        self.flush()
 
-    def finish(self, events: Events, failure: str = "", path: str | Path | None = None) -> None:
+    def end(self, events: Events, failure: str = "", path: str | Path | None = None) -> None:
         """Write the events and why the run stopped early, if it did; then give the file its name, or `path`."""
-        for name in columns(Events) if len(events) else ():
-            column = self._file[event_name(name)]
-            column.resize(len(events), axis=0)
-            column[...] = getattr(events, name)
-        self._file.attrs["failure"] = failure
-        self._whole.finish(path)
+        for column, name, _ in _columns(Events) if len(events) else ():
+            self.file[name].resize(len(events), axis=0)
+            self.file[name][...] = getattr(events, column)
+        self.file.attrs["failure"] = failure
+        self.finish(path)
 
 
-@functools.lru_cache(32)
-def _empty(count: int | None) -> tuple[bytes, Mapping[str, int]]:
-    """A trajectory file without header, for any number of samples, or `count` that are all zero.
+def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
+    """Write runs by name into one file; raises `StorageError` if that can't be done, leaving nothing behind.
 
-    The same for all, and most of the work of making one. Also where the numbers of each such column begin.
+    Columns have shape (run, sample, ...) and (run, event, ...); behind the samples and events that a run has they are
+    filled with nan, and cases with -1. What a file of one run says in attributes is a text for each run.
     """
-    content = io.BytesIO()
-    with h5py.File(content, "w", track_order=True) as file:
-        file.attrs["schema"] = SCHEMA
-        file.attrs["schema_version"] = SCHEMA_VERSION
-        axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
-        axis.attrs.update(AXIS_ATTRIBUTES)
-        axis.make_scale("axis")
-        for name, meta in columns(Trajectory).items():
-            _create_column(file, name, meta, "time", count)
-        for name, meta in columns(Events).items():
-            _create_column(file, event_name(name), meta, "event_time")
-        places = {} if not count else {name: file[name].id.get_offset() for name in columns(Trajectory)}
-    return content.getvalue(), places
-
-
-def _create_column(file: h5py.File, name: str, meta: Mapping[str, Any], scale: str, count: int | None = None) -> None:
-    shape, dtype = meta["shape"], _CASE_ENUM if meta["dtype"] is np.int8 else np.float64
-    if count:
-        column = file.create_dataset(name, data=np.zeros((count, *shape), dtype), dtype=dtype)
-    else:
-        layout = {"maxshape": (None, *shape), "chunks": (_CHUNK, *shape), "compression": "gzip", "shuffle": True}
-        column = file.create_dataset(name, (0, *shape), dtype, **layout)
-    column.attrs.update(attributes(meta))
-    if name == scale:
-        column.make_scale(scale)
-    else:
-        column.dims[0].attach_scale(file[scale])
-    if shape:
-        column.dims[1].attach_scale(file["axis"])
+    headers = [run.header.attributes() | {"mjcf": run.header.mjcf} for run in runs.values()]
+    with WholeFile(path) as whole:
+        file = whole.file
+        _begin(file, BATCH, BATCH_VERSION)
+        file.attrs["versions"] = json.dumps(dict(current_versions()))
+        file.create_dataset("run", data=list(runs), dtype=_TEXT).make_scale("run")
+        for name in headers[0]:
+            file.create_dataset(name, data=[header[name] for header in headers], dtype=_TEXT)
+            file[name].dims[0].attach_scale(file["run"])
+        for dimension, of in (("sample", Trajectory), ("event", Events)):
+            tables: list[Any] = [run.events if of is Events else run for run in runs.values()]
+            counts = [len(table.time) for table in tables]
+            file.create_dataset(f"{dimension}s", data=counts).dims[0].attach_scale(file["run"])
+            file.create_dataset(dimension, data=np.arange(max(counts))).make_scale(dimension)
+            for column, name, meta in _columns(of):
+                empty = -1 if meta["dtype"] is np.int8 else np.nan
+                values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
+                for row, count, table in zip(values, counts, tables, strict=True):
+                    row[:count] = getattr(table, column)
+                _create(file, name, meta, ("run", dimension, "axis"), data=values)
+        whole.finish()
 
 
 def load(path: str | Path) -> Trajectory:
-    """Read a trajectory.
+    """Read a trajectory from a file, or from one of many as ``FILE/NAME``.
 
     Raises `StorageError`, in one line, for a file that isn't one or is damaged.
     """
+    path = Path(path)
+    if path.parent.is_file():
+        runs = load_runs(path.parent)
+        if path.name not in runs:
+            raise StorageError(f"cannot read {path}: {path.parent} holds no run of that name")
+        return runs[path.name]
     with reading(path) as file:
         return _read(file, slice(None))
 
@@ -160,55 +140,123 @@ def load(path: str | Path) -> Trajectory:
 def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
     """Read a trajectory `size` samples at a time, so that it may be larger than memory; at least one part.
 
-    Each part has the header and all events. Raises `StorageError` as `load` does.
+    Each part has the header and all events; a run from a batch comes as one part. Raises `StorageError` as `load` does.
     """
+    if Path(path).parent.is_file():
+        yield load(path)
+        return
     with reading(path) as file:
         for start in range(0, max(len(dataset(file, "time")), 1), size):
             yield _read(file, slice(start, start + size))
 
 
+def contents(path: str | Path) -> tuple[str, list[str]]:
+    """The version of dualball that wrote a file, and the names of its runs; none if it is of one run.
+
+    Raises `StorageError` as `load` does.
+    """
+    with reading(path) as file:
+        version = str(_json(file.attrs, "versions").get("dualball"))
+        return version, _texts(file, "run") if is_batch(file) else []
+
+
+def exists(path: str | Path) -> bool:
+    """Whether there is a file of a run, be it one of many."""
+    return Path(path).is_file() or Path(path).parent.is_file()
+
+
+def is_batch(file: h5py.File) -> bool:
+    """Whether an open file is one of many runs."""
+    return bool(file.attrs.get("schema") == BATCH)
+
+
+def load_runs(path: str | Path) -> dict[str, Trajectory]:
+    """All runs of a file by name; the name of a single one is empty. Raises `StorageError` as `load` does."""
+    with reading(path) as file:
+        if not is_batch(file):
+            return {"": _read(file, slice(None))}
+        _check_schema(file, BATCH, BATCH_VERSION)
+        texts = {name: _texts(file, name) for name in _TEXTS}
+        samples, events = _table(file, Trajectory, 2), _table(file, Events, 2)
+        counts = zip(dataset(file, "samples")[...].tolist(), dataset(file, "events")[...].tolist(), strict=True)
+        runs = {}
+        for k, (name, (n, m)) in enumerate(zip(_texts(file, "run"), counts, strict=True)):
+            runs[name] = _trajectory(
+                {key: values[k] for key, values in texts.items()},
+                {column: values[k, :n].copy() for column, values in samples.items()},
+                {column: values[k, :m].copy() for column, values in events.items()},
+            )
+        return runs
+
+
+def _columns(of: type[Trajectory] | type[Events]) -> list[tuple[str, str, Mapping[str, Any]]]:
+    """Each column of a table: its name there, its name in a file, and its metadata."""
+    return [(name, event_name(name) if of is Events else name, meta) for name, meta in columns(of).items()]
+
+
+def _begin(file: h5py.File, schema: str, version: int) -> None:
+    file.attrs.update(schema=schema, schema_version=version)
+    axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
+    axis.attrs.update(AXIS_ATTRIBUTES)
+    axis.make_scale("axis")
+
+
+def _create(file: h5py.File, name: str, meta: Mapping[str, Any], dimensions: Sequence[str], **layout: Any) -> None:
+    """A column whose dimensions are of these names, as far as it has so many; it may be the scale of one itself."""
+    column = file.create_dataset(name, dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout)
+    column.attrs.update(attributes(meta))
+    for dimension, scale in zip(column.dims, dimensions, strict=False):
+        if scale == name:
+            column.make_scale(name)
+        else:
+            dimension.attach_scale(file[scale])
+
+
 def _read(file: h5py.File, part: slice) -> Trajectory:
-    header = _read_header(file)
-    samples = {name: _read_column(file, name, meta, part) for name, meta in columns(Trajectory).items()}
-    events = {name: _read_column(file, event_name(name), meta) for name, meta in columns(Events).items()}
-    for table in (samples, events):
-        lengths = {name: len(values) for name, values in table.items()}
-        if len(set(lengths.values())) > 1:
-            raise StorageError(f"its columns differ in length ({lengths})")
+    """Part of the samples of a file of one run, with all events."""
+    if is_batch(file):
+        raise StorageError("it holds the runs of a batch: name one of them, as FILE/NAME")
+    _check_schema(file, SCHEMA, SCHEMA_VERSION)
+    texts = dict(file.attrs) | {"mjcf": dataset(file, "mjcf").asstr()[()]}
+    return _trajectory(texts, _table(file, Trajectory, 1, part), _table(file, Events, 1))
+
+
+def _check_schema(file: h5py.File, name: str, newest: int) -> None:
+    schema, version = file.attrs.get("schema"), file.attrs.get("schema_version")
+    if schema != name:
+        raise StorageError(f"it is an HDF5 file, but not a {name}")
+    if not isinstance(version, (int, np.integer)) or version < 1:
+        raise StorageError(f"it has no valid schema version: {version!r}")
+    if version > newest:
+        raise StorageError(
+            f"it was written by a newer dualball: its schema version is {version}, this program reads up to {newest}"
+        )
+
+
+def _trajectory(
+    texts: Mapping[str, Any], samples: Mapping[str, npt.NDArray[Any]], events: Mapping[str, npt.NDArray[Any]]
+) -> Trajectory:
+    """A run from the texts of its header and its columns."""
+    values: dict[str, Any] = {name: _text(texts, name) for name in _TEXTS}
+    values |= {name: _json(texts, name) for name in ("parameters", "flow", "settings", "versions")}
+    values["parameters"] = Parameters.from_mapping(values["parameters"])
+    values["flow"] = Flow.from_mapping(values["flow"])
     codes = np.concatenate([samples["case"], events["from_case"], events["to_case"]])
     if not np.isin(codes, list(Case)).all():
         raise StorageError("it holds a case that does not exist")
-    return Trajectory(header=header, events=Events(**events), **samples)
+    return Trajectory(header=Header(**values), events=Events(**events), **samples)
 
 
-def _read_header(file: h5py.File) -> Header:
-    schema, version = file.attrs.get("schema"), file.attrs.get("schema_version")
-    if schema != SCHEMA:
-        raise StorageError(f"it is an HDF5 file, but not a {SCHEMA}")
-    if not isinstance(version, (int, np.integer)) or version < 1:
-        raise StorageError(f"it has no valid schema version: {version!r}")
-    if version > SCHEMA_VERSION:
-        raise StorageError(
-            f"it was written by a newer dualball: its schema version is {version}, this program reads up to "
-            f"{SCHEMA_VERSION}"
-        )
-    values: dict[str, Any] = {f.name: _text(file, f.name) for f in dataclasses.fields(Header) if f.name != "mjcf"}
-    values |= {name: _json(values[name], name) for name in ("parameters", "flow", "settings", "versions")}
-    values["parameters"] = Parameters.from_mapping(values["parameters"])
-    values["flow"] = Flow.from_mapping(values["flow"])
-    return Header(**values, mjcf=dataset(file, "mjcf").asstr()[()])
-
-
-def _text(file: h5py.File, name: str) -> str:
-    value = file.attrs.get(name)
+def _text(texts: Mapping[str, Any], name: str) -> str:
+    value = texts.get(name)
     if not isinstance(value, str):
         raise StorageError(f"its attribute {name!r} is missing")
     return value
 
 
-def _json(text: str, name: str) -> dict[str, Any]:
+def _json(texts: Mapping[str, Any], name: str) -> dict[str, Any]:
     try:
-        value = json.loads(text)
+        value = json.loads(_text(texts, name))
     except (json.JSONDecodeError, RecursionError) as error:
         raise StorageError(f"its attribute {name!r} is not JSON") from error
     if not isinstance(value, dict):
@@ -216,10 +264,24 @@ def _json(text: str, name: str) -> dict[str, Any]:
     return value
 
 
-def _read_column(file: h5py.File, name: str, meta: Mapping[str, Any], part: slice = slice(None)) -> npt.NDArray[Any]:
-    column = dataset(file, name)
-    if column.shape is None or column.shape[1:] != meta["shape"] or len(column.shape) != 1 + len(meta["shape"]):
-        raise StorageError(f"{name!r} has shape {column.shape}")
-    if column.dtype.kind != np.dtype(meta["dtype"]).kind:
-        raise StorageError(f"{name!r} has type {column.dtype}")
-    return np.asarray(column[part], dtype=meta["dtype"])
+def _texts(file: h5py.File, name: str) -> list[str]:
+    texts: list[str] = dataset(file, name).asstr()[...].tolist()
+    return texts
+
+
+def _table(
+    file: h5py.File, of: type[Trajectory] | type[Events], leading: int, part: slice = slice(None)
+) -> dict[str, npt.NDArray[Any]]:
+    """All columns of a table, checked: so many dimensions come before those of one entry."""
+    values = {}
+    for column, name, meta in _columns(of):
+        stored = dataset(file, name)
+        if len(stored.shape or ()) != leading + len(meta["shape"]) or stored.shape[leading:] != meta["shape"]:
+            raise StorageError(f"{name!r} has shape {stored.shape}")
+        if stored.dtype.kind != np.dtype(meta["dtype"]).kind:
+            raise StorageError(f"{name!r} has type {stored.dtype}")
+        values[column] = np.asarray(stored[part], dtype=meta["dtype"])
+    lengths = {name: column.shape[:leading] for name, column in values.items()}
+    if len(set(lengths.values())) > 1:
+        raise StorageError(f"its columns differ in length ({lengths})")
+    return values

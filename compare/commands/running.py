@@ -107,7 +107,7 @@ def campaign(args: argparse.Namespace, doing: str, directory: str = "", **more: 
     """A campaign in a directory of ``--output`` by the workers that are named, whose progress is shown."""
     with (
         progress.shown(args.quiet or args.json) as show,
-        Campaign(args.output / directory, workers(args), limit=args.limit, report=show, doing=doing, **more) as made,
+        Campaign(args.output / directory, workers(args), limit=args.limit, report=progress.counted(show), doing=doing, **more) as made,
     ):
         yield made
 

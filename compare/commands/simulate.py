@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from compare.commands import options, running
-from compare.runs.tasks import Task, failed_path, journal_path, store
+from compare.runs.tasks import failed_path, journal_path, store
 from compare.runs.workers import interrupts
 from compare.view import inspection
 from model.files import check_writable
@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() as scratch, interrupts() as interrupted:
         path = args.output or Path(scratch) / "run.h5"
         try:
-            failure = store([task], [path], stop=interrupted)[0].failure
+            failure = store(task, path, stop=interrupted)
         except KeyboardInterrupt:  # the second Ctrl-C
             print("dualball: interrupted; no samples are kept", file=sys.stderr)
             return 130
@@ -45,14 +45,10 @@ def run(args: argparse.Namespace) -> int:
         if args.output and not failure and not args.json:
             print(f"written to {args.output}")
         if failure:
-            print(f"dualball: the simulation {failure}; {_what_is_kept(task, args.output)}", file=sys.stderr)
+            kept = "nothing is kept without --output"
+            if args.output:
+                kept, journal = f"its samples so far are kept in {failed_path(path)}", journal_path(task, path)
+                if journal.exists():
+                    kept += f", and the same command goes on from what {journal} holds"
+            print(f"dualball: the simulation {failure}; {kept}", file=sys.stderr)
         return 130 if interrupted() else 1 if failure else 0
-
-
-def _what_is_kept(task: Task, output: Path | None) -> str:
-    """What is left of a run that broke down or was stopped."""
-    if output is None:
-        return "nothing is kept without --output"
-    journal = journal_path(task, output)
-    goes_on = f", and the same command goes on from what {journal} holds" if journal and journal.exists() else ""
-    return f"its samples so far are kept in {failed_path(output)}{goes_on}"

@@ -83,7 +83,7 @@ def _finish(
 ) -> int:
     """Print what there is, and return the exit code: 0 if all that count came out as expected."""
     if args.json:
-        print(json.dumps([results.describe(verdict) for verdict in verdicts], indent=1))
+        print(json.dumps([results.described(verdict) for verdict in verdicts], indent=1))
     if args.verbose:
         console.print(*(tables.checks(verdict) for verdict in verdicts if verdict.checks))
     console.print(tables.summary(verdicts), soft_wrap=True)

@@ -49,7 +49,7 @@ class Material:
 
     def motions(self, m: Measurement) -> list[Motion]:
         """The runs of a measurement whose files are there."""
-        there = [name for name in m.runs if (self.directory / name).is_file()]
+        there = [name for name in m.runs if storage.exists(self.directory / name)]
         return [Motion(name, m.engine, m.parameters, partial(storage.load, self.directory / name)) for name in there]
 
 

@@ -82,11 +82,6 @@ class Lab:
         """Carry out the tasks and return those that failed."""
         return self.campaign.complete(tasks)
 
-    def file(self, task: Task) -> str:
-        """Name of the task's run file, relative to the results directory."""
-        path = self.campaign.path(task)
-        return f"{path.parent.name}/{path.name}"
-
 
 def time_unit(p: Parameters) -> float:
     """sqrt(R/g), s: the time in which the ball falls by half of R."""

@@ -82,6 +82,8 @@ class Protocol:
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
     engine: Engine | None = None
     """Who measures, where it isn't the engine on trial."""
+    drawn: Callable[[Measurement], bool] = lambda m: False
+    """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is stored."""
 
     def measures(self, level: Level) -> dict[str, Parameters]:
         """The sets that it measures at a level, by name."""
@@ -98,7 +100,13 @@ PROTOCOLS = (
     Protocol("thresholds", thresholds.measure),
     Protocol("edge", edge.measure, ("thresholds",), quick=ONE),
     Protocol("birth", thresholds.birth, ("thresholds",)),
-    Protocol("unloading", unloading.measure, ("thresholds",), quick=TWO),
+    Protocol(
+        "unloading",
+        unloading.measure,
+        ("thresholds",),
+        quick=TWO,
+        drawn=lambda m: m.conditions["start"] == "unloading",
+    ),
     Protocol("field", field.measure, waits=False),
     Protocol("growth", growth.measure, waits=False),
     Protocol("steepest", growth.steepest, waits=False),
@@ -119,7 +127,7 @@ PROTOCOLS = (
     Protocol("calm", attractors.calm, level=Level.DEFAULT, alone="strong drag is tried on sets of its own"),
     Protocol("choice", attractors.choice, alone="the choice is that of sets of its own with mu > 1"),
     Protocol("pulsation", pulsation.measure, ("thresholds",)),
-    Protocol("unsteady", unsteady.measure, ("thresholds",)),
+    Protocol("unsteady", unsteady.measure, ("thresholds",), drawn=lambda m: m.quantity == "jump_height"),
     Protocol("slope", characteristic.slope, ("settled", "thresholds")),
 )
 """Every protocol there is, in the order in which they measure; each goes out only from those before it."""
@@ -192,11 +200,15 @@ def carry_out(
 ) -> Records:
     """What a protocol measures after others, on the sets `chosen` or its own; what is kept is not measured again.
 
+    Its measurement file is the record of what is done: once it is there, only the runs that a figure draws are kept.
+
     Raises `StorageError` where measurements can't be read or written; a run that breaks down raises
     `SimulationError`, as far as the protocol can't go on without it.
     """
     path = file(protocol, results, lab.engine, lab.level, chosen)
-    lab = replace(lab, engine=protocol.engine or lab.engine, protocol=protocol.name)
+    label = f"{protocol.name}-{path.parent.name}"
+    campaign = lab.campaign.under(label, protocol.name)
+    lab = replace(lab, engine=protocol.engine or lab.engine, campaign=campaign)
     if not path.exists():
         sets = protocol.measures(lab.level) if chosen is None else chosen
         weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
@@ -208,8 +220,14 @@ def carry_out(
             rows = [*protocol.measure(lab, strong, before), *rows]
         make_directory(path.parent)
         about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
+        place = f"{campaign.directory.name}/{label}.h5"
+        for k, row in enumerate(rows):
+            if isinstance(row, Measurement) and protocol.drawn(row):
+                rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
         record.save(Records.of(rows), path, about)
-    return record.load(path)
+    records = record.load(path)
+    campaign.reduce(label, {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run})
+    return records
 
 
 def _too_weak(p: Parameters, protocol: Protocol) -> str:

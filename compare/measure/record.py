@@ -1,7 +1,7 @@
 """Measurements as data, and the file that keeps them.
 
 A measurement is a number with its standard uncertainty and all that it belongs to: what was measured, by which engine,
-with which parameters, under which named conditions, in which run files. Labels and sentences are made from it and never
+with which parameters, under which named conditions, in which runs. Labels and sentences are made from it and never
 read back. A file holds the measurements of one protocol as columns, one row a measurement: it opens with
 ``xarray.open_dataset(path, engine="h5netcdf").to_dataframe()``.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,7 @@ class Measurement:
     conditions: Mapping[str, Condition] = field(default_factory=dict)
     """What else it depends on, by name; SI units."""
     runs: tuple[str, ...] = ()
-    """Run files, relative to the results directory."""
+    """Keys of its runs; where they are kept, FILE/KEY, relative to the results directory."""
 
     def __post_init__(self) -> None:
         quantity(self.quantity)
@@ -86,7 +86,7 @@ def measurement(
         set=set,
         parameters=p,
         conditions=conditions,
-        runs=tuple(lab.file(task) for task in tasks),
+        runs=tuple(task.key for task in tasks),
     )
 
 
@@ -154,9 +154,22 @@ class Records:
         return Measured(best.value, best.uncertainty) if best else None
 
 
+_OWN = ("protocol", "quantity", "value", "uncertainty", "unit", "engine", "set")
+_PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
+
+
 def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
-    """Write records, whole or not at all; `about` says what they are (JSON-able). Raises `StorageError`."""
-    columns = _columns(records.measurements)
+    """Write records, whole or not at all; `about` says what they are (JSON-able). Raises `StorageError`.
+
+    A condition that a row doesn't have is nan, or empty where it is text.
+    """
+    rows = records.measurements
+    columns: dict[str, list[Any]] = {name: [getattr(m, name) for m in rows] for name in _OWN}
+    columns["runs"] = [" ".join(m.runs) for m in rows]
+    columns |= {name: [getattr(m.parameters, name) for m in rows] for name in _PARAMETERS}
+    texts = {name: isinstance(value, str) for m in rows for name, value in m.conditions.items()}
+    for name, text in texts.items():
+        columns[f"at_{name}"] = [m.conditions.get(name, "" if text else np.nan) for m in rows]
     with WholeFile(path) as whole:
         file = whole.file
         file.attrs.update(
@@ -167,7 +180,7 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
             versions=json.dumps(dict(current_versions())),
             commit=current_commit(),
         )
-        row = file.create_dataset("row", data=np.arange(len(records.measurements)))
+        row = file.create_dataset("row", data=np.arange(len(rows)))
         row.make_scale("row")
         for name, values in columns.items():
             kind = h5py.string_dtype() if values and isinstance(values[0], str) else np.dtype(np.float64)
@@ -184,41 +197,18 @@ def load(path: Path) -> Records:
     with reading(path) as file:
         if file.attrs.get("schema") != SCHEMA or file.attrs.get("schema_version") != SCHEMA_VERSION:
             raise StorageError("it does not hold measurements in this program's format")
-        columns = {name: _column(dataset(file, name)) for name in file if name != "row"}
-        missing = tuple(Missing(**each) for each in json.loads(file.attrs["missing"]))
-        return Records(tuple(_rows(columns)), missing)
-
-
-_OWN = ("protocol", "quantity", "value", "uncertainty", "unit", "engine", "set", "runs")
-_PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
-
-
-def _columns(rows: Sequence[Measurement]) -> dict[str, list[Any]]:
-    """Columns by name; a condition that a row doesn't have is nan, or empty where it is text."""
-    columns: dict[str, list[Any]] = {name: [getattr(m, name) for m in rows] for name in _OWN if name != "runs"}
-    columns["runs"] = [" ".join(m.runs) for m in rows]
-    columns |= {name: [getattr(m.parameters, name) for m in rows] for name in _PARAMETERS}
-    kinds = {name: isinstance(value, str) for m in rows for name, value in m.conditions.items()}
-    for name, text in kinds.items():
-        empty: Condition = "" if text else np.nan
-        values = [m.conditions.get(name, empty) for m in rows]
-        columns[f"at_{name}"] = values if text else [float(value) for value in values]
-    return columns
-
-
-def _column(stored: h5py.Dataset) -> list[Any]:
-    values = stored.asstr()[...] if h5py.check_string_dtype(stored.dtype) else stored[...]
-    kept: list[Any] = values.tolist()
-    return kept
-
-
-def _rows(columns: Mapping[str, Sequence[Any]]) -> Iterator[Measurement]:
-    names = [name for name in columns if name.startswith("at_")]
-    for k in range(len(columns["value"])):
-        conditions = {name[3:]: columns[name][k] for name in names}
-        yield Measurement(
-            **{name: columns[name][k] for name in _OWN if name not in ("unit", "runs")},
-            runs=tuple(columns["runs"][k].split()),
-            parameters=Parameters(**{name: columns[name][k] for name in _PARAMETERS if name in columns}),
-            conditions={name: value for name, value in conditions.items() if value != "" and value == value},
-        )
+        columns: dict[str, list[Any]] = {}
+        for name in file:
+            stored = dataset(file, name)
+            columns[name] = (stored.asstr() if h5py.check_string_dtype(stored.dtype) else stored)[...].tolist()
+        rows = []
+        for k in range(len(columns["value"])):
+            conditions = {name[3:]: values[k] for name, values in columns.items() if name.startswith("at_")}
+            row = Measurement(
+                **{name: columns[name][k] for name in _OWN if name != "unit"},
+                runs=tuple(columns["runs"][k].split()),
+                parameters=Parameters(**{name: columns[name][k] for name in _PARAMETERS if name in columns}),
+                conditions={name: value for name, value in conditions.items() if value != "" and value == value},
+            )
+            rows.append(row)
+        return Records(tuple(rows), tuple(Missing(**each) for each in json.loads(file.attrs["missing"])))

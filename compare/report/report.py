@@ -22,6 +22,7 @@ from compare.measure.record import Records
 from compare.report import pictures, results, wording
 from compare.report.results import Summary
 from compare.runs.workers import Spread
+from model import storage
 from model.errors import StorageError
 from model.files import make_directory, write_text
 
@@ -71,7 +72,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         sections=[(name, [row for row in rows if row["claim"].section == name]) for name in sections],
         outcomes=sorted({verdict.outcome for verdict in ran}),
         wording=wording,
-        run_of=lambda m: next((name for name in m.runs if (directory / name).is_file()), ""),
+        run_of=lambda m: next((name for name in m.runs if storage.exists(directory / name)), ""),
         not_run=[verdict.claim for verdict in verdicts if verdict.outcome is Outcome.NOT_RUN],
         not_drawn=[f"{each['title']}: {each['gap']}" for each in drawn if each["gap"]],
         command=f"dualball validate --full -o {directory}",

@@ -23,7 +23,7 @@ from model.files import make_directory, write_text
 from model.trajectory import current_commit, current_versions
 
 SUMMARY, REPORT, RUNS, FIGURES = "summary.json", "report.html", "runs", "figures"
-SCHEMA, SCHEMA_VERSION = "dualball-summary", 3
+SCHEMA, SCHEMA_VERSION = "dualball-summary", 4
 
 
 @dataclass(frozen=True)
@@ -34,40 +34,49 @@ class Summary:
     measurements: tuple[str, ...] = ()
     """Files of the measurements that were judged, relative to the results directory."""
     verdicts: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """By claim id, see `describe`."""
+    """By claim id: outcome, number of checks, resolving power; the checks follow from the measurements."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, directory: Path, verdicts: Iterable[Verdict], level: Level, measured: Sequence[Path]) -> Summary:
         """The verdicts of now on the measurements in the files `measured`."""
         files = tuple(path.relative_to(directory).as_posix() for path in measured)
-        return cls(level.name, files, {verdict.claim.id: describe(verdict) for verdict in verdicts}, _provenance())
+        provenance = {
+            "versions": dict(current_versions()),
+            "commit": current_commit(),
+            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors",
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+        return cls(level.name, files, {verdict.claim.id: _outcome(verdict) for verdict in verdicts}, provenance)
 
     def records(self, directory: Path) -> Records:
         """The measurements that were judged, to be judged again; raises `StorageError` for a file that is not whole."""
         return sum((record.load(directory / name) for name in self.measurements), Records())
 
 
-def describe(verdict: Verdict) -> dict[str, Any]:
-    """A verdict as JSON-able data; a number that is not finite is null."""
+def described(verdict: Verdict) -> dict[str, Any]:
+    """A verdict with all its checks as JSON-able data; a number that is not finite is null."""
     claim = verdict.claim
     texts = {name: getattr(claim, name) for name in ("section", "source", "statement", "text", "reason")}
-    about = {"id": claim.id, "verdict": verdict.outcome, "expected": claim.expected, "passed": verdict.passed, **texts}
+    return _outcome(verdict) | texts | {"checks": plain([_check(check) for check in verdict.checks])}
+
+
+def _outcome(verdict: Verdict) -> dict[str, Any]:
+    """What a claim came to, with the numbers of its checks."""
+    about = {"id": verdict.claim.id, "verdict": verdict.outcome, "passed": verdict.passed}
+    counts = {name: sum(getattr(check, name) for check in verdict.checks) for name in ("agrees", "conclusive")}
     power = {"resolving_power": dict(verdict.resolving_power), "worst": verdict.worst}
-    less = {"missing": list(verdict.missing), "error": verdict.error}
-    return {**plain(about | power | less), "checks": [_check(check) for check in verdict.checks]}
+    less = {"expected": verdict.claim.expected, "missing": list(verdict.missing), "error": verdict.error}
+    told: dict[str, Any] = plain(about | {"checks": len(verdict.checks)} | counts | power | less)
+    return told
 
 
 def _check(check: Check) -> dict[str, Any]:
     m = check.measurement
     of_measurement = ("protocol", "quantity", "unit", "engine", "set", "conditions", "uncertainty", "runs")
     numbers = ("relation", "predicted", "deviation", "tolerance", "scale", "resolves", "agrees", "conclusive")
-    described: dict[str, Any] = plain(
-        {name: getattr(m, name) for name in of_measurement}
-        | {"parameters": dataclasses.asdict(m.parameters), "measured": m.value}
-        | {name: getattr(check, name) for name in numbers}
-    )
-    return described
+    about = {name: getattr(m, name) for name in of_measurement} | {name: getattr(check, name) for name in numbers}
+    return about | {"parameters": dataclasses.asdict(m.parameters), "measured": m.value}
 
 
 def open_directory(directory: Path) -> None:
@@ -112,12 +121,3 @@ def save(summary: Summary, directory: Path) -> None:
     """Write the summary, whole or not at all."""
     content = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **vars(summary)}
     write_text(directory / SUMMARY, json.dumps(content, ensure_ascii=False, allow_nan=False))
-
-
-def _provenance() -> dict[str, Any]:
-    return {
-        "versions": dict(current_versions()),
-        "commit": current_commit(),
-        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors",
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-    }

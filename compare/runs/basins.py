@@ -25,7 +25,7 @@ from compare.runs.engines import MOREAU, MUJOCO
 from compare.runs.sweep import Axis
 from compare.runs.tasks import Task
 from mjsim import ContactSettings
-from model import Case, Contact, Flow, InputError, Parameters, State, Trajectory, storage
+from model import Case, Contact, Flow, InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import reading_json, write_text
 from model.kinematics import VARIABLES
@@ -119,8 +119,8 @@ def basins(
     fine = _tasks(states, MOREAU.name, p, Settings(method=MOREAU.name, timestep=step))
     tasks = [*fine, *_tasks(few, MUJOCO.name, p, ContactSettings.for_problem(p, timestep))]
     broken = {failure.task.key for failure in campaign.complete(tasks)}
-    files = [None if task.key in broken else campaign.path(task) for task in tasks]
-    fates = np.array([_fate(storage.load(file)) if file else FATES.index("undecided") for file in files])
+    undecided = FATES.index("undecided")
+    fates = np.array([undecided if task.key in broken else _fate(campaign.load(task.key)) for task in tasks])
     by_stepping, by_mujoco = fates[: len(fine)].reshape(states.shape[:2]), fates[len(fine) :].reshape(few.shape[:2])
     return Basins(p, tuple(base.tolist()), across.name, up.name, x, y, by_stepping, coarse, by_mujoco, timestep)
 

@@ -18,12 +18,12 @@ from rich.table import Table
 
 from analytic import stable_solutions
 from compare import pages
-from compare.runs.campaign import Campaign
+from compare.runs.campaign import Campaign, run_batch
 from compare.runs.engines import MUJOCO
-from compare.runs.tasks import Task, store
+from compare.runs.tasks import Task, carry_out
 from compare.runs.workers import Workers, dask, processes
 from mjsim import benchmark
-from model import Parameters, State
+from model import Parameters, State, storage
 
 BATCH = 64
 REPEATS = 5
@@ -158,11 +158,10 @@ def _bookkeeping() -> float:
     """Median over `REPEATS` of what a task of a campaign in this process takes beyond simulating and storing it."""
     spent = []
     with tempfile.TemporaryDirectory() as directory:
-        paths = [Path(directory) / f"{k}.h5" for k in range(BATCH)]
-        store(_tasks(BATCH, 0.01), paths)  # imports and templates
+        run_batch(_tasks(BATCH, 0.01), Path(directory), "alone", math.inf)  # imports
         for _ in range(REPEATS):
             start = time.process_time()
-            store(_tasks(BATCH, 0.01), paths)
+            run_batch(_tasks(BATCH, 0.01), Path(directory), "alone", math.inf)
             middle = time.process_time()
             with tempfile.TemporaryDirectory() as runs, Campaign(Path(runs), workers=0) as campaign:
                 campaign.complete(_tasks(BATCH, 0.01))
@@ -172,9 +171,10 @@ def _bookkeeping() -> float:
 
 def _resuming() -> float:
     with tempfile.TemporaryDirectory() as directory:
-        for task in _tasks(FINISHED, 0.01):
-            (Path(directory) / f"{task.key}.h5").touch()
         tasks = _tasks(FINISHED, 0.01)
+        (run,) = carry_out(tasks[:1])
+        for k in range(0, FINISHED, BATCH):
+            storage.save_batch({task.key: run for task in tasks[k : k + BATCH]}, Path(directory) / f"runs-{k:024x}.h5")
         start = time.perf_counter()
         with Campaign(Path(directory), workers=0) as campaign:
             campaign.complete(tasks)

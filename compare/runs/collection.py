@@ -1,4 +1,4 @@
-"""Many runs in one file: what each settled to, over the parameters it ran with.
+"""Many runs in one file: what each settled to, as a function of the parameters it ran with.
 
 ``collect`` writes one row a run: its parameters, and the mean, uncertainty and case over the last part of the run. The
 file opens in xarray with the dimension ``run``, along which the parameters that vary are coordinates.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from model.kinematics import UNITS, VARIABLES
 SCHEMA = "dualball-collection"
 SCHEMA_VERSION = 1
 NAMED = 5
-"""Files that can't be gathered and are named one by one."""
+"""Most files that can't be gathered, and most runs of a file, that are named one by one."""
 
 
 def collect(directory: Path, output: Path) -> int:
@@ -44,13 +43,17 @@ def collect(directory: Path, output: Path) -> int:
         if file.parent.suffix == ".journal" or file.resolve() == output.resolve():
             continue
         try:
-            trajectory = storage.load(file)
+            runs = storage.load_runs(file)
         except StorageError as error:
             problems.append(str(error))
             continue
-        if (first := known.setdefault(_identity(trajectory), file)) is not file:
-            problems.append(f"{first} and {file} hold the same run")
-        rows.append(_row(trajectory, file.relative_to(directory)))
+        for name, run in runs.items():
+            header = dataclasses.asdict(dataclasses.replace(run.header, created="", failure=""))
+            header["flow"] = run.header.flow.to_mapping()
+            identity = json.dumps(header, sort_keys=True, default=dict)  # all that determines a run
+            if (first := known.setdefault(identity, file / name)) != file / name:
+                problems.append(f"{first} and {file / name} hold the same run")
+            rows.append(_row(run, (file / name).relative_to(directory)))
     if problems:
         more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
         raise StorageError("; ".join(problems[:NAMED]) + more)
@@ -60,29 +63,30 @@ def collect(directory: Path, output: Path) -> int:
     return len(rows)
 
 
-def _identity(trajectory: Trajectory) -> str:
-    """All that determines a run, as text."""
-    header = dataclasses.asdict(dataclasses.replace(trajectory.header, created="", failure=""))
-    header["flow"] = trajectory.header.flow.to_mapping()
-    return json.dumps(header, sort_keys=True, default=dict)
-
-
 def is_collection(path: Path) -> bool:
-    """Whether a file is what `collect` writes; raises `StorageError` if it can't be read."""
+    """Whether a file holds many runs: a collection, or a batch of a campaign; raises `StorageError` if unreadable."""
+    if path.parent.is_file():  # one run of a batch
+        return False
     with reading(path) as file:
-        return bool(file.attrs.get("schema") == SCHEMA)
+        return bool(file.attrs.get("schema") == SCHEMA) or storage.is_batch(file)
 
 
 def describe(path: Path) -> dict[str, Any]:
-    """What a collection holds: number of runs, engines, failures, and the range of every column, JSON-able.
+    """What a collection or batch holds: names of runs, engines, failures, the range of every column, JSON-able.
 
-    Raises `StorageError` for a collection that is not whole or of a newer version.
+    Raises `StorageError` for one that is not whole or of a newer version.
     """
     with reading(path) as file:
-        version = file.attrs.get("schema_version")
-        if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
-            raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
-        return described({name: dataset(file, name)[...] for name in file})
+        if not storage.is_batch(file):
+            version = file.attrs.get("schema_version")
+            if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
+                raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
+            return described({name: dataset(file, name)[...] for name in file})
+    rows = [_row(run, path / name) for name, run in storage.load_runs(path).items()]
+    texts = {name for name, value in rows[0].items() if isinstance(value, str)}
+    return described(
+        {name: np.array([row[name].encode() if name in texts else row[name] for row in rows]) for name in rows[0]}
+    )
 
 
 def described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
@@ -91,28 +95,27 @@ def described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
     failures = [text.decode() for text in columns["failure"] if text]
     codes, counts = np.unique(columns["case"], return_counts=True)
     finite = {name: values[np.isfinite(values)] for name, values in numbers.items()}
+    # Older files have no law of drag.
+    varied = [f.name for f in dataclasses.fields(Parameters) if len(set(columns.get(f.name, ()))) > 1]
     return {
         "runs": len(columns["run"]),
+        "names": [text.decode() for text in columns["run"]],
         "engines": sorted({text.decode() for text in columns["engine"]}),
         "cases": {Case(code).name: int(count) for code, count in zip(codes, counts, strict=True) if code >= 0},
         "failures": failures,
         "drag": sorted({text.decode() for text in columns.get("drag", ())}),
-        "varied": _varied(columns),
+        "varied": varied,
         "ranges": {name: [float(v.min()), float(v.max())] for name, v in finite.items() if len(v)},
     }
 
 
-def _varied(columns: Mapping[str, Iterable[Any]]) -> list[str]:
-    """Names of the parameters that are not the same in all runs."""
-    names = [f.name for f in dataclasses.fields(Parameters) if f.name in columns]  # older files have no law of drag
-    return [name for name in names if len(set(columns[name])) > 1]
-
-
 def table(about: dict[str, Any]) -> Table:
     """The description for the terminal."""
-    ranges = about["ranges"]
+    ranges, names = about["ranges"], about["names"]
+    more = f"\n… and {len(names) - NAMED} more" if len(names) > NAMED else ""
     rows = {
         "runs": f"{about['runs']} ({', '.join(about['engines'])}), {len(about['failures'])} failed",
+        "named": "\n".join(names[:NAMED]) + more,
         "cases": ", ".join(f"{name}: {count}" for name, count in about["cases"].items()),
         "varied": "\n".join("{} {:g} … {:g}".format(n, *ranges[n]) for n in about["varied"] if n != "drag"),
         "drag": ", ".join(about["drag"]),
@@ -122,23 +125,21 @@ def table(about: dict[str, Any]) -> Table:
 
 
 def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
+    """A run's parameters, and mean, standard uncertainty and prevailing case over its last part.
+
+    Those are nan, and the case -1, for a run too short for them.
+    """
     row: dict[str, Any] = {"run": str(name), "engine": trajectory.header.engine}
     row |= dataclasses.asdict(trajectory.header.parameters)
     row |= {"duration": float(trajectory.time[-1]) if len(trajectory.time) else 0.0}
     row |= {"failure": trajectory.header.failure}
-    return row | _settled(trajectory)
-
-
-def _settled(trajectory: Trajectory) -> dict[str, Any]:
-    """Mean, standard uncertainty and prevailing case over the last part of a run; nan for a run too short for it."""
-    row: dict[str, Any] = {}
-    for name in VARIABLES:
+    for variable in VARIABLES:
         try:
-            mean = settled_mean(trajectory, getattr(trajectory, name))
+            mean = settled_mean(trajectory, getattr(trajectory, variable))
         except InputError:  # too few samples for a mean
-            row |= {name: np.nan, f"{name}_uncertainty": np.nan}
+            row |= {variable: np.nan, f"{variable}_uncertainty": np.nan}
         else:
-            row |= {name: mean.value, f"{name}_uncertainty": mean.uncertainty}
+            row |= {variable: mean.value, f"{variable}_uncertainty": mean.uncertainty}
     return row | {"case": int(settled_case(trajectory)) if len(trajectory.case) else -1}
 
 
@@ -147,25 +148,18 @@ def _write(rows: list[dict[str, Any]], output: Path) -> None:
     units |= dict(zip(VARIABLES, UNITS, strict=True)) | {"duration": "s"}
     units |= {f"{name}_uncertainty": unit for name, unit in zip(VARIABLES, UNITS, strict=True)}
     columns = {name: [row[name] for row in rows] for name in rows[0]}
-    varied = _varied(columns)
+    varied = [f.name for f in dataclasses.fields(Parameters) if len(set(columns[f.name])) > 1]
     with WholeFile(output) as whole:
         whole.file.attrs["schema"], whole.file.attrs["schema_version"] = SCHEMA, SCHEMA_VERSION
         for name, values in columns.items():
-            column = _column(whole.file, name, values, units.get(name, ""))
+            kind = h5py.string_dtype() if isinstance(values[0], str) else None
+            column = whole.file.create_dataset(name, data=values, dtype=kind)
+            if units.get(name):
+                column.attrs["units"] = units[name]
+            if name == "run":
+                column.make_scale("run")
+            else:
+                column.dims[0].attach_scale(whole.file["run"])
             if varied and name not in ("run", *varied):
                 column.attrs["coordinates"] = " ".join(varied)  # the CF convention's way to say what it is over
         whole.finish()
-
-
-def _column(file: h5py.File, name: str, values: Sequence[Any], units: str) -> h5py.Dataset:
-    if isinstance(values[0], str):
-        column = file.create_dataset(name, data=np.array(values, dtype=object), dtype=h5py.string_dtype())
-    else:
-        column = file.create_dataset(name, data=np.array(values))
-    if units:
-        column.attrs["units"] = units
-    if name == "run":
-        column.make_scale("run")
-    else:
-        column.dims[0].attach_scale(file["run"])
-    return column

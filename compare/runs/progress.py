@@ -24,6 +24,11 @@ def nowhere(what: str, done: int, total: int, failed: int) -> None:
     """Shows nothing."""
 
 
+def counted(show: Show) -> Show:
+    """Says how many runs are done, too."""
+    return lambda what, done, total, failed: show(f"{what}: {done} of {total} runs", done, total, failed)
+
+
 @contextmanager
 def shown(quiet: bool = False) -> Iterator[Show]:
     """A function to report progress to, on standard error; it is never silent for longer than `INTERVAL`."""

@@ -9,8 +9,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -20,14 +19,11 @@ import numpy.typing as npt
 import mjsim
 from compare.runs import engines
 from compare.runs.engines import Engine, Settings
-from mjsim.engine import Blocks
 from mjsim.journal import Journal
 from model import Flow, InputError, Parameters, State, Trajectory, storage
 
 LONG = 1e6
-"""Steps from which on a run that hands out its samples keeps a journal and has a worker of its own, without batch."""
-HELD = 2**18
-"""Most samples of a batch that are held in memory, some 60 MB; more are written as they come."""
+"""Steps from which on a run that hands out its samples keeps a journal and is simulated alone, outside a batch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +89,11 @@ class Task:
         return self.t_end / (self.chosen_settings.timestep or self.t_end)
 
     @property
+    def samples(self) -> float:
+        """How many samples it has, about."""
+        return self.t_end / self.sample_interval if self.sample_interval else 1000
+
+    @property
     def long(self) -> bool:
         """Whether the run hands out its samples and takes more than `LONG` steps."""
         return self.simulator.stream is not None and self.steps > LONG
@@ -122,71 +123,63 @@ class Deadline:
             raise OutOfTimeError(f"it took longer than {self.limit:g} s")
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a task."""
-
-    failure: str
-    """Why it is not whole; empty if it is."""
-    run: Trajectory | None = field(default=None, repr=False)
-    """The run itself, unless it was too long to be held in memory."""
-
-
-def carry_out(
-    tasks: Sequence[Task], deadline: Deadline | None = None, stop: Callable[[], bool] = lambda: False
-) -> list[Trajectory]:
+def carry_out(tasks: Sequence[Task], deadline: Deadline | None = None) -> list[Trajectory]:
     """Run tasks of one `Task.batch_key`; a run that breaks down comes back with its failure in the header."""
     deadline = deadline or Deadline()
     if not tasks[0].simulator.stream:
-        return [_simulated(task, deadline, stop) for task in tasks]
-    run, blocks, stopped = _begun(tasks, None), [], ""
+        return [_simulated(task, deadline) for task in tasks]
+    run, blocks = _begun(tasks), []
     for block in run:
         deadline.check()
         blocks.append(block)
-        if stop():
-            stopped = _stopped(block)
-            break
-    headers = [replace(header, failure=header.failure or stopped) for header in run.headers]
     return [
         Trajectory.from_blocks(header, parts, events)
-        for header, parts, events in zip(headers, zip(*blocks, strict=True), run.events, strict=True)
+        for header, parts, events in zip(run.headers, zip(*blocks, strict=True), run.events, strict=True)
     ]
 
 
-def store(
-    tasks: Sequence[Task], paths: Sequence[Path], limit: float = math.inf, stop: Callable[[], bool] = lambda: False
-) -> list[Outcome]:
-    """Run tasks of one `Task.batch_key` into files.
+def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False) -> str:
+    """Carry out one task into a file of its own; return why the run is not whole, or nothing.
 
-    A run that breaks down is kept under `failed_path`, until one into the same file is whole. If there are more than
-    `HELD` samples, those of MuJoCo go to their files as they come, and a run of more than `LONG` steps keeps a journal,
-    from which it goes on after having been killed. Once `stop` says so, runs end as if they had broken down, but
-    MuJoCo's keep their journals.
+    A run that breaks down is kept under `failed_path`, until one into the same file is whole. Samples of MuJoCo go to
+    the file as they come, and a run of more than `LONG` steps keeps a journal, from which it goes on after having been
+    killed. Once `stop` says so, a run ends as if it had broken down, but MuJoCo's keeps its journal.
 
     Raises
     ------
     StorageError
         If a file can't be written.
     OutOfTimeError
-        If the batch takes longer than `limit` s for each of its runs.
+        If it takes longer than `limit` s.
     """
-    deadline, first = Deadline(limit * len(tasks)), tasks[0]
-    many = first.t_end * len(tasks) > HELD * (first.sample_interval or first.t_end / 1000)
-    if first.simulator.stream and (many or first.long):
-        outcomes = [Outcome(reason) for reason in _stream(tasks, paths, deadline, stop)]
+    deadline = Deadline(limit)
+    if not task.simulator.stream:
+        run = _simulated(task, deadline, stop)
+        storage.save(run, path if run.complete else failed_path(path))
+        failure = run.header.failure
     else:
-        runs = carry_out(tasks, deadline, stop)
-        for run, path in zip(runs, paths, strict=True):
-            storage.save(run, path if run.complete else failed_path(path))
-        outcomes = [Outcome(run.header.failure, run) for run in runs]
-    for path, outcome in zip(paths, outcomes, strict=True):
-        if not outcome.failure:
-            failed_path(path).unlink(missing_ok=True)
-    return outcomes
-
-
-def _stopped(block: Blocks) -> str:
-    return f"was stopped at t = {max(part['time'].max(initial=0.0) for part in block):g} s"
+        journal = Journal(journal_path(task, path)) if task.long else None
+        try:
+            under_way = _begun([task], journal)
+        except InputError:  # there is nothing to go on with
+            if journal:
+                journal.discard()
+            raise
+        stopped = ""
+        with storage.TrajectoryWriter(path, under_way.headers[0]) as writer:
+            for (block,) in under_way:
+                deadline.check()
+                writer.append(block)
+                if stop():
+                    stopped = f"was stopped at t = {block['time'].max(initial=0.0):g} s"
+                    break
+            failure = under_way.headers[0].failure or stopped
+            writer.end(under_way.events[0], failure, failed_path(path) if failure else path)
+        if journal and not stopped:
+            journal.discard()
+    if not failure:
+        failed_path(path).unlink(missing_ok=True)
+    return failure
 
 
 def failed_path(path: Path) -> Path:
@@ -194,53 +187,29 @@ def failed_path(path: Path) -> Path:
     return path.with_suffix(".failed.h5")
 
 
-def journal_path(task: Task, path: Path) -> Path | None:
+def journal_path(task: Task, path: Path) -> Path:
     """Where a long run into a file keeps its journal, under its `Task.key`, since the file may have any name."""
-    return path.with_name(f"{task.key}.journal") if task.long else None
+    return path.with_name(f"{task.key}.journal")
 
 
-def _begun(tasks: Sequence[Task], journal: Journal | None) -> mjsim.Run:
+def _begun(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
     """Runs that hand out their samples, in a batch unless they are long."""
     first = tasks[0]
     parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
-    given = parameters, x0s, first.t_end, flows, first.chosen_settings
     assert first.simulator.stream
     return first.simulator.stream(
-        *given, sample_interval=first.sample_interval, batched=not first.long, journal=journal
+        parameters,
+        x0s,
+        first.t_end,
+        flows,
+        first.chosen_settings,
+        sample_interval=first.sample_interval,
+        batched=not first.long,
+        journal=journal,
     )
 
 
-def _stream(tasks: Sequence[Task], paths: Sequence[Path], deadline: Deadline, stop: Callable[[], bool]) -> list[str]:
-    kept = journal_path(tasks[0], paths[0]) if len(tasks) == 1 else None
-    journal = Journal(kept) if kept else None
-    try:
-        run = _begun(tasks, journal)
-    except InputError:  # there is nothing to go on with
-        if journal:
-            journal.discard()
-        raise
-    stopped = ""
-    with ExitStack() as stack:
-        writers = [
-            stack.enter_context(storage.TrajectoryWriter(path, header))
-            for path, header in zip(paths, run.headers, strict=True)
-        ]
-        for blocks in run:
-            deadline.check()
-            for writer, block in zip(writers, blocks, strict=True):
-                writer.append(block)
-            if stop():
-                stopped = _stopped(blocks)
-                break
-        reasons = [header.failure or stopped for header in run.headers]
-        for writer, reason, events, path in zip(writers, reasons, run.events, paths, strict=True):
-            writer.finish(events, reason, failed_path(path) if reason else path)
-    if journal and not stopped:
-        journal.discard()
-    return reasons
-
-
-def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool]) -> Trajectory:
+def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool] = lambda: False) -> Trajectory:
     def check(done: float) -> None:
         deadline.check()
         if stop():

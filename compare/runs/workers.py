@@ -15,7 +15,8 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -53,16 +54,35 @@ def processes(count: int) -> Workers:
     def start() -> Executor:
         for name in _THREADS:  # inherited by the workers; numpy reads it when they import it
             os.environ.setdefault(name, "1")
-        return ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_follow_the_parent)
+        return _Pool(count)
 
     def stop(executor: Executor, at_once: bool) -> None:
-        assert isinstance(executor, ProcessPoolExecutor)
+        assert isinstance(executor, _Pool)
         if at_once:
-            for process in list((executor._processes or {}).values()):
-                process.kill()
+            executor.leash.close()
         executor.shutdown(wait=True, cancel_futures=True)
 
     return Workers(count, start, stop, (BrokenProcessPool,))
+
+
+class _Pool(ProcessPoolExecutor):
+    """Processes that end when the other end of a pipe is closed: by us, to give up their work, or by our death."""
+
+    def __init__(self, count: int) -> None:
+        context = get_context("spawn")
+        self._end, self.leash = context.Pipe(duplex=False)  # ours must stay open until all workers have started
+        super().__init__(count, mp_context=context, initializer=_follow, initargs=(self._end,))
+
+
+def _follow(end: Connection) -> None:
+    """In a worker: leave Ctrl-C to the parent, and end with it, or when it says so."""
+
+    def wait() -> None:
+        end.poll(None)
+        os._exit(1)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=wait, daemon=True).start()
 
 
 @contextmanager
@@ -138,15 +158,3 @@ def interrupts() -> Iterator[Callable[[], bool]]:
         yield lambda: pressed
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _follow_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
-    threading.Thread(target=_die_with_the_parent, daemon=True).start()
-
-
-def _die_with_the_parent() -> None:
-    """However it ends: a worker whose campaign was killed would go on with its batch, for nobody."""
-    if parent := parent_process():
-        parent.join()
-        os._exit(1)

@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     check_choice("page", args.page.name, list(PAGES))
     runs, tables = PAGES[args.page.name]
     check_names(args.only or (), list(tables), "table")
-    with progress.shown() as show, Campaign(args.output / runs, args.workers, report=show) as campaign:
+    with progress.shown() as show, Campaign(args.output / runs, args.workers, report=progress.counted(show)) as campaign:
         for name in args.only or tables:
             campaign.doing = name
             write(args.page, name, tables[name](campaign))

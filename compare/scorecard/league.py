@@ -37,7 +37,7 @@ from compare.scorecard.trials import (
     Stationary,
 )
 from compare.statistics import plain
-from model import Case, Parameters, Trajectory, storage
+from model import Case, Parameters, Trajectory
 from model.files import write_text
 
 STEPS = (4e-3, 2e-3, 1e-3)
@@ -118,7 +118,7 @@ def scored(
         for discipline, tasks in zip(asked, row, strict=True):
             reasons = [failed[task.key] for task in tasks if task.key in failed]
             entry.failures.update({discipline.name: reasons[0]} if reasons else {})
-            runs = [] if reasons else [storage.load(campaign.path(task)) for task in tasks]
+            runs = [] if reasons else [campaign.load(task.key) for task in tasks]
             entry.scores[discipline.name] = discipline.score(runs) if runs else math.nan
         if cost:
             campaign.report(f"cost of {each.name}", number, len(those), 0)
@@ -129,7 +129,7 @@ def scored(
 
 def _kept(campaign: Campaign, task: Task, cost: Callable[[Task], float]) -> float:
     """What a run costs, measured once and kept beside it."""
-    path = campaign.path(task).with_suffix(".cost.json")
+    path = campaign.directory / f"{task.key}.cost.json"
     if not path.exists():
         write_text(path, json.dumps(cost(task)))
     return float(json.loads(path.read_text("utf-8")))

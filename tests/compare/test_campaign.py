@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from compare.runs.campaign import FAILURES, Campaign, Failure, run_batch
-from compare.runs.tasks import Task
+from compare.runs.tasks import Task, carry_out
 from compare.runs.workers import dask, spread
 from model import InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
@@ -32,8 +32,10 @@ def tasks(count: int = 9, t_end: float = 0.2) -> list[Task]:
 
 def data(directory: Path) -> dict[str, dict[str, bytes]]:
     """All numbers of all runs of a directory."""
-    runs = {path.name: storage.load(path) for path in directory.glob("*.h5")}
-    return {n: {c: getattr(t, c).tobytes() for c in columns(Trajectory)} for n, t in runs.items()}
+    runs = [run for path in directory.glob("*.h5") for run in storage.load_runs(path).values()]
+    numbers = {str(run.header.parameters): {c: getattr(run, c).tobytes() for c in columns(Trajectory)} for run in runs}
+    assert len(numbers) == len(runs)
+    return numbers
 
 
 @pytest.fixture(scope="module")
@@ -57,8 +59,12 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
         campaign.complete(tasks(3))
         before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
         campaign.complete(tasks(4))
-    assert before.items() <= {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}.items()
     assert seen[-1] == ("it", 4, 4, 0)
+    with Campaign(tmp_path, workers=0) as again:
+        assert again.complete(tasks(4)) == []
+    assert len(before) == 1
+    assert before.items() <= {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}.items()
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_the_longest_go_first(tmp_path: Path) -> None:
@@ -66,28 +72,92 @@ def test_the_longest_go_first(tmp_path: Path) -> None:
     given = [*tasks(1, 0.1), *tasks(1, 0.4)]
     with Campaign(tmp_path, workers=0) as campaign:
         campaign.complete(given)
-        short, long = (campaign.path(task).stat().st_mtime_ns for task in given)
+    at = {key: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5") for key in storage.contents(path)[1]}
+    short, long = (at[task.key] for task in given)
     assert long < short
 
 
-@pytest.mark.parametrize("workers", [0, 1])
-def test_what_is_handed_over_is_what_the_file_holds(tmp_path: Path, workers: int) -> None:
-    with Campaign(tmp_path, workers, memory=10_000) as campaign:
+def test_the_runs_of_a_batch_are_one_file(tmp_path: Path) -> None:
+    with Campaign(tmp_path, workers=0) as campaign:
         runs = campaign.run(tasks(3))
-        stored = [storage.load(campaign.path(task)) for task in tasks(3)]
-    for run, other in zip(runs, stored, strict=True):
-        assert all(np.array_equal(getattr(run, name), getattr(other, name)) for name in columns(Trajectory))
-        assert run.header.parameters == other.header.parameters
-        assert run.events.time.tolist() == other.events.time.tolist()
+        (path,) = tmp_path.iterdir()
+    assert storage.contents(path)[1] == [task.key for task in tasks(3)]
+    for run, task in zip(runs, tasks(3), strict=True):
+        assert np.array_equal(run.omega_c, storage.load(path / task.key).omega_c)
+        assert run.header.parameters == task.parameters
 
 
 def test_no_more_is_held_than_there_is_memory_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file is read once, as long as there is room for its runs, of 201 samples each."""
     loaded: list[Path] = []
-    read = storage.load
-    monkeypatch.setattr(storage, "load", lambda path: [loaded.append(path), read(path)][1])
-    with Campaign(tmp_path, workers=0, memory=300) as campaign:  # a run has 201 samples
-        campaign.run(tasks(3))
-    assert len(loaded) == 2
+    read = storage.load_runs
+    monkeypatch.setattr(storage, "load_runs", lambda path: [loaded.append(path), read(path)][1])
+    with Campaign(tmp_path, workers=0, batch=2) as campaign:
+        campaign.run(tasks(4))
+        campaign.run(tasks(4))
+        assert len(loaded) == 2
+        monkeypatch.setattr("compare.runs.campaign.READ", 500)
+        with Campaign(tmp_path, workers=0) as small:
+            small.run(tasks(4))
+            small.run(tasks(4))
+    assert len(loaded) == 2 + 4
+
+
+def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path: Path) -> None:
+    wild = Task(engine="mujoco", parameters=Parameters.named("reference"), x0=(0, 0, 1e9, 0, 0, 0), t_end=0.2)
+    with Campaign(tmp_path, workers=0, batch=2, label="first") as campaign:
+        campaign.complete([*tasks(3), wild])
+        campaign.label = "first-and-more"
+        campaign.complete(tasks(4))
+        campaign.reduce("first", [tasks(2)[1].key])
+        kept = sorted((*path.name.rsplit("-", 1)[:1], *path.suffixes) for path in tmp_path.glob("*.h5"))
+        assert kept == [("first", ".failed", ".h5"), ("first-and-more", ".h5"), ("first.h5", ".h5")]
+        campaign.reduce("first", [tasks(2)[1].key])  # again, as after a kill: what is kept stays
+        assert list(storage.load_runs(tmp_path / "first.h5")) == [tasks(2)[1].key]
+        (tmp_path / "first.h5").unlink()
+        assert campaign.complete(tasks(4)) == []
+    assert len(data(tmp_path)) == 5
+
+
+def cut(content: bytes) -> bytes:
+    return content[:-100]
+
+
+def edited(content: bytes) -> bytes:
+    return content[:4000] + bytes([content[4000] ^ 1]) + content[4001:]
+
+
+@pytest.mark.parametrize("damage", [cut, edited])
+def test_a_file_that_was_cut_or_edited_is_named_and_done_again(tmp_path: Path, undisturbed, capsys, damage) -> None:
+    with Campaign(tmp_path, workers=0, batch=3) as campaign:
+        campaign.complete(tasks())
+    path = min(tmp_path.iterdir())
+    path.write_bytes(damage(path.read_bytes()))
+    untouched = {each: each.stat().st_mtime_ns for each in tmp_path.iterdir() if each != path}
+    with Campaign(tmp_path, workers=0, batch=3) as campaign:
+        assert campaign.complete(tasks()) == []
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"dualball: cannot read {path}: it is ")
+    assert line.endswith("; it is set aside, its runs are carried out again")
+    assert data(tmp_path) == undisturbed
+    assert untouched.items() <= {each: each.stat().st_mtime_ns for each in tmp_path.iterdir()}.items()
+
+
+def test_runs_of_other_versions_are_left_alone(tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of other versions by what they say, those of before there were batches by their names."""
+    with monkeypatch.context() as other:
+        other.setattr("model.storage.current_versions", lambda: {"dualball": "9.9"})
+        with Campaign(tmp_path, workers=0) as campaign:
+            campaign.complete(tasks(2))
+    (tmp_path / f"{tasks(1)[0].key}.h5").write_bytes(b"as it was")
+    (tmp_path / "sweep.h5").write_bytes(b"somebody's own")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    with Campaign(tmp_path, workers=0) as campaign:
+        campaign.label = "again"
+        assert campaign.complete(tasks(2)) == []
+    assert capsys.readouterr().err == f"dualball: 2 files of runs of other versions are left alone in {tmp_path}\n"
+    assert before.items() <= {path: path.read_bytes() for path in tmp_path.iterdir()}.items()
+    assert len(before) + 1 == len(list(tmp_path.iterdir()))
 
 
 def test_every_input_is_part_of_the_identity() -> None:
@@ -120,7 +190,7 @@ def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path: Path) ->
         failures = campaign.complete([*tasks(2), wild])
         assert [failure.task for failure in failures] == [wild]
         assert "diverged" in failures[0].reason
-        assert sorted(path.suffixes for path in tmp_path.glob("*.h5")) == [[".failed", ".h5"], [".h5"], [".h5"]]
+        assert sorted(path.suffixes for path in tmp_path.glob("*.h5")) == [[".failed", ".h5"], [".h5"]]
         assert [entry["key"] for entry in json.loads((tmp_path / FAILURES).read_text())] == [wild.key]
         with pytest.raises(SimulationError, match="diverged"):
             campaign.run([wild])
@@ -187,11 +257,11 @@ def test_a_run_that_takes_too_long_is_reported(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("*.h5"))) == 1
 
 
-def deadly(tasks, directory, limit, hand_over):
+def deadly(tasks, *where):
     """Stands in for `run_batch`: the run at omega_0 = 7 takes its worker down with it."""
     if any(task.parameters.omega_0 == 7.0 for task in tasks):
         os.kill(os.getpid(), signal.SIGKILL)
-    return run_batch(tasks, directory, limit, hand_over)
+    return run_batch(tasks, *where)
 
 
 def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
@@ -219,27 +289,32 @@ def test_what_a_killed_process_was_to_do_is_done_here(count: int) -> None:
         assert list(over(abs, [-1, -2])) == [1, 2]
 
 
-def test_a_full_disk_is_reported_for_each_task(tmp_path: Path) -> None:
+def test_a_full_disk_is_said_once_and_what_is_whole_stays(tmp_path: Path) -> None:
     """A limit on the size of files, in a process of its own, plays the disk that is full."""
     program = f"""
 import resource, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 import test_campaign
-resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
 with test_campaign.Campaign({str(tmp_path)!r}, workers=0) as campaign:
-    for failure in campaign.complete(test_campaign.tasks(2)):
-        print(failure.reason)
+    campaign.complete(test_campaign.tasks(1))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
+    try:
+        campaign.complete(test_campaign.tasks(3))
+    except test_campaign.StorageError as error:
+        print(error)
 """
     answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True)
-    assert [line.rsplit(": ", 1)[1] for line in answer.stdout.splitlines()] == ["File too large"] * 2
-    assert not list(tmp_path.glob("*.h5")) + list(tmp_path.glob(".*"))
+    (line,) = answer.stdout.splitlines()
+    assert line.endswith(": File too large")
+    assert len(data(tmp_path)) == len(list(tmp_path.iterdir())) == 1
 
 
 def test_the_parent_stays_small(tmp_path: Path) -> None:
     """Ten thousand tasks: what the parent keeps is the list of tasks and a few batches, not results."""
     many = tasks(10_000)
-    for task in many:
-        (tmp_path / f"{task.key}.h5").touch()
+    (run,) = carry_out(tasks(1, 0.01))
+    for k in range(0, len(many), 64):
+        storage.save_batch({task.key: run for task in many[k : k + 64]}, tmp_path / f"runs-{k:024x}.h5")
     tracemalloc.start()
     with Campaign(tmp_path, workers=0) as campaign:
         assert campaign.complete(many) == []
@@ -328,7 +403,6 @@ if __name__ == "__main__":
     )
     with Campaign({directory!r}, workers=0) as campaign:
         campaign.complete([task])
-    print(campaign.path(task))
 """
 
 
@@ -395,7 +469,7 @@ def test_interrupted_by_the_keyboard(tmp_path: Path) -> None:
     assert not list(tmp_path.glob(".*"))
     done = len(list(tmp_path.glob("*.h5")))
     assert 2 <= done < 200
-    assert all(storage.load(path).complete for path in tmp_path.glob("*.h5"))
+    assert len(data(tmp_path)) == 2 * done
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from compare.commands import cli
 from compare.runs import collection
 from compare.runs.campaign import Campaign
 from compare.runs.tasks import Task
-from model import Parameters, StorageError
+from model import Parameters, StorageError, storage
 from model.files import dataset, reading
 
 P = Parameters.named("reference")
@@ -22,10 +23,10 @@ OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
 
 @pytest.fixture(scope="module")
 def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The runs of a grid."""
+    """The runs of a grid, a batch each."""
     directory = tmp_path_factory.mktemp("grid")
     sets = [P.replace(omega_0=omega, eta=eta) for omega in OMEGAS for eta in ETAS]
-    with Campaign(directory, workers=0) as campaign:
+    with Campaign(directory, workers=0, batch=1) as campaign:
         assert not campaign.complete(Task(engine="event", parameters=p, x0=(0.0,) * 8, t_end=0.1) for p in sets)
     return directory
 
@@ -57,7 +58,7 @@ def test_the_law_of_drag_is_kept(tmp_path: Path) -> None:
     collection.collect(tmp_path / "runs", tmp_path / "all.h5")
     about = collection.describe(tmp_path / "all.h5")
     assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
-    assert collection.table(about).row_count == 5
+    assert collection.table(about).row_count == 6
     with reading(tmp_path / "all.h5") as file:
         older = {name: dataset(file, name)[...] for name in file if name != "drag"}
     assert collection.described(older)["varied"] == ["nu_f"]
@@ -73,11 +74,12 @@ def test_a_single_run_varies_nothing(runs: Path, tmp_path: Path) -> None:
 
 def test_the_same_run_twice_is_refused_by_name(runs: Path, tmp_path: Path) -> None:
     first = min(runs.glob("*.h5"))
+    (key,) = storage.load_runs(first)
     (runs / "copies").mkdir()
     shutil.copy(first, runs / "copies" / "copy.h5")
     with pytest.raises(StorageError) as caught:
         collection.collect(runs, tmp_path / "all.h5")
-    assert str(caught.value) == f"{first} and {runs / 'copies' / 'copy.h5'} hold the same run"
+    assert str(caught.value) == f"{runs / 'copies' / 'copy.h5' / key} and {first / key} hold the same run"
     assert not (tmp_path / "all.h5").exists()
 
 
@@ -99,6 +101,24 @@ def test_what_is_no_run_is_left_out(runs: Path) -> None:
     (runs / "x.journal" / "000000.h5").touch()
     assert collection.collect(runs, runs / "all.h5") == 6
     assert collection.collect(runs, runs / "all.h5") == 6
+
+
+def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tasks = [Task(engine="event", parameters=P.replace(omega_0=omega), x0=(0.0,) * 8, t_end=0.1) for omega in OMEGAS]
+    with Campaign(tmp_path / "runs", workers=0) as campaign:
+        campaign.complete(tasks)
+    (file,) = (tmp_path / "runs").iterdir()
+    paths = [file / task.key for task in tasks]
+    assert cli.main(["inspect", str(paths[0].parent), "--json"]) == 0
+    about = json.loads(capsys.readouterr().out)
+    assert about["names"] == [str(path) for path in paths]
+    assert (about["varied"], about["ranges"]["omega_0"]) == (["omega_0"], [min(OMEGAS), max(OMEGAS)])
+    assert cli.main(["inspect", about["names"][1], "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["parameters"]["omega_0"] == OMEGAS[1]
+    assert collection.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
+    assert collection.describe(tmp_path / "all.h5")["names"] == [str(Path(*path.parts[-2:])) for path in paths]
 
 
 def test_a_collection_is_not_drawn(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -65,7 +65,7 @@ def test_a_step_too_long_for_the_problem_is_refused_by_all(tmp_path, name):
     if name == NEWCOMER.name:
         words = r"timestep = 0\.5 s is too large for the contact settings: .* allow at most 0\.009 s"
     with pytest.raises(InputError, match=words):
-        store([task_of(name, REFERENCE, State(), 1.0, 0.5)], [tmp_path / "run.h5"])
+        store(task_of(name, REFERENCE, State(), 1.0, 0.5), tmp_path / "run.h5")
     assert not list(tmp_path.iterdir())
 
 

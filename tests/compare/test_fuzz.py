@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import tomllib
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +25,13 @@ from compare.runs import collection
 from compare.runs.engines import ENGINES
 from compare.view import inspection
 from model import Flow, InputError, Parameters, State, StorageError, Trajectory, storage
-from model.files import WholeFile
+from model.files import seal
 
 ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.slow)])
 """Mutations of one file."""
 P = Parameters.named("reference")
 CHUNKS = "in chunks"
-"""A run file of many samples, which are kept in compressed chunks; those of few are not."""
+"""A run file of several chunks."""
 RUNS = [*ENGINES, CHUNKS]
 """Run files."""
 
@@ -89,7 +91,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A file of every kind, by what it is."""
     made = tmp_path_factory.mktemp("whole")
     kept = {name: made / "runs" / f"{name}.h5" for name in RUNS} | {"collection": made / "all.h5"}
-    kept |= {"measurements": made / "measurements" / "settled.h5"}
+    kept |= {"measurements": made / "measurements" / "settled.h5", "batch": made / "batch.h5"}
     (made / "runs").mkdir()
     (made / "measurements").mkdir()
     for name, engine in ENGINES.items():
@@ -99,6 +101,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             assert cli.main(["simulate", "--engine", name, "--time", "0.05", "-o", str(kept[name]), "--json"]) == 0
     storage.save(analytic.simulate(P, State(), 5.0, sample_interval=1e-3), kept[CHUNKS])
     collection.collect(made / "runs", kept["collection"])
+    storage.save_batch({name: storage.load(kept[name]) for name in RUNS[:3]}, kept["batch"])
     measured = [
         Measurement(
             protocol="settled",
@@ -117,6 +120,15 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return kept
 
 
+@contextmanager
+def edited(path: Path) -> Iterator[h5py.File]:
+    """A file to be changed, which has a checksum that fits afterwards."""
+    with h5py.File(path, "r+") as file:
+        yield file
+    with path.open("r+b") as content:
+        seal(content)
+
+
 def whole(path: Path) -> list[dict[str, Any]]:
     """All that a run file says, read at once."""
     return [vars(storage.load(path))]
@@ -129,6 +141,8 @@ def parts(path: Path) -> list[dict[str, Any]]:
 
 READERS: list[tuple[str, Callable[[Path], Any]]] = [
     *((name, read) for name in RUNS for read in (whole, parts)),
+    ("batch", storage.contents),
+    ("batch", storage.load_runs),
     ("collection", collection.is_collection),
     ("collection", collection.describe),
     ("measurements", record.load),
@@ -169,6 +183,8 @@ def results_of(measurements: Path) -> Path:
         ("event", "inspect FILE --plot DIRECTORY/plot.png"),
         ("event", "render FILE -o DIRECTORY/picture.png"),
         ("event", "collect RUNS -o DIRECTORY/all.h5"),
+        ("batch", "inspect FILE"),
+        ("batch", "inspect FILE/event"),
         ("collection", "inspect FILE"),
         ("measurements", "inspect FILE"),
         ("measurements", "judge RESULTS"),
@@ -202,11 +218,11 @@ def test_a_header_that_says_something_else(tmp_path: Path, files: dict[str, Path
     good, rng, path = files[engine].read_bytes(), np.random.default_rng(4), tmp_path / "run.h5"
     refusals = []
     for _ in range(count):
-        with WholeFile(path, good) as crafted:
+        path.write_bytes(good)
+        with edited(path) as file:
             name = str(rng.choice(["parameters", "flow", "settings", "versions"]))
-            text = mutated(crafted.file.attrs[name].encode(), rng).decode("utf-8", "replace")
-            crafted.file.attrs[name] = text.replace("\0", "?")
-            crafted.finish()
+            text = mutated(file.attrs[name].encode(), rng).decode("utf-8", "replace")
+            file.attrs[name] = text.replace("\0", "?")
         try:
             inspection.table(inspection.describe(path))
         except StorageError as error:
@@ -285,9 +301,9 @@ def test_nothing_in_a_file_is_followed(
     secret = tmp_path / "secret.h5"
     with h5py.File(secret, "w") as file:
         file["x"] = np.arange(51.0)
-    with WholeFile(tmp_path / "run.h5", files["event"].read_bytes()) as crafted:  # with a checksum that fits
-        del crafted.file["y"]
-        dict(outside(secret))[way](crafted.file)
-        crafted.finish()
+    shutil.copy(files["event"], tmp_path / "run.h5")
+    with edited(tmp_path / "run.h5") as file:
+        del file["y"]
+        dict(outside(secret))[way](file)
     assert cli.main(["inspect", str(tmp_path / "run.h5")]) == 2
     assert "'y'" in capsys.readouterr().err

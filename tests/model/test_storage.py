@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import xarray
 
+import model.trajectory
 from model import Case, Events, Flow, Header, InputError, Parameters, StorageError, Trajectory, storage
-from model.files import WholeFile, reading
+from model.files import reading, seal
 from model.trajectory import SAMPLE, columns
 
 
@@ -101,7 +102,7 @@ def test_chunks_arrive_while_the_run_goes_on(tmp_path: Path) -> None:
         for block in np.array_split(samples, 7):
             writer.append(block)
             assert not path.exists()
-        writer.finish(trajectory.events)
+        writer.end(trajectory.events)
     assert_same(storage.load(path), trajectory)
 
 
@@ -161,13 +162,12 @@ def test_every_truncation_is_refused(tmp_path: Path) -> None:
         assert "\n" not in str(caught.value)
 
 
-def edit(tmp_path: Path, change) -> Path:
-    path = tmp_path / "run.h5"
-    storage.save(make(), path)
-    with WholeFile(path, path.read_bytes()) as whole:
-        change(whole.file)
-        whole.finish()
-    return path
+def edit(path: Path, change) -> None:
+    """Change what a file holds, and give it a checksum that fits."""
+    with h5py.File(path, "r+") as file:
+        change(file)
+    with path.open("r+b") as content:
+        seal(content)
 
 
 def replace(file: h5py.File, name: str, value: object) -> None:
@@ -247,8 +247,65 @@ def test_whatever_goes_wrong_inside_a_file_names_it(tmp_path: Path, error: type[
     ],
 )
 def test_a_foreign_or_damaged_file_is_refused(tmp_path: Path, change, says: str) -> None:
-    path = edit(tmp_path, change)
+    path = tmp_path / "run.h5"
+    storage.save(make(), path)
+    edit(path, change)
     with pytest.raises(StorageError, match=says) as caught:
         storage.load(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+BATCH = {"a": make(50, 2), "b": make(0, 0, "diverged"), "c": make(7, 9)}
+
+
+def test_the_runs_of_a_batch_are_one_file(tmp_path: Path) -> None:
+    """Of any numbers of samples and events; each is read as if it had a file of its own."""
+    path = tmp_path / "batch.h5"
+    storage.save_batch(BATCH, path)
+    assert [each.name for each in tmp_path.iterdir()] == ["batch.h5"]
+    assert storage.contents(path) == (model.trajectory.current_versions()["dualball"], ["a", "b", "c"])
+    loaded = storage.load_runs(path)
+    for name, run in BATCH.items():
+        assert_same(loaded[name], run)
+        assert_same(storage.load(path / name), run)
+        (part,) = storage.parts(path / name, 10)
+        assert_same(part, run)
+    assert [storage.exists(each / "a") for each in (path, tmp_path / "other")] == [True, False]
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
+        assert data.force_A.dims == ("run", "sample", "axis")
+        assert data.event_from.dims == ("run", "event")
+        assert data.omega_c.units == "rad s-1"
+        assert data.samples.values.tolist() == [50, 0, 7]
+        np.testing.assert_array_equal(data.omega_c.sel(run="c")[:7], BATCH["c"].omega_c)
+
+
+def test_a_file_of_one_run_is_one_without_a_name(tmp_path: Path) -> None:
+    storage.save(make(), tmp_path / "run.h5")
+    assert storage.contents(tmp_path / "run.h5")[1] == []
+    assert_same(storage.load_runs(tmp_path / "run.h5")[""], make())
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda f: f.attrs.__setitem__("schema_version", 2), "newer dualball: its schema version is 2"),
+        (lambda f: f.__delitem__("engine"), "no dataset 'engine'"),
+        (lambda f: replace(f, "flow", ["{"] * 3), "attribute 'flow' is not JSON"),
+        (lambda f: replace(f, "y", np.zeros((3, 49))), "differ in length"),
+        (lambda f: replace(f, "samples", [50, 0]), "does not hold what it should"),
+        (lambda f: f["case"].__setitem__((0, 0), 9), "case that does not exist"),
+    ],
+)
+def test_a_foreign_or_damaged_batch_is_refused(tmp_path: Path, change, says: str) -> None:
+    path = tmp_path / "batch.h5"
+    storage.save_batch(BATCH, path)
+    with pytest.raises(StorageError, match="name one of them, as FILE/NAME"):
+        storage.load(path)
+    with pytest.raises(StorageError, match="holds no run of that name"):
+        storage.load(path / "d")
+    edit(path, change)
+    with pytest.raises(StorageError, match=says) as caught:
+        storage.load(path / "a")
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
