@@ -140,9 +140,9 @@ class Campaign:
 
     @property
     def at_once(self) -> int:
-        """How many parts keep the workers busy: one more than there are workers, as some wait for a single long run."""
+        """How many parts keep the workers busy: two more than there are workers, as some wait for a single long run."""
         count = self._executor.workers.count
-        return count + 1 if count > 1 else 1
+        return count + 2 if count > 1 else 1
 
     def give_up(self) -> None:
         """Stop all that is under way, in whatever thread."""
