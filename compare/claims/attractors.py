@@ -12,28 +12,20 @@ from analytic import orbit_branch, orbits
 from analytic.orbit_branch import Bifurcation
 from analytic.orbits import Orbit
 from compare.claims.claim import Bearing, Claim
-from compare.claims.judge import remembered, simulated
-from compare.measure import attractors, hopping
+from compare.claims.judge import simulated, theory
 from compare.measure.levels import Level
 from compare.measure.record import Measurement, state
-from model import Parameters, Trajectory
-from model.kinematics import VARIABLES
+from compare.statistics import hops
+from model import Trajectory
 
-LASTS = 60.0
-"""How long theory simulates a motion that settles, in units of 1/c: the slowest part decays in 2 (1 + 2 j)/c."""
 _PERIODIC = "Section 5.3, last paragraph"
 
 
-@remembered
-def _orbit(p: Parameters, x: tuple[float, ...], period: float) -> Orbit:
-    return orbits.refine(p, x, period)
-
-
-def _left_alone(protocol: str, decide: Callable[[Trajectory], float]) -> Bearing:
+def _left_alone(protocol: str) -> Bearing:
     """Whether the ball hops on that theory lets go in the same state for as long."""
 
     def of(m: Measurement) -> float:
-        return decide(simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
+        return hops(simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
 
     return Bearing(protocol, "hops", of, by="analytic.simulate")
 
@@ -42,8 +34,7 @@ def _orbiting(protocol: str, quantity: str, predict: Callable[[Orbit], float]) -
     """A number of the closed orbit of theory near what was measured."""
 
     def of(m: Measurement) -> float:
-        x = tuple(float(m.conditions[name]) for name in VARIABLES)
-        return predict(_orbit(m.parameters, x, float(m.conditions["period"])))
+        return predict(theory(orbits.refine, m.parameters, state(m), float(m.conditions["period"])))
 
     return Bearing(protocol, quantity, of, by="analytic.orbits.refine")
 
@@ -62,10 +53,10 @@ def _death(orbit: Orbit) -> float:
 
 
 def _after_rest(quantity: str, predict: Callable[[Trajectory], float]) -> Bearing:
-    """A number of what theory's simulation comes to from rest."""
+    """A number of what theory comes to from rest within 60/c; the slowest part decays in 2 (1 + 2 j)/c."""
 
     def of(m: Measurement) -> float:
-        return predict(simulated(m.parameters, (0.0,) * 6, LASTS / m.parameters.c))
+        return predict(simulated(m.parameters, (0.0,) * 6, 60.0 / m.parameters.c))
 
     return Bearing("choice", quantity, of, by="analytic.simulate, which leaves rolling by Definitions 1-3")
 
@@ -113,7 +104,7 @@ CLAIMS = (
         "calm",
         _PERIODIC,
         "In strong drag, κ > 2, no ball was found that hops on.",
-        (_left_alone("calm", attractors.hops),),
+        (_left_alone("calm"),),
         level=Level.DEFAULT,
     ),
     Claim(
@@ -134,7 +125,7 @@ CLAIMS = (
         "hopping-death",
         _PERIODIC,
         "Along rougher walls hopping ends where a pair of Floquet multipliers leaves the unit circle.",
-        (_orbiting("followed", "orbit_death", _death), _left_alone("followed", hopping.lands)),
+        (_orbiting("followed", "orbit_death", _death), _left_alone("followed")),
         level=Level.DEFAULT,
     ),
 )

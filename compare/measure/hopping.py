@@ -7,8 +7,7 @@
   top of the steady hop is computed, and from two of them the start at the next wall is extrapolated. On both sides of
   the wall at which disturbances neither grow nor shrink, a ball is left alone: does it hop on?
 
-Hops are measured with two time steps: an engine may locate a landing to a step only, and the difference is then the
-error of the finer one.
+An engine may locate a landing to a step only; the difference of two time steps is then the error of the finer one.
 """
 
 from __future__ import annotations
@@ -18,11 +17,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from compare.measure.field import constrained
 from compare.measure.lab import Lab, coarse_step, time_unit
-from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, if_sure, measurement, state_of
+from compare.measure.trials import Trial, carry_out, finer, left_alone
 from compare.runs.tasks import Task
 from compare.statistics import Measured, peaks, top
 from model import Case, Flow, Parameters, State, Trajectory
@@ -31,17 +31,11 @@ from model.arrays import Array
 SET = "hopping"
 TOP = State(y=6.4e-3, omega_c=57.3, slip_x=-106.0)
 """A state near the top of a hop of the set."""
-FLOWS = {
-    Level.QUICK: (1.0,),
-    Level.DEFAULT: (1.0, 0.95, 0.91, 0.87, 0.83, 0.80),
-    Level.FULL: (1.0, 0.97, 0.94, 0.91, 0.88, 0.85, 0.82, 0.80),
-}
-"""Flows of the staircase in units of that of the set."""
 HOLD, LAST, LATER = 12.0, 3.0, 2.0
-"""How long each is held, the last part of it in which the motion is measured, and the first in which disturbances are
-too large to be linear, s."""
-REFINED, STEPPED = (8, 16), (40, 80)
-"""Steps in one of `coarse_step`, of the engine and of time stepping, which lets slip begin and turn at steps only."""
+"""How long each flow is held, the last part of it in which the motion is measured, and the first in which disturbances
+are too large to be linear, s."""
+REFINED = 8, 16
+"""Steps of the engine in one of `coarse_step`."""
 SAMPLE = 1e-3
 """Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
 WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
@@ -81,58 +75,52 @@ class Hops(NamedTuple):
 
 def hopping(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would begin."""
-    yield from _staircase(lab, "recurrent", FLOWS[lab.level], REFINED)
+    yield from _staircase(lab, "recurrent", lab.effort("recurrent.flows"), REFINED)
 
 
 def stepped(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Period, orbit and height at the flow of the set."""
-    yield from _staircase(lab, "stepped", (1.0,), STEPPED)
+    """The same at the flow of the set, by time stepping: it lets slip begin and turn at steps only."""
+    yield from _staircase(lab, "stepped", (1.0,), (40, 80))
 
 
 def _staircase(
-    lab: Lab, protocol: str, shares: Sequence[float], refinements: Sequence[int]
+    lab: Lab, protocol: str, shares: Sequence[float], refine: tuple[int, int]
 ) -> Iterator[Measurement | Missing]:
     p = Parameters.named(SET)
     flows = [share * p.omega_0 for share in shares]
-    flow, lasts = Flow.staircase(flows, HOLD), HOLD * len(flows)
-    tasks = [_task(lab, p, TOP, lasts, refined, flow) for refined in refinements]
-    runs, births = lab.attempt(tasks), []
-    if isinstance(runs, str):
-        yield Missing(protocol, SET, f"the run {runs}")
+    lasts = HOLD * len(flows)
+    flow, samples = Flow.staircase(flows, HOLD), round(lasts / SAMPLE)
+    trial = Trial(SET, p, "hops", TOP.stacked(), t_end=lasts, refine=refine, samples=samples, flow=flow)
+    (result,) = carry_out(lab, protocol, [trial])
+    if isinstance(result, Missing):
+        yield result
         return
+    heights = []
     for k, omega_0 in enumerate(flows):
-        q, end = p.replace(omega_0=omega_0), (k + 1) * HOLD
-        last = [tops(run, end - LAST, end) for run in runs]
+        q, begin, end = p.replace(omega_0=omega_0), k * HOLD, (k + 1) * HOLD
+        coarse, fine = (tops(run, end - LAST, end) for run in (result.coarse, result.fine))
         at = f"at omega_0 = {omega_0:.4g} rad/s"
-        if any(len(each.time) < 6 for each in last):
+        if min(len(coarse.time), len(fine.time)) < 6:
             yield Missing(protocol, SET, f"{at} the ball does not hop any more")
             break
-        coarse, fine = (each.values for each in last)
-        births.append((omega_0, coarse["orbit_height"].value, fine["orbit_height"].value))
-        conditions = last[1].conditions(q)
-        for quantity, value in fine.items():
-            error = math.hypot(value.value - coarse[quantity].value, value.uncertainty)
-            yield measurement(lab, protocol, SET, q, quantity, Measured(value.value, error), tasks, **conditions)
+        known, conditions = coarse.values, fine.conditions(q)
+        heights.append([each["orbit_height"].value for each in (known, fine.values)])
+        for quantity, value in fine.values.items():
+            sure = finer(known[quantity], value)
+            yield measurement(lab, protocol, SET, q, quantity, sure, result.tasks, **conditions)
         if k:
-            parts = (runs[0], LATER), (runs[1], LATER), (runs[1], 2 * LATER)
-            factor = finer(*(shrinking(tops(run, k * HOLD + after, end - LAST).x, q) for run, after in parts))
-            row = measurement(lab, protocol, SET, q, "orbit_multiplier", factor, tasks, **conditions)
+            parts = (result.coarse, LATER), (result.fine, LATER), (result.fine, 2 * LATER)
+            slow, fast, later = (hop_map(tops(run, begin + after, end - LAST).x, q)[0] for run, after in parts)
+            factor = finer(Measured(slow, 0.0), Measured(fast, abs(fast - later)))
+            row = measurement(lab, protocol, SET, q, "orbit_multiplier", factor, result.tasks, **conditions)
             yield if_sure(row, 1.0, f"how disturbances shrink {at} is too uncertain")
-    if len(births) >= 3:
-        yield measurement(lab, protocol, SET, p, "orbit_birth", birth(births[-3:]), tasks)
-
-
-def _task(lab: Lab, p: Parameters, x: Sequence[float], lasts: float, refined: int, flow: Flow | None = None) -> Task:
-    return lab.task(p, x, lasts, coarse_step(p) / refined, flow=flow, samples=round(lasts / SAMPLE))
-
-
-def finer(coarse: float, fine: float, other: float) -> Measured:
-    """What the finer step shows, uncertain by what the step changes, and another part of the run."""
-    return Measured(fine, math.hypot(fine - coarse, fine - other))
+    if len(heights) >= 3:
+        place = finer(*(birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)))
+        yield measurement(lab, protocol, SET, p, "orbit_birth", place, result.tasks)
 
 
 def tops(run: Trajectory, start: float, end: float) -> Hops:
-    """The tops of the hops between two times; a ball that stays within a tenth of the highest has none."""
+    """The tops of the hops between two times, those at least half as high as the highest of them."""
     t, y = run.time, run.y
     k, late = peaks(y)
     inside = (t[k] > start) & (t[k] < end)
@@ -159,67 +147,50 @@ def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
     return float(np.abs(np.linalg.eigvals(matrix)).max()), State(y=y, omega_c=omega_c, slip_x=slip_x)
 
 
-def shrinking(states: Array, p: Parameters) -> float:
-    """Factor by which disturbances shrink from one hop to the next, from states (n, 8) at tops that settle."""
-    return hop_map(states, p)[0]
-
-
-def birth(rows: Sequence[tuple[float, ...]]) -> Measured:
-    """Flow at which the height would be zero: parabolas through flows and heights, of the coarse and the fine step."""
-    flows, *heights = np.array(rows).T
-    coarse, fine = (float(np.polyfit(each, flows, 2)[-1]) for each in heights)
-    return finer(coarse, fine, float(np.polyfit(heights[1][-2:], flows[-2:], 1)[-1]))
+def birth(flows: Sequence[float], heights: Sequence[float]) -> Measured:
+    """Flow at which hops would have no height: a parabola through the last three, uncertain by what a line differs."""
+    parabola, line = (float(np.polyfit(heights[-n:], flows[-n:], n - 1)[-1]) for n in (3, 2))
+    return Measured(parabola, abs(parabola - line))
 
 
 def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The wall beyond which disturbances of the hop grow, and whether balls hop on, on both sides of it."""
     p = Parameters.named(SET)
     walls = [p.replace(eta=share * p.eta) for share in WALLS]
-    steady: tuple[list[State], list[State]] = [], []
-    factors, hops, starts, tasks = [], [], [], []
+    etas = [q.eta for q in walls]
+    steady = [TOP.stacked().repeat(2).reshape(8, 2).T]  # where hops return to themselves, with both steps (2, 8)
+    factors, tasks, near = [], [], []
     for k, q in enumerate(walls):
-        starts.append([_ahead(walls[:k], known, q) for known in steady])
-        pair = [_task(lab, q, x, FOLLOWED, refined) for x, refined in zip(starts[k], REFINED, strict=True)]
+        ahead = steady[-1]
+        if k > 1:
+            ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
+        pair = [_followed(lab, q, x, FOLLOWED, refined) for x, refined in zip(ahead, REFINED, strict=True)]
         runs = lab.attempt(pair)
-        parts = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED) for run in runs]
-        if isinstance(runs, str) or any(len(each.time) < 8 for each in parts):
+        hops = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED) for run in runs]
+        if isinstance(runs, str) or min(len(each.time) for each in hops) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
             yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
             return
-        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, FOLLOWED))]
-        for known, (_, state) in zip(steady, maps[:2], strict=True):
-            known.append(state)
+        maps = [hop_map(each.x, q) for each in (*hops, tops(runs[1], 2 * LATER, FOLLOWED))]
         factors.append([factor for factor, _ in maps])
-        hops.append(parts[1])
+        steady.append(np.array([state for _, state in maps[:2]]))
         tasks.append(pair)
-    rows = death([(q.eta, *each) for q, each in zip(walls, factors, strict=True)][-NEAR:])
+        near.append(hops[1].conditions(q))
+    place = death(etas[-NEAR:], factors[-NEAR:])
     used = [task for pair in tasks[-NEAR:] for task in pair]
-    conditions = hops[-NEAR].conditions(walls[-NEAR])
-    yield measurement(lab, "followed", SET, walls[-NEAR], "orbit_death", rows, used, **conditions)
-    alone = [_task(lab, walls[k], starts[k][1], ALONE, REFINED[0]) for k in (-NEAR, -1)]
-    for task, run in zip(alone, lab.each(alone), strict=True):
-        if isinstance(run, str):
-            yield Missing("followed", SET, f"a run {run}")
-        else:
-            at = state_of(State.of(task.x0).stacked())
-            yield measurement(lab, "followed", SET, task.parameters, "hops", lands(run), [task], **at, duration=ALONE)
+    yield measurement(lab, "followed", SET, walls[-NEAR], "orbit_death", place, used, **near[-NEAR])
+    again = [_followed(lab, walls[k], tasks[k][1].x0, ALONE, REFINED[0]) for k in (-NEAR, -1)]
+    yield from left_alone(lab, "followed", SET, again)
 
 
-def _ahead(walls: Sequence[Parameters], steady: Sequence[State], q: Parameters) -> State:
-    """Where to start at the next wall, by the line through the last two steady tops."""
-    if len(steady) < 2:
-        return steady[0] if steady else TOP
-    share = (q.eta - walls[-2].eta) / (walls[-1].eta - walls[-2].eta)
-    return State(*(a + share * (b - a) for a, b in zip(*steady[-2:], strict=True)))
+def _followed(lab: Lab, p: Parameters, x: npt.ArrayLike, lasts: float, refined: int) -> Task:
+    return lab.task(p, x, lasts, coarse_step(p) / refined, samples=round(lasts / SAMPLE))
 
 
-def death(rows: Sequence[tuple[float, ...]]) -> Measured:
-    """The wall at which disturbances neither grow nor shrink: lines through eta and factors, by `finer`."""
-    etas, *factors = np.array(rows).T
-    return finer(*(float(np.polyfit(each - 1, etas, 1)[-1]) for each in factors))
+def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured:
+    """The wall at which disturbances neither grow nor shrink, by lines through eta (n,) and factors (n, 3).
 
-
-def lands(run: Trajectory) -> float:
-    """1 if the ball comes down to the floor in the last third of a run, to a tenth of where it is highest; else 0."""
-    late = run.y[2 * len(run.y) // 3 :]
-    return float(late.min() < late.max() / 10)
+    Factors are those with the coarser step, with the finer one, and in a later part of the run with the finer one.
+    """
+    slow, fast, later = (float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True))
+    return finer(Measured(slow, 0.0), Measured(fast, abs(fast - later)))
