@@ -28,7 +28,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--seed", type=int, default=0)
     options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
     running.add_workers(command)
-    command.add_argument("--kept", action="store_true", help="show the results that come with the program instead")
+    command.add_argument("--kept", type=Path, nargs="+", metavar="FILE", help="show what --save wrote instead")
     command.add_argument("--save", type=Path, metavar="FILE", help="write the sets with hopping as JSON")
     command.add_argument("--page", type=Path, metavar="FILE", help="write the table as Markdown")
     options.outputs(command, "search", "print the sets with hopping as JSON")
@@ -51,7 +51,7 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Search what hasn't been searched yet, and show the table."""
-    searches = [regions.kept(name) for name in regions.KEPT] if args.kept else [_searched(args)]
+    searches = list(map(Searched.load, args.kept)) if args.kept else [_searched(args)]
     if args.save:
         searches[0].save(args.save)
     if args.page:

@@ -10,10 +10,8 @@ from typing import Any
 
 from compare.figures import (
     bifurcation_diagrams,
-    cases,
     characteristic,
     deviations,
-    hopping,
     parameter_plane,
     periodic,
     settings,
@@ -40,11 +38,8 @@ FIGURES: dict[str, Drawing] = {
         settings.caption_ladder,
     ),
     "frontier": Drawing("Error and cost", settings.select_frontier, settings.draw_frontier, settings.caption_frontier),
-    "fig-2": cases.FIGURE_2,
-    "fig-3": cases.FIGURE_3,
     "fig-4": _of("Fig. 4: a slip that dies out", slipping, "fig-4", "slip-NR-NS"),
     "fig-5": _of("Fig. 5: a slip that grows", slipping, "fig-5", "slip-NR-NS"),
-    "fig-6": cases.FIGURE_6,
     "fig-7": _of("Fig. 7: regions over wall friction and flow", parameter_plane, "fig-7"),
     "fig-8": _of("Fig. 8: regions over equal friction and flow", parameter_plane, "fig-8"),
     "fig-9": _of("Fig. 9: off the floor", bifurcation_diagrams, "fig-9"),
@@ -90,16 +85,6 @@ FIGURES: dict[str, Drawing] = {
         periodic.draw_walls,
         periodic.caption_walls,
         ("hopping-death",),
-    ),
-    "hopping": Drawing(
-        "Beyond the paper: where the ball hops for ever",
-        hopping.where,
-        hopping.draw_where,
-        hopping.caption_where,
-        background=True,
-    ),
-    "basins": Drawing(
-        "Beyond the paper: basins", hopping.plane, hopping.draw_plane, hopping.caption_plane, background=True
     ),
 }
 """Every figure by its file name, in the order of the report."""

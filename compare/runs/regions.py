@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import resources
-from pathlib import Path
 
 import numpy as np
 
@@ -47,20 +45,11 @@ def extremes(record: Searched) -> dict[str, tuple[float, float]]:
     return {name: (min(r[name] for r in rows), max(r[name] for r in rows)) for name in BOX} if rows else {}
 
 
-KEPT = ("hopping-box.json", "hopping-strong-drag.json")
-"""Searches that are kept beside this module: over the whole box, and beyond its largest kappa."""
-
-
-def kept(name: str = KEPT[0]) -> Searched:
-    """A search that is kept."""
-    return Searched.load(Path(str(resources.files("compare.runs"))) / name)
-
-
 INTRODUCTION = (
     "# Where the ball hops for ever",
     "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: mu and eta are the "
     "friction of floor and wall, kappa = c√(R/g) and Omega_0 = ω₀√(R/g). "
-    "`dualball search --kept --page docs/hopping.md` writes this page.",
+    "`dualball search --kept docs/studies/data/hopping-*.json --page docs/hopping.md` writes this page.",
 )
 
 

@@ -15,11 +15,11 @@ from compare.measure.lab import Lab
 from compare.measure.levels import Level
 from compare.measure.record import Measurement, Records
 from compare.measure.sets import sets
-from compare.mutants.exchange import believed
-from compare.mutants.theories import THEORIES
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MUJOCO
 from model import Case, Flow, Parameters
+from tests.mutants.exchange import believed
+from tests.mutants.theories import THEORIES
 
 NAME = "rough-wall"
 P = sets(Level.QUICK)[NAME]

@@ -15,6 +15,7 @@ from compare.commands import cli
 from compare.runs import regions, search
 from compare.runs.search import BOX, Search, Searched, carry_out, parameters, random_starts
 from compare.runs.workers import processes
+from docs.studies.figures import SEARCHES
 from model import Parameters, StorageError
 
 QUICK = Search({**BOX, "kappa": (0.5, 1.0)}, starts=2)
@@ -22,7 +23,7 @@ QUICK = Search({**BOX, "kappa": (0.5, 1.0)}, starts=2)
 
 def hopping_set() -> tuple[Parameters, float]:
     """A set of the kept search with drag enough that its ball hops soon, and the period it has there."""
-    row = next(r for r in regions.kept().confirmed if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1)
+    row = next(r for r in Searched.load(SEARCHES[0]).confirmed if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1)
     return parameters(np.array([row[name] for name in BOX])), row["confirmed"]["period"]
 
 
@@ -86,16 +87,16 @@ def test_intervals_of_shares():
 
 
 def test_the_parts_of_a_range_are_all_of_it():
-    record = regions.kept()
+    record = Searched.load(SEARCHES[0])
     for name in BOX:
         own = [part for part in regions.parts(record) if part.group == name]
         assert sum(part.sets for part in own) == record.sets
         assert sum(part.hopping for part in own) == len(record.confirmed)
 
 
-@pytest.mark.parametrize("name", regions.KEPT)
-def test_kept_searches_are_whole(name, tmp_path):
-    record = regions.kept(name)
+@pytest.mark.parametrize("path", SEARCHES, ids=lambda path: path.stem)
+def test_kept_searches_are_whole(path, tmp_path):
+    record = Searched.load(path)
     rows = record.search.points(record.sets)
     assert record.failed <= 1e-5 * record.sets * record.search.starts
     for row in record.rows:
