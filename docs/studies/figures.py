@@ -9,7 +9,7 @@ from pathlib import Path
 
 import matplotlib
 
-from compare.figures import gallery
+from compare.figures import drawing
 from compare.runs.basins import Basins
 from compare.runs.search import Searched
 from docs.studies import cases, hopping
@@ -26,10 +26,10 @@ def main() -> None:
     matplotlib.rcParams["svg.hashsalt"] = "dualball"  # equal figures make equal files
     make_directory(DOCS / "cases")
     for name, draw in (("fig-2", cases.draw_2), ("fig-3", cases.draw_3), ("fig-6", cases.draw_6)):
-        gallery.save(draw(), DOCS / "cases" / f"{name}.svg")
+        drawing.save(draw(), DOCS / "cases" / f"{name}.svg")
     search, basins = Searched.load(SEARCHES[0]), Basins.load(DATA / "basins.json")
     hopping.draw_where(search).savefig(DOCS / "attractors" / "where.png", dpi=110)
-    gallery.save(hopping.draw_plane(basins), DOCS / "attractors" / "basins.png")
+    drawing.save(hopping.draw_plane(basins), DOCS / "attractors" / "basins.png")
     print(hopping.caption_where(search), hopping.caption_plane(basins), sep="\n")
 
 

@@ -16,7 +16,7 @@ import analytic
 import mjsim
 from analytic import orbit_branch, thresholds
 from compare.claims.catalogue import CLAIMS
-from compare.figures import bifurcation_diagrams, deviations, gallery, slipping, style, unloading, unsteady
+from compare.figures import bifurcation_diagrams, deviations, registry, slipping, style, unloading, unsteady
 from compare.figures.drawing import Diagram, GapError, Material, Motion
 from compare.figures.registry import FIGURES, figures_of
 from compare.measure.check import Check
@@ -226,18 +226,18 @@ def test_claims_have_their_own_figures_or_deviations() -> None:
 
 def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     chosen = {name: FIGURES[name] for name in ("fig-10", "ladder")}
-    monkeypatch.setattr(gallery, "FIGURES", chosen)
-    assert dict(gallery.write(tmp_path, Material(), ("svg", "png"))) == {
+    monkeypatch.setattr(registry, "FIGURES", chosen)
+    assert dict(registry.write(tmp_path, Material(), ("svg", "png"))) == {
         "fig-10": "",
         "ladder": "not drawn: the ladder of settings was not measured",
     }
     assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-10.png", "fig-10.svg"]
     assert "Fig. 10" in (tmp_path / "captions.txt").read_text("utf-8")
     with pytest.raises(InputError, match="bmp"):
-        list(gallery.write(tmp_path, Material(), ("bmp",)))
+        list(registry.write(tmp_path, Material(), ("bmp",)))
     (tmp_path / "file").touch()
     with pytest.raises(StorageError):
-        list(gallery.write(tmp_path / "file", Material()))
+        list(registry.write(tmp_path / "file", Material()))
 
 
 def test_every_case_has_its_colour() -> None:
