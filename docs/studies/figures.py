@@ -10,8 +10,7 @@ from pathlib import Path
 import matplotlib
 
 from compare.figures import drawing
-from compare.runs.basins import Basins
-from compare.runs.search import Searched
+from compare.runs.search import Basins, Searched
 from docs.studies import cases, hopping
 from model.files import make_directory
 

@@ -12,8 +12,7 @@ from matplotlib.patches import Patch
 
 from analytic.ensemble import interval
 from compare.figures import style
-from compare.runs.basins import FATES, Basins
-from compare.runs.search import LOGARITHMIC, Searched
+from compare.runs.search import FATES, LOGARITHMIC, Basins, Searched
 from model.kinematics import UNITS, VARIABLES
 
 _PAIRS = (("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0"))
