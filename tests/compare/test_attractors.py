@@ -13,6 +13,7 @@ import analytic
 from analytic import orbits
 from compare.commands.cli import main
 from compare.measure import hopping
+from compare.statistics import hops
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.arrays import Array
 from model.trajectory import SAMPLE
@@ -61,11 +62,11 @@ def test_tops_of_known_hops() -> None:
     time = np.arange(0, 5, 1e-3)
     phase = np.mod(time, period) / period - 0.5
     run = _run(time, height * (1 - 4 * phase**2), 57.0 * time)
-    hops = hopping.tops(run, 1.0, 4.0)
+    tops = hopping.tops(run, 1.0, 4.0)
     # The parabola through three samples is the hop itself.
-    assert hops.values["orbit_period"].value == pytest.approx(period, rel=1e-9)
-    assert hops.values["orbit_height"].value == pytest.approx(height, rel=1e-9)
-    assert max(value.uncertainty for value in hops.values.values()) < 1e-9
+    assert tops.values["orbit_period"].value == pytest.approx(period, rel=1e-9)
+    assert tops.values["orbit_height"].value == pytest.approx(height, rel=1e-9)
+    assert max(value.uncertainty for value in tops.values.values()) < 1e-9
     assert len(hopping.tops(_run(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
 
 
@@ -86,15 +87,32 @@ def test_map_from_hop_to_hop(size: float) -> None:
 
 
 def test_birth_is_where_the_height_vanishes() -> None:
-    rows = [(w, 4e-4 * (w - 52) - 1e-6 * (w - 52) ** 2, 4e-4 * (w - 52)) for w in (58.0, 56.0, 54.0)]
-    place = hopping.birth(rows)
-    assert place.value == pytest.approx(52.0, abs=1e-9)
-    assert 0 < place.uncertainty < 0.1
+    flows = (58.0, 56.0, 54.0)
+    heights = [4e-4 * (w - 52) - 1e-6 * (w - 52) ** 2 for w in flows]
+    assert hopping.birth(flows, heights).value == pytest.approx(52.0, abs=1e-3)
+    place = hopping.birth((60.0, *flows), [0.0, *(4e-4 * (w - 52) for w in flows)])
+    assert (place.value, place.uncertainty) == pytest.approx((52.0, 0.0), abs=1e-9)
+    assert 0 < hopping.birth(flows, heights).uncertainty < 0.1
 
 
 def test_death_is_where_disturbances_neither_grow_nor_shrink() -> None:
-    place = hopping.death([(0.08, 0.97, 0.96, 0.96), (0.09, 0.99, 0.98, 0.98), (0.11, 1.03, 1.02, 1.02)])
+    place = hopping.death([0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)])
     assert (place.value, place.uncertainty) == pytest.approx((0.1, 5e-3))
+
+
+@pytest.mark.parametrize(
+    ("y", "hops_on"),
+    [
+        (lambda t: 4e-3 * np.abs(np.sin(12 * t)), True),
+        (lambda t: 4e-3 * np.exp(-t) * np.abs(np.sin(12 * t)), True),
+        (lambda t: 4e-3 * (1 + np.sin(12 * t) ** 2), False),  # it swings on the wall
+        (lambda t: np.maximum(4e-3 * (4.5 - t), 0.0), False),  # it sinks and stays
+        (lambda t: 1e-6 * np.abs(np.sin(12 * t)), False),
+    ],
+)
+def test_which_balls_hop(y, hops_on: bool) -> None:
+    time = np.arange(0, 5, 1e-3)
+    assert hops(_run(time, y(time), time)) is hops_on
 
 
 def _run(time: Array, y: Array, theta: Array) -> Trajectory:

@@ -1,4 +1,4 @@
-"""A search covers its box evenly, goes on where it stopped, and says what it knows with its confidence."""
+"""Searches cover their box evenly; basins are those of theory; both go on where they stopped."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ import math
 import numpy as np
 import pytest
 
-from analytic import hopping
+from analytic import hopping, stable_solutions
 from analytic.ensemble import interval
 from compare.commands import cli
-from compare.runs import regions, search
-from compare.runs.search import BOX, Search, Searched, carry_out, parameters, random_starts
+from compare.runs import search
+from compare.runs.campaign import Campaign
+from compare.runs.search import BOX, FATES, Basins, Search, Searched, basins, carry_out, parameters, random_starts
+from compare.runs.sweep import Axis
 from compare.runs.workers import processes
 from docs.studies.figures import SEARCHES
-from model import Parameters, StorageError
+from model import InputError, Parameters, StorageError
 
+BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
 QUICK = Search({**BOX, "kappa": (0.5, 1.0)}, starts=2)
 
 
@@ -89,9 +92,9 @@ def test_intervals_of_shares():
 def test_the_parts_of_a_range_are_all_of_it():
     record = Searched.load(SEARCHES[0])
     for name in BOX:
-        own = [part for part in regions.parts(record) if part.group == name]
-        assert sum(part.sets for part in own) == record.sets
-        assert sum(part.hopping for part in own) == len(record.confirmed)
+        own = [part for part in search.parts(record) if part[0] == name]
+        assert sum(sets for *_, sets, _ in own) == record.sets
+        assert sum(hits for *_, hits in own) == len(record.confirmed)
 
 
 @pytest.mark.parametrize("path", SEARCHES, ids=lambda path: path.stem)
@@ -105,23 +108,95 @@ def test_kept_searches_are_whole(path, tmp_path):
     assert dataclasses.asdict(Searched.load(tmp_path / "again.json")) == dataclasses.asdict(record)
 
 
-def test_a_file_that_is_no_search(tmp_path):
-    (tmp_path / "no.json").write_text("{}", "utf-8")
-    with pytest.raises(StorageError, match="holds no search"):
-        Searched.load(tmp_path / "no.json")
+def made_up(fates, mujoco=((0, 0), (0, 0))) -> Basins:
+    axes = "omega_c", "slip_x", np.arange(4.0), np.arange(4.0)
+    return Basins(BISTABLE, (0.0,) * 8, *axes, np.array(fates), 2, np.array(mujoco), 1e-3)
+
+
+def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(tmp_path):
+    """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both engines alike."""
+    assert {s.case.name for s in stable_solutions(BISTABLE)} == {"SS", "SR", "NR"}
+    given = BISTABLE, {"y": 0.002}, Axis("omega_c", (5.0, 25.0, 45.0)), Axis("slip_x", (-1.0, 1.0)), 2
+    seen, maps = [], []
+    for _ in range(2):
+        with Campaign(tmp_path, workers=0, report=lambda what, done, total, failed: seen.append(done)) as campaign:
+            maps.append(basins(campaign, *given))
+        next(tmp_path.glob("*.h5")).unlink()  # as if it had been killed before the last run was whole
+    assert (seen[0], seen[-2:]) == (0, [7, 8])
+    for basin in maps:
+        assert {FATES[k] for k in basin.fates.ravel()} == {"SS", "off the floor"}
+        np.testing.assert_array_equal(basin.mujoco, basin.fates[::2, ::2])
+        assert len(basin.differences()) == 0
+
+
+def test_a_ball_that_hops_on(tmp_path):
+    """From states near the top of the hop."""
+    p = Parameters.named("hopping")
+    with Campaign(tmp_path, workers=0) as campaign:
+        axes = Axis("y", (6.36e-3, 6.4e-3)), Axis("v_y", (0.0, 1e-3))
+        basin = basins(campaign, p, {"omega_c": 57.3, "slip_x": -106.0}, *axes)
+    assert {FATES[k] for k in basin.fates.ravel()} == {"hops"}
+
+
+def test_distance_from_a_boundary_in_cells():
+    """Two columns of each fate: columns 1 and 2 lie at the boundary, 0 and 3 a cell farther away."""
+    b = made_up([[0, 0, 2, 2]] * 4, [[2, 2], [0, 0]])
+    assert b.differences().tolist() == [2.0, 1.0]
+
+
+def test_shares():
+    b = made_up([[0, 0, 2, 2]] * 3 + [[2] * 4])
+    assert b.share("hops") == (6, 16)
+    assert b.share("RR") == (0, 16)
+
+
+def test_basins_kept_as_a_file(tmp_path):
+    b = made_up([[0, 0, 2, 2]] * 4)
+    b.save(tmp_path / "b.json")
+    again = Basins.load(tmp_path / "b.json")
+    assert (again.parameters, again.start) == (b.parameters, b.start)
+    np.testing.assert_array_equal(again.fates, b.fates)
+
+
+@pytest.mark.parametrize(("kind", "what", "text"), [(Searched, "search", "{}"), (Basins, "basins", "[]")])
+def test_a_file_of_another_kind(kind, what, text, tmp_path):
+    (tmp_path / "no.json").write_text(text, "utf-8")
+    with pytest.raises(StorageError, match=f"holds no {what}"):
+        kind.load(tmp_path / "no.json")
+
+
+@pytest.mark.parametrize(
+    ("changes", "start", "message"),
+    [
+        ({"c": 0.0}, {}, "there are no basins"),
+        ({}, {"omega": 1.0}, "unknown state variable 'omega'"),
+        ({}, {"h": 0.06}, "h = 0.06 m"),
+    ],
+)
+def test_no_basins(changes, start, message, tmp_path):
+    with pytest.raises(InputError, match=message), Campaign(tmp_path, workers=0) as campaign:
+        basins(campaign, BISTABLE.replace(**changes), start, Axis("omega_c", (0, 1)), Axis("slip_x", (0, 1)))
+
+
+def test_command_basins(capsys, tmp_path):
+    to = ["--output", str(tmp_path), "--workers", "0"]
+    across = ["--omega-0", "40", "--across", "omega_c=5:45:2", "--up", "slip_x=0:1:2"]
+    assert cli.main(["basins", *across, *to, "--json"]) == 0
+    assert '"shares"' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--range", "mo=1:2"], "unknown group 'mo'"),
-        (["--range", "mu=2:1"], "wrong order"),
-        (["--range", "mu=2"], "write mu=from:to"),
-        (["--range", "mu=-1:1"], "mu = -1"),
-        (["--sets", "0"], "sets = 0"),
-        (["--workers", "-1"], "workers = -1"),
+        ("search --range mo=1:2", "unknown group 'mo'"),
+        ("search --range mu=2:1", "wrong order"),
+        ("search --range mu=2", "write mu=from:to"),
+        ("search --range mu=-1:1", "mu = -1"),
+        ("search --sets 0", "sets = 0"),
+        ("search --workers -1", "workers = -1"),
+        ("basins --across omega=5:45:2 --up slip_x=0:1:2", "unknown state variable 'omega'"),
     ],
 )
 def test_bad_input(words, message, capsys):
-    assert cli.main(["search", *words]) == 2
+    assert cli.main(words.split()) == 2
     assert message in capsys.readouterr().err
