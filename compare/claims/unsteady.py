@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 
 import analytic
@@ -26,6 +27,23 @@ def _ratio(m: Measurement) -> complex:
     return theory(pulsation.first_harmonic, m.parameters, _at(m, "amplitude"), _at(m))
 
 
+def _slips(rule: str, relation: Relation) -> Bearing:
+    """The amplitude at which slip begins, if rolling ends by a rule."""
+
+    def onset(m: Measurement) -> float:
+        return theory(pulsation.slip_onset, m.parameters, _at(m), rule)
+
+    return Bearing("pulsation", "slip_amplitude", onset, relation=relation, by=f"analytic.pulsation.slip_onset, {rule}")
+
+
+def _mean_error(m: Measurement) -> float:
+    return theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m))
+
+
+def _peak(m: Measurement) -> tuple[float, float]:
+    return theory(response.peak, m.parameters, Case.SS)
+
+
 def ramp_end(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
     """The flow at which a ramp ends slipping at both points by theory; LookupError if it doesn't."""
     # The ramp goes on three times as far beyond the fold as a slow one overshoots it.
@@ -41,7 +59,10 @@ def _ramp_end(m: Measurement) -> float:
     return theory(ramp_end, m.parameters, _at(m, "rate"), state(m))
 
 
-_PEAK = "analytic.response.peak"
+def _overshoot(m: Measurement) -> float:
+    return abs(_ramp_end(m) - analytic.thresholds(m.parameters).omega_04)
+
+
 CLAIMS = (
     Claim(
         "pulsation-lag",
@@ -50,16 +71,13 @@ CLAIMS = (
         "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c.",
         (
             Bearing(
-                "pulsation",
-                "gain",
-                lambda m: abs(_ratio(m)),
-                by="analytic.response.transfer, pulsation.first_harmonic",
+                "pulsation", "gain", lambda m: abs(_ratio(m)), by="analytic.response.transfer, pulsation.first_harmonic"
             ),
-            Bearing("pulsation", "phase_lag", lambda m: -math.atan2(_ratio(m).imag, _ratio(m).real), by="the same"),
+            Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_ratio(m)), by="the same"),
             Bearing(
                 "unsteady",
                 "jump_delay",
-                lambda m: 1 / theory(response.rolling_rate, m.parameters),
+                lambda m: 1 / response.rolling_rate(m.parameters),
                 by="analytic.response.rolling_rate",
             ),
         ),
@@ -71,51 +89,27 @@ CLAIMS = (
         "load at its fastest, is more than floor and wall can hold: not before slip can last, and not after no "
         "forces allow rolling, mostly the same amplitude. In between Coulomb's law allows both; slip that "
         "lasts below the first or rolling beyond the second would refute it.",
-        tuple(
-            Bearing(
-                "pulsation",
-                "slip_amplitude",
-                lambda m, rule=rule: theory(pulsation.slip_onset, m.parameters, _at(m), rule),  # type: ignore[misc]
-                relation=relation,
-                by=f"analytic.pulsation.slip_onset, {rule}",
-            )
-            for rule, relation in (("slip-stability", Relation.AT_LEAST), ("infeasible", Relation.AT_MOST))
-        ),
+        (_slips("slip-stability", Relation.AT_LEAST), _slips("infeasible", Relation.AT_MOST)),
     ),
     Claim(
         "pulsation-mean",
         "(23), (26), Definitions 1-3",
         "A pulsation that makes the ball slip makes its mean reading low.",
-        (
-            Bearing(
-                "pulsation",
-                "mean_error",
-                lambda m: theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m)),
-                by="analytic.pulsation.mean_error",
-            ),
-        ),
+        (Bearing("pulsation", "mean_error", _mean_error, by="analytic.pulsation.mean_error"),),
     ),
     Claim(
         "jump-slipping",
         "(26), (38)-(42)",
         "After a jump of the flow a ball that slips at both points overshoots its new reading and rings.",
         (
-            Bearing("unsteady", "jump_peak", lambda m: theory(response.peak, m.parameters, Case.SS)[0], by=_PEAK),
-            Bearing("unsteady", "jump_height", lambda m: theory(response.peak, m.parameters, Case.SS)[1], by=_PEAK),
+            Bearing("unsteady", "jump_peak", lambda m: _peak(m)[0], by="analytic.response.peak"),
+            Bearing("unsteady", "jump_height", lambda m: _peak(m)[1], by="analytic.response.peak"),
         ),
     ),
     Claim(
         "ramp-fold",
         "(26), (88)",
         "A flow that rises steadily keeps the ball slipping beyond the fold, before it catches up.",
-        (
-            Bearing(
-                "unsteady",
-                "ramp_end",
-                _ramp_end,
-                size=lambda m: abs(_ramp_end(m) - analytic.thresholds(m.parameters).omega_04),
-                by="analytic.simulate",
-            ),
-        ),
+        (Bearing("unsteady", "ramp_end", _ramp_end, size=_overshoot, by="analytic.simulate"),),
     ),
 )

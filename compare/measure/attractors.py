@@ -41,7 +41,7 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     """
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
-    trial = Trial("reference", p, "swing", x0, t_end=SWINGS, refine=(60, 80), samples=12_000)
+    trial = Trial("reference", p, "swing", x0, SWINGS, (60, 80), 12_000)
     (result,) = carry_out(lab, "swing", [trial])
     end = SWINGS - SWUNG
     if isinstance(result, Missing):

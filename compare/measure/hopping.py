@@ -89,8 +89,8 @@ def _staircase(
     p = Parameters.named(SET)
     flows = [share * p.omega_0 for share in shares]
     lasts = HOLD * len(flows)
-    flow, samples = Flow.staircase(flows, HOLD), round(lasts / SAMPLE)
-    trial = Trial(SET, p, "hops", TOP.stacked(), t_end=lasts, refine=refine, samples=samples, flow=flow)
+    samples, flow = round(lasts / SAMPLE), Flow.staircase(flows, HOLD)
+    trial = Trial(SET, p, "hops", TOP.stacked(), lasts, refine, samples, flow=flow)
     (result,) = carry_out(lab, protocol, [trial])
     if isinstance(result, Missing):
         yield result

@@ -25,7 +25,7 @@ class Start:
     x0: Array
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Trial(Start):
     """A motion that is run with two time steps."""
 
@@ -35,11 +35,11 @@ class Trial(Start):
     """Time steps in one of `coarse_step`, fewer first."""
     samples: int | None = None
     """None for every step."""
+    read: Callable[..., Any] = lambda run: run
+    """What is read from the runs with one time step."""
     flow: Flow | None = None
     variants: tuple[Parameters, ...] = ()
     """Parameters of the runs that are read together; empty for one run with those of the start."""
-    read: Callable[..., Any] = lambda run: run
-    """What is read from the runs with one time step."""
     conditions: Mapping[str, Condition] = field(default_factory=dict)
     """Of all measurements of this trial."""
 

@@ -16,7 +16,7 @@ from numpy.polynomial import Polynomial
 
 from compare.measure.lab import Lab, coarse_step
 from compare.measure.questions import lasting
-from compare.measure.record import Measurement, Missing, Records, if_sure, state_of
+from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, state_of
 from compare.measure.settling import Settled, begin, family, settle_groups
 from compare.measure.trials import Result, Trial, carry_out
 from compare.statistics import Measured, settled_case
@@ -98,17 +98,9 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
             numbers = {("lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
         return family(settled_case(run)), numbers
 
-    return Trial(
-        state.start.set,
-        p,
-        name,
-        x0.stacked(),
-        t_end=t_end,
-        refine=refine,
-        samples=None if name == LANDING else 1000,
-        read=read,
-        conditions={"start": name, **state_of(x0.stacked()), "duration": t_end},
-    )
+    known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
+    samples = None if name == LANDING else 1000
+    return Trial(state.start.set, p, name, x0.stacked(), t_end, refine, samples, read, conditions=known)
 
 
 def _landed(run: Trajectory) -> Numbers:

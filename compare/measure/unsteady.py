@@ -71,46 +71,28 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _jump(set: str, p: Parameters, case: Case, x0: State) -> Trial:
+    sides, known = [p.replace(omega_0=p.omega_0 * (1 + side * JUMP)) for side in (1, -1)], {"case": case.name}
+    read = _delay if case is Case.RR else _peak
     return Trial(
-        set,
-        p,
-        case.name,
-        x0.stacked(),
-        t_end=lasting(p, 48.0),
-        refine=(2, 4),
-        samples=4000,
-        variants=tuple(p.replace(omega_0=p.omega_0 * (1 + side * JUMP)) for side in (1, -1)),
-        read=_delay if case is Case.RR else _peak,
-        conditions={"case": case.name},
+        set, p, case.name, x0.stacked(), lasting(p, 48.0), (2, 4), 4000, read, variants=tuple(sides), conditions=known
     )
 
 
 def _ramp(start: Start, x0: State, span: float, end: float, rate: float) -> Trial:
-    p, rise = start.p, rate * start.p.c * span
-    t_end = (end - p.omega_0) / rise
-    return Trial(
-        start.set,
-        p,
-        f"a ramp of {rise:.3g} rad/s^2",
-        x0.stacked(),
-        t_end=t_end,
-        refine=(1, 2),
-        samples=16000,
-        flow=Flow.ramp(p.omega_0, end, t_end),
-        read=lambda run: {"ramp_end": Measured(caught_up(run), 0.0)},
-        conditions={"rate": rise, **state_of(x0.stacked()[:6])},
-    )
+    p, rise, x = start.p, rate * start.p.c * span, x0.stacked()
+    t_end, name = (end - p.omega_0) / rise, f"a ramp of {rise:.3g} rad/s^2"
+    flow, known = Flow.ramp(p.omega_0, end, t_end), {"rate": rise, **state_of(x[:6])}
+    return Trial(start.set, p, name, x, t_end, (1, 2), 16000, _ramp_end, flow, conditions=known)
+
+
+def _ramp_end(run: Trajectory) -> dict[str, Measured]:
+    return {"ramp_end": Measured(caught_up(run), 0.0)}
 
 
 def odd_part(up: Trajectory, down: Trajectory) -> Array:
     """The part of omega_c (n,) that has the sign of the jump, relative to its last value: from 0 to 1."""
     odd = up.omega_c - down.omega_c
     return np.asarray(odd / odd[-1])
-
-
-def _late(run: Trajectory) -> float:
-    """Forces act in the middle of a step: a moment is known to half of the finer one, either way."""
-    return coarse_step(run.header.parameters) / 4 / math.sqrt(12)
 
 
 def _delay(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
@@ -121,14 +103,16 @@ def _peak(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
     """Time and height of the highest peak, nan where there is none in the first half of the run."""
     t, y = up.time, odd_part(up, down)
     k, late = peaks(y)
-    highest = (k == y.argmax()) & (k < len(t) // 2)
-    if not highest.any():
+    if not (highest := (k == y.argmax()) & (k < len(t) // 2)).any():
         return dict.fromkeys(("jump_peak", "jump_height"), Measured(math.nan, 0.0))
     k, late = k[highest], late[highest]
-    return {
-        "jump_peak": Measured(float((t[k] + late * (t[1] - t[0]))[0]), _late(up)),
-        "jump_height": Measured(float(top(y, k, late)[0]), 0.0),
-    }
+    at = Measured(float((t[k] + late * (t[1] - t[0]))[0]), _late(up))
+    return {"jump_peak": at, "jump_height": Measured(float(top(y, k, late)[0]), 0.0)}
+
+
+def _late(run: Trajectory) -> float:
+    """Forces act in the middle of a step: a moment is known to half of the finer one, either way."""
+    return coarse_step(run.header.parameters) / 4 / math.sqrt(12)
 
 
 def caught_up(run: Trajectory) -> float:
