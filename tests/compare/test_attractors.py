@@ -12,7 +12,7 @@ import pytest
 import analytic
 from analytic import orbits
 from compare.commands.cli import main
-from compare.measure import hopping
+from compare.measure import attractors
 from compare.measure.trials import finer
 from compare.statistics import hops
 from model import Events, Flow, Header, Parameters, Trajectory
@@ -63,12 +63,12 @@ def test_tops_of_known_hops() -> None:
     time = np.arange(0, 5, 1e-3)
     phase = np.mod(time, period) / period - 0.5
     run = _run(time, height * (1 - 4 * phase**2), 57.0 * time)
-    tops = hopping.tops(run, 1.0, 4.0)
+    tops = attractors.tops(run, 1.0, 4.0)
     # The parabola through three samples is the hop itself.
     assert tops.values["orbit_period"].value == pytest.approx(period, rel=1e-9)
     assert tops.values["orbit_height"].value == pytest.approx(height, rel=1e-9)
     assert max(value.uncertainty for value in tops.values.values()) < 1e-9
-    assert len(hopping.tops(_run(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
+    assert len(attractors.tops(_run(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
 
 
 @pytest.mark.parametrize("size", [0.9, 1.05])
@@ -82,7 +82,7 @@ def test_map_from_hop_to_hop(size: float) -> None:
     for state in states:
         state[[0, 2, 3]] = np.array([5e-3, 57.0, -100.0]) + mixed @ z * np.array([0.05, 14.0, 31.0])
         z = turn @ z
-    factor, steady = hopping.hop_map(states, HOPPING)
+    factor, steady = attractors.hop_map(states, HOPPING)
     assert factor == pytest.approx(size, rel=1e-6)
     assert steady == pytest.approx((5e-3, 0, 57.0, -100.0, 0, 0, 0, 0), rel=1e-6)
 
@@ -90,13 +90,13 @@ def test_map_from_hop_to_hop(size: float) -> None:
 def test_birth_is_where_the_height_vanishes() -> None:
     flows = (58.0, 56.0, 54.0)
     curved, straight = ([4e-4 * (w - 52) - b * (w - 52) ** 2 for w in flows] for b in (1e-6, 0.0))
-    place = finer(hopping.birth(flows, curved), hopping.birth(flows, straight))
+    place = finer(attractors.birth(flows, curved), attractors.birth(flows, straight))
     assert place.value == pytest.approx(52.0, abs=1e-9)
     assert 0 < place.uncertainty < 0.1
 
 
 def test_death_is_where_disturbances_neither_grow_nor_shrink() -> None:
-    place = hopping.death([0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)])
+    place = attractors.death([0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)])
     assert (place.value, place.uncertainty) == pytest.approx((0.1, 5e-3))
 
 
@@ -128,7 +128,7 @@ def test_time_stepping_comes_to_the_orbit_of_theory() -> None:
     orbit = orbits.refine(HOPPING, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.223)
     theory = np.array([orbit.period, orbit.turn / orbit.period, orbit.cycle.y.max()])
     coarse, fine = (
-        np.array([each.value for each in hopping.tops(run, 12.0, 16.0).values.values()])
+        np.array([each.value for each in attractors.tops(run, 12.0, 16.0).values.values()])
         for run in (
             analytic.simulate(HOPPING, orbit.loop.x, 16.0, method="time-stepping", timestep=step, sample_interval=1e-3)
             for step in (4e-6, 2e-6)
