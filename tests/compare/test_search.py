@@ -24,12 +24,6 @@ BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
 QUICK = Search({**BOX, "kappa": (0.5, 1.0)}, starts=2)
 
 
-def hopping_set() -> tuple[Parameters, float]:
-    """A set of the kept search with drag enough that its ball hops soon, and the period it has there."""
-    row = next(r for r in Searched.load(SEARCHES[0]).confirmed if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1)
-    return parameters(np.array([row[name] for name in BOX])), row["confirmed"]["period"]
-
-
 def test_points_fill_the_box_and_a_longer_search_contains_the_shorter():
     points = Search().points(64)
     low, high = np.array(list(BOX.values())).T
@@ -37,12 +31,8 @@ def test_points_fill_the_box_and_a_longer_search_contains_the_shorter():
     np.testing.assert_array_equal(Search().points(1000)[:64], points)
     halves = points[:, 0] < math.sqrt(low[0] * high[0])
     assert halves.sum() == 32  # a Sobol sequence puts equally many into each half, here of log mu
-
-
-def test_the_groups_of_a_point_are_those_of_its_parameters():
-    point = Search().points(1)[0]
-    p = parameters(point)
-    np.testing.assert_allclose([p.mu, p.eta, p.j, p.r / p.R, p.kappa, p.Omega_0], point)
+    p = parameters(points[0])
+    np.testing.assert_allclose([p.mu, p.eta, p.j, p.r / p.R, p.kappa, p.Omega_0], points[0])
 
 
 def test_a_search_goes_on_where_it_stopped(tmp_path):
@@ -67,15 +57,15 @@ def test_a_chunk_is_the_same_whoever_computes_it(tmp_path):
 
 
 def test_screen_and_confirmation_tell_hopping_from_rest():
-    """A ball hops on in a kept set; in the reference set it comes to rest whatever it starts with."""
-    p, period = hopping_set()
-    x0s = random_starts(p, 20, [0])
-    hops, x, failed = hopping.screen(p, x0s)
+    """A ball hops on in a kept set with drag enough; in the reference set it rests whatever it starts with."""
+    row = next(r for r in Searched.load(SEARCHES[0]).confirmed if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1)
+    p = parameters(np.array([row[name] for name in BOX]))
+    hops, x, failed = hopping.screen(p, random_starts(p, 20, [0]))
     assert failed == 0
     assert hops.any()
     record = hopping.confirm(p, x[hops][0])
     assert record is not None
-    assert record.period == pytest.approx(period, rel=1e-3)
+    assert record.period == pytest.approx(row["confirmed"]["period"], rel=1e-3)
     assert 0 < (record.multiplier or 0) < 1
     still = Parameters.named("reference").replace(omega_0=25.0)
     hops, x, _ = hopping.screen(still, random_starts(still, 3, [0]))
@@ -89,14 +79,6 @@ def test_intervals_of_shares():
     assert interval(0, 0) == (0.0, 1.0)
 
 
-def test_the_parts_of_a_range_are_all_of_it():
-    record = Searched.load(SEARCHES[0])
-    for name in BOX:
-        own = [part for part in search.parts(record) if part[0] == name]
-        assert sum(sets for *_, sets, _ in own) == record.sets
-        assert sum(hits for *_, hits in own) == len(record.confirmed)
-
-
 @pytest.mark.parametrize("path", SEARCHES, ids=lambda path: path.stem)
 def test_kept_searches_are_whole(path, tmp_path):
     record = Searched.load(path)
@@ -104,13 +86,11 @@ def test_kept_searches_are_whole(path, tmp_path):
     assert record.failed <= 1e-5 * record.sets * record.search.starts
     for row in record.rows:
         assert np.min(np.abs(rows - [row[group] for group in BOX]).sum(axis=1)) < 1e-9
+    for name in BOX:  # the parts of a range are all of it
+        sets, hits = zip(*(part[3:] for part in search.parts(record) if part[0] == name), strict=True)
+        assert (sum(sets), sum(hits)) == (record.sets, len(record.confirmed))
     record.save(tmp_path / "again.json")
     assert dataclasses.asdict(Searched.load(tmp_path / "again.json")) == dataclasses.asdict(record)
-
-
-def made_up(fates, mujoco=((0, 0), (0, 0))) -> Basins:
-    axes = "omega_c", "slip_x", np.arange(4.0), np.arange(4.0)
-    return Basins(BISTABLE, (0.0,) * 8, *axes, np.array(fates), 2, np.array(mujoco), 1e-3)
 
 
 def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(tmp_path):
@@ -138,20 +118,13 @@ def test_a_ball_that_hops_on(tmp_path):
     assert {FATES[k] for k in basin.fates.ravel()} == {"hops"}
 
 
-def test_distance_from_a_boundary_in_cells():
+def test_basins_count_measure_and_keep_their_points(tmp_path):
     """Two columns of each fate: columns 1 and 2 lie at the boundary, 0 and 3 a cell farther away."""
-    b = made_up([[0, 0, 2, 2]] * 4, [[2, 2], [0, 0]])
+    axes, fates = ("omega_c", "slip_x", np.arange(4.0), np.arange(4.0)), np.array([[0, 0, 2, 2]] * 4)
+    b = Basins(BISTABLE, (0.0,) * 8, *axes, fates, 2, np.array([[2, 2], [0, 0]]), 1e-3)
     assert b.differences().tolist() == [2.0, 1.0]
-
-
-def test_shares():
-    b = made_up([[0, 0, 2, 2]] * 3 + [[2] * 4])
-    assert b.share("hops") == (6, 16)
-    assert b.share("RR") == (0, 16)
-
-
-def test_basins_kept_as_a_file(tmp_path):
-    b = made_up([[0, 0, 2, 2]] * 4)
+    b.fates[3] = 2
+    assert (b.share("hops"), b.share("RR")) == ((6, 16), (0, 16))
     b.save(tmp_path / "b.json")
     again = Basins.load(tmp_path / "b.json")
     assert (again.parameters, again.start) == (b.parameters, b.start)
