@@ -82,22 +82,20 @@ def attractor_data(of: Attractor) -> dict[str, Any]:
     states = {"mean": orbit.mean if orbit else run.x.mean(axis=0), "low": run.x.min(axis=0), "high": run.x.max(axis=0)}
     # Those of a period, or those of the last window in the order in which they first come up.
     cases = orbit.cases if orbit else dict.fromkeys(fate.last.cases)
-    data: dict[str, Any] = plain(
-        {
-            "kind": fate.kind.value,
-            "cases": [case.name for case in cases],
-            "count": of.count,
-            "starts": of.starts,
-            "share": of.share,
-            "share_95": of.interval,
-            "period": orbit.period if orbit else fate.period,
-            "period_in_the_run": fate.period,
-            "multipliers": [[v.real, v.imag] for v in orbit.multipliers] if orbit else [],
-            "lyapunov": fate.exponent,
-            "theory": fate.solution.case.name if fate.solution else "orbit" if orbit else None,
-        }
-    )
-    data |= {name: dict(zip(VARIABLES, x.tolist(), strict=True)) for name, x in states.items()}
+    data: dict[str, Any] = {
+        "kind": fate.kind.value,
+        "cases": [case.name for case in cases],
+        "count": of.count,
+        "starts": of.starts,
+        "share": of.share,
+        "share_95": of.interval,
+        "period": orbit.period if orbit else fate.period,
+        "period_in_the_run": fate.period,
+        "multipliers": [[v.real, v.imag] for v in orbit.multipliers] if orbit else [],
+        "lyapunov": fate.exponent,
+        "theory": fate.solution.case.name if fate.solution else "orbit" if orbit else None,
+    }
+    data = plain(data) | {name: dict(zip(VARIABLES, x.tolist(), strict=True)) for name, x in states.items()}
     return data | {"failure": fate.failure}
 
 

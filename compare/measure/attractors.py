@@ -28,9 +28,9 @@ from compare.measure.field import constrained
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.record import Measurement, Missing, Records, if_sure, measurement, state_of
 from compare.measure.settling import settle
-from compare.measure.trials import Start, Trial, carry_out, finer, left_alone
+from compare.measure.trials import Start, Trial, carry_out, finer
 from compare.runs.tasks import Task
-from compare.statistics import Measured, peaks, top
+from compare.statistics import Measured, hops, peaks, top
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 
@@ -181,21 +181,21 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
         pair = [_followed(lab, q, x, FOLLOWED, refined) for x, refined in zip(ahead, REFINED, strict=True)]
         runs = lab.attempt(pair)
-        hops = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED) for run in runs]
-        if isinstance(runs, str) or min(len(each.time) for each in hops) < 8:
+        parts = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED) for run in runs]
+        if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
             yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
             return
-        maps = [hop_map(each.x, q) for each in (*hops, tops(runs[1], 2 * LATER, FOLLOWED))]
+        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, FOLLOWED))]
         factors.append([factor for factor, _ in maps])
         steady.append(np.array([state for _, state in maps[:2]]))
         tasks.append(pair)
-        near.append(hops[1].conditions(q))
+        near.append(parts[1].conditions(q))
     place = death(etas[-NEAR:], factors[-NEAR:])
     used = [task for pair in tasks[-NEAR:] for task in pair]
     yield measurement(lab, "followed", SET, walls[-NEAR], "orbit_death", place, used, **near[-NEAR])
     again = [_followed(lab, walls[k], tasks[k][1].x0, ALONE, REFINED[0]) for k in (-NEAR, -1)]
-    yield from left_alone(lab, "followed", SET, again)
+    yield from _left_alone(lab, "followed", SET, again)
 
 
 def _followed(lab: Lab, p: Parameters, x: npt.ArrayLike, lasts: float, refined: int) -> Task:
@@ -260,7 +260,17 @@ def calm(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
             slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, 3)
             x = State(rng.uniform(0, p.R), 0.0, p.omega_0 * rng.uniform(-0.5, 2), *slips)
             tasks.append(lab.task(p, x, 60.0 * unit / STRONG_DRAG["kappa"][0], coarse_step(p) / 4, samples=2000))
-    yield from left_alone(lab, "calm", "strong drag", tasks)
+    yield from _left_alone(lab, "calm", "strong drag", tasks)
+
+
+def _left_alone(lab: Lab, protocol: str, set: str, tasks: list[Task]) -> Iterator[Measurement | Missing]:
+    """Whether each ball hops at the end of a run from a state: 1 or 0."""
+    for task, run in zip(tasks, lab.each(tasks), strict=True):
+        if isinstance(run, str):
+            yield Missing(protocol, set, f"a run {run}")
+        else:
+            at = state_of(State.of(task.x0).stacked())
+            yield measurement(lab, protocol, set, task.parameters, "hops", hops(run), [task], **at, duration=task.t_end)
 
 
 def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:

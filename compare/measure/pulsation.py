@@ -9,6 +9,7 @@ share batches.
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -71,16 +72,21 @@ class Pulsation:
         return replace(self, begin=(omega_c - self.p.omega_0) / self.amplitude)
 
     def task(
-        self, lab: Lab, amplitude: float, x: Array, periods: float, refine: int, samples: int, **more: float
+        self,
+        lab: Lab,
+        amplitude: float,
+        x: Array,
+        periods: float,
+        refine: int,
+        samples: int,
+        phase: float = 0.0,
+        largest: float = 0.0,
     ) -> Task:
-        """A run from a state, with a power of two of time steps in a period.
-
-        `more` are the phase of the flow, and the largest amplitude with whose runs this one is compared.
-        """
-        fastest = 4 * (self.p.omega_0 + more.get("largest", amplitude)) / self.frequency
+        """A run from a state, with as many steps in a period, a power of two, as the `largest` amplitude needs."""
+        fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
         least = max(lab.effort("pulsation.steps"), 1 / (self.frequency * coarse_step(self.p)), fastest)
         step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * refine)
-        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, more.get("phase", 0.0))
+        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, phase)
         return lab.task(self.p, x, periods / self.frequency, step, flow=flow, samples=round(samples * periods))
 
     def row(self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: float) -> Measurement:
@@ -105,10 +111,10 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             at = f"at {each.frequency:g} Hz a ball slips in a pulsation half as large as in a slow one"
             yield Missing(PROTOCOL, each.set, at)
             continue
-        gain, lag = abs(each.ratio), -math.atan2(each.ratio.imag, each.ratio.real)
-        gains = {"gain": Measured(gain, each.uncertainty), "phase_lag": Measured(lag, each.uncertainty / gain)}
-        for quantity, value in gains.items():
-            yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
+        gain, lag = Measured(abs(each.ratio), each.uncertainty), -cmath.phase(each.ratio)
+        yield each.row(lab, "gain", gain, each.tasks, amplitude=each.amplitude)
+        angle = Measured(lag, gain.uncertainty / gain.value)
+        yield each.row(lab, "phase_lag", angle, each.tasks, amplitude=each.amplitude)
     rolling, slipping = _raised(lab, [each for each in followed if each.rolls]), []
     for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
         at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs

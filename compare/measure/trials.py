@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from compare.measure.lab import Lab, coarse_step
-from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.measure.record import Condition, Measurement, Missing, Records, measurement
 from compare.runs.tasks import Task
-from compare.statistics import Measured, hops
-from model import Flow, Parameters, State
+from compare.statistics import Measured
+from model import Flow, Parameters
 from model.arrays import Array
 
 
@@ -50,7 +50,7 @@ class Result:
 
     protocol: str
     trial: Trial
-    tasks: tuple[Task, ...] = field(repr=False)
+    tasks: Sequence[Task] = field(repr=False)
     """The runs, those with the coarser step first."""
     coarse: Any
     fine: Any
@@ -63,7 +63,14 @@ class Result:
 
 def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Result | Missing]:
     """Run all trials, and read each; or say which of its runs broke down."""
-    tasks = [(trial, tuple(_tasks(lab, trial))) for trial in trials]
+    tasks: list[tuple[Trial, list[Task]]] = []
+    for trial in trials:
+        tasks.append((trial, []))
+        for step in (coarse_step(trial.p) / refine for refine in trial.refine):
+            samples = trial.samples or round(trial.t_end / step)
+            for p in trial.variants or (trial.p,):
+                task = lab.task(p, trial.x0, trial.t_end, step, flow=trial.flow, samples=samples)
+                tasks[-1][1].append(task)
     lab.complete([task for _, own in tasks for task in own])
     for trial, own in tasks:
         runs = lab.attempt(own)
@@ -74,14 +81,6 @@ def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Resu
             yield Result(protocol, trial, own, trial.read(*runs[:half]), trial.read(*runs[half:]))
 
 
-def _tasks(lab: Lab, trial: Trial) -> Iterator[Task]:
-    for refine in trial.refine:
-        step = coarse_step(trial.p) / refine
-        samples = trial.samples or round(trial.t_end / step)
-        for p in trial.variants or (trial.p,):
-            yield lab.task(p, trial.x0, trial.t_end, step, flow=trial.flow, samples=samples)
-
-
 def known_flow(records: Records, set: str, threshold: str) -> float | None:
     """The flow that was measured first as a threshold of a set, rad s-1; None if it was not."""
     return next((m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None)
@@ -90,13 +89,3 @@ def known_flow(records: Records, set: str, threshold: str) -> float | None:
 def finer(coarse: Measured, fine: Measured) -> Measured:
     """What the finer step shows: its difference from the coarser one adds to its own uncertainty in quadrature."""
     return Measured(fine.value, math.hypot(fine.value - coarse.value, fine.uncertainty))
-
-
-def left_alone(lab: Lab, protocol: str, set: str, tasks: list[Task]) -> Iterator[Measurement | Missing]:
-    """Whether each ball hops at the end of a run from a state: 1 or 0."""
-    for task, run in zip(tasks, lab.each(tasks), strict=True):
-        if isinstance(run, str):
-            yield Missing(protocol, set, f"a run {run}")
-        else:
-            at = state_of(State.of(task.x0).stacked())
-            yield measurement(lab, protocol, set, task.parameters, "hops", hops(run), [task], **at, duration=task.t_end)

@@ -25,6 +25,8 @@ from model.drag import STOKES
 PROTOCOL = "unsteady"
 JUMP = 1e-3
 """Relative size of a jump."""
+SHOWS = {"RR": ("jump_delay",), "SS": ("jump_peak", "jump_height")}
+"""What a jump shows of a ball that rolls, and of one that slips at both points."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -60,8 +62,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield result
             continue
         trial = result.trial
-        for quantity, fine in result.fine.items():
-            row = result.row(lab, quantity, finer(result.coarse[quantity], fine))
+        for quantity in SHOWS.get(trial.name, ("ramp_end",)):
+            row = result.row(lab, quantity, finer(result.coarse[quantity], result.fine[quantity]))
             if trial.flow is None:
                 yield if_sure(row, abs(row.value), f"{quantity} in {trial.name}: no peak, or one that is too uncertain")
             elif math.isfinite(row.value):
@@ -71,22 +73,20 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _jump(set: str, p: Parameters, case: Case, x0: State) -> Trial:
-    sides, known = [p.replace(omega_0=p.omega_0 * (1 + side * JUMP)) for side in (1, -1)], {"case": case.name}
-    read = _delay if case is Case.RR else _peak
-    return Trial(
-        set, p, case.name, x0.stacked(), lasting(p, 48.0), (2, 4), 4000, read, variants=tuple(sides), conditions=known
-    )
+    sides = tuple(p.replace(omega_0=p.omega_0 * (1 + side * JUMP)) for side in (1, -1))
+    t_end, x, known = lasting(p, 48.0), x0.stacked(), {"case": case.name}
+    return Trial(set, p, case.name, x, t_end, (2, 4), 4000, _jumped, variants=sides, conditions=known)
 
 
 def _ramp(start: Start, x0: State, span: float, end: float, rate: float) -> Trial:
     p, rise, x = start.p, rate * start.p.c * span, x0.stacked()
     t_end, name = (end - p.omega_0) / rise, f"a ramp of {rise:.3g} rad/s^2"
     flow, known = Flow.ramp(p.omega_0, end, t_end), {"rate": rise, **state_of(x[:6])}
-    return Trial(start.set, p, name, x, t_end, (1, 2), 16000, _ramp_end, flow, conditions=known)
 
+    def read(run: Trajectory) -> dict[str, Measured]:
+        return {"ramp_end": Measured(caught_up(run), 0.0)}
 
-def _ramp_end(run: Trajectory) -> dict[str, Measured]:
-    return {"ramp_end": Measured(caught_up(run), 0.0)}
+    return Trial(start.set, p, name, x, t_end, (1, 2), 16000, read, flow, conditions=known)
 
 
 def odd_part(up: Trajectory, down: Trajectory) -> Array:
@@ -95,24 +95,19 @@ def odd_part(up: Trajectory, down: Trajectory) -> Array:
     return np.asarray(odd / odd[-1])
 
 
-def _delay(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
-    return {"jump_delay": Measured(float(np.trapezoid(1 - odd_part(up, down), up.time)), _late(up))}
-
-
-def _peak(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
-    """Time and height of the highest peak, nan where there is none in the first half of the run."""
+def _jumped(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
+    """The delay; time and height of the highest peak, nan where there is none in the first half of the runs."""
     t, y = up.time, odd_part(up, down)
-    k, late = peaks(y)
-    if not (highest := (k == y.argmax()) & (k < len(t) // 2)).any():
-        return dict.fromkeys(("jump_peak", "jump_height"), Measured(math.nan, 0.0))
-    k, late = k[highest], late[highest]
-    at = Measured(float((t[k] + late * (t[1] - t[0]))[0]), _late(up))
-    return {"jump_peak": at, "jump_height": Measured(float(top(y, k, late)[0]), 0.0)}
-
-
-def _late(run: Trajectory) -> float:
-    """Forces act in the middle of a step: a moment is known to half of the finer one, either way."""
-    return coarse_step(run.header.parameters) / 4 / math.sqrt(12)
+    # Forces act in the middle of a step: a moment is known to half of the finer one, either way.
+    late = coarse_step(up.header.parameters) / 4 / math.sqrt(12)
+    k, later = peaks(y)
+    highest = (k == y.argmax()) & (k < len(t) // 2)
+    at, height = (np.append(each[highest], math.nan)[0] for each in (t[k] + later * (t[1] - t[0]), top(y, k, later)))
+    return {
+        "jump_delay": Measured(float(np.trapezoid(1 - y, t)), late),
+        "jump_peak": Measured(float(at), late),
+        "jump_height": Measured(float(height), 0.0),
+    }
 
 
 def caught_up(run: Trajectory) -> float:
