@@ -121,17 +121,17 @@ def _staircase(
         known, conditions = coarse.values, fine.conditions(q)
         heights.append([each["orbit_height"].value for each in (known, fine.values)])
         for quantity, value in fine.values.items():
-            sure = finer(known[quantity], value)
+            sure = finer(known[quantity].value, value)
             yield measurement(lab, protocol, SET, q, quantity, sure, result.tasks, **conditions)
         if k:
             parts = (result.coarse, LATER), (result.fine, LATER), (result.fine, 2 * LATER)
             slow, fast, later = (hop_map(tops(run, begin + after, end - LAST).x, q)[0] for run, after in parts)
-            factor = finer(Measured(slow, 0.0), Measured(fast, abs(fast - later)))
+            factor = finer(slow, Measured(fast, abs(fast - later)))
             row = measurement(lab, protocol, SET, q, "orbit_multiplier", factor, result.tasks, **conditions)
             yield if_sure(row, 1.0, f"how disturbances shrink {at} is too uncertain")
     if len(heights) >= 3:
-        place = finer(*(birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)))
-        yield measurement(lab, protocol, SET, p, "orbit_birth", place, result.tasks)
+        coarse_birth, fine_birth = (birth(flows[: len(heights)], each) for each in zip(*heights, strict=True))
+        yield result.row(lab, "orbit_birth", finer(coarse_birth.value, fine_birth))
 
 
 def tops(run: Trajectory, start: float, end: float) -> Hops:
@@ -208,7 +208,7 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured
     Factors are those with the coarser step, with the finer one, and in a later part of the run with the finer one.
     """
     slow, fast, later = (float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True))
-    return finer(Measured(slow, 0.0), Measured(fast, abs(fast - later)))
+    return finer(slow, Measured(fast, abs(fast - later)))
 
 
 def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -230,7 +230,7 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         coarse, fine, before = (_swung(run, since) for run, since in parts)
         conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": fine["swing_period"]}
         for name, value in fine.items():
-            sure = finer(Measured(coarse[name], 0.0), Measured(value, abs(value - before[name])))
+            sure = finer(coarse[name], Measured(value, abs(value - before[name])))
             yield result.row(lab, name, sure, **conditions)
 
 

@@ -86,6 +86,6 @@ def known_flow(records: Records, set: str, threshold: str) -> float | None:
     return next((m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None)
 
 
-def finer(coarse: Measured, fine: Measured) -> Measured:
+def finer(coarse: float, fine: Measured) -> Measured:
     """What the finer step shows: its difference from the coarser one adds to its own uncertainty in quadrature."""
-    return Measured(fine.value, math.hypot(fine.value - coarse.value, fine.uncertainty))
+    return Measured(fine.value, math.hypot(fine.value - coarse, fine.uncertainty))

@@ -63,7 +63,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             continue
         trial = result.trial
         for quantity in SHOWS.get(trial.name, ("ramp_end",)):
-            row = result.row(lab, quantity, finer(result.coarse[quantity], result.fine[quantity]))
+            row = result.row(lab, quantity, finer(result.coarse[quantity].value, result.fine[quantity]))
             if trial.flow is None:
                 yield if_sure(row, abs(row.value), f"{quantity} in {trial.name}: no peak, or one that is too uncertain")
             elif math.isfinite(row.value):

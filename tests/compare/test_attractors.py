@@ -90,7 +90,7 @@ def test_map_from_hop_to_hop(size: float) -> None:
 def test_birth_is_where_the_height_vanishes() -> None:
     flows = (58.0, 56.0, 54.0)
     curved, straight = ([4e-4 * (w - 52) - b * (w - 52) ** 2 for w in flows] for b in (1e-6, 0.0))
-    place = finer(attractors.birth(flows, curved), attractors.birth(flows, straight))
+    place = finer(attractors.birth(flows, curved).value, attractors.birth(flows, straight))
     assert place.value == pytest.approx(52.0, abs=1e-9)
     assert 0 < place.uncertainty < 0.1
 
