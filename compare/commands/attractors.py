@@ -144,15 +144,11 @@ def _rows(data: dict[str, Any]) -> pages.Rows:
 
 def _table(data: dict[str, Any]) -> Table:
     lines = []
-    for branch in _branches(data):
+    for branch in (branch for each in data["sets"] for branch in each["branches"]):
         name, values = branch["parameter"], [orbit[branch["parameter"]] for orbit in branch["orbits"]]
         lines.append(f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:")
         lines += [f"  {place['kind']} at {place['value']:.7g} {place['reason']}" for place in branch["places"]]
     return pages.table(f"What balls come to ({data['engine']})", _rows(data), caption="\n".join(lines))
-
-
-def _branches(data: dict[str, Any]) -> list[dict[str, Any]]:
-    return [branch for each in data["sets"] for branch in each["branches"]]
 
 
 def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) -> str:
@@ -162,7 +158,7 @@ def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) 
     lines = [f"# {title}: what balls come to", ""]
     lines += [f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by", ""]
     lines += ["```sh", shlex.join(words), "```", "", pages.markdown(_rows(data))]
-    for branch in _branches(data):
+    for branch in (branch for each in data["sets"] for branch in each["branches"]):
         name = branch["parameter"]
         lines += ["", f"## Followed in {name}", ""]
         lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}".rstrip() for p in branch["places"]), ""]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -56,10 +55,6 @@ def select(material: Material, figure: str) -> Measurements:
     return Measurements(own, tuple(runs[:2]))
 
 
-def _at(name: str) -> Callable[[Measurement], float]:
-    return lambda m: float(m.conditions[name])
-
-
 @cache
 def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
     """Frequencies, amplitudes at which slip begins, mean errors at half as much again."""
@@ -102,7 +97,9 @@ def draw_pulsation(of: Measurements) -> Figure:
     error.axhline(0, **style.GUIDE)
     panels = {"gain": gain, "phase_lag": phase, "slip_amplitude": onset, "mean_error": error}
     for quantity, axes in panels.items():
-        style.points(axes, of.of(quantity), _at("f"), unit=180 / math.pi if axes is phase else 1.0)
+        style.points(
+            axes, of.of(quantity), lambda m: float(m.conditions["f"]), unit=180 / math.pi if axes is phase else 1.0
+        )
     gain.set(xscale="log", yscale="log", ylabel="gain $|\\omega_c/\\omega_0|$")
     phase.set(ylabel="phase lag (°)", xlabel="frequency (Hz)")
     onset.set(yscale="log", ylabel="amplitude at which\nslip begins (rad/s)")
@@ -146,7 +143,7 @@ def draw_unsteady(of: Measurements) -> Figure:
     style.guides(ramp, {"omega_04": fold})
     law.loglog(rates, response.ramp_coefficient(REFERENCE) * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
     law.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
-    style.points(law, ends, _at("rate"), lambda m: m.value - fold)
+    style.points(law, ends, lambda m: float(m.conditions["rate"]), lambda m: m.value - fold)
     law.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)", yticks=[0.5, 1, 2, 5])
     for axis in (law.xaxis, law.yaxis):
         axis.set_major_formatter("{x:g}")

@@ -123,7 +123,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         onset = Measured(place.value, math.hypot(place.uncertainty, unseen))
         if low is None or high is None:
             yield Missing(PROTOCOL, each.set, f"in {at} there is slip at no amplitude, or at all")
-        elif _alone(low) > 2e-4:
+            continue
+        alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
+        if alone > 2e-4 * math.sqrt(each.p.g * each.p.R):
             yield Missing(PROTOCOL, each.set, f"in {at} one contact slips before both do, too little to tell when")
         else:
             measured = each.row(lab, "slip_amplitude", onset, bracket.tasks)
@@ -212,12 +214,6 @@ def rolls_on(run: Trajectory) -> bool:
     """Whether after the first sixth of a run the ball nowhere slips at both points or leaves the floor for `LASTS`."""
     gone = np.isin(run.case[run.time > run.time[-1] / 6], [Case.SS, *(case for case in Case if case.A is Contact.N)])
     return bool(np.convolve(gone, np.ones(LASTS)).max() < LASTS)
-
-
-def _alone(run: Trajectory) -> float:
-    """Largest difference of the two slip speeds after the first sixth of a run, in units of sqrt(g R)."""
-    p, late = run.header.parameters, run.time > run.time[-1] / 6
-    return float(np.abs(run.slip_speed_A - run.slip_speed_B)[late].max() / math.sqrt(p.g * p.R))
 
 
 def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterator[Measurement | Missing]:

@@ -132,7 +132,10 @@ def random_starts(p: Parameters, count: int, seed: Sequence[int]) -> Array:
 
 
 def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
-    """Search the sets of a chunk and write its file; the first of the hopping states that can be confirmed counts."""
+    """Search the sets of a chunk and write its file.
+
+    Confirmed is the first hopping state that can be; if none can, "broken" says where the simulation broke down.
+    """
     rows = []
     for k, point in enumerate(points):
         p = parameters(point)
@@ -144,6 +147,7 @@ def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
             try:
                 if confirmed := hopping.confirm(p, state):
                     row["confirmed"] = dataclasses.asdict(confirmed)
+                    del row["broken"]
                     break
             except SimulationError as error:
                 row["broken"] = str(error)
