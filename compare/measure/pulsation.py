@@ -50,13 +50,13 @@ class Pulsation:
     reach: float
     """How far omega_c may swing in the largest pulsation that is tried, rad s-1."""
     begin: float = 0.0
-    """omega_c less the mean flow as a period begins, divided by the amplitude;"""
+    """omega_c less the mean flow as a period begins, divided by the amplitude."""
     power: float = 0.0
-    """the power of the amplitude with which that grows."""
+    """Power of the amplitude with which `begin` grows."""
     ratio: complex = 1.0
     """omega_c divided by omega_0, from the Fourier sums over two periods."""
     uncertainty: float = math.inf
-    """Of its parts."""
+    """Of the parts of `ratio`."""
     rolls: bool = True
     """Whether the ball rolls all the time."""
     tasks: tuple[Task, ...] = ()
@@ -162,20 +162,14 @@ def _followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """How balls follow pulsations of their own amplitudes."""
     followed, last = [], slice(-2 * SAMPLES, None)
     rounds = _rounds(lab, [(each, each.amplitude) for each in pulsations], 2, SAMPLES, slips=False)
-    for each, *pair in zip(pulsations, *rounds, strict=True):
+    for each, (earlier, before, _), (later, run, omega_c) in zip(pulsations, *rounds, strict=True):
         ratios = []
-        for _, run, _ in pair:
-            phase = 2 * math.pi * each.frequency * run.time[last]
-            ratios.append(complex(2j * np.mean(run.omega_c[last] * np.exp(-1j * phase)) / each.amplitude))
-        followed.append(
-            replace(
-                each.begun(pair[1][2]),
-                ratio=ratios[1],
-                uncertainty=abs(ratios[1] - ratios[0]),
-                rolls=rolls_on(pair[1][1]),
-                tasks=tuple(task for task, *_ in pair),
-            )
-        )
+        for shown in (before, run):
+            phase = 2 * math.pi * each.frequency * shown.time[last]
+            ratios.append(complex(2j * np.mean(shown.omega_c[last] * np.exp(-1j * phase)) / each.amplitude))
+        change, new = abs(ratios[1] - ratios[0]), each.begun(omega_c)
+        tasks, rolls = (earlier, later), rolls_on(run)
+        followed.append(replace(new, ratio=ratios[1], uncertainty=change, rolls=rolls, tasks=tasks))
     return followed
 
 
@@ -231,9 +225,10 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
         for k, x in enumerate(run.x[-1 - samples : -1 : samples // PHASES])
     ]
     begun = np.reshape([run.theta[-1] - run.theta[0] for run in lab.run(anew)], (-1, PHASES))
-    for (each, amplitude), turns, *pair in zip(slipping, begun, coarse, fine, strict=True):
-        means = [(np.diff(run.theta[::samples]) * each.frequency)[-2:].tolist() for _, run, _ in pair]
-        (before, usual), (first, mean), task = *means, pair[1][0]
+    pairs = zip(slipping, begun, coarse, fine, strict=True)
+    for (each, amplitude), turns, (_, run, _), (task, finer, _) in pairs:
+        before, usual = (np.diff(run.theta[::samples]) * each.frequency)[-2:].tolist()
+        first, mean = (np.diff(finer.theta[::samples]) * each.frequency)[-2:].tolist()
         value = mean - each.p.omega_0
         spread = float(np.abs(turns * each.frequency - usual).max())
         drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread

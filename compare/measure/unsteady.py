@@ -25,8 +25,8 @@ from model.drag import STOKES
 PROTOCOL = "unsteady"
 JUMP = 1e-3
 """Relative size of a jump."""
-SHOWS = {"RR": ("jump_delay",), "SS": ("jump_peak", "jump_height")}
-"""What a jump shows of a ball that rolls, and of one that slips at both points."""
+SHOWS = {"RR": ("jump_delay",), "SS": ("jump_peak", "jump_height"), "ramp": ("ramp_end",)}
+"""What is measured: after a jump, by the case of the ball before it, and along a ramp."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -62,14 +62,15 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield result
             continue
         trial = result.trial
-        for quantity in SHOWS.get(trial.name, ("ramp_end",)):
+        for quantity in SHOWS[trial.name]:
             row = result.row(lab, quantity, finer(result.coarse[quantity].value, result.fine[quantity]))
             if trial.flow is None:
                 yield if_sure(row, abs(row.value), f"{quantity} in {trial.name}: no peak, or one that is too uncertain")
             elif math.isfinite(row.value):
                 yield row
             else:
-                yield Missing(PROTOCOL, trial.set, f"{trial.name} doesn't end slipping at both points")
+                why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
+                yield Missing(PROTOCOL, trial.set, why)
 
 
 def _jump(set: str, p: Parameters, case: Case, x0: State) -> Trial:
@@ -80,13 +81,13 @@ def _jump(set: str, p: Parameters, case: Case, x0: State) -> Trial:
 
 def _ramp(start: Start, x0: State, span: float, end: float, rate: float) -> Trial:
     p, rise, x = start.p, rate * start.p.c * span, x0.stacked()
-    t_end, name = (end - p.omega_0) / rise, f"a ramp of {rise:.3g} rad/s^2"
+    t_end = (end - p.omega_0) / rise
     flow, known = Flow.ramp(p.omega_0, end, t_end), {"rate": rise, **state_of(x[:6])}
 
     def read(run: Trajectory) -> dict[str, Measured]:
         return {"ramp_end": Measured(caught_up(run), 0.0)}
 
-    return Trial(start.set, p, name, x, t_end, (1, 2), 16000, read, flow, conditions=known)
+    return Trial(start.set, p, "ramp", x, t_end, (1, 2), 16000, read, flow, conditions=known)
 
 
 def odd_part(up: Trajectory, down: Trajectory) -> Array:
