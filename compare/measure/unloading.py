@@ -17,10 +17,8 @@ import numpy as np
 
 from compare.measure.lab import Lab, coarse_step
 from compare.measure.levels import Level
-from compare.measure.onset import LOOSE
-from compare.measure.questions import lasting
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of
-from compare.measure.settling import Settled, begin, family, settle_groups
+from compare.measure.settling import Settled, begin, family, lasting, settle_groups
 from compare.runs.tasks import Task
 from compare.statistics import Measured, settled_case
 from model import Parameters, State, Trajectory
@@ -70,7 +68,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         lifts = records.threshold(name, "omega_03") or limit
         flows = ABOVE * limit.value, LIFTED * max(limit.value, lifts.value)
         starts.append([begin(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
-    for states in settle_groups(lab, starts, loose=LOOSE[lab.level]):
+    for states in settle_groups(lab, starts, loose=lab.effort("thresholds.loose")):
         for state, begun in zip(states, (_unloaded, _pushed), strict=True):
             if state.failure:
                 yield Missing(PROTOCOL, state.start.set, f"no ball to begin with on the wall: {state.failure}")

@@ -15,9 +15,8 @@ import numpy as np
 
 from compare.measure.lab import Lab, coarse_step
 from compare.measure.levels import Level
-from compare.measure.questions import lasting, rolling
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of, sure_enough
-from compare.measure.settling import Settled, settle
+from compare.measure.settling import Settled, begin, lasting, settle
 from compare.measure.trials import Start
 from compare.runs.tasks import Task
 from compare.statistics import Measured, peaks, top
@@ -61,7 +60,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield Missing(PROTOCOL, name, "no flows were measured between which the ball slips at both points")
             continue
         if p.drag == STOKES:  # with others there is no delay that all small jumps share
-            trials.append(_jump(lab, name, p.replace(omega_0=ROLLS * begins), rolling(p, ROLLS * begins)))
+            q = p.replace(omega_0=ROLLS * begins)
+            trials.append(_jump(lab, name, q, begin(name, q, "with the fluid").x0))
         flows = [("jump", begins + SLIPS * (holds - begins))]
         if ends is None:
             yield Missing(PROTOCOL, name, "no flow was measured at which slipping at both points ends in a jump")
