@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,7 +26,16 @@ from compare.measure.extrapolation import POINTS, initial_slope, turning, vanish
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.laws import PRESSES
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, sure_enough
-from compare.measure.settling import Settled, begin, family, high, lasting, settle_groups, settles
+from compare.measure.settling import (
+    Settled,
+    begin,
+    family,
+    high,
+    lasting,
+    settle_groups,
+    settled_cases,
+    settles,
+)
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured, settled_case, straight_line, tail
 from model import Case, Parameters, State, Trajectory
@@ -57,7 +67,7 @@ From = str | Array | Callable[[Parameters], Array]
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Bracket every change of the settled case, settle states beside it, then bisect and extrapolate."""
+    """Begin between flows whose settled cases differ: settle states beside each change, then bisect and extrapolate."""
     brackets = _neighbourhoods(lab, sets, records)
     states = _settled_beside(lab, sets, brackets)
     brackets = {key: b for key, b in brackets.items() if key[1] != "riding"} | _bisected(lab, sets, brackets, states)
@@ -78,49 +88,38 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         yield from _rows(lab, name, p, shown, beside, folds.get(name))
 
 
-def _changes(
-    lab: Lab, sets: Mapping[str, Parameters], records: Records, how: str, holds: Callable[[Case], bool]
-) -> dict[str, Bracket]:
-    """Between which flows balls that begin in one way cease to settle in cases for which `holds` is true, by set."""
-    from compare.measure.lab import time_unit
-
-    grid = np.linspace(0.3, 4.5, 15)
-    units = {"rest": 20, "with the fluid": 5, "on the wall": 12}[how]
-    found = {}
-    for name, p in sets.items():
-        qs = [p.replace(omega_0=float(w)) for w in grid / time_unit(p)]
-        runs = lab.run([lab.task(q, begin(name, q, how).x0, lasting(q, units), coarse_step(q)) for q in qs])
-        yes = [holds(family(settled_case(run))) for run in runs]
-        if yes[0] and not all(yes):
-            k = yes.index(False)
-            found[name] = Bracket(qs[k - 1].omega_0, qs[k].omega_0)
-    return found
-
-
 def _neighbourhoods(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict[Key, Bracket]:
-    """The largest flow at which a ball that rolls on both goes on so; and roughly, where sinking and slipping end."""
-    rolls = _changes(lab, sets, records, "with the fluid", lambda case: case is Case.RR)
-    sinks, slips = (
-        _changes(lab, sets, records, how, lambda case: case is not Case.NR) for how in ("on the wall", "rest")
-    )
+    """The largest flow at which a ball that rolls on both goes on so; and roughly, where sinking and slipping end.
+
+    Each between the fastest flow at which the ball was seen to settle so, and the next at which it settled otherwise.
+    Without such flows it is looked for from half the slowest, or up to twice the fastest.
+    """
+    kinds = {"rolling": "with the fluid", "riding": "on the wall", "slipping": "rest"}
+    seen = {(name, kind): settled_cases(records, name, how) for name in sets for kind, how in kinds.items()}
+    around: dict[Key, Bracket] = {}
+    for key, cases in seen.items():
+        if flows := list(cases):
+            ended = {case for case in Case if (case is not Case.RR if key[1] == "rolling" else case is Case.NR)}
+            low = max((flow for flow in flows if cases[flow] not in ended), default=flows[0] / 2)
+            around[key] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
     searches: dict[Key, Search] = {}
-    for name, around in rolls.items():
-        width = lab.effort("thresholds.width") * around.high
-        searches[name, "rolling"] = _search(lab, sets[name], around, "with the fluid", 5, stays_rolling, width)
-    rolling = _narrowed(lab, searches)
+    for name, p in sets.items():
+        if change := around.get((name, "rolling")):
+            width = lab.effort("thresholds.width") * change.high
+            searches[name, "rolling"] = _search(lab, p, change, "with the fluid", 5, stays_rolling, width)
+    found = _narrowed(lab, searches)
     searches = {}
     for name, p in sets.items():
-        if up := sinks.get(name):
-            searches[name, "riding"] = _search(
-                lab, p, up, "on the wall", 20, lambda run: family(settled_case(run)) is not Case.NR, ROUGH * up.high
-            )
-        end, last = rolling.get((name, "rolling")), slips.get(name)
-        if end and last and not lifts(end) and end.high < last.high:
-            around, width = Bracket(max(last.low, end.high), last.high), ROUGH * last.high
-            searches[name, "slipping"] = _search(
-                lab, p, around, "rest", 40, lambda run: settles(run) is not False, width, follow=True
-            )
-    return rolling | _narrowed(lab, searches, careful=False)
+        if change := around.get((name, "riding")):
+            width = ROUGH * change.low
+            searches[name, "riding"] = _search(lab, p, change, "on the wall", 20, falls, width)
+        end, change = found.get((name, "rolling")), around.get((name, "slipping"))
+        if end and change and not lifts(end) and end.high < change.high:
+            change = replace(change, low=max(change.low, end.high))
+            width = ROUGH * change.low
+            searches[name, "slipping"] = _search(lab, p, change, "rest", 40, keeps_on, width, follow=True)
+    found |= _narrowed(lab, searches, careful=False)
+    return {key: bracket for key, bracket in found.items() if bracket.runs[1] or bracket.high in seen[key]}
 
 
 def _settled_beside(
@@ -167,16 +166,12 @@ def _bisected(
         if len(riding := states.get((name, "riding"), [])) == len(RIDES):
             begins = brackets[name, "riding"]
             ride = rider(riding, height=high(p))
-            searches[name, "riding"] = _search(
-                lab, p, begins, ride, 5, lambda run: slip(run.slip_speed_B, run) > 1, fine * begins.high
-            )
+            searches[name, "riding"] = _search(lab, p, begins, ride, 5, slides, fine * begins.high)
         if len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
             end = brackets[name, "rolling"]
             around = Bracket(end.low * (1 - ROUGH), end.high * (1 + ROUGH))
             lean = rider(lifted, height=0.0, less=1e-3)
-            searches[name, "leaning"] = _search(
-                lab, p, around, lean, 20, lambda run: presses(run) and settled_case(run) is Case.RR, fine * end.high
-            )
+            searches[name, "leaning"] = _search(lab, p, around, lean, 20, rolls_again, fine * end.high)
     return _narrowed(lab, searches)
 
 
@@ -275,6 +270,26 @@ def stays_rolling(run: Trajectory) -> bool | None:
     return True if last < 1e-2 else None
 
 
+def rolls_again(run: Trajectory) -> bool:
+    """Whether a ball pressed on the floor comes back to rolling on both."""
+    return presses(run) and settled_case(run) is Case.RR
+
+
+def falls(run: Trajectory) -> bool:
+    """Whether the wall doesn't hold the ball in the end."""
+    return family(settled_case(run)) is not Case.NR
+
+
+def slides(run: Trajectory) -> bool:
+    """Whether a ball that rides the wall begins to slip on it."""
+    return slip(run.slip_speed_B, run) > 1
+
+
+def keeps_on(run: Trajectory) -> bool:
+    """Whether a ball on the floor settles there, or may."""
+    return settles(run) is not False
+
+
 def extrapolated(
     states: Sequence[Settled], quantity: str, to: Callable[[Array, Sequence[Measured]], Measured]
 ) -> Measured | None:
@@ -326,9 +341,9 @@ def _rows(
             yield missing(f"too few states settled for {quantity} by {by}, or they point to it too vaguely")
 
     rolling, leaning, riding, fold = (brackets.get(kind) for kind in ("rolling", "leaning", "riding", "fold"))
-    unseen = "no flow between omega_0 = {:.3g} and {:.3g} rad/s".format(*np.array([0.3, 4.5]) / time_unit(p))
+    none = "no flow that was tried, up to twice the fastest of the settled states,"
     if not rolling:
-        yield missing(f"{unseen} ends two-point rolling")
+        yield missing(f"{none} ends two-point rolling")
     elif lifts(rolling):
         yield missing("two-point rolling ends by losing the floor, not by slipping: there is no omega_01")
         yield bisected("omega_03", rolling, "from below", "loss of the floor")
@@ -343,7 +358,7 @@ def _rows(
     if riding:
         yield bisected("omega_02", riding, "from above", "onset of sliding on the wall")
     else:
-        yield missing(f"{unseen} is the least to hold a ball on the wall")
+        yield missing(f"{none} is the least to hold a ball on the wall")
     yield from vanishes("v_y", "sinking", "omega_02", "from below", "speed of settled sinking")
     if not states.get("turning"):
         yield missing("a ball that slips at both points settles at no flow: there is no omega_04")
