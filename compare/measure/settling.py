@@ -80,6 +80,16 @@ def scale(name: str, p: Parameters) -> float:
     return rotation_scale(p) * (1.0 if name == "omega_c" else p.R / p.r)
 
 
+def forces(A: Array, B: Array) -> dict[str, Array]:
+    """Components of contact forces (3, ...) by name, and the sums of them that the balances determine in every case."""
+    components = {
+        f"{contact}{axis}": each
+        for contact, rows in (("A", A), ("B", B))
+        for axis, each in zip("xyz", rows, strict=True)
+    }
+    return components | {"Ax-By": A[0] - B[1], "Ay+By": A[1] + B[1], "Bx+By": B[0] + B[1]}
+
+
 def determined(case: Case) -> tuple[str, ...]:
     """The quantities that a settled state of a case has.
 
@@ -178,11 +188,10 @@ def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Set
     more than a thousandth of its scale, in a window with 98 % of its samples in one case. Of two windows that counts
     which drifts less: half of the run for what oscillates, an eighth for what only decays.
     """
-    p, A, B = start.p, run.force_A, run.force_B
+    p = start.p
     series = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
     series["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
-    series |= {f"force_{c}{axis}": force[:, k] for c, force in (("A", A), ("B", B)) for k, axis in enumerate("xyz")}
-    series |= {"force_Ax-By": A[:, 0] - B[:, 1], "force_Ay+By": A[:, 1] + B[:, 1], "force_Bx+By": B[:, 0] + B[:, 1]}
+    series |= {f"force_{name}": values for name, values in forces(run.force_A.T, run.force_B.T).items()}
     rows = np.stack([*series.values(), *run.x.T])
     solved = SOLVED / (p.c * coarse_step(p))
     states = []
