@@ -21,7 +21,7 @@ _FLOWS = (
 EFFORT: dict[str, tuple[Any, Any, Any]] = {
     # quick, default, full
     # settled: flows omega_0 sqrt(R/g), and the share of the drift limit down to which a state goes on
-    "settled.flows": ((0.43, 0.62, 0.9, 1.13, 1.4, 1.7, 2.05, 2.5, 3.1, 4.2), _FLOWS, _FLOWS),
+    "settled.flows": ((0.62, 1.4, 1.7, 2.5, 4.2), _FLOWS, _FLOWS),
     "settled.sharp": (1.0, 0.1, 0.1),
     # thresholds: relative widths of the last brackets, of those about a fold, and the factor on the settling tolerance
     "thresholds.width": (5e-5, 1e-6, 5e-7),

@@ -82,11 +82,7 @@ def scale(name: str, p: Parameters) -> float:
 
 def forces(A: Array, B: Array) -> dict[str, Array]:
     """Components of contact forces (3, ...) by name, and the sums of them that the balances determine in every case."""
-    components = {
-        f"{contact}{axis}": each
-        for contact, rows in (("A", A), ("B", B))
-        for axis, each in zip("xyz", rows, strict=True)
-    }
+    components = dict(zip(("Ax", "Ay", "Az", "Bx", "By", "Bz"), (*A, *B), strict=True))
     return components | {"Ax-By": A[0] - B[1], "Ay+By": A[1] + B[1], "Bx+By": B[0] + B[1]}
 
 
