@@ -32,6 +32,7 @@ from compare.measure.settling import (
     family,
     high,
     lasting,
+    presses,
     settle_groups,
     settled_cases,
     settles,
@@ -67,71 +68,79 @@ From = str | Array | Callable[[Parameters], Array]
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Begin between flows whose settled cases differ: settle states beside each change, then bisect and extrapolate."""
-    brackets = _neighbourhoods(lab, sets, records)
-    states = _settled_beside(lab, sets, brackets)
-    brackets = {key: b for key, b in brackets.items() if key[1] != "riding"} | _bisected(lab, sets, brackets, states)
-    folds = {}
-    for name in sets:
-        turned, riding = states.get((name, "turning"), []), brackets.get((name, "riding"))
+    """Begin between flows whose settled cases differ: settle states beside each change, then bisect and extrapolate.
+
+    A change is between the fastest flow at which a ball was seen to settle so, and the next at which it settled
+    otherwise. Without such flows it is looked for from half the slowest, or up to twice the fastest.
+    """
+    fine, narrowest = lab.effort("thresholds.width"), lab.effort("thresholds.fold")
+    kinds = {"rolling": "with the fluid", "riding": "on the wall", "slipping": "rest"}
+    seen = {(name, kind): settled_cases(records, name, how) for name in sets for kind, how in kinds.items()}
+    around: dict[Key, Bracket] = {}
+    for key, cases in seen.items():
+        if flows := list(cases):
+            ended = {Case.NR} if key[1] != "rolling" else set(Case) - {Case.RR}
+            low = max((flow for flow in flows if cases[flow] not in ended), default=flows[0] / 2)
+            around[key] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
+
+    # The largest flow at which a ball that rolls on both goes on so; and roughly, where sinking and slipping end.
+    searches: dict[Key, Search] = {}
+    for (name, kind), change in around.items():
+        if kind == "rolling":
+            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], fine * change.high)
+    brackets, searches = _narrowed(lab, searches), {}
+    for (name, kind), change in around.items():
+        if kind == "riding":
+            searches[name, kind] = _search(lab, sets[name], "sinking", change, kinds[kind], ROUGH * change.low)
+        end = brackets.get((name, "rolling"))
+        if kind == "slipping" and end and not lifts(end) and end.high < change.high:
+            change = replace(change, low=max(change.low, end.high))
+            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], ROUGH * change.low)
+    brackets |= _narrowed(lab, searches, careful=False)
+    brackets = {key: bracket for key, bracket in brackets.items() if bracket.runs[1] or bracket.high in seen[key]}
+    states, searches = _settled_beside(lab, sets, brackets), {}
+
+    # Where a ball that rides the wall begins to slip on it, and up to where one pressed to the floor rolls again. They
+    # begin from settled states continued to each flow; the pressed one has a thousandth less spin on the wall.
+    for name, p in sets.items():
+        begins, end = brackets.pop((name, "riding"), None), brackets.get((name, "rolling"))
+        if begins and len(riding := states[name, "riding"]) == len(RIDES):
+            ride = rider(riding, height=high(p))
+            searches[name, "riding"] = _search(lab, p, "riding", begins, ride, fine * begins.high)
+        if end and len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
+            pressed = rider(lifted, height=0.0, less=1e-3)
+            change = Bracket(end.low * (1 - ROUGH), end.high * (1 + ROUGH))
+            searches[name, "leaning"] = _search(lab, p, "leaning", change, pressed, fine * end.high)
+    brackets |= _narrowed(lab, searches)
+
+    # The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
+    # the branch. There is no fold where the floor's force on it vanishes just where the wall begins to carry it.
+    folds, searches = {}, {}
+    for name, p in sets.items():
+        turned, held = states.get((name, "turning"), []), brackets.get((name, "riding"))
         top, unloaded = extrapolated(turned, "slip_x", turning), extrapolated(turned, "force_Ay", vanishing)
-        # There is no fold where the floor's force on a slipping ball vanishes just where the wall begins to carry it.
-        off = (
-            max(abs(unloaded.value - riding.high), COVERAGE * unloaded.uncertainty) if riding and unloaded else math.inf
-        )
-        if top and not (riding and off < lab.effort("thresholds.fold") * riding.high):
-            folds[name] = top
-    brackets |= _last_settled(lab, sets, folds, states)
+        off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
+        if top and not (held and off < narrowest * held.high):
+            folds[name], half = top, max(narrowest, 5.0 * top.uncertainty / top.value)
+            change = Bracket(top.value * (1 - half), top.value * (1 + half))
+            # At a fold all slows down, like the root of the distance.
+            time, width = 1 / math.sqrt(narrowest), narrowest * top.value
+            searches[name, "fold"] = _search(lab, p, "fold", change, turned[0].mean, width, time)
+    brackets |= _narrowed(lab, searches, careful=False)
     for name, p in sets.items():
         shown = {kind: b for (one, kind), b in brackets.items() if one == name and None not in b.runs}
         beside = {kind: settled for (one, kind), settled in states.items() if one == name}
         yield from _rows(lab, name, p, shown, beside, folds.get(name))
 
 
-def _neighbourhoods(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> dict[Key, Bracket]:
-    """The largest flow at which a ball that rolls on both goes on so; and roughly, where sinking and slipping end.
-
-    Each between the fastest flow at which the ball was seen to settle so, and the next at which it settled otherwise.
-    Without such flows it is looked for from half the slowest, or up to twice the fastest.
-    """
-    kinds = {"rolling": "with the fluid", "riding": "on the wall", "slipping": "rest"}
-    seen = {(name, kind): settled_cases(records, name, how) for name in sets for kind, how in kinds.items()}
-    around: dict[Key, Bracket] = {}
-    for key, cases in seen.items():
-        if flows := list(cases):
-            ended = {case for case in Case if (case is not Case.RR if key[1] == "rolling" else case is Case.NR)}
-            low = max((flow for flow in flows if cases[flow] not in ended), default=flows[0] / 2)
-            around[key] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
-    searches: dict[Key, Search] = {}
-    for name, p in sets.items():
-        if change := around.get((name, "rolling")):
-            width = lab.effort("thresholds.width") * change.high
-            searches[name, "rolling"] = _search(lab, p, change, "with the fluid", 5, stays_rolling, width)
-    found = _narrowed(lab, searches)
-    searches = {}
-    for name, p in sets.items():
-        if change := around.get((name, "riding")):
-            width = ROUGH * change.low
-            searches[name, "riding"] = _search(lab, p, change, "on the wall", 20, falls, width)
-        end, change = found.get((name, "rolling")), around.get((name, "slipping"))
-        if end and change and not lifts(end) and end.high < change.high:
-            change = replace(change, low=max(change.low, end.high))
-            width = ROUGH * change.low
-            searches[name, "slipping"] = _search(lab, p, change, "rest", 40, keeps_on, width, follow=True)
-    found |= _narrowed(lab, searches, careful=False)
-    return {key: bracket for key, bracket in found.items() if bracket.runs[1] or bracket.high in seen[key]}
-
-
-def _settled_beside(
-    lab: Lab, sets: Mapping[str, Parameters], brackets: Mapping[Key, Bracket]
-) -> dict[Key, list[Settled]]:
+def _settled_beside(lab: Lab, sets: Mapping[str, Parameters], of: Mapping[Key, Bracket]) -> dict[Key, list[Settled]]:
     """Settled states beside every change, the nearest first; only those that did settle in the case that belongs."""
     places: dict[Key, tuple[Array, str]] = {}
     for name in sets:
-        if carried := brackets.get((name, "riding")):
+        if carried := of.get((name, "riding")):
             places[name, "riding"] = carried.high * (1 + RIDES), "on the wall"
             places[name, "sinking"] = carried.low * (1 - NEAR), "on the wall"
-        end, last = brackets.get((name, "rolling")), brackets.get((name, "slipping"))
+        end, last = of.get((name, "rolling")), of.get((name, "slipping"))
         if end and lifts(end):
             places[name, "lifted"] = end.high * (1 + RIDES), "on the wall"
         elif end and last:
@@ -150,75 +159,24 @@ def _settled_beside(
     }
 
 
-def _bisected(
-    lab: Lab,
-    sets: Mapping[str, Parameters],
-    brackets: Mapping[Key, Bracket],
-    states: Mapping[Key, Sequence[Settled]],
-) -> dict[Key, Bracket]:
-    """Where a ball that rides the wall begins to slip on it, and up to where one pressed to the floor rolls again.
-
-    They begin from settled states continued to each flow; the pressed one has a thousandth less spin on the wall.
-    """
-    searches: dict[Key, Search] = {}
-    fine = lab.effort("thresholds.width")
-    for name, p in sets.items():
-        if len(riding := states.get((name, "riding"), [])) == len(RIDES):
-            begins = brackets[name, "riding"]
-            ride = rider(riding, height=high(p))
-            searches[name, "riding"] = _search(lab, p, begins, ride, 5, slides, fine * begins.high)
-        if len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
-            end = brackets[name, "rolling"]
-            around = Bracket(end.low * (1 - ROUGH), end.high * (1 + ROUGH))
-            lean = rider(lifted, height=0.0, less=1e-3)
-            searches[name, "leaning"] = _search(lab, p, around, lean, 20, rolls_again, fine * end.high)
-    return _narrowed(lab, searches)
-
-
-def _last_settled(
-    lab: Lab,
-    sets: Mapping[str, Parameters],
-    folds: Mapping[str, Measured],
-    states: Mapping[Key, Sequence[Settled]],
-) -> dict[Key, Bracket]:
-    """The largest flow at which a ball on the floor settles, about the maximum of the branch on which it comes up.
-
-    At least five standard uncertainties of that on either side. At a fold all slows down: the time is as long as 1.4
-    divided by the root of the relative width, in units of 1/c.
-    """
-    searches: dict[Key, Search] = {}
-    narrowest: float = lab.effort("thresholds.fold")
-    for name, top in folds.items():
-        half = max(narrowest, 5.0 * top.uncertainty / top.value)
-        around = Bracket(top.value * (1 - half), top.value * (1 + half))
-        x0, units = states[name, "turning"][0].mean, 1.4 / math.sqrt(narrowest)
-        searches[name, "fold"] = _search(lab, sets[name], around, x0, units, settles, narrowest * top.value)
-    return _narrowed(lab, searches, careful=False)
-
-
 def _narrowed(lab: Lab, searches: Mapping[Key, Search], careful: bool = True) -> dict[Key, Bracket]:
     return dict(zip(searches, narrow(lab, list(searches.values()), careful), strict=True))
 
 
 def _search(
-    lab: Lab,
-    p: Parameters,
-    around: Bracket,
-    start: From,
-    units: float,
-    answer: Answer,
-    width: float,
-    follow: bool = False,
+    lab: Lab, p: Parameters, question: str, around: Bracket, start: From, width: float, time: float = 1.0
 ) -> Search:
-    """Narrow a bracket by runs of some units of 1/c at held flows, which begin alike and give an answer.
+    """Narrow a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
 
-    To `follow`, a run goes out from where the ball has come to at the largest flow that it has settled at so far.
+    When it is where slipping ends, a run goes out from where the ball has come to at the largest flow so far.
     """
+    units, answer = ASKED[question]
 
     def task(omega: float, bracket: Bracket, care: Care) -> Task:
-        q, last = p.replace(omega_0=float(omega)), bracket.runs[0] if follow else None
+        q, last = p.replace(omega_0=float(omega)), bracket.runs[0] if question == "slipping" else None
         x0 = last.x[-1] if last else begin("", q, start).x0 if isinstance(start, str) else start
-        return lab.task(q, x0(q) if callable(x0) else x0, lasting(q, units * care.time), coarse_step(q) / care.refine)
+        t_end = lasting(q, units * time * care.time)
+        return lab.task(q, x0(q) if callable(x0) else x0, t_end, coarse_step(q) / care.refine)
 
     return Search(around, task, answer, width)
 
@@ -250,11 +208,6 @@ def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
     return float(speeds[tail(run, share)].max() / (SLIPS * math.sqrt(p.g * p.R)))
 
 
-def presses(run: Trajectory) -> bool:
-    """Whether the floor carries something all the time in the end."""
-    return bool(np.all(run.force_A[tail(run), 1] > 0))
-
-
 def stays_rolling(run: Trajectory) -> bool | None:
     """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip still dies out.
 
@@ -270,24 +223,18 @@ def stays_rolling(run: Trajectory) -> bool | None:
     return True if last < 1e-2 else None
 
 
-def rolls_again(run: Trajectory) -> bool:
-    """Whether a ball pressed on the floor comes back to rolling on both."""
-    return presses(run) and settled_case(run) is Case.RR
+ASKED: dict[str, tuple[float, Answer]] = {
+    "rolling": (5, stays_rolling),
+    "sinking": (20, lambda run: family(settled_case(run)) is not Case.NR),
+    "slipping": (40, lambda run: settles(run) is not False),
+    "riding": (5, lambda run: slip(run.slip_speed_B, run) > 1),
+    "leaning": (20, lambda run: presses(run) and settled_case(run) is Case.RR),
+    "fold": (1.4, settles),
+}
+"""How long a run takes, in units of 1/c, and what is asked of it: yes below a threshold, no above.
 
-
-def falls(run: Trajectory) -> bool:
-    """Whether the wall doesn't hold the ball in the end."""
-    return family(settled_case(run)) is not Case.NR
-
-
-def slides(run: Trajectory) -> bool:
-    """Whether a ball that rides the wall begins to slip on it."""
-    return slip(run.slip_speed_B, run) > 1
-
-
-def keeps_on(run: Trajectory) -> bool:
-    """Whether a ball on the floor settles there, or may."""
-    return settles(run) is not False
+The ball still rolls; the wall doesn't hold it; it settles on the floor, or may; it begins to slip on the wall; pressed
+to the floor it rolls on both again; it settles on the floor."""
 
 
 def extrapolated(

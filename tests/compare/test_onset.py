@@ -22,7 +22,7 @@ from compare.measure.levels import Level
 from compare.measure.record import Missing, Records
 from compare.measure.sets import sets
 from compare.measure.settling import begin, lasting, settles
-from compare.measure.thresholds import NEAR, TURNS, slides, stays_rolling
+from compare.measure.thresholds import ASKED, NEAR, TURNS
 from compare.statistics import Measured
 from model import Case, Parameters
 from tests.measured import measured
@@ -113,11 +113,11 @@ def _ran(lab, p, omega, x0=None, units=5.0):
 def test_the_engine_begins_to_slip_at_omega_01_and_the_wall_lets_go_at_omega_02(lab):
     t = analytic.thresholds(REFERENCE)
     for side in (-1, 1):
-        assert stays_rolling(_ran(lab, REFERENCE, t.omega_01 * (1 + side * 1e-5))) is (side < 0)
+        assert ASKED["rolling"][1](_ran(lab, REFERENCE, t.omega_01 * (1 + side * 1e-5))) is (side < 0)
         p = REFERENCE.replace(omega_0=t.omega_02 * (1 + side * 1e-5))
         x = analytic.solution(p, Case.NR, formal=True).x.copy()
         x[0] = p.R
-        assert slides(_ran(lab, p, p.omega_0, x)) is (side < 0)
+        assert ASKED["riding"][1](_ran(lab, p, p.omega_0, x)) is (side < 0)
 
 
 def test_what_runs_away_beyond_the_fold_does_not_settle(lab):
