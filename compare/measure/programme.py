@@ -76,7 +76,7 @@ PROTOCOLS = (
     Protocol("hysteresis", characteristic.hysteresis, ("settled",)),
     Protocol("rates", rates.measure, ("settled",)),
     Protocol("laws", laws.measure, waits=False),
-    Protocol("thresholds", thresholds.measure),
+    Protocol("thresholds", thresholds.measure, ("settled",)),
     Protocol("edge", edge.measure, ("thresholds",)),
     Protocol("birth", thresholds.birth, ("thresholds",)),
     Protocol("unloading", unloading.measure, ("thresholds",)),

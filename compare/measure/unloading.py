@@ -15,9 +15,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from compare.measure.lab import Lab, coarse_step
-from compare.measure.questions import lasting
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, state_of
-from compare.measure.settling import Settled, begin, family, settle_groups
+from compare.measure.settling import Settled, begin, family, lasting, settle_groups
 from compare.measure.trials import Result, Trial, carry_out
 from compare.statistics import Measured, settled_case
 from model import Case, Parameters, State, Trajectory
@@ -44,7 +43,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         lifts = records.threshold(name, "omega_03") or limit
         flows = ABOVE * limit.value, 1.1 * max(limit.value, lifts.value)
         starts.append([begin(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
-    for states in settle_groups(lab, starts, loose=lab.effort("unloading.loose")):
+    for states in settle_groups(lab, starts, loose=lab.effort("thresholds.loose")):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
                 yield Missing(PROTOCOL, state.start.set, f"no ball to begin with on the wall: {state.failure}")

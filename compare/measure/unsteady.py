@@ -13,9 +13,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from compare.measure.lab import Lab, coarse_step
-from compare.measure.questions import lasting
 from compare.measure.record import Measurement, Missing, Records, if_sure, state_of
-from compare.measure.settling import settle
+from compare.measure.settling import lasting, settle
 from compare.measure.trials import Start, Trial, carry_out, finer, known_flow
 from compare.statistics import Measured, peaks, top
 from model import Case, Flow, Parameters, State, Trajectory
