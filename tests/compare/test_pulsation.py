@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -42,17 +43,14 @@ def records(lab) -> Records:
     return Records.of([*rows, *unsteady.measure(lab, {NAME: QUICK[NAME]}, known(NAME))])
 
 
-def test_everything_is_measured(records: Records, lab) -> None:
+def test_everything_is_measured_and_theory_and_engine_agree(records: Records, lab) -> None:
     assert not records.missing
     for quantity in ("gain", "phase_lag", "slip_amplitude", "mean_error"):
         assert len(list(records.select("pulsation", quantity))) == 2 * len(lab.effort("pulsation.octaves"))
     assert {m.quantity for m in records.select("unsteady")} == {"jump_delay", "jump_peak", "jump_height", "ramp_end"}
-
-
-def test_theory_and_engine_agree(records: Records) -> None:
-    assert {v.claim.id: v.outcome for v in judge(claims.CLAIMS, records)} == dict.fromkeys(
-        ("pulsation-lag", "pulsation-slip", "pulsation-mean", "jump-slipping", "ramp-fold"), Outcome.CONFIRMED
-    )
+    assert {v.claim.id for v in judge(claims.CLAIMS, records) if v.outcome is Outcome.CONFIRMED} == {
+        *("pulsation-lag", "pulsation-slip", "pulsation-mean", "jump-slipping", "ramp-fold")
+    }
 
 
 @pytest.mark.parametrize("wrong", UNSTEADY, ids=lambda wrong: wrong.what)
@@ -96,24 +94,14 @@ def test_limit_of_a_geometric_sequence() -> None:
     assert pulsation.limit(np.array([0.0, 1.0, 3.0])) == 3.0
 
 
-@pytest.mark.parametrize(
-    ("case", "at", "rolls"),
-    [
-        (Case.RR, 0, True),
-        (Case.SS, 0, True),
-        (Case.SS, 14, True),
-        (Case.SS, 9, False),
-        (Case.NR, 9, False),
-        (Case.RS, 9, True),
-    ],
-)
-def test_rolling_on_is_judged_after_the_beginning(case, at: int, rolls: bool) -> None:
-    class Run:
-        time = np.linspace(0.0, 1.5, 16)
-        case = np.full(16, Case.RR)
+CASES = [(Case.RR, 0, True), (Case.SS, 0, True), (Case.SS, 14, True), (Case.SS, 9, False), (Case.NR, 9, False)]
 
-    Run.case[at : at + pulsation.LASTS] = case
-    assert pulsation.rolls_on(Run) is rolls
+
+@pytest.mark.parametrize(("case", "at", "rolls"), [*CASES, (Case.RS, 9, True)])
+def test_rolling_on_is_judged_after_the_beginning(case, at: int, rolls: bool) -> None:
+    cases = np.full(16, Case.RR)
+    cases[at : at + pulsation.LASTS] = case
+    assert pulsation.rolls_on(SimpleNamespace(time=np.linspace(0.0, 1.5, 16), case=cases)) is rolls
 
 
 def test_a_measured_flow_by_both_witnesses(tmp_path) -> None:
