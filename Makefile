@@ -22,7 +22,7 @@ validate: $(VENV)/installed
 mutants: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet
 	$(BIN)/dualball validate --quiet -o results/default
-	$(BIN)/python -m compare.mutants results results/default --whole --engines --least 0.95 --page docs/mutants.md
+	$(BIN)/python -m tests.mutants results results/default --whole --engines --least 0.95 --page docs/mutants.md
 
 test: $(VENV)/installed-dev
 	$(BIN)/pytest -n 2 --dist loadfile
@@ -32,7 +32,7 @@ test-all: $(VENV)/installed-dev
 
 verdicts: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet -o $(RESULTS)
-	$(BIN)/python -m compare.mutants $(RESULTS) --least 0.95
+	$(BIN)/python -m tests.mutants $(RESULTS) --least 0.95
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

@@ -162,3 +162,17 @@ def peaks(values: Array) -> tuple[npt.NDArray[np.intp], Array]:
 def top(values: Array, k: npt.NDArray[np.intp], late: Array) -> Array:
     """The heights of the parabolas that `peaks` puts through samples (n,)."""
     return np.asarray(values[k] + late * (values[k + 1] - values[k - 1]) / 4)
+
+
+def hops(run: Trajectory, share: float = 1 / 3) -> bool:
+    """Whether a ball hops on in the last part of a run: twice near the floor, and high above it in between.
+
+    High is more than half as high as the highest sample, near less than a fifth: every tenth sample of a hop is so low.
+    What stays below 1e-4 R doesn't hop.
+    """
+    late = run.y[tail(run, share)]
+    highest = late.max()
+    near = np.flatnonzero(late < highest / 5)
+    if highest < 1e-4 * run.header.parameters.R or not len(near):
+        return False
+    return bool(late[near[0] : near[-1] + 1].max() > highest / 2)

@@ -28,7 +28,7 @@ author = "The dualball developers"
 version = release = tomllib.loads((HERE.parent / "pyproject.toml").read_text("utf-8"))["project"]["version"]
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
-exclude_patterns = ["_build", "conf.py"]
+exclude_patterns = ["_build", "conf.py", "studies"]
 html_theme = "furo"
 html_title = f"dualball {version}"
 html_static_path = ["_static"]

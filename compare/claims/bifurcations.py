@@ -5,54 +5,40 @@ from __future__ import annotations
 import math
 
 import analytic
-from analytic import StationarySolution, bifurcation
+from analytic import bifurcation
 from compare.claims.claim import Bearing, Claim, When, given
-from compare.claims.judge import remembered
+from compare.claims.judge import theory
 from compare.claims.stationary import number
 from compare.measure.record import Measurement
 from compare.measure.settling import scale
-from model import Case, Parameters
+from model import Case
 
 SLIPPING = "floor force of settled slipping → 0"
 """How omega_02 is measured where slipping at both points ends without a fold: that is a claim of its own."""
 
 
-@remembered
-def _thresholds(p: Parameters) -> analytic.Thresholds:
-    return analytic.thresholds(p)
-
-
-@remembered
-def _unstable(p: Parameters) -> StationarySolution:
-    return analytic.solution(p, Case.SS, stable=False)
-
-
-def _passes_over(m: Measurement) -> bool:
-    return m.conditions["by"] == SLIPPING
-
-
 def _in_a_jump(m: Measurement) -> bool:
-    return not _passes_over(m)
+    return m.conditions["by"] != SLIPPING
 
 
 def _at(quantity: str, when: When = _in_a_jump, protocol: str = "thresholds") -> Bearing:
     """A threshold."""
 
     def predict(m: Measurement) -> float:
-        return float(getattr(_thresholds(m.parameters), quantity))
+        return float(getattr(theory(analytic.thresholds, m.parameters), quantity))
 
     return Bearing(protocol, quantity, predict, when=when, by=f"analytic.thresholds: {quantity}")
 
 
 def _edge(name: str) -> Bearing:
     """A quantity of the unstable state."""
-    return Bearing(
-        "edge",
-        f"edge_{name}",
-        lambda m: number(name, _unstable(m.parameters), m.parameters),
-        size=lambda m: scale(name, m.parameters),
-        by="analytic.solution: SS beyond the fold, (37)-(41)",
-    )
+
+    def predict(m: Measurement) -> float:
+        unstable = theory(analytic.solution, m.parameters, Case.SS, stable=False)
+        return number(name, unstable, m.parameters)
+
+    size, by = (lambda m: scale(name, m.parameters)), "analytic.solution: SS beyond the fold, (37)-(41)"
+    return Bearing("edge", f"edge_{name}", predict, size=size, by=by)
 
 
 def _folds(m: Measurement) -> float:
@@ -60,19 +46,11 @@ def _folds(m: Measurement) -> float:
     p = m.parameters
     if not p.eta < p.j:
         raise LookupError("no branch of slipping at both points for eta > j")
-    return float(p.eta > _thresholds(p).eta_cr)
+    return float(p.eta > theory(analytic.thresholds, p).eta_cr)
 
 
 def _has_fold(m: Measurement) -> float:
-    return float(math.isfinite(_thresholds(m.parameters).omega_04))
-
-
-def _number_of_folds(m: Measurement) -> float:
-    return float(bifurcation.number_of_folds(m.parameters))
-
-
-def _critical_drag(m: Measurement) -> float:
-    return bifurcation.critical_drag(m.parameters)
+    return float(math.isfinite(theory(analytic.thresholds, m.parameters).omega_04))
 
 
 CLAIMS = (
@@ -119,14 +97,26 @@ CLAIMS = (
         "the wall at ω₀₂, without a jump.",
         (
             Bearing("thresholds", "folds", _folds, by="analytic.thresholds: eta_cr"),
-            Bearing("birth", "critical_drag", _critical_drag, by="analytic.bifurcation.critical_drag"),
-            _at("omega_02", _passes_over),
+            Bearing(
+                "birth",
+                "critical_drag",
+                lambda m: bifurcation.critical_drag(m.parameters),
+                by="analytic.bifurcation.critical_drag",
+            ),
+            _at("omega_02", given(by=SLIPPING)),
         ),
     ),
     Claim(
         "one-fold",
         "after Prop. 7",
         "There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
-        (Bearing("thresholds", "folds", _number_of_folds, by="analytic.bifurcation.number_of_folds"),),
+        (
+            Bearing(
+                "thresholds",
+                "folds",
+                lambda m: float(bifurcation.number_of_folds(m.parameters)),
+                by="analytic.bifurcation.number_of_folds",
+            ),
+        ),
     ),
 )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import analytic
 from compare.claims.claim import Bearing, Claim, Text, When, every, given, one
-from compare.claims.judge import remembered
+from compare.claims.judge import theory
 from compare.claims.stationary import (
     cases,
     detected,
@@ -18,12 +18,7 @@ from compare.claims.stationary import (
     slips_first,
 )
 from compare.measure.record import Measurement
-from model import Case, Parameters
-
-
-@remembered
-def _slope(p: Parameters, case: Case) -> float:
-    return analytic.characteristic_slope(p, case)
+from model import Case
 
 
 def _slopes(by: str, predict: Callable[[Measurement], float], function: str, *cases: Case) -> Bearing:
@@ -32,9 +27,8 @@ def _slopes(by: str, predict: Callable[[Measurement], float], function: str, *ca
     return Bearing("slope", "slope", predict, when=when, size=one, by=f"analytic.{function}")
 
 
-def _along_curve(*cases: Case) -> Bearing:
-    """Slopes between neighbours on the characteristic curve."""
-    return _slopes("neighbours", lambda m: _slope(m.parameters, detected(m)), "characteristic_slope", *cases)
+def _local(m: Measurement) -> float:
+    return theory(analytic.characteristic_slope, m.parameters, detected(m))
 
 
 def _settled(quantity: str, predict: Callable[[Measurement], float], when: When) -> Bearing:
@@ -76,22 +70,18 @@ def _branch(m: Measurement) -> Case:
     return next(iter(here or states))
 
 
-def _case(m: Measurement) -> float:
-    return float(_branch(m))
-
-
 def _reading(m: Measurement) -> float:
     case = _branch(m)
     return next(float(s.state.omega_c) for s in lasting(m.parameters) if s.case is case)
 
 
-def _stays(m: Measurement) -> bool:
-    """Whether there is a flow, and the ball doesn't sink."""
-    return m.parameters.omega_0 > 0 and detected(m) is not Case.NS
-
-
 def _flows(m: Measurement) -> bool:
     return m.parameters.omega_0 > 0
+
+
+def _stays(m: Measurement) -> bool:
+    """Whether there is a flow, and the ball doesn't sink."""
+    return _flows(m) and detected(m) is not Case.NS
 
 
 CLAIMS = (
@@ -99,13 +89,13 @@ CLAIMS = (
         "slope-rolling",
         "Section 5.3",
         "Rolling at both points, or carried by the wall alone, the ball reads the flow: dω_c/dω₀ = 1.",
-        (_along_curve(Case.RR, Case.NR),),
+        (_slopes("neighbours", _local, "characteristic_slope", Case.RR, Case.NR),),
     ),
     Claim(
         "slope-slipping",
         "Section 5.3, (38), (41)",
         "While the ball slips at both points its reading rises by (38), (41), at first hardly at all.",
-        (_along_curve(Case.SS),),
+        (_slopes("neighbours", _local, "characteristic_slope", Case.SS),),
     ),
     Claim(
         "slope-jump",
@@ -151,7 +141,7 @@ CLAIMS = (
         "Fig. 13, left",
         "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
         (
-            Bearing("hysteresis", "case", _case, by="analytic.stable_solutions"),
+            Bearing("hysteresis", "case", lambda m: float(_branch(m)), by="analytic.stable_solutions"),
             Bearing("hysteresis", "omega_c", _reading, size=natural_size, by="(32), (38), (46)"),
         ),
         text=Text.CORRECTED,

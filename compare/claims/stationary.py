@@ -7,31 +7,23 @@ from collections.abc import Callable, Iterable
 import analytic
 from analytic import StationarySolution, bifurcation
 from compare.claims.claim import Bearing, Claim, Text, When, every, given
-from compare.claims.judge import remembered
+from compare.claims.judge import theory
 from compare.measure.record import Measurement
-from compare.measure.settling import FORCES, SUMS, family, scale
+from compare.measure.settling import FORCES, SUMS, family, forces, scale
 from model import Case, Parameters
 from model.arrays import Array
-from model.kinematics import VARIABLES
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
 
 
-@remembered
-def lasting(p: Parameters) -> tuple[StationarySolution, ...]:
+def lasting(p: Parameters) -> list[StationarySolution]:
     """The stationary solutions that a ball may settle to: those that attract, and the one that sinks for ever."""
-    return tuple(analytic.stable_solutions(p, sinking=True))
+    return theory(analytic.stable_solutions, p, sinking=True)
 
 
 def cases(p: Parameters) -> set[Case]:
     """Cases of the states that last; SR, the state of NR on an unloaded floor, is none of its own."""
     return {s.case for s in lasting(p)} - {Case.SR}
-
-
-@remembered
-def solution(p: Parameters, case: Case) -> StationarySolution:
-    """The stable solution of a case; `InputError` if theory has none."""
-    return analytic.solution(p, case)
 
 
 def detected(m: Measurement) -> Case:
@@ -45,15 +37,15 @@ def detected(m: Measurement) -> Case:
 
 def reached(m: Measurement) -> StationarySolution:
     """The lasting state of the case that was detected; LookupError if theory has none."""
-    state = next((s for s in lasting(m.parameters) if s.case is detected(m)), None)
-    if state is None:
-        raise LookupError(f"no state of case {detected(m).name} lasts")
-    return state
+    for state in lasting(m.parameters):
+        if state.case is detected(m):
+            return state
+    raise LookupError(f"no state of case {detected(m).name} lasts")
 
 
 def leaning(m: Measurement) -> StationarySolution:
     """The state of SR."""
-    return solution(m.parameters, Case.SR)
+    return theory(analytic.solution, m.parameters, Case.SR)
 
 
 def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
@@ -62,15 +54,12 @@ def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
         return float(bifurcation.wall_spin(s.state, p))
     if quantity.startswith("force_"):
         return force(quantity.removeprefix("force_"), s.force_A, s.force_B)
-    return float(s.x[VARIABLES.index(quantity)])
+    return float(getattr(s.state, quantity))
 
 
 def force(name: str, A: Array, B: Array) -> float:
-    """A component of the contact forces (3,), such as "Ax", or the sum or difference of two, such as "Ax-By"."""
-    one = float((A if name[0] == "A" else B)["xyz".index(name[1])])
-    if len(name) == 2:
-        return one
-    return one + float(f"{name[2]}1") * force(name[3:], A, B)
+    """A component of the contact forces (3,), such as "Ax", or a sum that mechanics determine, such as "Ax-By"."""
+    return float(forces(A, B)[name])
 
 
 def case(m: Measurement) -> float:
@@ -93,7 +82,7 @@ def case(m: Measurement) -> float:
 
 def rolling(m: Measurement) -> float:
     """RR as long as it exists, (84) and (86); beyond, anything but RR."""
-    t = analytic.thresholds(m.parameters)
+    t = theory(analytic.thresholds, m.parameters)
     limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
     if m.parameters.omega_0 < limit:
         return float(Case.RR)
@@ -148,9 +137,8 @@ def _cases(when: When) -> Bearing:
 
 
 def _with_fluid(when: When = lambda m: True) -> Bearing:
-    return Bearing(
-        "settled", "case", rolling, when=every(given(start="with the fluid"), when), by="analytic.thresholds"
-    )
+    chosen = every(given(start="with the fluid"), when)
+    return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 
 
 def _plane(figure: str, source: str, axis: str) -> Claim:
@@ -173,7 +161,11 @@ CLAIMS = (
         "Prop. 1, (30)-(32)",
         "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
         "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j).",
-        (*bearings((*MOTION, *SUMS), _ROLLS, by="(31), (32)"), _cases(_ROLLS), _with_fluid()),
+        (
+            *bearings((*MOTION, *SUMS), _ROLLS, by="(31), (32)"),
+            _cases(_ROLLS),
+            _with_fluid(),
+        ),
     ),
     Claim(
         "prop-1-rough",
@@ -188,7 +180,7 @@ CLAIMS = (
         bearings(
             ("omega_c", "slip_x", "slip_z", "v_y", *FORCES),
             is_in(Case.RS),
-            lambda m: solution(m.parameters, Case.RS),
+            lambda m: theory(analytic.solution, m.parameters, Case.RS),
             by="(33), (34)",
         ),
     ),
@@ -210,14 +202,20 @@ CLAIMS = (
         "Prop. 4, (37)-(42)",
         "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
         "its contact forces are (42)-(44).",
-        (*bearings(_STATE, _SLIPS, by="(37)-(44)"), _cases(_SLIPS)),
+        (
+            *bearings(_STATE, _SLIPS, by="(37)-(44)"),
+            _cases(_SLIPS),
+        ),
     ),
     Claim(
         "prop-6",
         "Prop. 6, (49), (50)",
         "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
         "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
-        (*bearings(_STATE, _SINKS, by="(49), (50)"), _cases(_SINKS)),
+        (
+            *bearings(_STATE, _SINKS, by="(49), (50)"),
+            _cases(_SINKS),
+        ),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
     ),

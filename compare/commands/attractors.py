@@ -82,22 +82,20 @@ def attractor_data(of: Attractor) -> dict[str, Any]:
     states = {"mean": orbit.mean if orbit else run.x.mean(axis=0), "low": run.x.min(axis=0), "high": run.x.max(axis=0)}
     # Those of a period, or those of the last window in the order in which they first come up.
     cases = orbit.cases if orbit else dict.fromkeys(fate.last.cases)
-    data: dict[str, Any] = plain(
-        {
-            "kind": fate.kind.value,
-            "cases": [case.name for case in cases],
-            "count": of.count,
-            "starts": of.starts,
-            "share": of.share,
-            "share_95": of.interval,
-            "period": orbit.period if orbit else fate.period,
-            "period_in_the_run": fate.period,
-            "multipliers": [[v.real, v.imag] for v in orbit.multipliers] if orbit else [],
-            "lyapunov": fate.exponent,
-            "theory": fate.solution.case.name if fate.solution else "orbit" if orbit else None,
-        }
-    )
-    data |= {name: dict(zip(VARIABLES, x.tolist(), strict=True)) for name, x in states.items()}
+    data: dict[str, Any] = {
+        "kind": fate.kind.value,
+        "cases": [case.name for case in cases],
+        "count": of.count,
+        "starts": of.starts,
+        "share": of.share,
+        "share_95": of.interval,
+        "period": orbit.period if orbit else fate.period,
+        "period_in_the_run": fate.period,
+        "multipliers": [[v.real, v.imag] for v in orbit.multipliers] if orbit else [],
+        "lyapunov": fate.exponent,
+        "theory": fate.solution.case.name if fate.solution else "orbit" if orbit else None,
+    }
+    data = plain(data) | {name: dict(zip(VARIABLES, x.tolist(), strict=True)) for name, x in states.items()}
     return data | {"failure": fate.failure}
 
 
@@ -116,38 +114,49 @@ def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
         }
 
     places = [
-        {"kind": place.kind.value, "value": place.value, "reason": place.reason, "orbit": data(place.orbit)}
-        for place in branch.places
+        {"kind": p.kind.value, "value": p.value, "reason": p.reason, "orbit": data(p.orbit)} for p in branch.places
     ]
     return {"parameter": branch.name, "places": places, "orbits": list(map(data, branch.orbits))}
 
 
-_COLUMNS = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
-
-
 def _rows(data: dict[str, Any]) -> pages.Rows:
+    """A row for each attractor of each set."""
     varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
-    body = [
-        [*(f"{each[name]:.6g}" for name in varied), *_cells(row)] for each in data["sets"] for row in each["attractors"]
-    ]
-    return [[*varied, *_COLUMNS], *body]
+    head = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
+    rows = [[*varied, *head]]
+    for each in data["sets"]:
+        for row in each["attractors"]:
+            low, high = row["share_95"]
+            exponent = f"exponent {row['lyapunov']:.2g}/s" if row["lyapunov"] is not None else "none"
+            cells = [
+                row["kind"],
+                " ".join(row["cases"]),
+                f"{row['count']}/{row['starts']} ({low:.2f}–{high:.2f})",
+                f"{row['period']:.6g}" if row["period"] else "-",
+                f"{row['mean']['omega_c']:.6g} ({row['low']['omega_c']:.5g}–{row['high']['omega_c']:.5g})",
+                f"{1e3 * row['high']['y']:.4g}",
+                f"{_largest(row):.4g}" if row["multipliers"] else "-",
+                row["theory"] or row["failure"] or exponent,
+            ]
+            rows.append([*(f"{each[name]:.6g}" for name in varied), *cells])
+    return rows
 
 
 def _table(data: dict[str, Any]) -> Table:
-    caption = "\n".join(_way(branch) for each in data["sets"] for branch in each["branches"])
-    return pages.table(f"What balls come to ({data['engine']})", _rows(data), caption=caption)
+    lines = []
+    for branch in (branch for each in data["sets"] for branch in each["branches"]):
+        name, values = branch["parameter"], [orbit[branch["parameter"]] for orbit in branch["orbits"]]
+        lines.append(f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:")
+        lines += [f"  {place['kind']} at {place['value']:.7g} {place['reason']}" for place in branch["places"]]
+    return pages.table(f"What balls come to ({data['engine']})", _rows(data), caption="\n".join(lines))
 
 
 def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) -> str:
     """The same in Markdown, with the parameters, the command that writes it and the orbits of each branch."""
     values = (f"{f.metadata['symbol']} = {getattr(p, f.name):.5g} {f.metadata['unit']}" for f in p.quantities())
     given = ", ".join(value.removesuffix(" 1") for value in values)
-    lines = [
-        f"# {title}: what balls come to",
-        "",
-        f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by",
-        "",
-    ]
+    lines = [f"# {title}: what balls come to", ""]
+    lines += [f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by", ""]
     lines += ["```sh", shlex.join(words), "```", "", pages.markdown(_rows(data))]
     for branch in (branch for each in data["sets"] for branch in each["branches"]):
         name = branch["parameter"]
@@ -164,26 +173,3 @@ def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) 
 def _largest(row: dict[str, Any]) -> float:
     """The largest modulus of the multipliers; nan if there are none."""
     return max((abs(complex(*each)) for each in row["multipliers"]), default=math.nan)
-
-
-def _cells(row: dict[str, Any]) -> list[str]:
-    """An attractor as cells of the table."""
-    low, high = row["share_95"]
-    exponent = f"exponent {row['lyapunov']:.2g}/s" if row["lyapunov"] is not None else "none"
-    return [
-        row["kind"],
-        " ".join(row["cases"]),
-        f"{row['count']}/{row['starts']} ({low:.2f}–{high:.2f})",
-        f"{row['period']:.6g}" if row["period"] else "-",
-        f"{row['mean']['omega_c']:.6g} ({row['low']['omega_c']:.5g}–{row['high']['omega_c']:.5g})",
-        f"{1e3 * row['high']['y']:.4g}",
-        f"{_largest(row):.4g}" if row["multipliers"] else "-",
-        row["theory"] or row["failure"] or exponent,
-    ]
-
-
-def _way(branch: dict[str, Any]) -> str:
-    """What happens along a branch, in lines."""
-    values = [orbit[branch["parameter"]] for orbit in branch["orbits"]]
-    first = f"Followed in {branch['parameter']}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:"
-    return "\n".join([first, *(f"  {p['kind']} at {p['value']:.7g} {p['reason']}" for p in branch["places"])])

@@ -50,7 +50,6 @@ _MODULES = {
     "look": ("report", "figures", "inspect", "render", "view"),
     "grade": ("grade",),
     "league": ("league",),
-    "benchmark": ("benchmark",),
 }
 """The commands in each module of this package: `predict` doesn't wait for the engines and figures of the others."""
 
@@ -66,8 +65,6 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     asked = [module for module, names in _MODULES.items() if words[0:1] and words[0] in names]
     for module in asked or _MODULES:
         importlib.import_module(f"compare.commands.{module}").add(commands)
-    if not asked:
-        importlib.import_module("compare.commands.completion").add(parser)
     return parser
 
 

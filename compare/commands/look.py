@@ -66,10 +66,10 @@ def report(args: argparse.Namespace) -> int:
 def figures(args: argparse.Namespace) -> int:
     """Draw every figure; one whose results are missing is named."""
     from compare import validation  # here, because drawing takes a second to load
-    from compare.figures import gallery
+    from compare.figures import registry
 
     stored = validation.stored_material(args.results)
-    for name, gap in gallery.write(args.output, stored, tuple(args.format or ["svg"])):
+    for name, gap in registry.write(args.output, stored, args.format or ["svg"]):
         print(f"{args.output / name}: {gap or 'written'}")
     return 0
 
@@ -82,9 +82,9 @@ def inspect(args: argparse.Namespace) -> int:
         options.show(collection.describe(args.file), collection.table, args.json)
         return 0
     if args.plot:
-        from compare.figures import gallery, trajectory  # here, because drawing takes a second to load
+        from compare.figures import drawing, trajectory  # here, because drawing takes a second to load
 
-        gallery.save(trajectory.draw(storage.load(args.file)), args.plot)
+        drawing.save(trajectory.draw(storage.load(args.file)), args.plot)
     options.show(inspection.describe(args.file), inspection.table, args.json)
     return 0
 

@@ -106,8 +106,8 @@ def add_processes(options: Any) -> None:
 def campaign(args: argparse.Namespace, doing: str, directory: str = "", **more: Any) -> Iterator[Campaign]:
     """A campaign in a directory of ``--output`` by the workers that are named, whose progress is shown."""
     with (
-        progress.shown(args.quiet or args.json) as show,
-        Campaign(args.output / directory, workers(args), limit=args.limit, report=progress.counted(show), doing=doing, **more) as made,
+        progress.shown(args.quiet or args.json, counted=True) as show,
+        Campaign(args.output / directory, workers(args), limit=args.limit, report=show, doing=doing, **more) as made,
     ):
         yield made
 

@@ -12,8 +12,8 @@ from rich.markdown import Markdown
 
 from analytic.ensemble import interval
 from compare.commands import options, running
-from compare.runs import basins, progress, regions, search
-from compare.runs.search import BOX, Search, Searched
+from compare.runs import progress, search
+from compare.runs.search import BOX, FATES, Search, Searched
 from compare.runs.sweep import Axis
 from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
@@ -28,7 +28,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--seed", type=int, default=0)
     options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
     running.add_workers(command)
-    command.add_argument("--kept", action="store_true", help="show the results that come with the program instead")
+    command.add_argument("--kept", type=Path, nargs="+", metavar="FILE", help="show what --save wrote instead")
     command.add_argument("--save", type=Path, metavar="FILE", help="write the sets with hopping as JSON")
     command.add_argument("--page", type=Path, metavar="FILE", help="write the table as Markdown")
     options.outputs(command, "search", "print the sets with hopping as JSON")
@@ -51,26 +51,25 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Search what hasn't been searched yet, and show the table."""
-    searches = [regions.kept(name) for name in regions.KEPT] if args.kept else [_searched(args)]
+    if args.kept:
+        searches = [Searched.load(path) for path in args.kept]
+    else:
+        count, starts = (
+            int(check_number(name, getattr(args, name), name, Range(1, whole=True))) for name in ("sets", "starts")
+        )
+        axes = [Axis.parse(text, dict.fromkeys(BOX, "1"), "group", POSITIVE) for text in args.range]
+        asked = Search(BOX | {axis.name: axis.ends for axis in axes}, starts, args.seed)
+        with progress.shown(args.quiet or args.json) as show:
+            searches = [search.run(args.output, asked, count, running.workers(args), show)]
     if args.save:
         searches[0].save(args.save)
     if args.page:
-        write_text(args.page, regions.page(*searches))
+        write_text(args.page, search.page(*searches))
     if args.json:
         print(json.dumps([dataclasses.asdict(each) for each in searches], indent=1))
     else:
-        Console().print(Markdown(regions.page(*searches)))
+        Console().print(Markdown(search.page(*searches)))
     return 0
-
-
-def _searched(args: argparse.Namespace) -> Searched:
-    count = int(check_number("sets", args.sets, "sets", Range(1, whole=True)))
-    starts = int(check_number("starts", args.starts, "starts", Range(1, whole=True)))
-    units = dict.fromkeys(BOX, "1")
-    axes = [Axis.parse(text, units, "group", POSITIVE) for text in args.range]
-    searched = Search(BOX | {axis.name: axis.ends for axis in axes}, starts, args.seed)
-    with progress.shown(args.quiet or args.json) as show:
-        return search.run(args.output, searched, count, running.workers(args), show)
 
 
 def plane(args: argparse.Namespace) -> int:
@@ -80,10 +79,10 @@ def plane(args: argparse.Namespace) -> int:
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
     with running.campaign(args, "basins") as campaign:
-        mapped = basins.basins(campaign, p, running.start(args)._asdict(), across, up, coarse, args.timestep)
+        mapped = search.basins(campaign, p, running.start(args)._asdict(), across, up, coarse, args.timestep)
     if args.save:
         mapped.save(args.save)
-    shares = {fate: mapped.share(fate) for fate in basins.FATES if mapped.share(fate)[0]}
+    shares = {fate: mapped.share(fate) for fate in FATES if mapped.share(fate)[0]}
     differ = mapped.differences().tolist() if coarse else []
     if args.json:
         print(json.dumps({"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}))

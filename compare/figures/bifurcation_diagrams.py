@@ -61,73 +61,57 @@ def caption(of: Diagram) -> str:
 
 def draw(of: Diagram) -> Figure:
     """One diagram, with both scales."""
-    figure = style.figure(5.8, 4.1)
-    axes = figure.add_subplot()
-    draws = {"fig-9": _figure_9, "fig-10": _figure_10, "fig-11": _figure_11, "fig-12": _figure_12}
-    values = draws[of.figure](axes, of.p)
+    figure, p = style.figure(5.8, 4.1), of.p
+    axes, t = figure.add_subplot(), bifurcation.thresholds(of.p)
+    guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
+    bottom, top = 0.0, 2 * t.omega_02
+    if of.figure == "fig-9":
+        guides = {"omega_02": t.omega_02}
+        _branch(axes, p, Case.NS, 1e-3 * t.omega_02, (1 - 1e-9) * t.omega_02, "NS", (0.35, (-4, 6)))
+        _branch(axes, p, Case.NR, t.omega_02, top, "NR", (0.5, (4, 6)))
+        style.mark(axes, t.omega_02, lifted(t.omega_02, p), "P2", (0, 8))
+    elif of.figure == "fig-10":
+        del guides["omega_03"]
+        top = 1.25 * t.omega_04
+        _branch(axes, p, Case.RR, 0.0, t.omega_01)
+        slipping(axes, p, partial(spin, p), (0.5, (0, -7)), (0.4, (6, 6)))
+        _branch(axes, p, Case.SR, t.omega_02, top, "SR", (0.85, (-5, -5)))
+        style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (-6, 4))
+        style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-4, -6))
+        style.mark(axes, t.omega_04, float(bifurcation.wall_spin(fold_state(p), p)), "F", (4, -6))
+    elif of.figure == "fig-11":
+        guides = {"omega_02": t.omega_02, "omega_03": t.omega_03}
+        top = 1.6 * t.omega_03
+        _branch(axes, p, Case.RR, 0.0, t.omega_03)
+        _branch(axes, p, Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.4, (6, 4)), UNSTABLE)
+        _branch(axes, p, Case.SR, t.omega_03, top, "SR", (0.5, (4, 6)))
+        for w in (t.omega_02, t.omega_03):
+            axes.plot([w], [lifted(w, p)], **style.POINT)
+    else:
+        curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
+        guides |= {name: float(curves[name] * np.sqrt(p.g / p.R)) for name in ("omega_01", "omega_04")}
+        omega_01, omega_04 = guides["omega_01"], guides["omega_04"]
+        bottom, top = (edge + part * (omega_04 - t.omega_02) for edge, part in ((t.omega_02, -0.5), (omega_04, 0.35)))
+        _branch(axes, p, Case.RR, bottom, t.omega_03)
+        _branch(axes, p, Case.RR, t.omega_03, omega_01, "RR, virtual", (0.6, (-4, 4)), UNSTABLE)
+        slipping(axes, p, partial(spin, p), (0.5, (0, 7)), (0.35, (0, 7)))
+        _branch(axes, p, Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.5, (-20, 60)), UNSTABLE)
+        _branch(axes, p, Case.SR, t.omega_03, top, "SR", (0.35, (-5, -5)))
+        style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
+        style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (0, -8))
+        style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-6, 4))
+        style.mark(axes, omega_04, float(bifurcation.wall_spin(fold_state(p, released=True), p)), "F", (7, 0))
+        for s in branch_stability.hopf_places(p):
+            x, omega_0 = branch_stability.states(s, p)
+            style.mark(axes, float(omega_0), float(bifurcation.wall_spin(State.of(x), p)), "H", (5, -6))
+    axes.set(xlim=(bottom, top), ylim=(0, 1.12 * axes.get_ylim()[1]), xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
+    if of.figure == "fig-12":
+        axes.set_ylim(0.75 * t.omega_03 * p.R / p.r, 1.15 * guides["omega_01"] * p.R / p.r)
     style.points(axes, of.states)
-    axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
-    style.guides(axes, values)
+    style.guides(axes, guides)
     style.legend(axes, loc="upper left")
-    style.dimensionless(axes, of.p, style.FREE_0, style.FREE_X)
+    style.dimensionless(axes, p, style.FREE_0, style.FREE_X)
     return figure
-
-
-def _figure_9(axes: Axes, p: Parameters) -> dict[str, float]:
-    t = bifurcation.thresholds(p)
-    below = np.linspace(1e-3, 1 - 1e-9, 100) * t.omega_02
-    style.curve(axes, Case.NS, below, spins(Case.NS, below, p), "NS", (0.35, (-4, 6)))
-    _lifting(axes, p, t.omega_02, 2 * t.omega_02, "NR", (0.5, (4, 6)), case=Case.NR)
-    style.mark(axes, t.omega_02, lifted(t.omega_02, p), "P2", (0, 8))
-    _frame(axes, 0.0, 2 * t.omega_02)
-    return {"omega_02": t.omega_02}
-
-
-def _figure_10(axes: Axes, p: Parameters) -> dict[str, float]:
-    t = bifurcation.thresholds(p)
-    top = 1.25 * t.omega_04
-    _rolling(axes, p, 0.0, t.omega_01)
-    slipping(axes, p, partial(spin, p), (0.5, (0, -7)), (0.4, (6, 6)))
-    _lifting(axes, p, t.omega_02, top, "SR", (0.85, (-5, -5)))
-    style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (-6, 4))
-    style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-4, -6))
-    style.mark(axes, t.omega_04, float(bifurcation.wall_spin(fold_state(p), p)), "F", (4, -6))
-    _frame(axes, 0.0, top)
-    return {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_04")}
-
-
-def _figure_11(axes: Axes, p: Parameters) -> dict[str, float]:
-    t = bifurcation.thresholds(p)
-    top = 1.6 * t.omega_03
-    _rolling(axes, p, 0.0, t.omega_03)
-    _lifting(axes, p, t.omega_02, t.omega_03, "SR, unstable", (0.4, (6, 4)), UNSTABLE)
-    _lifting(axes, p, t.omega_03, top, "SR", (0.5, (4, 6)))
-    for w in (t.omega_02, t.omega_03):
-        axes.plot([w], [lifted(w, p)], **style.POINT)
-    _frame(axes, 0.0, top)
-    return {"omega_02": t.omega_02, "omega_03": t.omega_03}
-
-
-def _figure_12(axes: Axes, p: Parameters) -> dict[str, float]:
-    t, unit = bifurcation.thresholds(p), np.sqrt(p.g / p.R)
-    curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
-    omega_01, omega_04 = (float(curves[name] * unit) for name in ("omega_01", "omega_04"))
-    top, bottom = omega_04 + 0.35 * (omega_04 - t.omega_02), t.omega_02 - 0.5 * (omega_04 - t.omega_02)
-    _rolling(axes, p, bottom, t.omega_03)
-    _rolling(axes, p, t.omega_03, omega_01, "RR, virtual", (0.6, (-4, 4)), UNSTABLE)
-    slipping(axes, p, partial(spin, p), (0.5, (0, 7)), (0.35, (0, 7)))
-    _lifting(axes, p, t.omega_02, t.omega_03, "SR, unstable", (0.5, (-20, 60)), UNSTABLE)
-    _lifting(axes, p, t.omega_03, top, "SR", (0.35, (-5, -5)))
-    style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
-    style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (0, -8))
-    style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-6, 4))
-    style.mark(axes, omega_04, float(bifurcation.wall_spin(fold_state(p, released=True), p)), "F", (7, 0))
-    for s in branch_stability.hopf_places(p):
-        x, omega_0 = branch_stability.states(s, p)
-        style.mark(axes, float(omega_0), float(bifurcation.wall_spin(State.of(x), p)), "H", (5, -6))
-    _frame(axes, bottom, top)
-    axes.set_ylim(0.75 * t.omega_03 * p.R / p.r, 1.15 * omega_01 * p.R / p.r)
-    return {"omega_01": omega_01, "omega_02": t.omega_02, "omega_03": t.omega_03, "omega_04": omega_04}
 
 
 def spin(p: Parameters, slip_x: Array, omega_c: Array) -> Array:
@@ -135,12 +119,8 @@ def spin(p: Parameters, slip_x: Array, omega_c: Array) -> Array:
     return np.asarray(bifurcation.wall_spin(State(omega_c=omega_c, slip_x=slip_x), p))
 
 
-def _frame(axes: Axes, bottom: float, top: float) -> None:
-    axes.set(xlim=(bottom, top), ylim=(0, 1.12 * axes.get_ylim()[1]))
-
-
 def spins(case: Case, flows: npt.ArrayLike, p: Parameters) -> list[float]:
-    """omega_x^0, rad s-1, of NR (that of SR is the same) or NS at flows, also where they are formal."""
+    """omega_x^0, rad s-1, of a case at flows, also where it is formal; that of SR is that of NR."""
     sets = [p.replace(omega_0=float(flow)) for flow in np.ravel(flows)]
     return [float(bifurcation.wall_spin(analytic.solution(q, case, formal=True).state, q)) for q in sets]
 
@@ -150,31 +130,20 @@ def lifted(omega_0: float, p: Parameters) -> float:
     return spins(Case.NR, omega_0, p)[0]
 
 
-def _rolling(
+def _branch(
     axes: Axes,
     p: Parameters,
+    case: Case,
     begin: float,
     end: float,
     text: str = "RR",
     place: Place = (0.5, (-5, 5)),
     line: style.Line = style.STABLE,
 ) -> None:
-    omega = np.array([begin, end])
-    style.curve(axes, Case.RR, omega, omega * p.R / p.r, text, place, line)
-
-
-def _lifting(
-    axes: Axes,
-    p: Parameters,
-    begin: float,
-    end: float,
-    text: str,
-    place: Place,
-    line: style.Line = style.STABLE,
-    case: Case = Case.SR,
-) -> None:
-    omega = np.linspace(begin, end, 200)
-    style.curve(axes, case, omega, spins(Case.NR, omega, p), text, place, line)
+    """The spin on the wall in RR, SR, NR or NS from one flow to another, with its name."""
+    flows = np.linspace(begin, end, 200)
+    values = flows * p.R / p.r if case is Case.RR else spins(Case.NR if case is Case.SR else case, flows, p)
+    style.curve(axes, case, flows, values, text, place, line)
 
 
 def slipping(

@@ -112,8 +112,12 @@ def draw_figure_13(of: Diagram) -> Figure:
     figure = style.figure(6.0, 4.3)
     axes = figure.add_subplot()
     if p.eta < p.j:
-        _fold_curve(axes, p, top)
-        _jumps(axes, p)
+        t = _fold_curve(axes, p, top)
+        slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
+        look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
+        jumps = (t.omega_04, fold_state(p).omega_c, t.omega_04), (t.omega_02, t.omega_02, slow.state.omega_c)
+        for x, begin, end in jumps:
+            axes.annotate("", (x, float(end)), (x, float(begin)), arrowprops=look)
         for side, (mark, text) in _WAYS.items():
             style.points(axes, [m for m in of.states if m.conditions.get("side") == side], way=text, marker=mark)
         style.points(axes, [m for m in of.states if m.protocol == "edge"], way=", edge", ms=3.5)
@@ -139,23 +143,15 @@ def _top(p: Parameters) -> float:
     return 1.25 * t.omega_04 if p.eta < p.j else 1.6 * t.omega_03
 
 
-def _fold_curve(axes: Axes, p: Parameters, fastest: float) -> None:
-    """eta < j: rolling, slipping with its fold, and the line of SR and NR."""
+def _fold_curve(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
+    """eta < j: rolling, slipping with its fold, and the line of SR and NR; the thresholds."""
     t = bifurcation.thresholds(p)
     _line(axes, Case.RR, 0.0, t.omega_01, "RR", 0.5)
     slipping(axes, p, lambda _, omega_c: omega_c, (0.5, (0, -7)), (0.5, (38, -14)))
     _line(axes, Case.SR, t.omega_02, fastest, "SR, NR", 0.75)
     axes.set_xlim(0, fastest)
     style.guides(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in (1, 2, 4)})
-
-
-def _jumps(axes: Axes, p: Parameters) -> None:
-    t = bifurcation.thresholds(p)
-    slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
-    look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
-    jumps = (t.omega_04, fold_state(p).omega_c, t.omega_04), (t.omega_02, t.omega_02, slow.state.omega_c)
-    for x, begin, end in jumps:
-        axes.annotate("", (x, float(end)), (x, float(begin)), arrowprops=look)
+    return t
 
 
 def _plain_curve(axes: Axes, p: Parameters, fastest: float, apart: float = 0.0) -> None:

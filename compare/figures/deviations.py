@@ -1,4 +1,4 @@
-"""The numbers of a claim, each by how much of its tolerance it is off: a strip for every quantity."""
+"""Deviations of the numbers of a claim, divided by their tolerances: a strip for every quantity."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from compare.measure.quantities import quantity
 from compare.statistics import COVERAGE
 
 _WIDEST = 1.5
-"""Deviations over tolerance beyond this are drawn at the edge, as arrows."""
+"""Deviations beyond this multiple of the tolerance are drawn at the edge, as arrows."""
 _MANY = 100
 """From so many points on, they are drawn as pixels: a page of many figures stays small."""
 
@@ -40,7 +40,7 @@ def caption(checks: Checks) -> str:
     sets = dict.fromkeys(c.measurement.set for c in checks)
     alone = f"{next(iter(sets))}: {style.named(checks[0].measurement.parameters)}"
     return (
-        f"Measured less predicted, over the tolerance of each of the {len(checks)} numbers "
+        f"Measured less predicted, divided by the tolerance of each of the {len(checks)} numbers "
         f"({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}). Shaded: "
         "within tolerance, three standard uncertainties; darker: within one. Arrows: beyond the frame."
     )
@@ -58,7 +58,7 @@ def draw(checks: Checks) -> Figure:
     axes.axvline(0, **style.GUIDE)
     many = len(checks) > _MANY
     row = np.array([names.index(c.measurement.quantity) for c in checks])
-    # Neighbours one above the other, so that few points lie upon each other; one that is alone in the middle.
+    # Points are spread vertically against overlap; a single point stays centred.
     alone = np.bincount(row)[row] == 1
     lanes = row + np.where(alone, 0.0, 0.6 * ((np.arange(len(row)) * 0.618 + 0.5) % 1 - 0.5))
     ratio = np.array([c.deviation / c.tolerance for c in checks])

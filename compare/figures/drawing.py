@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from compare.measure.check import Check
 from compare.measure.record import Measurement, Records
-from model import Parameters, Trajectory, storage
+from model import Parameters, StorageError, Trajectory, storage
 
 if TYPE_CHECKING:  # it takes half a second to load, and much that hands over material never draws
     from matplotlib.figure import Figure
@@ -80,3 +80,16 @@ class Drawing:
     """The claims beside which it stands."""
     background: bool = False
     """Whether it explains the model rather than showing results."""
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure to a file, in the format that its name says; equal figures make equal files.
+
+    Raises `StorageError` if it can't be written or the name says no format.
+    """
+    date = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix)
+    try:
+        figure.savefig(path, dpi=200, metadata={date: None} if date else {})
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
+        raise StorageError(f"cannot write {path}: {reason}") from error

@@ -32,7 +32,6 @@ _LINES = {
     "omega_03": ("#E69F00", "-."),
     "omega_04": ("#D55E00", (0, (1, 1))),
 }
-_BOTH = "\nbistable"
 _BISTABLE = Exists.SS | Exists.SS_BEYOND_FOLD | Exists.SR | Exists.NR
 _TINTS = {
     Exists.RR | Exists.NS: "#e8f1f8",
@@ -122,17 +121,16 @@ def _regions(axes: Axes, p: Parameters, mu: Array, eta: Array, omega_0: Array) -
             shown = np.where((eta < p.j) & (name == "omega_03"), np.nan, curve * unit)
             axes.plot(eta, shown, color=colour, ls=line, lw=1.8, label=style.THRESHOLD_LABELS[name])
     for kind in kinds:
-        _label_regions(axes, plane == kind, eta, omega_0, _names(int(kind)))
+        _label_regions(axes, plane == kind, eta, omega_0, int(kind))
 
 
-def _names(kind: int) -> str:
+def _label_regions(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, kind: int) -> None:
+    """Write the cases at the widest spot of every connected region that has room for them, clear of sections.
+
+    The region with two stable motions is too narrow: its name stands at the top, with a line to where it belongs.
+    """
     names = [flag.name.replace("SS_BEYOND_FOLD", "SS*") for flag in Exists if flag & kind and flag.name]
     text = "\n".join(["  ".join(names[:2]), "  ".join(names[2:])]) if len(names) > 2 else "  ".join(names)
-    return text + (_BOTH if kind == _BISTABLE else "")
-
-
-def _label_regions(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, text: str) -> None:
-    """Write the cases at the widest spot of every connected region that has room for them, clear of sections."""
     regions, count = ndimage.label(where)
     near = np.any([np.abs(eta - section) < 0.035 for section in _SECTIONS], axis=0)
     for k, box in zip(range(1, count + 1), ndimage.find_objects(regions), strict=True):
@@ -141,27 +139,20 @@ def _label_regions(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0
         room = ndimage.distance_transform_edt(inside, sampling=(1.0, 0.55))[1:-1, 1:-1]
         room = np.where(near[box[1]][None, :], room / 4, room)
         row, column = np.unravel_index(np.argmax(room), room.shape)
-        if room[row, column] > 7:
-            here = float(eta[box[1]][column]), float(omega_0[box[0]][row])
-            if text.endswith(_BOTH):
-                _far_label(axes, here, text)
-            else:
-                style.name(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
-
-
-def _far_label(axes: Axes, here: tuple[float, float], text: str) -> None:
-    """A name at the top, with a line to where it belongs: the region itself is too narrow."""
-    look: dict[str, Any] = {"bbox": style.HALO, "arrowprops": {"arrowstyle": "-", "lw": 0.7, "color": "0.4"}}
-    axes.annotate(text, here, xytext=(0.31, 0.97), textcoords="axes fraction", fontsize=9, va="top", zorder=6, **look)
+        here = float(eta[box[1]][column]), float(omega_0[box[0]][row])
+        if room[row, column] > 7 and kind == _BISTABLE:
+            look: dict[str, Any] = {"bbox": style.HALO, "arrowprops": {"arrowstyle": "-", "lw": 0.7, "color": "0.4"}}
+            at: dict[str, Any] = {"xytext": (0.31, 0.97), "textcoords": "axes fraction", "va": "top"}
+            axes.annotate(f"{text}\nbistable", here, **at, **look, fontsize=9, zorder=6)
+        elif room[row, column] > 7:
+            style.name(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
 
 
 def _points(axes: Axes, plane: Plane) -> None:
+    def places(checks: Sequence[Check]) -> Array:
+        return np.transpose([(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks])
+
     for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items():
-        axes.plot(*_places(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
+        axes.plot(*places(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
     if failed := [check for check in plane.checks if not check.agrees]:
-        axes.plot(*_places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
-
-
-def _places(checks: Sequence[Check]) -> Array:
-    """Wall friction and flow of each, (2, n)."""
-    return np.transpose([(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks])
+        axes.plot(*places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")

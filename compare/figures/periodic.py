@@ -1,8 +1,4 @@
-"""Beyond the paper: the ball that hops for ever, and Figs. 9, 10 and 13 with the branch of such motions.
-
-The branch along rougher walls takes minutes; it is kept in `compare.runs`, as the command in
-docs/attractors/walls.md gives it.
-"""
+"""Beyond the paper: the ball that hops for ever, and Figs. 9, 10 and 13 with the branch of such motions."""
 
 from __future__ import annotations
 
@@ -25,13 +21,9 @@ from model import Case, Parameters, State
 from model.files import reading_json
 
 SET = Parameters.named("hopping")
-TOP, PERIOD = (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222
-"""About a state and the period of the orbit; Newton's method does the rest."""
 LOW, HIGH = 0.9, 1.4
 """Flows shown, in units of omega_02."""
 COLOUR = "#7B3294"
-Offset = tuple[float, float]
-"""Of a name from its curve, in points."""
 
 
 def select(material: Material) -> Diagram:
@@ -41,7 +33,8 @@ def select(material: Material) -> Diagram:
 
 @functools.cache
 def _orbit() -> orbits.Orbit:
-    return orbits.refine(SET, TOP, PERIOD)
+    """By Newton's method, from about a state and the period."""
+    return orbits.refine(SET, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222)
 
 
 @functools.cache
@@ -63,41 +56,32 @@ def caption_branch(of: Diagram) -> str:
 
 def draw_branch(of: Diagram) -> Figure:
     """omega_c and the spin on the wall over the flow."""
-    p, edge = of.p, bifurcation.thresholds(of.p).omega_02
-    figure = style.figure(9.0, 4.2)
-    orbit, wall = figure.subplots(1, 2)
-    _diagram(orbit, p, lambda slip_x, omega_c: omega_c, (-5, -7), (-5, 7), (-5, 12))
-    _diagram(wall, p, functools.partial(spin, p), (-5, 7), (-60, -50), (-18, -80))
+    edge = bifurcation.thresholds(of.p).omega_02
+    figure, (orbit, wall) = style.panels(9.0, 4.2, 1, 2)
+    _diagram(orbit, of.p, lambda slip_x, omega_c: omega_c, (-5, -7), (-5, 7), (-5, 12))
+    _diagram(wall, of.p, functools.partial(spin, of.p), (-5, 7), (-60, -50), (-18, -80))
     orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * HIGH * edge))
-    wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, p)))
+    wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, of.p)))
     style.points(orbit, of.states)
     style.legend(orbit, loc="center right")
     return figure
 
 
-def _diagram(axes: Axes, p: Parameters, quantity: Quantity, offset: Offset, riding: Offset, hopping: Offset) -> None:
-    """The diagram of a quantity; names stand at offsets that are clear of the curves: of SS, SR and NR, hopping."""
-    edge = bifurcation.thresholds(p).omega_02
-    carried, sinking = np.linspace(edge, HIGH * edge, 100), np.array([LOW, 1 - 1e-9]) * edge
+def _diagram(axes: Axes, p: Parameters, quantity: Quantity, *offsets: tuple[float, float]) -> None:
+    """The diagram of a quantity; names stand at offsets in points from the curves of SS, SR and NR, hopping."""
+    slips, rides, hops = offsets
+    edge, branch = bifurcation.thresholds(p).omega_02, _branch()
     slipping(axes, p, quantity)
     fast = p.replace(omega_0=0.95 * HIGH * edge)  # the branch goes on far beyond the frame
     for stable, text in ((True, "SS"), (False, "SS, unstable")):
         end = analytic.solution(fast, Case.SS, stable=stable).state
-        style.name(axes, fast.omega_0, float(quantity(end.slip_x, end.omega_c)), text, offset, style.COLOURS[Case.SS])
+        style.name(axes, fast.omega_0, float(quantity(end.slip_x, end.omega_c)), text, slips, style.COLOURS[Case.SS])
     for case, x, text, place in (
-        (Case.NR, carried, "SR, NR", (0.6, riding)),
-        (Case.NS, sinking, "NS", (0.5, (-3, 9))),
+        (Case.NR, np.linspace(edge, HIGH * edge, 100), "SR, NR", (0.6, rides)),
+        (Case.NS, np.array([LOW, 1 - 1e-9]) * edge, "NS", (0.5, (-3, 9))),
     ):
         slip = np.asarray(spins(case, x, p)) - p.R / p.r * x
         style.curve(axes, case, x, quantity(slip, x), text, place)
-    _hops(axes, quantity, hopping)
-    axes.set(xlim=(LOW * edge, HIGH * edge), xlabel=style.OMEGA_0)
-    style.guides(axes, {"omega_02": edge})
-
-
-def _hops(axes: Axes, quantity: Quantity, offset: Offset) -> None:
-    """The periodic branch: mean, least and greatest of a quantity over a period."""
-    branch = _branch()
     cycles = [quantity(orbit.cycle.slip_x, orbit.cycle.omega_c) for orbit in branch.orbits]
     means = State(*np.transpose([orbit.mean for orbit in branch.orbits]))
     mean = quantity(means.slip_x, means.omega_c)
@@ -105,11 +89,13 @@ def _hops(axes: Axes, quantity: Quantity, offset: Offset) -> None:
     axes.fill_between(branch.values, low, high, color=COLOUR, alpha=0.25, lw=0)
     for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
         axes.plot(branch.values, np.where(part, mean, np.nan), color=COLOUR, ls=line, lw=2)
-    style.name(axes, float(branch.values[-3]), float(mean[-3]), "hopping", offset, COLOUR)
-    for place in branch.places:
-        if place.kind is orbit_branch.Bifurcation.BIRTH:
-            born = State(*place.orbit.mean)
-            style.mark(axes, place.value, float(quantity(born.slip_x, born.omega_c)), "birth", (-10, -30))
+    style.name(axes, float(branch.values[-3]), float(mean[-3]), "hopping", hops, COLOUR)
+    for special in branch.places:
+        if special.kind is orbit_branch.Bifurcation.BIRTH:
+            born = State(*special.orbit.mean)
+            style.mark(axes, special.value, float(quantity(born.slip_x, born.omega_c)), "birth", (-10, -30))
+    axes.set(xlim=(LOW * edge, HIGH * edge), xlabel=style.OMEGA_0)
+    style.guides(axes, {"omega_02": edge})
 
 
 def caption_orbit(of: Diagram) -> str:
@@ -126,8 +112,7 @@ def caption_orbit(of: Diagram) -> str:
 def draw_orbit(of: Diagram) -> Figure:
     """Height over time, height over its rate, and height over the slip."""
     cycle = _orbit().cycle
-    figure = style.figure(9.0, 3.2)
-    axes = figure.subplots(1, 3, sharey=True)
+    figure, axes = style.panels(9.0, 3.2, 1, 3, sharey=True)
     shown = {"t (ms)": 1e3 * cycle.time, "$v_y$ (m/s)": cycle.v_y, "$\\tilde\\omega_x$ (rad/s)": cycle.slip_x}
     for ax, (label, x) in zip(axes, shown.items(), strict=True):
         for case in dict.fromkeys(cycle.cases):
@@ -140,54 +125,26 @@ def draw_orbit(of: Diagram) -> Figure:
 
 
 def walls() -> dict[str, Any]:
-    """The kept branch of hops over the friction of the wall."""
+    """The branch of hops over the friction of the wall, which takes minutes, kept as docs/attractors/walls.md says.
+
+    Hops of no height are none: ends of the branch are extrapolated from the last two orbits.
+    """
     path = Path(str(resources.files("compare.runs"))) / "hopping-walls.json"
     with reading_json(path, "branch") as data:
         branch: dict[str, Any] = data["sets"][0]["branches"][0]
-        return branch
+    orbits, places = branch["orbits"], branch["places"]
+    for place, (one, two), at in ((places[-1], orbits[:-3:-1], len(orbits)), (places[0], orbits[:2], 0)):
+        if place["kind"] == "nonsmooth birth":
+            share = (place["value"] - one["eta"]) / (two["eta"] - one["eta"])
+            end = {name: one[name] + share * (two[name] - one[name]) for name in ("eta", "height", "omega_c")}
+            place["orbit"] = end | {"stable": one["stable"]}
+            orbits.insert(at, place["orbit"])
+    return branch
 
 
 def select_walls(material: Material) -> Diagram:
     """The measured end of hopping."""
     return Diagram("hopping-walls", SET, tuple(material.select("orbit_death")))
-
-
-def draw_walls(of: Diagram) -> Figure:
-    """Height and mean omega_c of the hops over the friction of the wall."""
-    branch = walls()
-    orbits, places = branch["orbits"], branch["places"]
-    for k, beside in ((0, orbits[:2]), (-1, orbits[:-3:-1])):  # hops of no height are none: both ends are extrapolated
-        if places[k]["kind"] == "nonsmooth birth":
-            end = places[k]["orbit"] = _at(places[k]["value"], *beside)
-            orbits.insert(len(orbits) if k else 0, end)
-    figure = style.figure(9.0, 3.8)
-    shown = {"height": ("height of the hops (mm)", 1e3), "omega_c": ("mean " + style.OMEGA_C, 1.0)}
-    for axes, (quantity, (label, unit)) in zip(figure.subplots(1, 2), shown.items(), strict=True):
-        for rows, line in ((orbits, style.UNSTABLE), ([row for row in orbits if row["stable"]], style.STABLE)):
-            axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=COLOUR, ls=line, lw=2)
-        for place in places:
-            axes.plot(place["value"], unit * place["orbit"][quantity], **style.POINT)
-        for kind, (name, offset) in _NAMED.items():
-            place = next(place for place in places if place["kind"] == kind)
-            style.name(axes, place["value"], unit * place["orbit"][quantity], name, offset)
-        for m in of.states:
-            low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
-            axes.axvspan(low, high, color=style.mark_of(m.engine)["color"], alpha=0.4, label=f"{m.engine}: hops end")
-        axes.set(xlabel="η", ylabel=label)
-        axes.margins(0.2, 0.1)
-    style.legend(figure.axes[0], loc="upper left")
-    return figure
-
-
-def _at(eta: float, one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    """Where the line through two orbits is at another wall."""
-    share = (eta - one["eta"]) / (other["eta"] - one["eta"])
-    quantities = {name: one[name] + share * (other[name] - one[name]) for name in ("height", "omega_c")}
-    return {"eta": eta, "stable": one["stable"], **quantities}
-
-
-_NAMED = {"torus": ("torus", (8.0, 4.0)), "fold": ("fold", (8.0, 4.0)), "nonsmooth birth": ("birth", (-8.0, 5.0))}
-"""Names of places, and where they stand, in points."""
 
 
 def caption_walls(of: Diagram) -> str:
@@ -197,3 +154,28 @@ def caption_walls(of: Diagram) -> str:
     groups = style.named(of.p, "mu", "j", "kappa", "omega_0")
     what = f"Height and mean ω_c of the hopping ball over the friction of the wall: {places}"
     return f"{what}. {groups} rad/s. Dashed: unstable.{mark}"
+
+
+def draw_walls(of: Diagram) -> Figure:
+    """Height and mean omega_c of the hops over the friction of the wall."""
+    branch = walls()
+    orbits, places = branch["orbits"], branch["places"]
+    figure, panels = style.panels(9.0, 3.8, 1, 2)
+    shown = ("height", "height of the hops (mm)", 1e3), ("omega_c", "mean " + style.OMEGA_C, 1.0)
+    names = {"torus": ("torus", (8, 4)), "fold": ("fold", (8, 4)), "nonsmooth birth": ("birth", (-8, 5))}
+    for axes, (quantity, label, unit) in zip(panels, shown, strict=True):
+        for rows, line in ((orbits, style.UNSTABLE), ([row for row in orbits if row["stable"]], style.STABLE)):
+            axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=COLOUR, ls=line, lw=2)
+        named = dict(names)
+        for place in places:
+            x, y = place["value"], unit * place["orbit"][quantity]
+            axes.plot(x, y, **style.POINT)
+            if place["kind"] in named:
+                style.name(axes, x, y, *named.pop(place["kind"]))
+        for m in of.states:
+            low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
+            axes.axvspan(low, high, color=style.mark_of(m.engine)["color"], alpha=0.4, label=f"{m.engine}: hops end")
+        axes.set(xlabel="η", ylabel=label)
+        axes.margins(0.2, 0.1)
+    style.legend(panels[0], loc="upper left")
+    return figure

@@ -1,19 +1,20 @@
 """The figures of the report; those of the league and of a designed meter belong to their pages.
 
-To add one, write a module with what it selects, how that is drawn, its caption; add a record.
+To add one, write a module with what it selects, how that is drawn, its caption; add a record to those of its subject.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from compare.figures import (
     bifurcation_diagrams,
-    cases,
     characteristic,
     deviations,
-    hopping,
+    drawing,
     parameter_plane,
     periodic,
     settings,
@@ -21,30 +22,25 @@ from compare.figures import (
     unloading,
     unsteady,
 )
-from compare.figures.drawing import Drawing
+from compare.figures.drawing import Drawing, GapError, Material
+from model import InputError, StorageError
+from model.files import make_directory, write_text
+
+Figures = dict[str, Drawing]
+"""Figures by their file names."""
+FORMATS = ("svg", "pdf", "png")
+CAPTIONS = "captions.txt"
 
 
 def _of(title: str, module: Any, name: str, *claims: str) -> Drawing:
-    """One of the figures of a module; it stands beside the claim of its own name if no others are named."""
+    """One of several figures of a module; it stands beside the claim of its own name if no others are named."""
     return Drawing(title, partial(module.select, figure=name), module.draw, module.caption, claims or (name,))
 
 
-FIGURES: dict[str, Drawing] = {
+STATIONARY: Figures = {
     "characteristic": Drawing(
         "Characteristic curves", characteristic.select, characteristic.draw, characteristic.caption
     ),
-    "ladder": Drawing(
-        "From a newcomer's settings to the study's",
-        settings.select_ladder,
-        settings.draw_ladder,
-        settings.caption_ladder,
-    ),
-    "frontier": Drawing("Error and cost", settings.select_frontier, settings.draw_frontier, settings.caption_frontier),
-    "fig-2": cases.FIGURE_2,
-    "fig-3": cases.FIGURE_3,
-    "fig-4": _of("Fig. 4: a slip that dies out", slipping, "fig-4", "slip-NR-NS"),
-    "fig-5": _of("Fig. 5: a slip that grows", slipping, "fig-5", "slip-NR-NS"),
-    "fig-6": cases.FIGURE_6,
     "fig-7": _of("Fig. 7: regions over wall friction and flow", parameter_plane, "fig-7"),
     "fig-8": _of("Fig. 8: regions over equal friction and flow", parameter_plane, "fig-8"),
     "fig-9": _of("Fig. 9: off the floor", bifurcation_diagrams, "fig-9"),
@@ -53,6 +49,12 @@ FIGURES: dict[str, Drawing] = {
     "fig-12": _of("Fig. 12: on the floor, η > j, (12) released", bifurcation_diagrams, "fig-12"),
     "fig-13-left": characteristic.figure_13("fig-13-left", "Fig. 13, left: hysteresis, η < j"),
     "fig-13-right": characteristic.figure_13("fig-13-right", "Fig. 13, right: η > j"),
+}
+SLIPPING: Figures = {
+    "fig-4": _of("Fig. 4: a slip that dies out", slipping, "fig-4", "slip-NR-NS"),
+    "fig-5": _of("Fig. 5: a slip that grows", slipping, "fig-5", "slip-NR-NS"),
+}
+UNSTEADY: Figures = {
     "unloading": Drawing(
         "Section 5.3: the fall at unloading", unloading.select, unloading.draw, unloading.caption, ("fig-13-right",)
     ),
@@ -70,6 +72,8 @@ FIGURES: dict[str, Drawing] = {
         unsteady.caption_unsteady,
         ("jump-slipping", "ramp-fold"),
     ),
+}
+ATTRACTORS: Figures = {
     "hopping-orbit": Drawing(
         "Beyond the paper: a ball that hops for ever",
         periodic.select,
@@ -91,21 +95,45 @@ FIGURES: dict[str, Drawing] = {
         periodic.caption_walls,
         ("hopping-death",),
     ),
-    "hopping": Drawing(
-        "Beyond the paper: where the ball hops for ever",
-        hopping.where,
-        hopping.draw_where,
-        hopping.caption_where,
-        background=True,
-    ),
-    "basins": Drawing(
-        "Beyond the paper: basins", hopping.plane, hopping.draw_plane, hopping.caption_plane, background=True
-    ),
 }
-"""Every figure by its file name, in the order of the report."""
+BENCH: Figures = {
+    "ladder": Drawing(
+        "From a newcomer's settings to the study's",
+        settings.select_ladder,
+        settings.draw_ladder,
+        settings.caption_ladder,
+    ),
+    "frontier": Drawing("Error and cost", settings.select_frontier, settings.draw_frontier, settings.caption_frontier),
+}
+FIGURES: Figures = STATIONARY | BENCH | SLIPPING | UNSTEADY | ATTRACTORS
+"""Every figure, in the order of the report."""
 
 
-def figures_of(claim: str) -> dict[str, Drawing]:
+def figures_of(claim: str) -> Figures:
     """The figures that stand beside a claim; unless one bears its name, also the deviations of its numbers."""
     own = {name: each for name, each in FIGURES.items() if claim in each.claims}
     return own if claim in own else own | {f"claim-{claim}": deviations.of(claim)}
+
+
+def write(output: Path, material: Material, formats: Sequence[str] = ("svg",)) -> Iterator[tuple[str, str]]:
+    """Write all figures to a directory, and their captions; yield the name of each, and why it wasn't drawn if so.
+
+    Raises `InputError` for an unknown format, `StorageError` if a file can't be written.
+    """
+    for suffix in formats:
+        if suffix not in FORMATS:
+            raise InputError(f"no figure can be written as {suffix!r}; there are {', '.join(FORMATS)}")
+    make_directory(output)
+    captions = []
+    for name, each in FIGURES.items():
+        try:
+            data = each.select(material)
+            figure = each.draw(data)
+        except (GapError, StorageError) as gap:
+            yield name, f"not drawn: {gap}"
+            continue
+        for suffix in formats:
+            drawing.save(figure, output / f"{name}.{suffix}")
+        captions.append(f"{name}\n{each.title}. {each.caption(data)}\n")
+        yield name, ""
+    write_text(output / CAPTIONS, "\n".join(captions))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
@@ -11,8 +12,11 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from compare.measure.quantities import QUANTITIES
 from compare.measure.record import Measurement
+from compare.pages import readable
 from compare.runs.engines import ENGINES
+from compare.statistics import COVERAGE
 from model import Case, Parameters, Trajectory
 from model.drag import STOKES
 
@@ -32,8 +36,8 @@ COLOURS = {
 FORCE, SLIP, BALL, INK = "#b3261e", "#6a3d9a", "#f5cc6b", "#1c2430"
 """Of pictures and films: arrows of force and slip, the ball, text."""
 Line = str | tuple[object, ...]
+"""A line style of matplotlib."""
 STABLE, UNSTABLE = "-", (0, (5, 2.5))
-"""Line styles."""
 Place = tuple[float, tuple[float, float]]
 """Where the name of a curve stands: at a share of its length, with an offset in points."""
 GUIDE: dict[str, Any] = {"color": "0.55", "lw": 0.8, "ls": ":", "zorder": 0}
@@ -41,18 +45,43 @@ GUIDE: dict[str, Any] = {"color": "0.55", "lw": 0.8, "ls": ":", "zorder": 0}
 POINT: dict[str, Any] = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none", "zorder": 5}
 """A special point."""
 HALO: dict[str, Any] = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.85}
-"""Ground of a name that stands on lines."""
-_TEXT: dict[str, Any] = {"fontsize": 9, "bbox": HALO}
-OMEGA_0, OMEGA_C, OMEGA_X = "$\\omega_0$ (rad/s)", "$\\omega_c$ (rad/s)", "$\\omega_x^0$ (rad/s)"
+"""Background of a name that stands on lines."""
+LEAST = 1e-16
+"""Smaller relative errors are drawn here: an error may be zero."""
+SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
+THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
 FREE_0, FREE_C = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$", "$\\Omega_c = \\omega_c\\sqrt{R/g}$"
 FREE_X = "$\\omega_x^0\\sqrt{R/g}$"
-THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
-SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
 
 
 def figure(width: float, height: float) -> Figure:
     """An empty figure in inches, sized for a column of print, with room for all labels."""
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def panels(width: float, height: float, rows: int = 1, columns: int = 1, **layout: Any) -> tuple[Figure, Any]:
+    """A figure in inches and its axes, as `matplotlib.pyplot.subplots` gives them."""
+    made = figure(width, height)
+    return made, made.subplots(rows, columns, **layout)
+
+
+def symbol(name: str) -> str:
+    """A quantity of `compare.measure.quantities`, by its name, in letters of the axes."""
+
+    def typeset(match: re.Match[str]) -> str:
+        letter, tilde, index, zero = match.groups()
+        return "$" + (rf"\tilde{{{letter}}}" if tilde else letter) + f"_{index}" + ("^0$" if zero else "$")
+
+    return re.sub(r"(\w)(\u0303?)_(\w)(⁰?)", typeset, QUANTITIES[name].symbol)
+
+
+def label(name: str, unit: str = "") -> str:
+    """The label of an axis: symbol of a quantity and unit, its own if no other is given."""
+    unit = unit or readable(QUANTITIES[name].unit)
+    return f"{symbol(name)} ({unit})" if unit else symbol(name)
+
+
+OMEGA_0, OMEGA_C, OMEGA_X = "$ω_0$ (rad/s)", label("omega_c"), label("wall_spin")
 
 
 def named(p: Parameters, *names: str) -> str:
@@ -61,6 +90,11 @@ def named(p: Parameters, *names: str) -> str:
     if p.drag != STOKES:
         values.append(f"{p.drag} drag with Re = {2 * p.r * math.sqrt(p.g * p.R) / p.nu_f:.3g} at √(gR)")
     return ", ".join(values)
+
+
+def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = (), names: Sequence[str] = ()) -> str:
+    """Sentences, the parameters (those of `names`, see `named`), and what the marks of measured states are."""
+    return " ".join(filter(None, (*sentences, f"{named(p, *names)}."))) + edge(states) + marks(states)
 
 
 def marks(states: Sequence[Measurement]) -> str:
@@ -72,7 +106,7 @@ def marks(states: Sequence[Measurement]) -> str:
 def edge(states: Sequence[Measurement]) -> str:
     """What a caption says of points on the unstable branch; nothing where there are none."""
     between = any(m.protocol == "edge" for m in states)
-    return " On the unstable SS: the edge between two motions, which the engine was made to follow." * between
+    return " On the unstable SS: the edge between two motions, which the engine was made to follow." if between else ""
 
 
 def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:
@@ -116,22 +150,22 @@ def name(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] 
     leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1} if math.hypot(*offset) > 16 else None
     ha = "center" if offset[0] == 0 else "left" if offset[0] > 0 else "right"
     va = "center" if offset[1] == 0 else "bottom" if offset[1] > 0 else "top"
-    look: dict[str, Any] = {"color": colour, "arrowprops": leader, "zorder": 6, "ha": ha, "va": va}
-    axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", **_TEXT | look)
+    look: dict[str, Any] = {"color": colour, "arrowprops": leader, "zorder": 6, "ha": ha, "va": va, "fontsize": 9}
+    axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", bbox=HALO, **look)
 
 
 def guides(axes: Axes, values: dict[str, float]) -> None:
-    """Dotted lines at thresholds by name, rad s-1, named at the foot; names side by side would overlap."""
+    """Dotted lines at thresholds by name, rad s-1, named at the foot, one higher where names would overlap."""
     low, high = axes.get_xlim()
     last, step = -math.inf, 0
+    look: dict[str, Any] = {"xytext": (2, 0), "textcoords": "offset points", "fontsize": 9, "bbox": HALO}
     for key, value in sorted(values.items(), key=lambda item: item[1]):
-        if not low <= value <= high:
-            continue
-        step = 1 - step if value - last < 0.08 * (high - low) else 0
-        last = value
-        axes.axvline(value, **GUIDE)
-        place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "xytext": (2, 0), "textcoords": "offset points"}
-        axes.annotate(THRESHOLD_LABELS[key], (value, 0.02 + 0.07 * step), **place, **_TEXT, color="0.25", zorder=0.5)
+        if low <= value <= high:
+            step = 1 - step if value - last < 0.08 * (high - low) else 0
+            last = value
+            axes.axvline(value, **GUIDE)
+            foot: dict[str, Any] = {"xy": (value, 0.02 + 0.07 * step), "xycoords": ("data", "axes fraction")}
+            axes.annotate(THRESHOLD_LABELS[key], **foot, **look, color="0.25", zorder=0.5)
 
 
 def mark_of(engine: str) -> dict[str, Any]:
@@ -165,8 +199,22 @@ def points(
     """Measured values, one `unit` each, by engine; capped bars of three standard uncertainties."""
     for engine, own in by_engine(rows, lambda m: m.engine).items():
         usual = {"ms": 5, "label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
-        bars = [3 * unit * m.uncertainty for m in own]
+        bars = [COVERAGE * unit * m.uncertainty for m in own]
         axes.errorbar([x(m) for m in own], [unit * y(m) for m in own], bars, **mark_of(engine) | usual | look)
+
+
+def deviations(
+    axes: Axes,
+    rows: Iterable[Measurement],
+    predicted: Callable[[Measurement], float],
+    x: Callable[[Measurement], float] = omega_0,
+) -> None:
+    """A panel of relative deviations of measured values from predicted ones, by engine, on a logarithmic axis."""
+    for engine, own in by_engine(rows, lambda m: m.engine).items():
+        off = [max(abs(m.value / predicted(m) - 1), LEAST) for m in own]
+        axes.plot([x(m) for m in own], off, ls="none", ms=5, **mark_of(engine))
+    axes.set(yscale="log", ylim=(LEAST / 10, 10), ylabel="relative deviation")
+    axes.grid(alpha=0.25)
 
 
 def legend(of: Axes | Figure, **where: Any) -> None:

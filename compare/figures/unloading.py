@@ -19,16 +19,6 @@ from model.arrays import Array
 
 SET = "high-wall-friction"
 _P = Parameters.named(SET)
-_BEFORE, _AFTER = 0.3, 1.7
-"""Time shown before and after the ball leaves NR, s."""
-_CLOSE = 0.02
-"""Time shown round the landing, s."""
-_LOW = 1e-7
-"""Least height of the frame of the magnified gaps, m."""
-_SAMPLES = 1500
-"""Samples drawn of a curve."""
-_HOLD = 5.0
-"""How long the simulation of theory holds each flow, s: shorter ones are sampled more densely."""
 
 
 def select(material: Material) -> Motion:
@@ -36,26 +26,34 @@ def select(material: Material) -> Motion:
     for m in material.records.select("unloading", where=lambda m: m.set == SET):
         if m.conditions["start"] == "unloading" and (motions := material.motions(m)):
             return motions[-1]  # with the finest step
-    return Motion("held", EVENT.name, _P, partial(scenarios.unloading, _P, _HOLD))
+    # Flows held for no longer than 5 s each: longer ones are sampled less densely.
+    return Motion("held", EVENT.name, _P, partial(scenarios.unloading, _P, 5.0))
 
 
 def caption(fall: Motion) -> str:
     """Of the fall."""
-    return (
+    return style.caption(
+        fall.p,
         "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the wall (NS), sinks, "
         "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the impact, magnified in "
         "time and height: it stops the sinking at once; after it the gaps show how far the ball hops, if it does. "
-        f"Grounds: the case, by name above. {style.named(fall.p)}; engine: {fall.engine}."
+        f"Background: the case, by name above; engine: {fall.engine}.",
     )
 
 
 def draw(fall: Motion) -> Figure:
-    """Height, velocities and slip around the fall, and the landing magnified: the gaps as high as the ball hops."""
+    """Height, velocities and slip around the fall, and 20 ms about the landing: the gaps as high as the ball hops."""
     run = fall.load()
-    left, lands = _fall(run)
-    figure = style.figure(9, 6)
-    whole, close = figure.subplots(3, 2, sharex="col", width_ratios=[1.7, 1]).T
-    k, t = _column(whole, run, (left - _BEFORE, left + _AFTER), left, 1.0, 1e3)
+    lands = next(
+        (t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is not Contact.N), None
+    )
+    if lands is None:
+        raise GapError("the ball never landed")
+    leaves = run.events.time[(run.events.from_case == Case.NR) & (run.events.time <= lands)]
+    left = leaves[-1] if len(leaves) else run.time[0]
+    figure, panels = style.panels(9, 6, 3, 2, sharex="col", width_ratios=[1.7, 1])
+    whole, close = panels.T
+    k, t = _column(whole, run, (left - 0.3, left + 1.7), left, 1.0, 1e3)
     whole[0].set_ylabel("gap (mm)")
     whole[1].plot(t, run.omega_c[k], color="black", label="$\\omega_c$")
     whole[1].plot(t, run.header.flow(run.time[k]), color="0.5", ls="--", label="$\\omega_0$")
@@ -64,9 +62,9 @@ def draw(fall: Motion) -> Figure:
     for axes in whole:
         axes.axvline(lands - left, color="0.3", lw=0.8)
         style.legend(axes, frameon=False)
-    k, t = _column(close, run, (lands - _CLOSE, lands + _CLOSE), lands, 1e3, 1e6)
+    k, t = _column(close, run, (lands - 0.02, lands + 0.02), lands, 1e3, 1e6)
     hops = run.y[k][run.v_y[k] > 0].max(initial=0.0)
-    highest = 1e6 * max(float(run.h[k].max()), float(hops), _LOW)
+    highest = 1e6 * max(float(run.h[k].max()), float(hops), 1e-7)
     close[0].set(ylim=(-0.4 * highest, 1.4 * highest), ylabel="gap (µm)")
     close[1].plot(t, run.v_y[k], color="black")
     close[1].set_ylabel("$v_y$ (m/s)")
@@ -81,10 +79,10 @@ def _column(
 ) -> tuple[npt.NDArray[np.intp], Array]:
     """Draw gaps, `size` to a metre, slip speeds where there is contact, and the cases, over a span of time in s.
 
-    Return which samples are drawn, evenly chosen, and their times in the units of the axis, `unit` to a second.
+    Return which samples are drawn, some 1500 evenly chosen, and their times in units of the axis, `unit` to a second.
     """
     k = np.flatnonzero((run.time > span[0]) & (run.time < span[1]))
-    k = k[:: max(1, len(k) // _SAMPLES)]
+    k = k[:: max(1, len(k) // 1500)]
     t = unit * (run.time[k] - origin)
     gaps, _, slip = panels
     gaps.plot(t, size * run.y[k], color="black", label="$y$ (floor)")
@@ -97,13 +95,3 @@ def _column(
     for axes in panels:
         style.ground(axes, run, span, unit, origin, named=axes is gaps)
     return k, t
-
-
-def _fall(run: Trajectory) -> tuple[float, float]:
-    """Times at which the ball leaves NR for the last time before it lands, and at which it lands, s."""
-    changes = [(float(t), Case(case)) for t, case in zip(run.events.time, run.events.to_case, strict=True)]
-    lands = next((t for t, case in changes if case.A is not Contact.N), None)
-    if lands is None:
-        raise GapError("the ball never landed")
-    leaves = run.events.time[(run.events.from_case == Case.NR) & (run.events.time <= lands)]
-    return float(leaves[-1] if len(leaves) else run.time[0]), lands

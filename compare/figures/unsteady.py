@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -18,8 +17,8 @@ from compare.figures import style
 from compare.figures.bifurcation_diagrams import slipping
 from compare.figures.drawing import Material, Motion
 from compare.measure.record import Measurement
-from compare.measure.unsteady import JUMP, caught_up
-from model import Case, Flow, Parameters, Trajectory
+from compare.measure.unsteady import JUMP, caught_up, odd_part
+from model import Case, Flow, Parameters
 
 SET = "reference"
 REFERENCE = Parameters.named(SET)
@@ -29,8 +28,6 @@ POINTS = 22
 """Frequencies for which theory computes the onset of slip and the mean error."""
 FLOWS = (18.0, 25.0, 35.0)
 """Flows about which the jumps of a slipping ball are shown, rad s-1."""
-RATES = (0.05, 0.3, 1.0)
-"""Rates of the ramps shown, rad s-2."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +49,10 @@ class Measurements:
 
 
 def select(material: Material, figure: str) -> Measurements:
-    """The measurements of a protocol; for the jumps their runs, too."""
+    """The measurements of a protocol; for the jumps their runs with the finer step, too."""
     own = tuple(m for m in material.records.measurements if m.protocol == figure and m.set == SET)
-    runs = [motion for m in own if m.quantity == "jump_height" for motion in material.motions(m)]
+    runs = [motion for m in own if m.quantity == "jump_height" for motion in material.motions(m)[-2:]]
     return Measurements(own, tuple(runs[:2]))
-
-
-def _at(name: str) -> Callable[[Measurement], float]:
-    return lambda m: float(m.conditions[name])
 
 
 @cache
@@ -72,21 +65,20 @@ def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
 
 def caption_pulsation(of: Measurements) -> str:
     """Of gain, phase, onset of slip and mean error."""
-    p = of.mean
-    return (
-        f"A ball in a flow that pulsates about ω₀ = {p.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, where it "
-        f"rolls at both points (RR) and, dashed, where it slips at both (SS, about {FLOWS[1]:g} rad/s). Right: the "
-        "amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast pulsations; "
-        f"and the error of its mean reading when the amplitude is half as much again. {style.named(p)}."
-        f"{style.marks(of.rows)}"
+    return style.caption(
+        of.mean,
+        f"A ball in a flow that pulsates about ω₀ = {of.mean.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, "
+        f"where it rolls at both points (RR) and, dashed, where it slips at both (SS, about {FLOWS[1]:g} rad/s). "
+        "Right: the amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast "
+        "pulsations; and the error of its mean reading when the amplitude is half as much again.",
+        states=of.rows,
     )
 
 
 def draw_pulsation(of: Measurements) -> Figure:
     """Gain, phase, onset, mean error over frequency."""
     p = of.mean
-    figure = style.figure(9.0, 5.6)
-    (gain, onset), (phase, error) = figure.subplots(2, 2, sharex=True)
+    figure, ((gain, onset), (phase, error)) = style.panels(9.0, 5.6, 2, 2, sharex=True)
     f = np.geomspace(*DECADES, 400)
     for q, case, line in ((p, Case.RR, "-"), (REFERENCE.replace(omega_0=FLOWS[1]), Case.SS, "--")):
         ratio = response.transfer(q, case, f)
@@ -103,13 +95,11 @@ def draw_pulsation(of: Measurements) -> Figure:
         style.name(onset, at, limit, text, (0, shift))
     error.plot(frequencies, errors, ".-", color=style.COLOURS[Case.SS], lw=1.5, ms=5)
     error.axhline(0, **style.GUIDE)
-    for axes, quantity, unit in (
-        (gain, "gain", 1.0),
-        (phase, "phase_lag", 180 / math.pi),
-        (onset, "slip_amplitude", 1.0),
-        (error, "mean_error", 1.0),
-    ):
-        style.points(axes, of.of(quantity), _at("f"), unit=unit)
+    panels = {"gain": gain, "phase_lag": phase, "slip_amplitude": onset, "mean_error": error}
+    for quantity, axes in panels.items():
+        style.points(
+            axes, of.of(quantity), lambda m: float(m.conditions["f"]), unit=180 / math.pi if axes is phase else 1.0
+        )
     gain.set(xscale="log", yscale="log", ylabel="gain $|\\omega_c/\\omega_0|$")
     phase.set(ylabel="phase lag (°)", xlabel="frequency (Hz)")
     onset.set(yscale="log", ylabel="amplitude at which\nslip begins (rad/s)")
@@ -122,25 +112,44 @@ def draw_pulsation(of: Measurements) -> Figure:
 def caption_unsteady(of: Measurements) -> str:
     """Of jumps and ramps."""
     measured = f" Dots: MuJoCo, half the difference of two jumps by {JUMP:.1%}, up and down." if of.runs else ""
-    return (
-        "Left: ω_c after a small jump of the flow, over its change in the end; a ball that rolls creeps to its new "
-        f"reading, one that slips at both points rings.{measured} Middle: ramps past the fold, faster ones catch up "
-        "with the flow later. Right: by how much a ramp passes ω₀₄ until the ball lags by half as much as at first, "
-        f"dashed the law of slow ramps, 2.338 (ρ²/(ab))^(1/3). {style.named(REFERENCE)}."
-        f"{style.marks(of.of('ramp_end'))}"
+    return style.caption(
+        REFERENCE,
+        "Left: ω_c after a small jump of the flow, divided by its change in the end; a ball that rolls creeps to its "
+        f"new reading, one that slips at both points rings.{measured} Middle: ramps past the fold, faster ones catch "
+        "up with the flow later. Right: by how much a ramp passes ω₀₄ until the ball lags by half as much as at first, "
+        "dashed the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).",
+        states=of.of("ramp_end"),
     )
 
 
 def draw_unsteady(of: Measurements) -> Figure:
     """Step responses, ramps, overshoot over rate."""
-    figure = style.figure(10.0, 3.6)
-    jump, ramp, law = figure.subplots(1, 3)
+    figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
     _jumps(jump, of)
-    ends = of.of("ramp_end")
+    ends, fold = of.of("ramp_end"), bifurcation.thresholds(REFERENCE).omega_04
     p = ends[0].parameters if ends else REFERENCE.replace(omega_0=34.9)
-    runs = {rate: _ramp(p, rate) for rate in RATES}
-    _ramps(ramp, runs)
-    _law(law, runs, ends)
+    slipping(ramp, REFERENCE, lambda slip_x, omega_c: omega_c, unstable=(0.2, (-4, 6)))
+    rates, passed = np.array([0.05, 0.3, 1.0]), []
+    for rate, shade in zip(rates.tolist(), (1.0, 0.65, 0.4), strict=True):
+        lasts = 15.0 / rate
+        flow = Flow.ramp(p.omega_0, p.omega_0 + 15.0, lasts)
+        run = analytic.simulate(p, analytic.solution(p, Case.SS).x, lasts, flow, sample_interval=lasts / 5000)
+        passed.append(caught_up(run) - fold)
+        look = {"color": "black", "alpha": shade, "lw": 1.5, "label": f"rising by {rate:g} rad/s²"}
+        ramp.plot(flow(run.time), run.omega_c, **look)
+    beyond = np.array([fold - 6, fold + 7])
+    style.curve(ramp, Case.NR, beyond, beyond, "NR", (0.9, (-5, 5)))
+    ramp.set(xlim=beyond, ylim=(15, 55), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    style.guides(ramp, {"omega_04": fold})
+    law.loglog(rates, response.ramp_coefficient(REFERENCE) * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
+    law.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
+    style.points(law, ends, lambda m: float(m.conditions["rate"]), lambda m: m.value - fold)
+    law.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)", yticks=[0.5, 1, 2, 5])
+    for axis in (law.xaxis, law.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+    for axes in (ramp, law):
+        style.legend(axes, loc="upper left")
     return figure
 
 
@@ -155,41 +164,7 @@ def _jumps(axes: Axes, of: Measurements) -> None:
         axes.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {omega_0:.3g} rad/s")
     if len(of.runs) == 2:
         up, down = (motion.load() for motion in of.runs)
-        y, shown = (up.omega_c - down.omega_c) / (up.omega_c - down.omega_c)[-1], up.time <= t[-1]
-        axes.plot(up.time[shown][::5], y[shown][::5], "k.", ms=3.5, label="MuJoCo")
+        shown = np.flatnonzero(up.time <= t[-1])[::5]
+        axes.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="MuJoCo")
     axes.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$, 1 in the end")
     style.legend(axes)
-
-
-def _ramp(p: Parameters, rate: float) -> Trajectory:
-    """Theory's motion from slipping to well past the fold."""
-    span = 15.0
-    flow, interval = Flow.ramp(p.omega_0, p.omega_0 + span, span / rate), span / rate / 5000
-    return analytic.simulate(p, analytic.solution(p, Case.SS).x, span / rate, flow, sample_interval=interval)
-
-
-def _ramps(axes: Axes, runs: Mapping[float, Trajectory]) -> None:
-    end = bifurcation.thresholds(REFERENCE).omega_04
-    slipping(axes, REFERENCE, lambda slip_x, omega_c: omega_c, unstable=(0.2, (-4, 6)))
-    for (rate, run), shade in zip(runs.items(), (1.0, 0.65, 0.4), strict=True):
-        flow, label = run.header.flow(run.time), f"rising by {rate:g} rad/s²"
-        axes.plot(flow, run.omega_c, color="black", alpha=shade, lw=1.5, label=label)
-    beyond = np.array([end - 6, end + 7])
-    style.curve(axes, Case.NR, beyond, beyond, "NR", (0.9, (-5, 5)))
-    axes.set(xlim=beyond, ylim=(15, 55), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
-    style.guides(axes, {"omega_04": end})
-    style.legend(axes, loc="upper left")
-
-
-def _law(axes: Axes, runs: Mapping[float, Trajectory], ends: list[Measurement]) -> None:
-    end, K = bifurcation.thresholds(REFERENCE).omega_04, response.ramp_coefficient(REFERENCE)
-    rates = np.array([*runs])
-    axes.loglog(rates, K * rates ** (2 / 3), color="0.4", ls="--", label="slow ramps")
-    passed = [caught_up(run) - end for run in runs.values()]
-    axes.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
-    style.points(axes, ends, _at("rate"), lambda m: m.value - end)
-    axes.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)", yticks=[0.5, 1, 2, 5])
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter(NullFormatter())
-    style.legend(axes, loc="upper left")

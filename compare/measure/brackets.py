@@ -62,7 +62,8 @@ class Search:
 def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
     """Narrow every search down to its width, or as far as runs show it, all of them together, round by round.
 
-    With `careful` the ends of the brackets are asked once more with half the time step, see `Bracket.shift`.
+    With `careful` the ends of the brackets are asked once more with half the time step: one that doesn't hold is as
+    uncertain as the bracket before it was wide, see `Bracket.shift`.
     """
     brackets = [search.begin for search in searches]
     before = list(brackets)
@@ -71,45 +72,36 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
         for k, bracket in zip(todo, _round(lab, [searches[k] for k in todo], [brackets[k] for k in todo]), strict=True):
             before[k], brackets[k] = brackets[k], bracket
         todo = [k for k in todo if brackets[k].high - brackets[k].low < (before[k].high - before[k].low) / 2]
-    return _checked(lab, searches, brackets, before) if careful else brackets
-
-
-def _checked(
-    lab: Lab, searches: Sequence[Search], brackets: Sequence[Bracket], before: Sequence[Bracket]
-) -> list[Bracket]:
-    """Ask at the ends of the brackets with half the time step; one that doesn't hold is as wide as that before it."""
-    tasks = [s.task(v, b, FINER) for s, b in zip(searches, brackets, strict=True) for v in (b.low, b.high)]
-    runs = lab.run(tasks)
-    answers = [(s.answer(low), s.answer(high)) for s, low, high in zip(searches, runs[::2], runs[1::2], strict=True)]
-    return [
-        replace(bracket, shift=wide.high - wide.low) if low is False or high is True else bracket
-        for bracket, wide, (low, high) in zip(brackets, before, answers, strict=True)
-    ]
+    if careful:
+        ends = [(s, v, b) for s, b in zip(searches, brackets, strict=True) for v in (b.low, b.high)]
+        runs = iter(lab.run([s.task(v, b, FINER) for s, v, b in ends]))
+        for k, search in enumerate(searches):
+            low, high = search.answer(next(runs)), search.answer(next(runs))
+            if low is False or high is True:
+                brackets[k] = replace(brackets[k], shift=before[k].high - before[k].low)
+    return brackets
 
 
 def _round(lab: Lab, searches: Sequence[Search], brackets: Sequence[Bracket]) -> list[Bracket]:
-    """Ask inside every bracket; once more, for longer, where the run doesn't show the answer."""
-    asked = [(s, b, v) for s, b in zip(searches, brackets, strict=True) for v in _inside(b)]
+    """Ask inside every bracket; once more, for longer, where the run doesn't show the answer.
+
+    The new bracket is from the last yes before the first no to that no.
+    """
+    values = [np.linspace(b.low, b.high, SECTIONS + 2).tolist() for b in brackets]
+    asked = [(s, b, v) for s, b, row in zip(searches, brackets, values, strict=True) for v in row[1:-1]]
     tasks = [s.task(v, b, USUAL) for s, b, v in asked]
     runs = lab.run(tasks)
     answers = [s.answer(run) for (s, _, _), run in zip(asked, runs, strict=True)]
-    open_ = [k for k, answer in enumerate(answers) if answer is None]
-    longer = [asked[k][0].task(asked[k][2], asked[k][1], LONGER) for k in open_]
-    for k, task, run in zip(open_, longer, lab.run(longer), strict=True):
+    unclear = [k for k, answer in enumerate(answers) if answer is None]
+    longer = [asked[k][0].task(asked[k][2], asked[k][1], LONGER) for k in unclear]
+    for k, task, run in zip(unclear, longer, lab.run(longer), strict=True):
         tasks[k], runs[k], answers[k] = task, run, asked[k][0].answer(run)
-    rows = [slice(n * SECTIONS, (n + 1) * SECTIONS) for n in range(len(searches))]
-    return [_section(b, answers[row], tasks[row], runs[row]) for b, row in zip(brackets, rows, strict=True)]
-
-
-def _inside(bracket: Bracket) -> list[float]:
-    values: list[float] = np.linspace(bracket.low, bracket.high, SECTIONS + 2)[1:-1].tolist()
-    return values
-
-
-def _section(around: Bracket, inside: list[bool | None], tasks: list[Task], runs: list[Trajectory]) -> Bracket:
-    """From the last yes before the first no to that no."""
-    answers = [True, *inside, False]
-    ends, asked = [around.low, *_inside(around), around.high], [around.runs[0], *runs, around.runs[1]]
-    b = answers.index(False)
-    a = max(k for k in range(b) if answers[k])
-    return Bracket(ends[a], ends[b], (asked[a], asked[b]), tuple(tasks[max(a - 1, 0) : b]))
+    narrower = []
+    for n, (bracket, at) in enumerate(zip(brackets, values, strict=True)):
+        inside = slice(n * SECTIONS, (n + 1) * SECTIONS)
+        said, shown = [True, *answers[inside], False], [bracket.runs[0], *runs[inside], bracket.runs[1]]
+        no = said.index(False)
+        yes = max(k for k in range(no) if said[k])
+        by = tuple(tasks[inside][max(yes - 1, 0) : no])
+        narrower.append(Bracket(at[yes], at[no], (shown[yes], shown[no]), by))
+    return narrower

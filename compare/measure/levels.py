@@ -14,8 +14,47 @@ class Level(IntEnum):
     FULL = 2
 
 
+_FLOWS = (
+    *(0.43, 0.51, 0.62, 0.75, 0.9, 1.02, 1.13, 1.26, 1.4, 1.53),
+    *(1.7, 1.87, 2.05, 2.27, 2.5, 2.78, 3.1, 3.43, 3.8, 4.2),
+)
 EFFORT: dict[str, tuple[Any, Any, Any]] = {
     # quick, default, full
+    # settled: flows omega_0 sqrt(R/g), and the share of the drift limit down to which a state goes on
+    "settled.flows": ((0.62, 1.4, 1.7, 2.5, 4.2), _FLOWS, _FLOWS),
+    "settled.sharp": (1.0, 0.1, 0.1),
+    # thresholds: relative widths of the last brackets, of those about a fold, and the factor on the settling tolerance
+    "thresholds.width": (5e-5, 1e-6, 5e-7),
+    "thresholds.fold": (1.2e-3, 3e-4, 1.5e-4),
+    "thresholds.loose": (10.0, 1.0, 1.0),
+    # edge: parts of the way from omega_02 to omega_04, lines for each edge, time of a run in units of 1/c
+    "edge.flows": ((0.3,), (0.1, 0.17, 0.26, 0.38, 0.6), (0.1, 0.17, 0.26, 0.38, 0.45, 0.6, 0.8)),
+    "edge.lines": (3, 4, 6),
+    "edge.time": (20.0, 60.0, 60.0),
+    # plane: points spread evenly over each plane, and added in each round
+    "plane.spread": (28, 160, 600),
+    "plane.added": ((10, 10), (60, 60, 60), (200,) * 5),
+    # hysteresis: how long each level of the loop is held in units of 1/c, parts of a gap in which a case changes
+    "hysteresis.hold": (40.0, 60.0, 100.0),
+    "hysteresis.parts": (2, 4, 8),
+    # slope: slipping states of a set at which it is measured, at most
+    "slope.slipping": (2, 20, 20),
+    # unsteady: rates of the ramps, in units of c times the range of flows in which the ball slips
+    "unsteady.rates": ((1e-2,), (2.5e-3, 5e-3, 1e-2), (1.25e-3, 2.5e-3, 5e-3, 1e-2)),
+    # pulsation
+    "pulsation.octaves": ((3, 6), (0, 1, 3, 4, 6, 7), tuple(range(8))),  # of the frequencies, above c/(4 pi)
+    "pulsation.steps": (512, 1024, 2048),  # least number of time steps in a period
+    "pulsation.width": (1e-3, 2.5e-4, 1.2e-4),  # relative width to which the onset of slip is bracketed
+    # unloading
+    "unloading.refine": ((16, 32), (32, 64), (64, 128)),  # time steps in a coarse one where the ball lands
+    # recurrent: flows of the staircase in units of that of the set
+    "recurrent.flows": (
+        (1.0,),
+        (1.0, 0.95, 0.91, 0.87, 0.83, 0.80),
+        (1.0, 0.97, 0.94, 0.91, 0.88, 0.85, 0.82, 0.80),
+    ),
+    # choice: sets; the contacts of the second hover for long
+    "choice.sets": (1, 2, 2),
 }
 
 

@@ -14,64 +14,49 @@ from scipy.spatial import Delaunay
 from scipy.stats import qmc
 
 from compare.measure.lab import Lab, time_unit
-from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, measurement
-from compare.measure.settling import Settled, begin, family, settle_groups
+from compare.measure.settling import LOOSE, begin, family, settle_groups
 from model import Parameters
 from model.arrays import Array
 
 PROTOCOL = "plane"
-STARTS = ("rest", "half as fast", "with the fluid", "on the wall")
-"""From where the ball starts at every point."""
 DRAG = 1.25
 """Drag c, s-1: states settle within seconds, and slipping still lasts beyond the flow at which the wall can carry."""
 FIGURES = ("fig-7", "fig-8")
 """mu as it is, and mu = eta."""
 ETA, OMEGA = (0.02, 0.8), (0.45, 3.6)
 """Ranges of eta and of omega_0 sqrt(R/g)."""
-SPREAD = {Level.QUICK: 28, Level.DEFAULT: 160, Level.FULL: 600}
-"""Points spread evenly over each plane."""
-ADDED = {Level.QUICK: (10, 10), Level.DEFAULT: (60, 60, 60), Level.FULL: (200,) * 5}
-"""Points that are then added, a round at a time."""
-SEED = 7
-SPAN = 20.0
-"""Length of a round, in units of 1/c."""
-RARE = 0.5
-"""A set of cases is rare if it was seen less than this share of what would fall to it evenly."""
-LOOSE = 1000.0
-"""How much less sharply settled a state may be of which only the case counts."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is left out."""
     plane = sets["reference"].replace(c=DRAG)
-    points = {figure: spread(SPREAD[lab.level], SEED + k) for k, figure in enumerate(FIGURES)}
+    points = {figure: spread(lab.effort("plane.spread"), 7 + k) for k, figure in enumerate(FIGURES)}
     seen: dict[str, list[tuple[Array, int]]] = {figure: [] for figure in FIGURES}
     tried: dict[str, set[tuple[float, ...]]] = {figure: set() for figure in FIGURES}
-    out: Counter[str] = Counter()
-    for count in (*ADDED[lab.level], 0):
+    for count in (*lab.effort("plane.added"), 0):
         chosen = [(figure, u) for figure in FIGURES for u in points[figure]]
-        starts = [[begin(figure, _at(plane, figure, u), how) for how in STARTS] for figure, u in chosen]
-        for (figure, u), states in zip(chosen, settle_groups(lab, starts, span=SPAN, loose=LOOSE), strict=True):
-            if any(each.failure for each in states):
-                out[figure] += 1
-                continue
-            seen[figure].append((u, mask(states)))
-            p, tasks = states[0].start.p, [each.task for each in states]
-            yield measurement(lab, PROTOCOL, "reference", p, "cases", mask(states), tasks, figure=figure)
+        starts = []
+        for figure, u in chosen:
+            eta, flow = (low + float(part) * (high - low) for part, (low, high) in zip(u, (ETA, OMEGA), strict=True))
+            p = plane.replace(eta=eta, omega_0=flow / time_unit(plane))
+            p = p.replace(mu=eta) if figure == "fig-8" else p
+            starts.append([begin(figure, p, how) for how in ("rest", "half as fast", "with the fluid", "on the wall")])
+        for (figure, u), states in zip(chosen, settle_groups(lab, starts, span=20.0, loose=LOOSE), strict=True):
+            if not any(each.failure for each in states):
+                mask = sum(1 << case for case in {family(each.case) for each in states})
+                seen[figure].append((u, mask))
+                p, tasks = states[0].start.p, [each.task for each in states]
+                yield measurement(lab, PROTOCOL, "reference", p, "cases", mask, tasks, figure=figure)
         for figure in FIGURES:
             tried[figure] |= {tuple(u.tolist()) for u in points[figure]}
             fresh = (u for u in added(seen[figure]) if tuple(u.tolist()) not in tried[figure])
             points[figure] = list(islice(fresh, count))
-    for figure, number in out.items():
-        total = number + len(seen[figure])
-        reason = f"{figure}: {number} of {total} points are left out, too close to a change of case to settle"
-        yield Missing(PROTOCOL, "reference", reason)
-
-
-def mask(states: Sequence[Settled]) -> int:
-    """The set of cases as a number: bit k for the case of code k."""
-    return sum(1 << case for case in {family(each.case) for each in states})
+    for figure in FIGURES:
+        if out := len(tried[figure]) - len(seen[figure]):
+            total = len(tried[figure])
+            reason = f"{figure}: {out} of {total} points are left out, too close to a change of case to settle"
+            yield Missing(PROTOCOL, "reference", reason)
 
 
 def spread(count: int, seed: int) -> list[Array]:
@@ -80,12 +65,15 @@ def spread(count: int, seed: int) -> list[Array]:
 
 
 def added(seen: Sequence[tuple[Array, int]]) -> list[Array]:
-    """Midpoints between neighbours that differ, each kind of border in turn, the longest first; and among rare ones."""
+    """Midpoints between neighbours that differ, each kind of border in turn, the longest first; and among rare ones.
+
+    A set of cases is rare if it was seen less than half as often as if all were seen equally often.
+    """
     if len(seen) < 4:
         return []
     places, masks = np.array([u for u, _ in seen]), [m for _, m in seen]
     often = Counter(masks)
-    rare = {m for m, number in often.items() if number < RARE * len(masks) / len(often)}
+    rare = {m for m, number in often.items() if number < 0.5 * len(masks) / len(often)}
     borders: dict[tuple[int, ...], list[tuple[float, int, int]]] = {}
     for a, b in {tuple(sorted((int(t[i]), int(t[i - 1])))) for t in Delaunay(places).simplices for i in range(3)}:
         if masks[a] != masks[b] or masks[a] in rare:
@@ -94,9 +82,3 @@ def added(seen: Sequence[tuple[Array, int]]) -> list[Array]:
     rows = zip_longest(*(sorted(edges) for _, edges in sorted(borders.items())))
     turns = [edge for row in rows for edge in row if edge]
     return [(places[a] + places[b]) / 2 for _, a, b in turns]
-
-
-def _at(plane: Parameters, figure: str, u: Array) -> Parameters:
-    eta, Omega_0 = (low + float(share) * (high - low) for share, (low, high) in zip(u, (ETA, OMEGA), strict=True))
-    p = plane.replace(eta=eta, omega_0=Omega_0 / time_unit(plane))
-    return p.replace(mu=eta) if figure == "fig-8" else p

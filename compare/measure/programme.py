@@ -22,7 +22,6 @@ from compare.measure import (
     edge,
     field,
     growth,
-    hopping,
     laws,
     lift,
     motions,
@@ -93,8 +92,8 @@ class Protocol:
 
 PROTOCOLS = (
     # Single long runs begin first: beside them there is work for the other workers.
-    Protocol("recurrent", hopping.hopping, alone=HOPS),
-    Protocol("stepped", hopping.stepped, engine=MOREAU, alone=HOPS),
+    Protocol("recurrent", attractors.hopping, alone=HOPS),
+    Protocol("stepped", attractors.stepped, engine=MOREAU, alone=HOPS),
     Protocol("choice", attractors.choice, alone="the choice is that of sets of its own with mu > 1"),
     Protocol("settled", settled.measure),
     Protocol("newcomer", settled.newcomer, alone="the engine's own settings are measured on reference only"),
@@ -102,7 +101,7 @@ PROTOCOLS = (
     Protocol("hysteresis", characteristic.hysteresis, ("settled",), quick=ONE),
     Protocol("rates", rates.measure, ("settled",)),
     Protocol("laws", laws.measure, waits=False),
-    Protocol("thresholds", thresholds.measure),
+    Protocol("thresholds", thresholds.measure, ("settled",)),
     Protocol("edge", edge.measure, ("thresholds",), quick=ONE),
     Protocol("birth", thresholds.birth, ("thresholds",)),
     Protocol(
@@ -120,7 +119,7 @@ PROTOCOLS = (
     Protocol("watched", bounds.watched, ("thresholds",)),
     Protocol("motions", motions.measure, quick=ONE, waits=False),
     Protocol("impacts", motions.impacts, quick=TWO, waits=False),
-    Protocol("followed", hopping.followed, level=Level.DEFAULT, alone=HOPS),
+    Protocol("followed", attractors.followed, level=Level.DEFAULT, alone=HOPS),
     Protocol(
         "swing",
         attractors.swing,

@@ -1,14 +1,15 @@
 """A rolling ball in a pulsating flow: how it follows, at which amplitude it slips, what it then reads on average.
 
-The mean flow is a fixed part of that at which two-point rolling ends. A small pulsation shows the engine's own rhythm,
-from which every other run starts, so that it need not settle. With Stokes' law a large pulsation is a small one
-magnified; with another one the amplitude is raised step by step until the ball slips, and the rhythm looked at anew.
+The mean flow is a fixed part of that at which two-point rolling ends. A small pulsation shows how the engine's ball
+follows; every other run starts from there, so that it need not settle. With Stokes' law a large pulsation is a small
+one magnified; with another one the amplitude is raised step by step until the ball slips, and each time settled anew.
 Slip is what the engine's contacts show: both slip. Frequencies are powers of two, so that sets of about the same drag
 share batches.
 """
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +18,8 @@ import numpy as np
 
 from compare.measure.brackets import Bracket, Care, Search, narrow
 from compare.measure.lab import Lab, coarse_step
-from compare.measure.levels import Level
-from compare.measure.record import Measurement, Missing, Records, measurement, sure_enough
+from compare.measure.record import Measurement, Missing, Records, if_sure, measurement
+from compare.measure.trials import known_flow
 from compare.runs.tasks import Task
 from compare.statistics import Measured
 from model import Case, Contact, Flow, Parameters, State, Trajectory
@@ -26,72 +27,49 @@ from model.arrays import Array
 from model.drag import STOKES
 
 PROTOCOL = "pulsation"
-MEAN = 0.85
-"""Mean flow over that at which two-point rolling ends."""
-SMALL = 0.5
-"""Amplitude of the pulsation that shows the rhythm, over what the mean flow lacks to the end of rolling."""
-RUNG, RUNGS = 1.5, 12
-"""Factor by which the amplitude is raised at a time with another law of drag than Stokes', and how often at most."""
-SLOWEST = 0.5
-"""The lowest angular frequency, about, in units of c."""
-OCTAVES = {Level.QUICK: (3, 6), Level.DEFAULT: (0, 1, 3, 4, 6, 7), Level.FULL: (0, 1, 2, 3, 4, 5, 6, 7)}
-"""Where the frequencies are above it: two decades."""
-STEPS = {Level.QUICK: 512, Level.DEFAULT: 1024, Level.FULL: 2048}
-"""Least number of time steps in a period."""
+RAISE = 1.5
+"""Factor by which the amplitude is raised at a time where the law of drag isn't Stokes'."""
 PERIODS, ROUNDS = 3, 5
-"""Length of the runs, and how many there are, each from where the one before points to, the last with half the step."""
-WIDTH = {Level.QUICK: 1e-3, Level.DEFAULT: 2.5e-4, Level.FULL: 1.2e-4}
-"""Relative width to which the onset of slip is bracketed; if half the step moves it, it counts eight times as much."""
-REACH = 1.1
-"""Largest amplitude that is tried: it would take the ball beyond its end of rolling by so much."""
-LOOKED = 1.5
-"""Length of the runs of a bracket in periods, of which the first sixth doesn't count."""
-ALONE = 2e-4
-"""How much the slip speeds of both may differ just below the onset, over sqrt(g R): beyond it, one slips alone."""
+"""Length of a run, and how many follow each other until it is settled, the last with half the step."""
 SAMPLES, LASTS = 256, 5
-"""Samples in a period there, and how many of them slip must last to count: friction may be full for a moment before."""
-SURE = 0.9
-"""Part of what is measured that stands for what will be predicted, where it is asked whether it is sure enough."""
-BEYOND = 1.5
-"""Amplitude at which the mean reading is measured, over the one at which slip begins."""
-ANEW = 8
-"""Phases of a period at which the motion is started anew from its state: what changes then hangs on more than that."""
+"""Samples in a period, and how many of them slip must last to count: friction may be full for a moment before."""
+PHASES = 8
+"""Phases of a period at which the motion is started anew from its state, to see whether the mean depends on more."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rhythm:
-    """How a rolling ball follows a small pulsation."""
+class Pulsation:
+    """A pulsating flow, and how a rolling ball follows it."""
 
     set: str
     p: Parameters
     """With the mean flow."""
     frequency: float
     amplitude: float
-    """Of the pulsation, rad s-1."""
+    """rad s-1"""
     reach: float
     """How far omega_c may swing in the largest pulsation that is tried, rad s-1."""
     begin: float = 0.0
-    """omega_c less the mean flow as a period begins, over the amplitude;"""
+    """omega_c less the mean flow as a period begins, divided by the amplitude."""
     power: float = 0.0
-    """the power of the amplitude with which that grows."""
+    """Power of the amplitude with which `begin` grows."""
     ratio: complex = 1.0
-    """omega_c over omega_0."""
+    """omega_c divided by omega_0, from the Fourier sums over two periods."""
     uncertainty: float = math.inf
-    """Of its parts."""
+    """Of the parts of `ratio`."""
+    rolls: bool = True
+    """Whether the ball rolls all the time."""
     tasks: tuple[Task, ...] = ()
+    """The last two runs."""
 
     def start(self, amplitude: float) -> Array:
-        """The state of a ball that follows a pulsation, as it begins."""
-        return State(
-            omega_c=self.p.omega_0 + amplitude * self.begin * (amplitude / self.amplitude) ** self.power
-        ).stacked()
+        """The state (8,) of a ball that follows a pulsation of an amplitude, as it begins."""
+        grown = (amplitude / self.amplitude) ** self.power
+        return State(omega_c=self.p.omega_0 + amplitude * self.begin * grown).stacked()
 
-    def steps(self, lab: Lab, largest: float) -> int:
-        """Usual number of time steps in a period, a power of two, for amplitudes up to the `largest`."""
-        fastest = 4 * (self.p.omega_0 + largest) / self.frequency
-        return int(
-            2 ** math.ceil(math.log2(max(STEPS[lab.level], 1 / (self.frequency * coarse_step(self.p)), fastest)))
-        )
+    def begun(self, omega_c: float) -> Pulsation:
+        """The same with this omega_c as a period begins."""
+        return replace(self, begin=(omega_c - self.p.omega_0) / self.amplitude)
 
     def task(
         self,
@@ -99,185 +77,169 @@ class Rhythm:
         amplitude: float,
         x: Array,
         periods: float,
-        largest: float,
         refine: int,
-        samples: int = 64,
+        samples: int,
         phase: float = 0.0,
+        largest: float = 0.0,
     ) -> Task:
-        """A run from a state; no amplitude that it is compared with is above the `largest`."""
-        step = 1 / (self.frequency * self.steps(lab, largest) * refine)
+        """A run from a state, with as many steps in a period, a power of two, as the `largest` amplitude needs."""
+        fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
+        least = max(lab.effort("pulsation.steps"), 1 / (self.frequency * coarse_step(self.p)), fastest)
+        step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * refine)
         flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, phase)
         return lab.task(self.p, x, periods / self.frequency, step, flow=flow, samples=round(samples * periods))
+
+    def row(self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: float) -> Measurement:
+        """A measurement in this pulsation."""
+        return measurement(lab, PROTOCOL, self.set, self.p, quantity, value, tasks, f=self.frequency, **at)
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
-    rhythms = []
+    small = []
     for name, p in sets.items():
-        ends = [m.value for m in records.select("thresholds", "omega_01", lambda m, name=name: m.set == name)]  # type: ignore[misc]
-        if not ends:
+        if (end := known_flow(records, name, "omega_01")) is None:
             yield Missing(PROTOCOL, name, "no flow was measured at which two-point rolling ends by slipping")
-        else:
-            base = 2.0 ** round(math.log2(SLOWEST * p.c / (2 * math.pi)))
-            q = p.replace(omega_0=MEAN * ends[0])
-            room = ends[0] - q.omega_0
-            rhythms += [Rhythm(name, q, base * 2.0**n, SMALL * room, REACH * room) for n in OCTAVES[lab.level]]
-    rhythms = _rhythms(lab, rhythms)
-    for rhythm in rhythms:
-        yield from _followed(lab, rhythm)
-    rhythms = _raised(lab, [rhythm for rhythm in rhythms if _rolls(lab, rhythm)])
-    brackets = narrow(lab, [_search(lab, rhythm) for rhythm in rhythms])
-    slipping = []
-    for rhythm, bracket in zip(rhythms, brackets, strict=True):
-        at, place = f"a pulsation at {rhythm.frequency:g} Hz", bracket.place
+            continue
+        q = p.replace(omega_0=0.85 * end)
+        room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
+        octaves = lab.effort("pulsation.octaves")
+        small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, 1.1 * room) for n in octaves]
+    followed = _followed(lab, small)
+    for each in followed:
+        if not each.rolls:
+            at = f"at {each.frequency:g} Hz a ball slips in a pulsation half as large as in a slow one"
+            yield Missing(PROTOCOL, each.set, at)
+            continue
+        gain, lag = Measured(abs(each.ratio), each.uncertainty), -cmath.phase(each.ratio)
+        yield each.row(lab, "gain", gain, each.tasks, amplitude=each.amplitude)
+        angle = Measured(lag, gain.uncertainty / gain.value)
+        yield each.row(lab, "phase_lag", angle, each.tasks, amplitude=each.amplitude)
+    rolling, slipping = _raised(lab, [each for each in followed if each.rolls]), []
+    for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
+        at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
         # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
         unseen = (math.pi * LASTS / SAMPLES) ** 2 / 2 * place.value
         onset = Measured(place.value, math.hypot(place.uncertainty, unseen))
-        low, high = bracket.runs
         if low is None or high is None:
-            yield Missing(PROTOCOL, rhythm.set, f"in {at} there is slip at no amplitude, or at all")
-        elif _alone(low) > ALONE:
-            yield Missing(PROTOCOL, rhythm.set, f"in {at} one contact slips before both do, too little to tell when")
-        elif not sure_enough("slip_amplitude", onset, SURE * onset.value):
-            yield Missing(PROTOCOL, rhythm.set, f"slip in {at} begins at no definite amplitude")
+            yield Missing(PROTOCOL, each.set, f"in {at} there is slip at no amplitude, or at all")
+            continue
+        alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
+        if alone > 2e-4 * math.sqrt(each.p.g * each.p.R):
+            yield Missing(PROTOCOL, each.set, f"in {at} one contact slips before both do, too little to tell when")
         else:
-            yield _record(lab, rhythm, "slip_amplitude", onset, bracket.tasks)
-            slipping.append((rhythm, BEYOND * onset.value))
+            measured = each.row(lab, "slip_amplitude", onset, bracket.tasks)
+            # What will be predicted may be a tenth smaller than what is measured.
+            yield (row := if_sure(measured, 0.9 * onset.value, f"slip in {at} begins at no definite amplitude"))
+            if isinstance(row, Measurement):
+                slipping.append((each, 1.5 * onset.value))
     yield from mean_errors(lab, slipping)
 
 
-def _rhythms(lab: Lab, rhythms: Sequence[Rhythm]) -> list[Rhythm]:
-    """Runs in pulsations of their amplitudes, each from where the one before points to."""
-    followed = list(rhythms)
+def _rounds(
+    lab: Lab, driven: Sequence[tuple[Pulsation, float]], refine: int, samples: int, slips: bool
+) -> list[list[tuple[Task, Trajectory, float]]]:
+    """Runs in pulsations of these amplitudes until they are settled, the last with half the step: the last two rounds.
+
+    Each run comes with its task and the limit of omega_c as its periods begin, from which the next one starts; a ball
+    that slips goes on with the rest of its last state.
+    """
+    states, rounds = [each.start(a) for each, a in driven], []
     for n in range(ROUNDS):
-        refine = 4 if n == ROUNDS - 1 else 2
-        tasks = [
-            r.task(lab, r.amplitude, r.start(r.amplitude), PERIODS, r.amplitude, refine, SAMPLES) for r in followed
+        times = refine * (2 if n == ROUNDS - 1 else 1)
+        tasks = [each.task(lab, a, x, PERIODS, times, samples) for (each, a), x in zip(driven, states, strict=True)]
+        runs = lab.run(tasks)
+        limits = [limit(run.omega_c[samples::samples]) for run in runs]
+        states = [
+            State.of(run.x[-1])._replace(omega_c=omega_c).stacked() if slips else each.begun(omega_c).start(a)
+            for (each, a), run, omega_c in zip(driven, runs, limits, strict=True)
         ]
-        for k, (rhythm, task, run) in enumerate(zip(followed, tasks, lab.run(tasks), strict=True)):
-            period = (len(run.time) - 1) // PERIODS
-            ratio = _ratio(run, rhythm, period)
-            followed[k] = replace(
-                rhythm,
-                begin=(limit(run.omega_c[period::period]) - rhythm.p.omega_0) / rhythm.amplitude,
-                ratio=ratio,
-                uncertainty=abs(ratio - rhythm.ratio),
-                tasks=(*rhythm.tasks[-1:], task),
-            )
+        rounds.append(list(zip(tasks, runs, limits, strict=True)))
+    return rounds[-2:]
+
+
+def _followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
+    """How balls follow pulsations of their own amplitudes."""
+    followed, last = [], slice(-2 * SAMPLES, None)
+    rounds = _rounds(lab, [(each, each.amplitude) for each in pulsations], 2, SAMPLES, slips=False)
+    for each, (earlier, before, _), (later, run, omega_c) in zip(pulsations, *rounds, strict=True):
+        ratios = []
+        for shown in (before, run):
+            phase = 2 * math.pi * each.frequency * shown.time[last]
+            ratios.append(complex(2j * np.mean(shown.omega_c[last] * np.exp(-1j * phase)) / each.amplitude))
+        change, new = abs(ratios[1] - ratios[0]), each.begun(omega_c)
+        tasks, rolls = (earlier, later), rolls_on(run)
+        followed.append(replace(new, ratio=ratios[1], uncertainty=change, rolls=rolls, tasks=tasks))
     return followed
 
 
-def _ratio(run: Trajectory, rhythm: Rhythm, period: int) -> complex:
-    """omega_c over omega_0, by the Fourier sum over the last two periods."""
-    phase = 2 * math.pi * rhythm.frequency * run.time[-2 * period :]
-    return complex(2j * np.mean(run.omega_c[-2 * period :] * np.exp(-1j * phase)) / rhythm.amplitude)
-
-
-def _followed(lab: Lab, rhythm: Rhythm) -> Iterator[Measurement | Missing]:
-    if not _rolls(lab, rhythm):
-        yield Missing(
-            PROTOCOL,
-            rhythm.set,
-            f"at {rhythm.frequency:g} Hz a ball slips in a pulsation half as large as in a slow one",
-        )
-        return
-    gain, lag, by = abs(rhythm.ratio), -math.atan2(rhythm.ratio.imag, rhythm.ratio.real), rhythm.uncertainty
-    yield _record(lab, rhythm, "gain", Measured(gain, by), rhythm.tasks, amplitude=rhythm.amplitude)
-    yield _record(lab, rhythm, "phase_lag", Measured(lag, by / gain), rhythm.tasks, amplitude=rhythm.amplitude)
-
-
-def _raised(lab: Lab, rhythms: Sequence[Rhythm]) -> list[Rhythm]:
-    """The rhythms at the last of rising amplitudes at which the ball rolls, and how their beginnings have changed."""
-    raised, todo = list(rhythms), [k for k, rhythm in enumerate(rhythms) if rhythm.p.drag != STOKES]
-    for _ in range(RUNGS):
-        begin = [
-            replace(each, amplitude=RUNG * each.amplitude, begin=each.begin * RUNG**each.power)
+def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
+    """The largest of rising amplitudes at which the ball still rolls, where the law of drag isn't Stokes'."""
+    raised, todo = list(pulsations), [k for k, each in enumerate(pulsations) if each.p.drag != STOKES]
+    for _ in range(12):
+        higher = [
+            replace(each, amplitude=RAISE * each.amplitude, begin=each.begin * RAISE**each.power)
             for each in (raised[k] for k in todo)
         ]
-        higher = {k: rhythm for k, rhythm in zip(todo, _rhythms(lab, begin), strict=True) if _rolls(lab, rhythm)}
-        for k, rhythm in higher.items():
-            raised[k] = replace(rhythm, power=math.log(rhythm.begin / raised[k].begin, RUNG))
-        todo = list(higher)
+        still = [(k, each) for k, each in zip(todo, _followed(lab, higher), strict=True) if each.rolls]
+        for k, each in still:
+            raised[k] = replace(each, power=math.log(each.begin / raised[k].begin, RAISE))
+        todo = [k for k, _ in still]
     return raised
 
 
-def _rolls(lab: Lab, rhythm: Rhythm) -> bool:
-    return rolls_on(*lab.run(rhythm.tasks[-1:]))
+def _search(lab: Lab, pulsation: Pulsation) -> Search:
+    """For the amplitude at which slip begins, in runs of one period and a half of which the first sixth is left out."""
 
-
-def _search(lab: Lab, rhythm: Rhythm) -> Search:
     def task(amplitude: float, bracket: Bracket, care: Care) -> Task:
-        start = rhythm.start(amplitude)
-        return rhythm.task(lab, amplitude, start, LOOKED * care.time, begin.high, 2 * care.refine, SAMPLES)
+        x = pulsation.start(amplitude)
+        return pulsation.task(lab, amplitude, x, 1.5 * care.time, 2 * care.refine, SAMPLES, largest=begin.high)
 
-    if rhythm.p.drag == STOKES:
+    if pulsation.p.drag == STOKES:
         # Where slip begins is not known yet: the least amplitude at which it may is taken for a rough width.
-        begin, width = Bracket(0.0, rhythm.reach / abs(rhythm.ratio)), rhythm.reach / abs(rhythm.ratio) / 2
+        largest = pulsation.reach / abs(pulsation.ratio)
+        begin, size = Bracket(0.0, largest), largest / 2
     else:
-        begin, width = Bracket(0.99 * rhythm.amplitude, RUNG * rhythm.amplitude), rhythm.amplitude
-    return Search(begin, task, rolls_on, WIDTH[lab.level] * width)
+        begin, size = Bracket(0.99 * pulsation.amplitude, RAISE * pulsation.amplitude), pulsation.amplitude
+    return Search(begin, task, rolls_on, lab.effort("pulsation.width") * size)
 
 
 def rolls_on(run: Trajectory) -> bool:
-    """Whether the ball nowhere slips at both points or leaves the floor for `LASTS`, but for the beginning of a run."""
+    """Whether after the first sixth of a run the ball nowhere slips at both points or leaves the floor for `LASTS`."""
     gone = np.isin(run.case[run.time > run.time[-1] / 6], [Case.SS, *(case for case in Case if case.A is Contact.N)])
     return bool(np.convolve(gone, np.ones(LASTS)).max() < LASTS)
 
 
-def _alone(run: Trajectory) -> float:
-    """Largest difference of the slip speeds but for the beginning of a run, over sqrt(g R)."""
-    p, late = run.header.parameters, run.time > run.time[-1] / 6
-    return float(np.abs(run.slip_speed_A - run.slip_speed_B)[late].max() / math.sqrt(p.g * p.R))
-
-
-def mean_errors(lab: Lab, slipping: Sequence[tuple[Rhythm, float]]) -> Iterator[Measurement | Missing]:
-    """Means over the last period, with both steps, once each period is as the one before.
+def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterator[Measurement | Missing]:
+    """Means over the last period in pulsations of these amplitudes, with both steps, once periods repeat.
 
     The engine may remember what a state doesn't hold, such as how strongly floor and wall press against each other. How
-    much the mean hangs on it is seen in periods that start anew from states of the last one.
+    much the mean depends on it is seen in periods that start anew from states of the last one.
     """
-    states = [rhythm.start(amplitude) for rhythm, amplitude in slipping]
-    means: list[list[float]] = [[] for _ in slipping]
-    last: list[Array] = [np.empty(0) for _ in slipping]
-    for n in range(ROUNDS):
-        refine = 2 if n == ROUNDS - 1 else 1
-        tasks = [r.task(lab, a, x, PERIODS, a, refine) for (r, a), x in zip(slipping, states, strict=True)]
-        for k, run in enumerate(lab.run(tasks)):
-            period = (len(run.time) - 1) // PERIODS
-            turns = np.diff(run.theta[::period]) * slipping[k][0].frequency
-            means[k] += [float(turns[-2]), float(turns[-1])]
-            states[k] = State.of(run.x[-1])._replace(omega_c=limit(run.omega_c[period::period])).stacked()
-            if n == ROUNDS - 2:
-                last[k] = run.x[-1 - period : -1 : period // ANEW]
+
+    samples = 8 * PHASES
+    coarse, fine = _rounds(lab, slipping, 1, samples, slips=True)
     anew = [
-        r.task(lab, a, x, 1, a, 1, phase=2 * math.pi * k / ANEW)
-        for (r, a), period in zip(slipping, last, strict=True)
-        for k, x in enumerate(period)
+        each.task(lab, a, x, 1, 1, samples, phase=2 * math.pi * k / PHASES)
+        for (each, a), (_, run, _) in zip(slipping, coarse, strict=True)
+        for k, x in enumerate(run.x[-1 - samples : -1 : samples // PHASES])
     ]
-    begun = np.reshape([run.theta[-1] - run.theta[0] for run in lab.run(anew)], (-1, ANEW))
-    for (rhythm, amplitude), task, (*_, before, usual, coarse, fine), turns in zip(
-        slipping, tasks, means, begun, strict=True
-    ):
-        value = fine - rhythm.p.omega_0
-        spread = float(np.abs(turns * rhythm.frequency - usual).max())
-        drift = abs(fine - usual) + abs(fine - coarse) + abs(usual - before) + spread
-        # Slip begins and ends within a step: that much of a period, and of what it takes off the mean, is open.
-        error = Measured(value, drift + abs(value) / (2 * rhythm.steps(lab, amplitude)))
-        if sure_enough("mean_error", error, SURE * abs(error.value)):
-            yield _record(lab, rhythm, "mean_error", error, [task], amplitude=amplitude)
-        else:
-            at = f"the mean reading at {rhythm.frequency:g} Hz"
-            yield Missing(PROTOCOL, rhythm.set, f"{at} doesn't settle, or hangs on more than the state")
+    begun = np.reshape([run.theta[-1] - run.theta[0] for run in lab.run(anew)], (-1, PHASES))
+    pairs = zip(slipping, begun, coarse, fine, strict=True)
+    for (each, amplitude), turns, (_, run, _), (task, finer, _) in pairs:
+        before, usual = (np.diff(run.theta[::samples]) * each.frequency)[-2:].tolist()
+        first, mean = (np.diff(finer.theta[::samples]) * each.frequency)[-2:].tolist()
+        value = mean - each.p.omega_0
+        spread = float(np.abs(turns * each.frequency - usual).max())
+        drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
+        # Slip begins and ends within a coarse step: half of that part of the mean error is uncertain.
+        error = Measured(value, drift + abs(value) / round(task.steps / PERIODS))
+        row = each.row(lab, "mean_error", error, [task], amplitude=amplitude)
+        at = f"the mean reading at {each.frequency:g} Hz"
+        yield if_sure(row, 0.9 * abs(value), f"{at} doesn't settle, or depends on more than the state")
 
 
 def limit(values: Array) -> float:
-    """Where the last three values of a row point to, that of a geometric approach; the last one if they diverge."""
+    """The limit of the last three values of a geometric sequence; the last one if they diverge."""
     first, second = values[-2] - values[-3], values[-1] - values[-2]
     return float(values[-1] + (second**2 / (first - second) if abs(second) < abs(first) else 0.0))
-
-
-def _record(
-    lab: Lab, rhythm: Rhythm, quantity: str, value: Measured, tasks: Sequence[Task], **conditions: float
-) -> Measurement:
-    at = {"f": rhythm.frequency} | conditions
-    return measurement(lab, PROTOCOL, rhythm.set, rhythm.p, quantity, value, tasks, **at)

@@ -14,9 +14,10 @@ import numpy as np
 
 from compare.measure.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.measure.quantities import quantity
+from compare.measure.record import Records
 from compare.measure.trials import Start
 from compare.runs.tasks import Task
-from compare.statistics import COVERAGE, Measured
+from compare.statistics import COVERAGE, Measured, settled_case, tail
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -24,29 +25,19 @@ from model.drag import STOKES
 SPAN = 40.0
 """Least length of a round in units of 1/c, the time in which the fluid stops a free ball."""
 ROUNDS = (1.0, 2.0, 2.0)
-"""What follows each other, in units of that length. The later rounds last longer: a ball on the wall that goes on from
-its mean begins to swing anew, if less, and that has to die out, too."""
-SOONER = (1 / 64, 1 / 8)
-"""Rounds before those, in parts of one, where the law isn't Stokes': what lags or sinks is dragged harder than by
-c, and settles sooner. In such a part it may drift only that part of what it may in a whole round."""
-SHARES = (0.5, 0.125)
-"""Lengths of the window over that of the run: a long one for what oscillates, a short one for what only decays."""
+"""Lengths of successive rounds, in units of `SPAN`. The later ones are longer, because a ball on the wall that goes on
+from its mean swings again, if less, and that has to die out, too."""
+SHORT = (1 / 64, 1 / 8)
+"""Rounds before those where the law isn't Stokes': other drag laws are stronger, so balls settle sooner. The drift
+limit of such a round is reduced in proportion to its length."""
 TAPER = 8
 """Exponent of the sine that the window is: m periods within it leave about (TAPER/2)!^2/(pi m^(TAPER+1)) of one."""
-STEPS = 2048
-"""Coarse time steps of which a round has a whole multiple, so that sets of about the same drag share a batch."""
-PERIODS = 8
-"""Least length of a round in turns of the fluid, in whose rhythm a slipping ball on the wall swings."""
 STEPS_A_SAMPLE = 8
 """A coarse time step is a twentieth of sqrt(R/g) or so, and the ball goes round in more than that."""
 SOLVED = 1e-12
 """Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a time 1/c."""
-MARGIN = 2.0
-"""A run is settled once its drift lets each check resolve what it should with this to spare."""
-SWING = 1e-3
-"""Largest range of a settled quantity within the window, over its scale: what swings more goes on from its mean."""
-STEADY = 0.98
-"""Share of the samples in the window that must be of one case."""
+LOOSE = 1000.0
+"""Factor on the settling tolerance where only the case matters."""
 FORCES = tuple(f"force_{contact}{axis}" for contact in "AB" for axis in "xyz")
 SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
 """What mechanics determine of the forces where both contacts roll: the rest is a family of one parameter."""
@@ -89,14 +80,10 @@ def scale(name: str, p: Parameters) -> float:
     return rotation_scale(p) * (1.0 if name == "omega_c" else p.R / p.r)
 
 
-def columns(run: Trajectory) -> dict[str, Array]:
-    """Quantities of a settled state by name, each (n,)."""
-    p, A, B = run.header.parameters, run.force_A, run.force_B
-    values = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
-    values["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
-    values |= {f"force_{c}{axis}": force[:, k] for c, force in (("A", A), ("B", B)) for k, axis in enumerate("xyz")}
-    sums = {"force_Ax-By": A[:, 0] - B[:, 1], "force_Ay+By": A[:, 1] + B[:, 1], "force_Bx+By": B[:, 0] + B[:, 1]}
-    return values | sums
+def forces(A: Array, B: Array) -> dict[str, Array]:
+    """Components of contact forces (3, ...) by name, and the sums of them that the balances determine in every case."""
+    components = dict(zip(("Ax", "Ay", "Az", "Bx", "By", "Bz"), (*A, *B), strict=True))
+    return components | {"Ax-By": A[0] - B[1], "Ay+By": A[1] + B[1], "Bx+By": B[0] + B[1]}
 
 
 def determined(case: Case) -> tuple[str, ...]:
@@ -114,54 +101,69 @@ def family(case: Case) -> Case:
     return Case.NR if case is Case.SR else case
 
 
+def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
+    """In which case a ball of a set settled from one kind of start, by flow in rad s-1, the slowest first."""
+    found = records.select("settled", "case", lambda m: m.set == set and m.conditions["start"] == how)
+    return dict(sorted((m.parameters.omega_0, family(Case(int(m.value)))) for m in found))
+
+
 def settle(
     lab: Lab,
     starts: Sequence[Start],
     *,
-    refine: int = 1,
+    refine: float = 1,
     span: float = SPAN,
     loose: float = 1.0,
     sharp: float = math.inf,
 ) -> list[Settled]:
-    """Run each start until it is settled, in the order given; the step is that of `coarse_step` over `refine`.
+    """Run each start until it is settled, in the order given; the step is `coarse_step` divided by `refine`.
 
-    Settled may drift and swing `loose` times as much as values may that are held against theory; but as long as there
-    are rounds, what exceeds `sharp` times goes on as well.
+    A settled state may drift and swing `loose` times as much as values may that are held against theory; but as long as
+    there are rounds, one that exceeds `sharp` times that goes on.
 
     It goes on from its mean, but at the height from which it started: a ball on the wall alone knows nothing of its
     height, and one that sinks must not land.
     """
     states: dict[int, Settled] = {}
     todo = dict(enumerate(starts))
-    left = [[*(SOONER if start.p.drag != STOKES else ()), *ROUNDS] for start in starts]
+    left = [[*(SHORT if start.p.drag != STOKES else ()), *ROUNDS] for start in starts]
     while todo:
-        parts = {n: left[n].pop(0) for n in todo}
-        tasks = {n: _task(lab, start, refine, span * parts[n]) for n, start in todo.items()}
-        parts = {n: task.t_end / duration(task.parameters, span) for n, task in tasks.items()}
+        tasks = {n: _round(lab, start, refine, span * left[n].pop(0)) for n, start in todo.items()}
         todo = {}
         for (n, task), run in zip(tasks.items(), lab.each(list(tasks.values())), strict=True):
+            start = starts[n]
             if isinstance(run, str):
-                states[n] = Settled(starts[n], Case.NN, {}, starts[n].x0, task, failure=f"the run {run}")
+                states[n] = Settled(start, Case.NN, {}, start.x0, task, failure=f"the run {run}")
                 continue
-            states[n] = judged(starts[n], task, run, loose)
-            if left[n] and states[n].excess > min(parts[n], 1.0) * min(loose, sharp):
+            state = states[n] = judged(start, task, run, loose)
+            part = task.t_end / duration(start.p, span)
+            if left[n] and state.excess > min(part, 1.0) * min(loose, sharp):
                 # A part of a round may end on the way to where the ball settles: it goes on as it is.
-                todo[n] = replace(starts[n], x0=run.x[-1]) if parts[n] < 1 else _onward(states[n])
+                x = State.of(run.x[-1] if part < 1 else state.mean)
+                if part >= 1 and state.case.A is Contact.N:
+                    x = x._replace(y=max(State.of(start.x0).y, 0.0))
+                todo[n] = replace(start, x0=x.stacked())
     return [states[n] for n in range(len(starts))]
 
 
-def settle_groups(
-    lab: Lab, groups: Sequence[Sequence[Start]], *, span: float = SPAN, loose: float = 1.0, sharp: float = math.inf
-) -> list[list[Settled]]:
+def settle_groups(lab: Lab, groups: Sequence[Sequence[Start]], **how: float) -> list[list[Settled]]:
     """The same for groups of starts, all of them together."""
-    states = iter(settle(lab, [start for group in groups for start in group], span=span, loose=loose, sharp=sharp))
+    states = iter(settle(lab, [start for group in groups for start in group], **how))
     return [[next(states) for _ in group] for group in groups]
 
 
+def _round(lab: Lab, start: Start, refine: float, span: float) -> Task:
+    step, t_end = coarse_step(start.p), duration(start.p, span)
+    return lab.task(start.p, start.x0, t_end, step / refine, samples=round(t_end / (STEPS_A_SAMPLE * step)))
+
+
 def duration(p: Parameters, span: float = SPAN) -> float:
-    """Length of a round, s."""
-    unit = STEPS * coarse_step(p)
-    turns = PERIODS * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
+    """Length of a round, s: at least 8 turns of the fluid, in whose rhythm a slipping ball on the wall swings.
+
+    A whole multiple of 2048 coarse time steps, so that sets of about the same drag share a batch.
+    """
+    unit = 2048 * coarse_step(p)
+    turns = 8 * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
     return unit * math.ceil(max(span / p.c, turns) / unit)
 
 
@@ -170,46 +172,63 @@ def high(p: Parameters) -> float:
     return 1.25 * dragged_speed(p) * duration(p, max(ROUNDS) * SPAN)
 
 
-def _task(lab: Lab, start: Start, refine: int, span: float) -> Task:
-    step, t_end = coarse_step(start.p), duration(start.p, span)
-    return lab.task(start.p, start.x0, t_end, step / refine, samples=round(t_end / (STEPS_A_SAMPLE * step)))
-
-
-def _onward(state: Settled) -> Start:
-    x0 = State.of(state.mean)
-    if state.case.A is Contact.N:
-        x0 = x0._replace(y=max(State.of(state.start.x0).y, 0.0))
-    return replace(state.start, x0=x0.stacked())
+def lasting(p: Parameters, units: float) -> float:
+    """A time in s of about `units` of 1/c: a power of two, so that sets share batches."""
+    return float(2.0 ** round(math.log2(units / p.c)))
 
 
 def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:
-    """What a run has come to, over the window in which it drifts the least; `loose` as in `settle`."""
-    windows = (_judged(start, task, run, int(share * len(run.time)), loose) for share in SHARES)
-    return min(windows, key=lambda state: state.excess)
+    """What a run has come to; `loose` as in `settle`.
 
-
-def _judged(start: Start, task: Task, run: Trajectory, length: int, loose: float) -> Settled:
-    counts = np.bincount(run.case[-length:])
-    case, p = Case(int(counts.argmax())), start.p
-    series = columns(run)
-    swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in determined(case))
-    means, drifts = steady_mean(np.stack([*series.values(), *run.x.T]), length)
-    mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
-    groups = [[q for q in group if q in determined(case)] for group in GROUPS]
-    worst = {q: max(drift[each] / scale(each, p) for each in group) for group in groups for q in group}
+    A run is settled once its drift lets each check resolve twice as much as it should, with no quantity swinging by
+    more than a thousandth of its scale, in a window with 98 % of its samples in one case. Of two windows that counts
+    which drifts less: half of the run for what oscillates, an eighth for what only decays.
+    """
+    p = start.p
+    series = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
+    series["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
+    series |= {f"force_{name}": values for name, values in forces(run.force_A.T, run.force_B.T).items()}
+    rows = np.stack([*series.values(), *run.x.T])
     solved = SOLVED / (p.c * coarse_step(p))
-    values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
-    drifting = max(COVERAGE * MARGIN * worst[q] / quantity(q).resolves for q in worst)
-    floor = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
-    failure = ""
-    excess = max(drifting, swings / SWING)
-    if counts.max() < STEADY * length:
-        excess = math.inf
-        failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
-    elif max(excess, floor) > loose:
-        way = "drifts" if max(drifting, floor) > loose else "swings"
-        failure = f"in {case.name} it still {way} {max(excess, floor):.2g} times as much as it may"
-    return Settled(start, case, values, means[len(series) :], task, excess, failure)
+    states = []
+    for length in (len(run.time) // 2, len(run.time) // 8):
+        counts = np.bincount(run.case[-length:])
+        case = Case(int(counts.argmax()))
+        means, drifts = steady_mean(rows, length)
+        mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
+        groups = [[q for q in group if q in determined(case)] for group in GROUPS]
+        worst = {q: max(drift[each] / scale(each, p) for each in group) for group in groups for q in group}
+        values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
+        swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)
+        drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolves for q in worst)
+        floor = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
+        excess, failure = max(drifting, swings / 1e-3), ""
+        if counts.max() < 0.98 * length:
+            excess = math.inf
+            failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
+        elif max(excess, floor) > loose:
+            way = "drifts" if max(drifting, floor) > loose else "swings"
+            failure = f"in {case.name} it still {way} {max(excess, floor):.2g} times as much as it may"
+        states.append(Settled(start, case, values, means[len(series) :], task, excess, failure))
+    return min(states, key=lambda state: state.excess)
+
+
+def presses(run: Trajectory) -> bool:
+    """Whether the floor carries something all the time in the end."""
+    return bool(np.all(run.force_A[tail(run), 1] > 0))
+
+
+def settles(run: Trajectory) -> bool | None:
+    """Whether a ball that slips on the floor comes to rest there, however slowly; None where the run is too short.
+
+    Its speed must change less in the last tenth than in the tenth before the middle. On the way past a fold that it has
+    missed the change falls at most like 1/time^2, from one to the other to 0.22; after that it rises.
+    """
+    if settled_case(run).A is Contact.N or not presses(run):
+        return False
+    middle, last = (abs(float(run.omega_c[k] - run.omega_c[k - 10])) for k in (-51, -1))
+    slowing = last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0  # round-off: at rest
+    return False if slowing > 1 else True if slowing < 0.2 else None
 
 
 def taper(length: int) -> Array:

@@ -17,53 +17,224 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from compare.measure import onset
-from compare.measure.brackets import Bracket
+from compare.measure.brackets import Answer, Bracket, Care, Search, narrow
 from compare.measure.extrapolation import POINTS, initial_slope, turning, vanishing
-from compare.measure.lab import Lab, time_unit
-from compare.measure.questions import slip
+from compare.measure.lab import Lab, coarse_step, time_unit
+from compare.measure.laws import PRESSES
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, sure_enough
-from compare.measure.settling import Settled, begin, settle_groups
+from compare.measure.settling import (
+    Settled,
+    begin,
+    family,
+    high,
+    lasting,
+    presses,
+    settle_groups,
+    settled_cases,
+    settles,
+)
 from compare.runs.tasks import Task
-from compare.statistics import COVERAGE, Measured, straight_line
-from model import Case, Parameters
+from compare.statistics import COVERAGE, Measured, settled_case, straight_line, tail
+from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 
-STRONG = (2.0, 4.0)
-"""The first two drags where a fold is born, c sqrt(R/g): the fluid takes a ball along within a fraction of the time of
-its fall."""
-BEYOND = (1.6, 2.6)
-"""The others, over the one to which the first two point: near to it, but so far off that states still settle soon."""
-NEAR = (0.02, 0.035, 0.055, 0.08, 0.12)
-"""Distances of the states from omega_02, in parts of the range of slipping."""
+PROTOCOL = "thresholds"
+ROUGH = 1e-2
+"""Relative width of a bracket where only the neighbourhood is wanted."""
+NEAR: Array = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
+"""Relative distances of settled states from a flow at which something vanishes."""
+TURNS: Array = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
+"""The same below a fold, where slip goes like the root of the distance; in parts of the range of slipping."""
+RIDES: Array = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
+"""The same of the states that are continued to where a ball rides the wall as slowly as it can."""
+SLIPS = 3e-8
+"""Slip speed, divided by sqrt(g R), that counts as slip: far above what contacts are solved to, 1e-12, and reached
+within the time of a run by a ball whose friction falls short by a millionth."""
+STRONG, BEYOND = (2.0, 4.0), (1.6, 2.6)
+"""Drags at which slopes are measured for the birth of a fold: first two values of c sqrt(R/g), at which the fluid takes
+a ball along within a fraction of the time of its fall; then multiples of the drag to which those two point, near to it
+but so far off that states still settle soon."""
+BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
+"""Distances of the states from omega_02 there, in parts of the range of slipping."""
+
+Key = tuple[str, str]
+"""A set, and what is looked for: the end of "rolling", "slipping", "leaning" or the "fold", the begin of "riding"."""
+From = str | Array | Callable[[Parameters], Array]
+"""How a ball starts, as `settling.begin` has it, or in which state: fixed, or of the parameters with the flow."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Bracket every change on the grid, settle states beside it, then bisect and extrapolate."""
-    cases = onset.look(lab, sets)
-    brackets = onset.ends_of_rolling(lab, sets, cases)
-    brackets |= onset.neighbourhoods(lab, sets, cases, brackets)
-    states = onset.settled_beside(lab, sets, brackets)
-    brackets = {key: b for key, b in brackets.items() if key[1] != "riding"} | onset.refined(
-        lab, sets, brackets, states
-    )
-    ends = {}
-    for name in sets:
-        turned, riding = states.get((name, "turning"), []), brackets.get((name, "riding"))
-        top = extrapolated(turned, "slip_x", turning)
-        if top and not (riding and _reaches(extrapolated(turned, "force_Ay", vanishing), riding.high, lab)):
-            ends[name] = top
-    brackets |= onset.folded(lab, sets, ends, states)
+    """Begin between flows whose settled cases differ: settle states beside each change, then bisect and extrapolate.
+
+    A change is between the fastest flow at which a ball was seen to settle so, and the next at which it settled
+    otherwise. Without such flows it is looked for from half the slowest, or up to twice the fastest.
+    """
+    fine, narrowest = lab.effort("thresholds.width"), lab.effort("thresholds.fold")
+    kinds = {"rolling": "with the fluid", "riding": "on the wall", "slipping": "rest"}
+    seen = {(name, kind): settled_cases(records, name, how) for name in sets for kind, how in kinds.items()}
+    around: dict[Key, Bracket] = {}
+    for key, cases in seen.items():
+        if flows := list(cases):
+            ended = {Case.NR} if key[1] != "rolling" else set(Case) - {Case.RR}
+            low = max((flow for flow in flows if cases[flow] not in ended), default=flows[0] / 2)
+            around[key] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
+
+    # The largest flow at which a ball that rolls on both goes on so; and roughly, where sinking and slipping end.
+    searches: dict[Key, Search] = {}
+    for (name, kind), change in around.items():
+        if kind == "rolling":
+            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], fine * change.high)
+    brackets, searches = _narrowed(lab, searches), {}
+    for (name, kind), change in around.items():
+        if kind == "riding":
+            searches[name, kind] = _search(lab, sets[name], "sinking", change, kinds[kind], ROUGH * change.low)
+        end = brackets.get((name, "rolling"))
+        if kind == "slipping" and end and not lifts(end) and end.high < change.high:
+            change = replace(change, low=max(change.low, end.high))
+            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], ROUGH * change.low)
+    brackets |= _narrowed(lab, searches, careful=False)
+    brackets = {key: bracket for key, bracket in brackets.items() if bracket.runs[1] or bracket.high in seen[key]}
+    states, searches = _settled_beside(lab, sets, brackets), {}
+
+    # Where a ball that rides the wall begins to slip on it, and up to where one pressed to the floor rolls again. They
+    # begin from settled states continued to each flow; the pressed one has a thousandth less spin on the wall.
     for name, p in sets.items():
-        own = {kind: bracket for (one, kind), bracket in brackets.items() if one == name}
-        rows = Rows(lab, name, p, own, {kind: s for (one, kind), s in states.items() if one == name})
-        yield from rows.rolling()
-        yield from rows.riding()
-        yield from rows.slipping(ends.get(name))
+        begins, end = brackets.pop((name, "riding"), None), brackets.get((name, "rolling"))
+        if begins and len(riding := states[name, "riding"]) == len(RIDES):
+            ride = rider(riding, height=high(p))
+            searches[name, "riding"] = _search(lab, p, "riding", begins, ride, fine * begins.high)
+        if end and len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
+            pressed = rider(lifted, height=0.0, less=1e-3)
+            change = Bracket(end.low * (1 - ROUGH), end.high * (1 + ROUGH))
+            searches[name, "leaning"] = _search(lab, p, "leaning", change, pressed, fine * end.high)
+    brackets |= _narrowed(lab, searches)
+
+    # The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
+    # the branch. There is no fold where the floor's force on it vanishes just where the wall begins to carry it.
+    folds, searches = {}, {}
+    for name, p in sets.items():
+        turned, held = states.get((name, "turning"), []), brackets.get((name, "riding"))
+        top, unloaded = extrapolated(turned, "slip_x", turning), extrapolated(turned, "force_Ay", vanishing)
+        off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
+        if top and not (held and off < narrowest * held.high):
+            folds[name], half = top, max(narrowest, 5.0 * top.uncertainty / top.value)
+            change = Bracket(top.value * (1 - half), top.value * (1 + half))
+            # At a fold all slows down, like the root of the distance.
+            time, width = 1 / math.sqrt(narrowest), narrowest * top.value
+            searches[name, "fold"] = _search(lab, p, "fold", change, turned[0].mean, width, time)
+    brackets |= _narrowed(lab, searches, careful=False)
+    for name, p in sets.items():
+        shown = {kind: b for (one, kind), b in brackets.items() if one == name and None not in b.runs}
+        beside = {kind: settled for (one, kind), settled in states.items() if one == name}
+        yield from _rows(lab, name, p, shown, beside, folds.get(name))
+
+
+def _settled_beside(lab: Lab, sets: Mapping[str, Parameters], of: Mapping[Key, Bracket]) -> dict[Key, list[Settled]]:
+    """Settled states beside every change, the nearest first; only those that did settle in the case that belongs."""
+    places: dict[Key, tuple[Array, str]] = {}
+    for name in sets:
+        if carried := of.get((name, "riding")):
+            places[name, "riding"] = carried.high * (1 + RIDES), "on the wall"
+            places[name, "sinking"] = carried.low * (1 - NEAR), "on the wall"
+        end, last = of.get((name, "rolling")), of.get((name, "slipping"))
+        if end and lifts(end):
+            places[name, "lifted"] = end.high * (1 + RIDES), "on the wall"
+        elif end and last:
+            span = last.low - end.high
+            places[name, "slipping"] = end.high + NEAR * min(span, end.high), "rest"
+            places[name, "turning"] = last.low - TURNS * span, "rest"
+    starts = [
+        [begin(name, sets[name].replace(omega_0=flow), how) for flow in flows.tolist()]
+        for (name, _), (flows, how) in places.items()
+    ]
+    belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
+    rows = settle_groups(lab, starts, loose=lab.effort("thresholds.loose"))
+    return {
+        key: [s for s in states if not s.failure and family(s.case) is belongs.get(key[1], Case.NR)]
+        for key, states in zip(places, rows, strict=True)
+    }
+
+
+def _narrowed(lab: Lab, searches: Mapping[Key, Search], careful: bool = True) -> dict[Key, Bracket]:
+    return dict(zip(searches, narrow(lab, list(searches.values()), careful), strict=True))
+
+
+def _search(
+    lab: Lab, p: Parameters, question: str, around: Bracket, start: From, width: float, time: float = 1.0
+) -> Search:
+    """Narrow a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
+
+    When it is where slipping ends, a run goes out from where the ball has come to at the largest flow so far.
+    """
+    units, answer = ASKED[question]
+
+    def task(omega: float, bracket: Bracket, care: Care) -> Task:
+        q, last = p.replace(omega_0=float(omega)), bracket.runs[0] if question == "slipping" else None
+        x0 = last.x[-1] if last else begin("", q, start).x0 if isinstance(start, str) else start
+        t_end = lasting(q, units * time * care.time)
+        return lab.task(q, x0(q) if callable(x0) else x0, t_end, coarse_step(q) / care.refine)
+
+    return Search(around, task, answer, width)
+
+
+def rider(states: Sequence[Settled], height: float, less: float = 0.0) -> Callable[[Parameters], Array]:
+    """Riding the wall at a height, as continued in omega_0 from settled states, with some part of its spin less."""
+    omegas = np.array([state.start.p.omega_0 for state in states])
+    fit = np.polynomial.Polynomial.fit(omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1)
+
+    def ride(p: Parameters) -> Array:
+        slip_x = float(fit(p.omega_0))
+        wall_spin = slip_x + p.R / p.r * p.omega_0
+        return State(y=height, omega_c=p.omega_0, slip_x=slip_x - less * wall_spin).stacked()
+
+    return ride
+
+
+def lifts(end: Bracket) -> bool:
+    """Whether two-point rolling ends by losing the floor, not by slipping: it carries no more than what hovers."""
+    if (run := end.runs[1]) is None:
+        return False
+    p = run.header.parameters
+    return bool(run.force_A[tail(run), 1].mean() < PRESSES * p.m * p.g)
+
+
+def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
+    """Largest of the slip speeds (n,) in the last part of a run, in units of `SLIPS` sqrt(g R)."""
+    p = run.header.parameters
+    return float(speeds[tail(run, share)].max() / (SLIPS * math.sqrt(p.g * p.R)))
+
+
+def stays_rolling(run: Trajectory) -> bool | None:
+    """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip still dies out.
+
+    It does where slip has fallen below 0.6 of what it was in the second half; a hundredth of what counts as slip is
+    none.
+    """
+    if not presses(run):
+        return False
+    middle = run.slip_speed_A[len(run.time) // 2 :]
+    last, before = slip(run.slip_speed_A, run), slip(middle, run, share=1.0)
+    if last >= 1:
+        return False if last > 0.6 * before else None
+    return True if last < 1e-2 else None
+
+
+ASKED: dict[str, tuple[float, Answer]] = {
+    "rolling": (5, stays_rolling),
+    "sinking": (20, lambda run: family(settled_case(run)) is not Case.NR),
+    "slipping": (40, lambda run: settles(run) is not False),
+    "riding": (5, lambda run: slip(run.slip_speed_B, run) > 1),
+    "leaning": (20, lambda run: presses(run) and settled_case(run) is Case.RR),
+    "fold": (1.4, settles),
+}
+"""How long a run takes, in units of 1/c, and what is asked of it: yes below a threshold, no above.
+
+The ball still rolls; the wall doesn't hold it; it settles on the floor, or may; it begins to slip on the wall; pressed
+to the floor it rolls on both again; it settles on the floor."""
 
 
 def extrapolated(
@@ -73,173 +244,124 @@ def extrapolated(
     if len(states) < POINTS:
         return None
     omegas = np.array([state.start.p.omega_0 for state in states])
-    place = to(omegas, [_lag(state) if quantity == "lag" else state.values[quantity] for state in states])
+    values = [state.values["omega_c" if quantity == "lag" else quantity] for state in states]
+    if quantity == "lag":
+        values = [
+            Measured(omega - orbit.value, orbit.uncertainty)
+            for omega, orbit in zip(omegas.tolist(), values, strict=True)
+        ]
+    place = to(omegas, values)
     return place if math.isfinite(place.uncertainty) else None
 
 
-def _lag(state: Settled) -> Measured:
-    """omega_0 - omega_c, rad s-1."""
-    orbit = state.values["omega_c"]
-    return Measured(state.start.p.omega_0 - orbit.value, orbit.uncertainty)
+def _rows(
+    lab: Lab,
+    name: str,
+    p: Parameters,
+    brackets: Mapping[str, Bracket],
+    states: Mapping[str, Sequence[Settled]],
+    top: Measured | None,
+) -> Iterator[Measurement | Missing]:
+    """What was measured on one set: the end of rolling, the begin of riding, and the end of slipping on both."""
+    tasks = {kind: [state.task for state in settled] for kind, settled in states.items()}
 
+    def missing(reason: str) -> Missing:
+        return Missing(PROTOCOL, name, reason)
 
-def _reaches(unloaded: Measured | None, carried: float, lab: Lab) -> bool:
-    """Whether the floor's force on a slipping ball falls to zero just where the wall begins to carry it."""
-    near = onset.FOLD_WIDTH[lab.level] * carried
-    return bool(unloaded and abs(unloaded.value - carried) < near and COVERAGE * unloaded.uncertainty < near)
+    def record(quantity: str, value: Measured | float, tasks: Sequence[Task], **at: Condition) -> Measurement:
+        q = p.replace(omega_0=value.value) if isinstance(value, Measured) else p
+        return measurement(lab, PROTOCOL, name, q, quantity, value, tasks, **at)
 
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """What was measured on one set, as records."""
-
-    lab: Lab
-    set: str
-    p: Parameters
-    brackets: Mapping[str, Bracket]
-    states: Mapping[str, Sequence[Settled]]
-
-    def rolling(self) -> Iterator[Measurement | Missing]:
-        """The end of two-point rolling: omega_01 or omega_03, from both sides."""
-        end, leaning = self._asked("rolling"), self._asked("leaning")
-        if not end:
-            yield self._missing(f"{self._range} ends two-point rolling")
-        elif onset.lifts(end):
-            yield self._missing("two-point rolling ends by losing the floor, not by slipping: there is no omega_01")
-            yield self._bisected("omega_03", end, "from below", "loss of the floor")
-            if leaning:
-                yield self._bisected("omega_03", leaning, "from above", "return to rolling when pressed")
-            else:
-                yield self._missing("a lifted ball did not settle, and could not be pressed back to the floor")
-        else:
-            yield self._missing("two-point rolling ends by slipping before the ball is lifted: there is no omega_03")
-            yield self._bisected("omega_01", end, "from below", "onset of slip")
-            yield from self._extrapolated("omega_01", "slipping", "lag", "from above", "lag of settled slipping")
-
-    def riding(self) -> Iterator[Measurement | Missing]:
-        """The least flow that holds a ball on the wall: omega_02, from both sides."""
-        if held := self._asked("riding"):
-            yield self._bisected("omega_02", held, "from above", "onset of sliding on the wall")
-        else:
-            yield self._missing(f"{self._range} is the least to hold a ball on the wall")
-        yield from self._extrapolated("omega_02", "sinking", "v_y", "from below", "speed of settled sinking")
-
-    def slipping(self, top: Measured | None) -> Iterator[Measurement | Missing]:
-        """The end of slipping on both: a fold, omega_04, or a passage to the wall without a jump at omega_02."""
-        states, riding, fold = self.states.get("turning"), self.brackets.get("riding"), self._asked("fold")
-        if not states:
-            yield self._missing("a ball that slips at both points settles at no flow: there is no omega_04")
-        elif top is None:
-            by = "floor force of settled slipping"
-            yield self._missing("slipping at both points passes to the wall without a jump: there is no omega_04")
-            yield from self._extrapolated("omega_02", "turning", "force_Ay", "from below", by)
-            yield self._record("folds", 0.0, self._tasks("turning"))
-        else:
-            by = "maximum of omega_0 along the branch"
-            row = self._record("omega_04", top, self._tasks("turning"), side="from below", by=by)
-            yield if_sure(row, top.value, f"the {by} is uncertain by {top.uncertainty:.1g} rad/s")
-            if fold:
-                yield self._bisected("omega_04", fold, "from below", "last settled slipping")
-            else:
-                yield self._missing("the end of slipping at both points could be extrapolated, but not be bracketed")
-            last = fold.low if fold else states[0].start.p.omega_0
-            if riding and last > riding.high:
-                yield self._record("folds", 1.0, self._tasks("turning"))
-
-    @property
-    def _range(self) -> str:
-        low, high = onset.GRID[[0, -1]] / time_unit(self.p)
-        return f"no flow between omega_0 = {low:.3g} and {high:.3g} rad/s"
-
-    def _asked(self, kind: str) -> Bracket | None:
-        """A bracket of which runs show both ends."""
-        bracket = self.brackets.get(kind)
-        return bracket if bracket and None not in bracket.runs else None
-
-    def _bisected(self, quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
-        high = of.runs[1]
-        assert high is not None
+    def bisected(quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
         # Slip that is still too small to count may have begun below: it is proportional to the distance.
-        speed = max(slip(high.slip_speed_A, high), slip(high.slip_speed_B, high))
+        speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in (run.slip_speed_A, run.slip_speed_B))
         unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
-        row = self._record(quantity, place, of.tasks, side=side, by=by)
+        row = record(quantity, place, of.tasks, side=side, by=by)
         return if_sure(row, place.value, f"{quantity} by {by} is uncertain by {place.uncertainty:.1g} rad/s")
 
-    def _extrapolated(
-        self, quantity: str, kind: str, vanishes: str, side: str, by: str
-    ) -> Iterator[Measurement | Missing]:
-        place = extrapolated(self.states.get(kind, []), vanishes, vanishing)
+    def vanishes(what: str, kind: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
+        place = extrapolated(states.get(kind, []), what, vanishing)
         if place and sure_enough(quantity, place, place.value):
-            yield self._record(quantity, place, self._tasks(kind), side=side, by=f"{by} → 0")
-        elif kind in self.states:
-            yield self._missing(f"too few states settled for {quantity} by {by}, or they point to it too vaguely")
+            yield record(quantity, place, tasks[kind], side=side, by=f"{by} → 0")
+        elif kind in states:
+            yield missing(f"too few states settled for {quantity} by {by}, or they point to it too vaguely")
 
-    def _tasks(self, kind: str) -> list[Task]:
-        return [state.task for state in self.states[kind]]
-
-    def _record(
-        self, quantity: str, value: Measured | float, tasks: Sequence[Task], **conditions: Condition
-    ) -> Measurement:
-        p = self.p.replace(omega_0=value.value) if isinstance(value, Measured) else self.p
-        return measurement(self.lab, "thresholds", self.set, p, quantity, value, tasks, **conditions)
-
-    def _missing(self, reason: str) -> Missing:
-        return Missing("thresholds", self.set, reason)
+    rolling, leaning, riding, fold = (brackets.get(kind) for kind in ("rolling", "leaning", "riding", "fold"))
+    none = "no flow that was tried, up to twice the fastest of the settled states,"
+    if not rolling:
+        yield missing(f"{none} ends two-point rolling")
+    elif lifts(rolling):
+        yield missing("two-point rolling ends by losing the floor, not by slipping: there is no omega_01")
+        yield bisected("omega_03", rolling, "from below", "loss of the floor")
+        if leaning:
+            yield bisected("omega_03", leaning, "from above", "return to rolling when pressed")
+        else:
+            yield missing("a lifted ball did not settle, and could not be pressed back to the floor")
+    else:
+        yield missing("two-point rolling ends by slipping before the ball is lifted: there is no omega_03")
+        yield bisected("omega_01", rolling, "from below", "onset of slip")
+        yield from vanishes("lag", "slipping", "omega_01", "from above", "lag of settled slipping")
+    if riding:
+        yield bisected("omega_02", riding, "from above", "onset of sliding on the wall")
+    else:
+        yield missing(f"{none} is the least to hold a ball on the wall")
+    yield from vanishes("v_y", "sinking", "omega_02", "from below", "speed of settled sinking")
+    if not states.get("turning"):
+        yield missing("a ball that slips at both points settles at no flow: there is no omega_04")
+    elif top is None:
+        yield missing("slipping at both points passes to the wall without a jump: there is no omega_04")
+        yield from vanishes("force_Ay", "turning", "omega_02", "from below", "floor force of settled slipping")
+        yield record("folds", 0.0, tasks["turning"])
+    else:
+        by = "maximum of omega_0 along the branch"
+        row = record("omega_04", top, tasks["turning"], side="from below", by=by)
+        yield if_sure(row, top.value, f"the {by} is uncertain by {top.uncertainty:.1g} rad/s")
+        if fold:
+            yield bisected("omega_04", fold, "from below", "last settled slipping")
+        else:
+            yield missing("the end of slipping at both points could be extrapolated, but not be bracketed")
+        last = fold.low if fold else states["turning"][0].start.p.omega_0
+        if riding and last > riding.high:
+            yield record("folds", 1.0, tasks["turning"])
 
 
 def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The drag at which the slope vanishes, by slopes over 1/c: what a force makes a ball lag by is proportional."""
+    """The drag at which omega_0 as a function of the floor's force has no slope where that vanishes.
+
+    By slopes over 1/c, to which what a force makes a ball lag by is proportional: the zero of the line through them.
+    """
     ranges = {}
     for name in sets:
         begins, ends = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
         if begins and ends and begins.value < ends.value:
             ranges[name] = begins.value, ends.value
-    slopes = _slopes(lab, sets, ranges, [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in STRONG])
-    near = {name: 1 / lag.value for name in ranges if (lag := _vanishing_lag(slopes, name)) and lag.value > 0}
-    slopes |= _slopes(lab, sets, ranges, [(name, c * k) for name, c in near.items() for k in BEYOND])
+    slopes: dict[str, list[tuple[float, Measured, list[Settled]]]] = {name: [] for name in ranges}
+    lags: dict[str, Measured] = {}
+    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in STRONG]
+    for _ in (STRONG, BEYOND):
+        starts = [
+            [begin(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest") for part in BEFORE_END]
+            for name, c in drags
+            for low, high in [ranges[name]]
+        ]
+        for (name, c), states in zip(drags, settle_groups(lab, starts), strict=True):
+            if not any(state.failure or state.case is not Case.SS for state in states):
+                flows = np.array([state.start.p.omega_0 for state in states])
+                slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
+                slopes[name].append((1 / c, slope, states))
+        for name, points in slopes.items():
+            if len(points) >= len(STRONG):
+                at, measured = [lag for lag, *_ in points], [slope for _, slope, _ in points]
+                lags[name], _ = straight_line(at, [m.value for m in measured], [m.uncertainty for m in measured])
+        drags = [(name, 1 / lag.value * k) for name, lag in lags.items() if lag.value > 0 for k in BEYOND]
     for name, p in sets.items():
-        own = [states for (one, _), (_, states) in slopes.items() if one == name]
         if name not in ranges:
             yield Missing("birth", name, "there is no range of slipping at both points that ends at the wall")
-        elif len(own) < len(STRONG) + len(BEYOND) or not (lag := _vanishing_lag(slopes, name)):
+        elif len(slopes[name]) < len(STRONG) + len(BEYOND):
             yield Missing("birth", name, "too few states of slipping at both points settle near the end of the branch")
         else:
-            drag = Measured(1 / lag.value, lag.uncertainty / lag.value**2)
-            tasks, q = [state.task for states in own for state in states], p.replace(c=drag.value)
-            row = measurement(lab, "birth", name, q, "critical_drag", drag, tasks)
-            why = f"the drag where the fold is born is too vague: {drag.uncertainty:.2g} 1/s"
-            yield if_sure(row, drag.value, why)
-
-
-Slopes = dict[tuple[str, float], tuple[Measured, list[Settled]]]
-"""By set and drag: d omega_0 over that of the floor's force, where it vanishes; and the states that show it."""
-
-
-def _slopes(
-    lab: Lab,
-    sets: Mapping[str, Parameters],
-    ranges: Mapping[str, tuple[float, float]],
-    drags: Sequence[tuple[str, float]],
-) -> Slopes:
-    starts = [
-        [begin(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest") for part in NEAR]
-        for name, c in drags
-        for low, high in [ranges[name]]
-    ]
-    slopes = Slopes()
-    for drag, states in zip(drags, settle_groups(lab, starts), strict=True):
-        if not any(state.failure or state.case is not Case.SS for state in states):
-            flows = np.array([state.start.p.omega_0 for state in states])
-            slopes[drag] = initial_slope(flows, [state.values["force_Ay"] for state in states]), states
-    return slopes
-
-
-def _vanishing_lag(slopes: Slopes, name: str) -> Measured | None:
-    """1/c where the line through the slopes of a set vanishes; None where too few were measured."""
-    points = [(1 / c, slope) for (one, c), (slope, _) in slopes.items() if one == name]
-    if len(points) < len(STRONG):
-        return None
-    lags, values = [lag for lag, _ in points], [slope.value for _, slope in points]
-    zero, _ = straight_line(lags, values, [slope.uncertainty for _, slope in points])
-    return zero
+            drag = Measured(1 / lags[name].value, lags[name].uncertainty / lags[name].value ** 2)
+            tasks = [state.task for *_, settled in slopes[name] for state in settled]
+            row = measurement(lab, "birth", name, p.replace(c=drag.value), "critical_drag", drag, tasks)
+            yield if_sure(row, drag.value, f"the drag where the fold is born is too vague: {drag.uncertainty:.2g} 1/s")

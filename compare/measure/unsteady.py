@@ -2,153 +2,112 @@
 
 Half the difference of two runs, after a jump up and one down, is free of what goes with the square of the jump. A ramp
 starts from settled slipping well below the end of it, and ends well above; the ball has left slipping once it lags by
-half as much as at first. Every number is measured with two time steps.
+half as much as at first.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from compare.measure.lab import Lab, coarse_step
-from compare.measure.levels import Level
-from compare.measure.questions import lasting, rolling
-from compare.measure.record import Measurement, Missing, Records, measurement, state_of, sure_enough
-from compare.measure.settling import Settled, settle
-from compare.measure.trials import Start
-from compare.runs.tasks import Task
+from compare.measure.record import Measurement, Missing, Records, if_sure, state_of
+from compare.measure.settling import lasting, settle
+from compare.measure.trials import Start, Trial, carry_out, finer, known_flow
 from compare.statistics import Measured, peaks, top
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
-from model.kinematics import SLIP_XYZ
 
 PROTOCOL = "unsteady"
-ROLLS = 0.85
-"""Flow of the ball that rolls, over the one at which that ends."""
-SLIPS, BEFORE, AFTER = 0.3, 0.75, 1.35
-"""Flow of the ball that slips, from where slipping begins, 0, to where the wall holds a ball, 1; flows at which a ramp
-begins and ends, from where slipping begins to where it ends."""
 JUMP = 1e-3
 """Relative size of a jump."""
-LASTS = 48.0
-"""How long a jump is followed, in units of 1/c."""
-SAMPLES = {"jump": 4000, "ramp": 16000}
-RATES = {Level.QUICK: (1e-2,), Level.DEFAULT: (2.5e-3, 5e-3, 1e-2), Level.FULL: (1.25e-3, 2.5e-3, 5e-3, 1e-2)}
-"""Rates of the ramps, in units of c times the range of slipping."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """A motion with both time steps, the coarser first: up and down after a jump, or along a ramp."""
-
-    set: str
-    p: Parameters
-    x0: Array
-    tasks: tuple[tuple[Task, ...], ...] = field(repr=False)
-    rate: float = 0.0
+SHOWS = {"RR": ("jump_delay",), "SS": ("jump_peak", "jump_height"), "ramp": ("ramp_end",)}
+"""What is measured: after a jump, by the case of the ball before it, and along a ramp."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Start from rolling, and from settled slipping."""
-    trials, starts = [], []
+    """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at which a ramp ends it."""
+    trials: list[Trial] = []
+    starts: list[tuple[tuple[float, float] | None, Start]] = []
     for name, p in sets.items():
-        begins, holds, ends = (_flow(records, name, f"omega_0{n}") for n in (1, 2, 4))
+        begins, holds, ends = (known_flow(records, name, f"omega_0{n}") for n in (1, 2, 4))
         if begins is None or holds is None:
             yield Missing(PROTOCOL, name, "no flows were measured between which the ball slips at both points")
             continue
         if p.drag == STOKES:  # with others there is no delay that all small jumps share
-            trials.append(_jump(lab, name, p.replace(omega_0=ROLLS * begins), rolling(p, ROLLS * begins)))
-        flows = [("jump", begins + SLIPS * (holds - begins))]
+            q = p.replace(omega_0=0.85 * begins)
+            trials.append(_jump(name, q, Case.RR, State(omega_c=q.omega_0)))
+        starts.append((None, Start(name, p.replace(omega_0=begins + 0.3 * (holds - begins)), "jump", np.zeros(8))))
         if ends is None:
             yield Missing(PROTOCOL, name, "no flow was measured at which slipping at both points ends in a jump")
         else:
-            flows += [("ramp", begins + BEFORE * (ends - begins))]
-        starts += [(kind, begins, ends, Start(name, p.replace(omega_0=w), kind, np.zeros(8))) for kind, w in flows]
-    for (kind, begins, ends, start), state in zip(starts, settle(lab, [s for *_, s in starts]), strict=True):
+            span = ends - begins
+            first = p.replace(omega_0=begins + 0.75 * span)
+            starts.append(((span, begins + 1.35 * span), Start(name, first, "ramp", np.zeros(8))))
+    for (ramp, start), state in zip(starts, settle(lab, [start for _, start in starts]), strict=True):
         if state.failure or state.case is not Case.SS:
             yield Missing(PROTOCOL, start.set, f"no settled slipping to start from: {state.failure or state.case.name}")
-        elif kind == "jump":
-            trials.append(_jump(lab, start.set, start.p, _on_floor(state)))
-        elif ends is not None:
-            trials += [_ramp(lab, state, begins, ends, rate) for rate in RATES[lab.level]]
-    lab.complete([task for trial in trials for pair in trial.tasks for task in pair])
-    for trial in trials:
-        yield from (_left if trial.rate else _jumped)(lab, trial)
-
-
-def _flow(records: Records, name: str, quantity: str) -> float | None:
-    return next((m.value for m in records.select("thresholds", quantity, lambda m: m.set == name)), None)
-
-
-def _jump(lab: Lab, name: str, p: Parameters, x0: Array) -> Trial:
-    jumped, t_end = [p.replace(omega_0=p.omega_0 * (1 + side * JUMP)) for side in (1, -1)], lasting(p, LASTS)
-    tasks = tuple(
-        tuple(lab.task(q, x0, t_end, coarse_step(p) / refine, samples=SAMPLES["jump"]) for q in jumped)
-        for refine in (2, 4)
-    )
-    return Trial(name, p, x0, tasks)
-
-
-def _ramp(lab: Lab, state: Settled, begins: float, ends: float, rate: float) -> Trial:
-    p, rise = state.start.p, rate * state.start.p.c * (ends - begins)
-    target = begins + AFTER * (ends - begins)
-    t_end = (target - p.omega_0) / rise
-    flow, x0 = Flow.ramp(p.omega_0, target, t_end), _on_floor(state)
-    tasks = tuple(
-        (lab.task(p, x0, t_end, coarse_step(p) / refine, flow=flow, samples=SAMPLES["ramp"]),) for refine in (1, 2)
-    )
-    return Trial(state.start.set, p, x0, tasks, rise)
-
-
-def _on_floor(state: Settled) -> Array:
-    """Its mean state, on the floor and at the wall to the last digit."""
-    return State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
-
-
-def _jumped(lab: Lab, trial: Trial) -> Iterator[Measurement | Missing]:
-    """Delay of a ball that rolls; time and height of the peak of one that slips, if there is one."""
-    answers = []
-    for pair in trial.tasks:
-        up, down = lab.run(pair)
-        answers.append(_answer(up, down))
-    case, known = ("RR", ("jump_delay",)) if not trial.x0[SLIP_XYZ].any() else ("SS", ("jump_peak", "jump_height"))
-    for name in known:
-        coarse, fine = (answer[name] for answer in answers)
-        # Forces act in the middle of a step: a moment is known to half of the finer one, either way.
-        late = 0.0 if name == "jump_height" else coarse_step(trial.p) / 4 / math.sqrt(12)
-        value = Measured(fine, math.hypot(fine - coarse, late))
-        if np.isfinite(fine) and sure_enough(name, value, abs(fine)):
-            yield measurement(lab, PROTOCOL, trial.set, trial.p, name, value, trial.tasks[-1], case=case)
+            continue
+        x0 = State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0)  # at both walls to the last digit
+        if ramp is None:
+            trials.append(_jump(start.set, start.p, Case.SS, x0))
         else:
-            yield Missing(PROTOCOL, trial.set, f"{name} in {case}: no peak, or one that is too uncertain")
+            trials += [_ramp(start, x0, *ramp, rate) for rate in lab.effort("unsteady.rates")]
+    for result in carry_out(lab, PROTOCOL, trials):
+        if isinstance(result, Missing):
+            yield result
+            continue
+        trial = result.trial
+        for quantity in SHOWS[trial.name]:
+            row = result.row(lab, quantity, finer(result.coarse[quantity].value, result.fine[quantity]))
+            if trial.flow is None:
+                yield if_sure(row, abs(row.value), f"{quantity} in {trial.name}: no peak, or one that is too uncertain")
+            elif math.isfinite(row.value):
+                yield row
+            else:
+                why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
+                yield Missing(PROTOCOL, trial.set, why)
 
 
-def _answer(up: Trajectory, down: Trajectory) -> dict[str, float]:
-    """What the part of omega_c shows that has the sign of the jump: 0 at first, 1 in the end."""
-    t, odd = up.time, up.omega_c - down.omega_c
-    y = odd / odd[-1]
-    k, late = peaks(y)
-    peak = {"jump_peak": np.nan, "jump_height": np.nan}
-    if 0 < (first := int(y.argmax())) < len(t) // 2:
-        k, late = k[k == first], late[k == first]
-        at, height = t[k] + late * (t[1] - t[0]), top(y, k, late)
-        peak = {"jump_peak": float(at[0]), "jump_height": float(height[0])}
-    return peak | {"jump_delay": float(np.trapezoid(1 - y, t))}
+def _jump(set: str, p: Parameters, case: Case, x0: State) -> Trial:
+    sides = tuple(p.replace(omega_0=p.omega_0 * (1 + side * JUMP)) for side in (1, -1))
+    t_end, x, known = lasting(p, 48.0), x0.stacked(), {"case": case.name}
+    return Trial(set, p, case.name, x, t_end, (2, 4), 4000, _jumped, variants=sides, conditions=known)
 
 
-def _left(lab: Lab, trial: Trial) -> Iterator[Measurement | Missing]:
-    """The flow at which the ball has caught up."""
-    coarse, fine = (caught_up(lab.run([task])[0]) for (task,) in trial.tasks)
-    value = Measured(fine, abs(fine - coarse))
-    if np.isfinite(fine):
-        at = {"rate": trial.rate} | state_of(trial.x0[:6])
-        yield measurement(lab, PROTOCOL, trial.set, trial.p, "ramp_end", value, trial.tasks[-1], **at)
-    else:
-        yield Missing(PROTOCOL, trial.set, f"a ramp of {trial.rate:.3g} rad/s^2 doesn't end slipping at both points")
+def _ramp(start: Start, x0: State, span: float, end: float, rate: float) -> Trial:
+    p, rise, x = start.p, rate * start.p.c * span, x0.stacked()
+    t_end = (end - p.omega_0) / rise
+    flow, known = Flow.ramp(p.omega_0, end, t_end), {"rate": rise, **state_of(x[:6])}
+
+    def read(run: Trajectory) -> dict[str, Measured]:
+        return {"ramp_end": Measured(caught_up(run), 0.0)}
+
+    return Trial(start.set, p, "ramp", x, t_end, (1, 2), 16000, read, flow, conditions=known)
+
+
+def odd_part(up: Trajectory, down: Trajectory) -> Array:
+    """The part of omega_c (n,) that has the sign of the jump, relative to its last value: from 0 to 1."""
+    odd = up.omega_c - down.omega_c
+    return np.asarray(odd / odd[-1])
+
+
+def _jumped(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
+    """The delay; time and height of the highest peak, nan where there is none in the first half of the runs."""
+    t, y = up.time, odd_part(up, down)
+    # Forces act in the middle of a step: a moment is known to half of the finer one, either way.
+    late = coarse_step(up.header.parameters) / 4 / math.sqrt(12)
+    k, later = peaks(y)
+    highest = (k == y.argmax()) & (k < len(t) // 2)
+    at, height = (np.append(each[highest], math.nan)[0] for each in (t[k] + later * (t[1] - t[0]), top(y, k, later)))
+    return {
+        "jump_delay": Measured(float(np.trapezoid(1 - y, t)), late),
+        "jump_peak": Measured(float(at), late),
+        "jump_height": Measured(float(height), 0.0),
+    }
 
 
 def caught_up(run: Trajectory) -> float:
@@ -156,6 +115,6 @@ def caught_up(run: Trajectory) -> float:
     lag = run.header.flow(run.time) - run.omega_c
     below = np.flatnonzero(lag < lag[0] / 2)
     if not len(below):
-        return np.nan
+        return math.nan
     near = slice(below[0], below[0] - 2, -1)
     return float(run.header.flow(np.interp(lag[0] / 2, lag[near], run.time[near])))

@@ -14,6 +14,15 @@ Rows = Sequence[Sequence[str]]
 """A table: its head, then its body."""
 
 
+def readable(unit: str) -> str:
+    """A unit of the files as a reader writes it: rad s-1 is rad/s, 1 is nothing."""
+    if unit == "1":
+        return ""
+    for written, read in ((" s-2", "/s²"), (" s-1", "/s"), ("s-1", "1/s"), ("rad-1", "1/rad"), ("rad2", "rad²")):
+        unit = unit.replace(written, read)
+    return unit
+
+
 def render(package: str, template: str, **values: Any) -> str:
     """A template of a package, filled in; what is not marked safe is escaped, a value that is missing is an error."""
     loader = jinja2.ChoiceLoader([jinja2.PackageLoader(package), jinja2.PackageLoader("compare.pages")])

@@ -10,6 +10,7 @@ from compare.claims.claim import Outcome, Verdict
 from compare.measure.check import Check
 from compare.measure.quantities import QUANTITIES, quantity
 from compare.measure.record import Condition, Measurement
+from compare.pages import readable
 from model import Case
 
 SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {
@@ -27,15 +28,6 @@ MARKS = {
     Outcome.NOT_RUN: ("none", "…"),
 }
 """Class and sign of each outcome."""
-
-
-def unit(name: str) -> str:
-    """A unit of the files as a reader writes it: rad s-1 is rad/s, 1 is nothing."""
-    if name == "1":
-        return ""
-    for written, read in ((" s-2", "/s²"), (" s-1", "/s"), ("s-1", "1/s"), ("rad-1", "1/rad"), ("rad2", "rad²")):
-        name = name.replace(written, read)
-    return name
 
 
 def number(value: float) -> str:
@@ -71,7 +63,7 @@ def _condition(name: str, of: Condition) -> str:
         return of if name == "side" else f"{name.replace('_', ' ')} {of}"
     if of == 0 and name in ("y", "v_y", "h", "v_h", "slip_x", "slip_y", "slip_z"):
         return ""
-    return f"{SYMBOLS.get(name, name.replace('_', ' '))} = {of:.4g} {unit(_UNITS.get(name, '1'))}".rstrip()
+    return f"{SYMBOLS.get(name, name.replace('_', ' '))} = {of:.4g} {readable(_UNITS.get(name, '1'))}".rstrip()
 
 
 def noticed(verdict: Verdict) -> str:

@@ -24,16 +24,17 @@ def nowhere(what: str, done: int, total: int, failed: int) -> None:
     """Shows nothing."""
 
 
-def counted(show: Show) -> Show:
-    """Says how many runs are done, too."""
-    return lambda what, done, total, failed: show(f"{what}: {done} of {total} runs", done, total, failed)
-
-
 @contextmanager
-def shown(quiet: bool = False) -> Iterator[Show]:
-    """A function to report progress to, on standard error; it is never silent for longer than `INTERVAL`."""
+def shown(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
+    """A function to report progress to, on standard error, never silent for longer than `INTERVAL`.
+
+    `counted` if what is done are runs, whose number is to be shown, too.
+    """
     if quiet:
         yield nowhere
+    elif counted:
+        with shown() as show:
+            yield lambda what, done, total, failed: show(f"{what}: {done} of {total} runs", done, total, failed)
     elif sys.stderr.isatty():
         times = TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn()
         columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), *times

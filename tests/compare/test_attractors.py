@@ -12,7 +12,9 @@ import pytest
 import analytic
 from analytic import orbits
 from compare.commands.cli import main
-from compare.measure import hopping
+from compare.measure import attractors
+from compare.measure.trials import finer
+from compare.statistics import hops
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.arrays import Array
 from model.trajectory import SAMPLE
@@ -61,40 +63,46 @@ def test_tops_of_known_hops() -> None:
     time = np.arange(0, 5, 1e-3)
     phase = np.mod(time, period) / period - 0.5
     run = _run(time, height * (1 - 4 * phase**2), 57.0 * time)
-    hops = hopping.tops(run, 1.0, 4.0)
+    tops = attractors.tops(run, 1.0, 4.0)
     # The parabola through three samples is the hop itself.
-    assert hops.values["orbit_period"].value == pytest.approx(period, rel=1e-9)
-    assert hops.values["orbit_height"].value == pytest.approx(height, rel=1e-9)
-    assert max(value.uncertainty for value in hops.values.values()) < 1e-9
-    assert len(hopping.tops(_run(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
+    assert tops.values["orbit_period"].value == pytest.approx(period, rel=1e-9)
+    assert tops.values["orbit_height"].value == pytest.approx(height, rel=1e-9)
+    assert max(value.uncertainty for value in tops.values.values()) < 1e-9
+    assert len(attractors.tops(_run(time, np.zeros_like(time), time), 1.0, 4.0).time) == 0
 
 
 @pytest.mark.parametrize("size", [0.9, 1.05])
 def test_map_from_hop_to_hop(size: float) -> None:
     """States that follow a linear map with a complex pair and a fast root: how they change, and what stays."""
-    angle = 0.23
-    turn = size * np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 0]])
-    turn[2, 2] = 0.03
+    cos, sin = size * math.cos(0.23), size * math.sin(0.23)
+    turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 0.03]])
     mixed = np.array([[1, 0.3, 0.2], [0.1, 1, 0.4], [0.5, -0.2, 1]])
     states, z = np.zeros((12, 8)), np.array([1e-3, 2e-3, 1e-3])
     for state in states:
         state[[0, 2, 3]] = np.array([5e-3, 57.0, -100.0]) + mixed @ z * np.array([0.05, 14.0, 31.0])
         z = turn @ z
-    factor, steady = hopping.hop_map(states, HOPPING)
+    factor, steady = attractors.hop_map(states, HOPPING)
     assert factor == pytest.approx(size, rel=1e-6)
     assert steady == pytest.approx((5e-3, 0, 57.0, -100.0, 0, 0, 0, 0), rel=1e-6)
 
 
-def test_birth_is_where_the_height_vanishes() -> None:
-    rows = [(w, 4e-4 * (w - 52) - 1e-6 * (w - 52) ** 2, 4e-4 * (w - 52)) for w in (58.0, 56.0, 54.0)]
-    place = hopping.birth(rows)
+def test_where_hopping_begins_and_ends() -> None:
+    """At no height; and where disturbances neither grow nor shrink."""
+    flows = (58.0, 56.0, 54.0)
+    curved, straight = ([4e-4 * (w - 52) - b * (w - 52) ** 2 for w in flows] for b in (1e-6, 0.0))
+    place = finer(attractors.birth(flows, curved).value, attractors.birth(flows, straight))
     assert place.value == pytest.approx(52.0, abs=1e-9)
     assert 0 < place.uncertainty < 0.1
-
-
-def test_death_is_where_disturbances_neither_grow_nor_shrink() -> None:
-    place = hopping.death([(0.08, 0.97, 0.96, 0.96), (0.09, 0.99, 0.98, 0.98), (0.11, 1.03, 1.02, 1.02)])
+    place = attractors.death([0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)])
     assert (place.value, place.uncertainty) == pytest.approx((0.1, 5e-3))
+
+
+def test_which_balls_hop() -> None:
+    """Those that come down again and again, but none that swings on the wall, sinks, or hardly leaves the floor."""
+    t = np.arange(0, 5, 1e-3)
+    hop = 4e-3 * np.abs(np.sin(12 * t))
+    assert all(hops(_run(t, y, t)) for y in (hop, np.exp(-t) * hop))
+    assert not any(hops(_run(t, y, t)) for y in (4e-3 + hop, np.maximum(4e-3 * (4.5 - t), 0.0), hop / 4000))
 
 
 def _run(time: Array, y: Array, theta: Array) -> Trajectory:
@@ -110,7 +118,7 @@ def test_time_stepping_comes_to_the_orbit_of_theory() -> None:
     orbit = orbits.refine(HOPPING, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.223)
     theory = np.array([orbit.period, orbit.turn / orbit.period, orbit.cycle.y.max()])
     coarse, fine = (
-        np.array([each.value for each in hopping.tops(run, 12.0, 16.0).values.values()])
+        np.array([each.value for each in attractors.tops(run, 12.0, 16.0).values.values()])
         for run in (
             analytic.simulate(HOPPING, orbit.loop.x, 16.0, method="time-stepping", timestep=step, sample_interval=1e-3)
             for step in (4e-6, 2e-6)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compare.scorecard import confirmation
+from docs.studies import confirmation
 
 
 def test_formulas_are_what_mujoco_does() -> None:

@@ -10,8 +10,10 @@ import pytest
 
 from compare import pages
 from compare.runs.campaign import Campaign
-from compare.scorecard import accuracy, document, standings
-from compare.scorecard.accuracy import REACHED
+from compare.scorecard import standings
+from docs.studies import accuracy
+from docs.studies import tables as document
+from docs.studies.accuracy import REACHED
 from model import InputError
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -13,14 +13,16 @@ import analytic
 from compare.claims import bifurcations
 from compare.claims.claim import Outcome
 from compare.claims.judge import judge
-from compare.measure import onset, thresholds
+from compare.measure import thresholds
 from compare.measure.brackets import FINER, LONGER, Bracket, Search, narrow
 from compare.measure.edge import Edge, ends_slipping
 from compare.measure.extrapolation import turning, vanishing
+from compare.measure.lab import coarse_step, time_unit
 from compare.measure.levels import Level
-from compare.measure.questions import held, keeps_on, rolling, settles, slides, stays_rolling
-from compare.measure.record import Records
+from compare.measure.record import Missing, Records
 from compare.measure.sets import sets
+from compare.measure.settling import begin, lasting, settles
+from compare.measure.thresholds import ASKED, NEAR, TURNS
 from compare.statistics import Measured
 from model import Case, Parameters
 from tests.measured import measured
@@ -68,7 +70,7 @@ def test_an_end_that_was_never_asked_shows():
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6])
 def test_extrapolated_zero_is_as_sure_as_it_says(noise):
-    where = 2.0 * (1 + onset.NEAR)
+    where = 2.0 * (1 + NEAR)
     values = [Measured(math.sin(w - 2) * (1 + w), noise) for w in where]
     bracket = vanishing(where, values)
     assert abs(bracket.value - 2.0) < 3 * bracket.uncertainty
@@ -79,14 +81,14 @@ def test_extrapolated_zero_is_as_sure_as_it_says(noise):
 def test_extrapolated_zero_of_what_is_no_power_series_is_as_sure_as_it_says(power):
     """As omega_0 is none of the lag where drag isn't linear."""
     for part in (0.02, 0.1, 0.5):
-        order = onset.NEAR / onset.NEAR[-1]
+        order = NEAR / NEAR[-1]
         where = 1.0 + 0.05 * (order + part * order**power + 0.1 * order**3)
         place = vanishing(where, [Measured(float(value), 1e-12) for value in order])
         assert abs(place.value - 1.0) < 3 * place.uncertainty
 
 
 def test_extrapolated_maximum_is_as_sure_as_it_says():
-    slip = 1 + np.sqrt(onset.TURNS)  # its maximum is at slip = 1, with a cubic part
+    slip = 1 + np.sqrt(TURNS)  # its maximum is at slip = 1, with a cubic part
     where = 3 - (slip - 1) ** 2 * (1 + 0.5 * (slip - 1) + 0.2 * (slip - 1) ** 2)
     bracket = turning(where, [Measured(-float(s), 1e-9) for s in slip])
     assert abs(bracket.value - 3) < 3 * bracket.uncertainty
@@ -101,49 +103,64 @@ def test_a_line_has_no_maximum(bend):
     assert not math.isfinite(turning(where - bend * where**2, order).value)
 
 
-def _ran(lab, p, omega, x0, units=5.0):
-    return lab.run([held(lab, p, omega, x0, units)])[0]
+def _ran(lab, p, omega, x0=None, units=5.0):
+    """A run at a flow from a state, rolling with the fluid if none is given."""
+    q = p.replace(omega_0=omega)
+    x0 = begin("", q, "with the fluid").x0 if x0 is None else x0
+    return lab.run([lab.task(q, x0, lasting(q, units), coarse_step(q))])[0]
 
 
-def test_the_engine_begins_to_slip_at_omega_01(lab):
-    omega_01 = analytic.thresholds(REFERENCE).omega_01
-    for side, stays in ((-1, True), (1, False)):
-        omega = omega_01 * (1 + side * 1e-5)
-        assert stays_rolling(_ran(lab, REFERENCE, omega, rolling(REFERENCE, omega))) is stays
-
-
-def test_the_wall_lets_go_at_omega_02(lab):
-    omega_02 = analytic.thresholds(REFERENCE).omega_02
+def test_the_engine_begins_to_slip_at_omega_01_and_the_wall_lets_go_at_omega_02(lab):
+    t = analytic.thresholds(REFERENCE)
     for side in (-1, 1):
-        p = REFERENCE.replace(omega_0=omega_02 * (1 + side * 1e-5))
+        assert ASKED["rolling"][1](_ran(lab, REFERENCE, t.omega_01 * (1 + side * 1e-5))) is (side < 0)
+        p = REFERENCE.replace(omega_0=t.omega_02 * (1 + side * 1e-5))
         x = analytic.solution(p, Case.NR, formal=True).x.copy()
         x[0] = p.R
-        assert slides(_ran(lab, p, p.omega_0, x)) is (side < 0)
+        assert ASKED["riding"][1](_ran(lab, p, p.omega_0, x)) is (side < 0)
 
 
 def test_what_runs_away_beyond_the_fold_does_not_settle(lab):
     omega_04 = analytic.thresholds(REFERENCE).omega_04
-    p = REFERENCE.replace(omega_0=0.99 * omega_04)
-    x = analytic.solution(p, Case.SS).x
-    assert settles(_ran(lab, p, 0.985 * omega_04, x, 20.0))
-    away = _ran(lab, p, 1.02 * omega_04, x, 20.0)
-    assert settles(away) is False
-    assert not keeps_on(away)
+    x = analytic.solution(REFERENCE.replace(omega_0=0.99 * omega_04), Case.SS).x
+    assert settles(_ran(lab, REFERENCE, 0.985 * omega_04, x, 20.0))
+    assert settles(_ran(lab, REFERENCE, 1.02 * omega_04, x, 20.0)) is False
 
 
 def test_edge_tells_by_the_way_a_run_still_goes():
     slipping, lifted = np.eye(8)[2] * 10.0, np.eye(8)[2] * 30.0
-    edge = Edge("reference", REFERENCE, slipping, lifted, slipping, lifted - slipping, (0.0, 1.0))
-    for rate, falls in ((-0.1, True), (0.1, False)):
-        assert ends_slipping(SimpleNamespace(time=np.arange(101), omega_c=25 + rate * np.arange(101)), edge) is falls
-    for end, falls in ((10.0, True), (30.0, False)):
-        assert ends_slipping(SimpleNamespace(time=np.arange(101), omega_c=np.full(101, end)), edge) is falls
+    edge = Edge("reference", REFERENCE, slipping, lifted, slipping, lifted - slipping)
+    time = np.arange(101)
+    for omega_c, falls in (
+        (25 - 0.1 * time, True),
+        (25 + 0.1 * time, False),
+        (10 + 0 * time, True),
+        (30 + 0 * time, False),
+    ):
+        assert ends_slipping(SimpleNamespace(time=time, omega_c=omega_c), edge) is falls
 
 
-def test_protocol_on_a_set_without_fold(lab):
+def _settled(name, p, flows):
+    """In which cases balls settle at a few flows, as the protocol `settled` has it."""
+    for flow in flows:
+        q = p.replace(omega_0=flow / time_unit(p))
+        cases = {s.case for s in analytic.stable_solutions(q)}
+        floor = Case.RR if Case.RR in cases else Case.SS if Case.SS in cases else Case.NR
+        for start, case in (
+            ("rest", floor),
+            ("with the fluid", floor),
+            ("on the wall", Case.NR if Case.NR in cases else Case.NS),
+        ):
+            yield measured("settled", "case", float(case), 0.0, q, name, start=start, case=case.name)
+
+
+@pytest.mark.parametrize("flows", [(0.6, 1.4, 2.5, 4.2), (0.6, 1.4, 2.5)])
+def test_protocol_on_a_set_without_fold(lab, flows):
+    """Also where no flow of the settled states is beyond the end of slipping."""
     name = "thick-fluid"
     p = sets(Level.QUICK)[name]
-    records = Records.of(thresholds.measure(lab, {name: p}, Records()))
+    known = Records(tuple(_settled(name, p, flows)))
+    records = Records.of(thresholds.measure(lab, {name: p}, known))
     kinds = {(m.quantity, m.conditions.get("by")) for m in records.measurements}
     assert len(kinds) == 6
     assert {quantity for quantity, _ in kinds} == {"omega_01", "omega_02", "folds"}
@@ -154,6 +171,12 @@ def test_protocol_on_a_set_without_fold(lab):
     # That there is no fold bears on the fold, too; its flow was not measured.
     assert [check.measurement.quantity for check in verdicts["table-5-F"].checks] == ["folds"]
     assert verdicts["table-5-NF2"].outcome is Outcome.NOT_RUN
+
+
+def test_protocol_without_settled_states(lab):
+    rows = list(thresholds.measure(lab, {"reference": REFERENCE}, Records()))
+    assert all(isinstance(row, Missing) for row in rows)
+    assert any("ends two-point rolling" in row.reason for row in rows)
 
 
 def _records():

@@ -27,6 +27,7 @@ from compare.measure import record
 from compare.measure.check import Check, Relation
 from compare.measure.levels import Level
 from compare.measure.record import Measurement, Records
+from compare.pages import readable
 from compare.report import pictures, report, results, wording
 from compare.report.results import Summary
 from compare.runs.workers import spread
@@ -183,7 +184,7 @@ def test_wording() -> None:
         wording.conditions({"case": "SS", "side": "from above", "y": 0.02, "v_y": 0.0})
         == "case SS, from above, y = 0.02 m"
     )
-    assert [wording.unit(name) for name in ("rad s-1", "m s-2", "s-1", "1")] == ["rad/s", "m/s²", "1/s", ""]
+    assert [readable(name) for name in ("rad s-1", "m s-2", "s-1", "1")] == ["rad/s", "m/s²", "1/s", ""]
     (check,) = checks(1)
     assert wording.value(check.measurement, math.nan) == "none"
     cases = Measurement(

@@ -1,4 +1,4 @@
-"""A search covers its box evenly, goes on where it stopped, and says what it knows with its confidence."""
+"""Searches cover their box evenly; basins are those of theory; both go on where they stopped."""
 
 from __future__ import annotations
 
@@ -9,21 +9,19 @@ import math
 import numpy as np
 import pytest
 
-from analytic import hopping
+from analytic import hopping, stable_solutions
 from analytic.ensemble import interval
 from compare.commands import cli
-from compare.runs import regions, search
-from compare.runs.search import BOX, Search, Searched, carry_out, parameters, random_starts
+from compare.runs import search
+from compare.runs.campaign import Campaign
+from compare.runs.search import BOX, FATES, Basins, Search, Searched, basins, carry_out, parameters, random_starts
+from compare.runs.sweep import Axis
 from compare.runs.workers import processes
-from model import Parameters, StorageError
+from docs.studies.figures import SEARCHES
+from model import InputError, Parameters, StorageError, storage
 
+BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
 QUICK = Search({**BOX, "kappa": (0.5, 1.0)}, starts=2)
-
-
-def hopping_set() -> tuple[Parameters, float]:
-    """A set of the kept search with drag enough that its ball hops soon, and the period it has there."""
-    row = next(r for r in regions.kept().confirmed if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1)
-    return parameters(np.array([row[name] for name in BOX])), row["confirmed"]["period"]
 
 
 def test_points_fill_the_box_and_a_longer_search_contains_the_shorter():
@@ -33,12 +31,8 @@ def test_points_fill_the_box_and_a_longer_search_contains_the_shorter():
     np.testing.assert_array_equal(Search().points(1000)[:64], points)
     halves = points[:, 0] < math.sqrt(low[0] * high[0])
     assert halves.sum() == 32  # a Sobol sequence puts equally many into each half, here of log mu
-
-
-def test_the_groups_of_a_point_are_those_of_its_parameters():
-    point = Search().points(1)[0]
-    p = parameters(point)
-    np.testing.assert_allclose([p.mu, p.eta, p.j, p.r / p.R, p.kappa, p.Omega_0], point)
+    p = parameters(points[0])
+    np.testing.assert_allclose([p.mu, p.eta, p.j, p.r / p.R, p.kappa, p.Omega_0], points[0])
 
 
 def test_a_search_goes_on_where_it_stopped(tmp_path):
@@ -63,15 +57,15 @@ def test_a_chunk_is_the_same_whoever_computes_it(tmp_path):
 
 
 def test_screen_and_confirmation_tell_hopping_from_rest():
-    """A ball hops on in a kept set; in the reference set it comes to rest whatever it starts with."""
-    p, period = hopping_set()
-    x0s = random_starts(p, 20, [0])
-    hops, x, failed = hopping.screen(p, x0s)
+    """A ball hops on in a kept set with drag enough; in the reference set it rests whatever it starts with."""
+    row = next(r for r in Searched.load(SEARCHES[0]).confirmed if r["confirmed"]["landings"] == 1 and r["kappa"] > 0.1)
+    p = parameters(np.array([row[name] for name in BOX]))
+    hops, x, failed = hopping.screen(p, random_starts(p, 20, [0]))
     assert failed == 0
     assert hops.any()
     record = hopping.confirm(p, x[hops][0])
     assert record is not None
-    assert record.period == pytest.approx(period, rel=1e-3)
+    assert record.period == pytest.approx(row["confirmed"]["period"], rel=1e-3)
     assert 0 < (record.multiplier or 0) < 1
     still = Parameters.named("reference").replace(omega_0=25.0)
     hops, x, _ = hopping.screen(still, random_starts(still, 3, [0]))
@@ -85,42 +79,98 @@ def test_intervals_of_shares():
     assert interval(0, 0) == (0.0, 1.0)
 
 
-def test_the_parts_of_a_range_are_all_of_it():
-    record = regions.kept()
-    for name in BOX:
-        own = [part for part in regions.parts(record) if part.group == name]
-        assert sum(part.sets for part in own) == record.sets
-        assert sum(part.hopping for part in own) == len(record.confirmed)
-
-
-@pytest.mark.parametrize("name", regions.KEPT)
-def test_kept_searches_are_whole(name, tmp_path):
-    record = regions.kept(name)
+@pytest.mark.parametrize("path", SEARCHES, ids=lambda path: path.stem)
+def test_kept_searches_are_whole(path, tmp_path):
+    record = Searched.load(path)
     rows = record.search.points(record.sets)
     assert record.failed <= 1e-5 * record.sets * record.search.starts
     for row in record.rows:
         assert np.min(np.abs(rows - [row[group] for group in BOX]).sum(axis=1)) < 1e-9
+    for name in BOX:  # the parts of a range are all of it
+        sets, hits = zip(*(part[3:] for part in search.parts(record) if part[0] == name), strict=True)
+        assert (sum(sets), sum(hits)) == (record.sets, len(record.confirmed))
     record.save(tmp_path / "again.json")
     assert dataclasses.asdict(Searched.load(tmp_path / "again.json")) == dataclasses.asdict(record)
 
 
-def test_a_file_that_is_no_search(tmp_path):
-    (tmp_path / "no.json").write_text("{}", "utf-8")
-    with pytest.raises(StorageError, match="holds no search"):
-        Searched.load(tmp_path / "no.json")
+def test_fates_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_where_it_stopped(tmp_path):
+    """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both engines alike."""
+    assert {s.case.name for s in stable_solutions(BISTABLE)} == {"SS", "SR", "NR"}
+    given = BISTABLE, {"y": 0.002}, Axis("omega_c", (5.0, 25.0, 45.0)), Axis("slip_x", (-1.0, 1.0)), 2
+    seen, maps = [], []
+    for _ in range(2):
+        with Campaign(tmp_path, workers=0, report=lambda what, done, total, failed: seen.append(done)) as campaign:
+            maps.append(basins(campaign, *given))
+        for path in [path for path in tmp_path.glob("*.h5") if len(storage.contents(path)[1]) == 2]:
+            path.unlink()  # as if it had been killed before MuJoCo's batch was whole
+    assert (seen[0], seen[-2:]) == (0, [6, 8])
+    for basin in maps:
+        assert {FATES[k] for k in basin.fates.ravel()} == {"SS", "off the floor"}
+        np.testing.assert_array_equal(basin.mujoco, basin.fates[::2, ::2])
+        assert len(basin.differences()) == 0
+
+
+def test_a_ball_that_hops_on(tmp_path):
+    """From states near the top of the hop."""
+    p = Parameters.named("hopping")
+    with Campaign(tmp_path, workers=0) as campaign:
+        axes = Axis("y", (6.36e-3, 6.4e-3)), Axis("v_y", (0.0, 1e-3))
+        basin = basins(campaign, p, {"omega_c": 57.3, "slip_x": -106.0}, *axes)
+    assert {FATES[k] for k in basin.fates.ravel()} == {"hops"}
+
+
+def test_basins_count_measure_and_keep_their_points(tmp_path):
+    """Two columns of each fate: columns 1 and 2 lie at the boundary, 0 and 3 a cell farther away."""
+    axes, fates = ("omega_c", "slip_x", np.arange(4.0), np.arange(4.0)), np.array([[0, 0, 2, 2]] * 4)
+    b = Basins(BISTABLE, (0.0,) * 8, *axes, fates, 2, np.array([[2, 2], [0, 0]]), 1e-3)
+    assert b.differences().tolist() == [2.0, 1.0]
+    b.fates[3] = 2
+    assert (b.share("hops"), b.share("RR")) == ((6, 16), (0, 16))
+    b.save(tmp_path / "b.json")
+    again = Basins.load(tmp_path / "b.json")
+    assert (again.parameters, again.start) == (b.parameters, b.start)
+    np.testing.assert_array_equal(again.fates, b.fates)
+
+
+@pytest.mark.parametrize(("kind", "what", "text"), [(Searched, "search", "{}"), (Basins, "basins", "[]")])
+def test_a_file_of_another_kind(kind, what, text, tmp_path):
+    (tmp_path / "no.json").write_text(text, "utf-8")
+    with pytest.raises(StorageError, match=f"holds no {what}"):
+        kind.load(tmp_path / "no.json")
+
+
+@pytest.mark.parametrize(
+    ("changes", "start", "message"),
+    [
+        ({"c": 0.0}, {}, "there are no basins"),
+        ({}, {"omega": 1.0}, "unknown state variable 'omega'"),
+        ({}, {"h": 0.06}, "h = 0.06 m"),
+    ],
+)
+def test_no_basins(changes, start, message, tmp_path):
+    with pytest.raises(InputError, match=message), Campaign(tmp_path, workers=0) as campaign:
+        basins(campaign, BISTABLE.replace(**changes), start, Axis("omega_c", (0, 1)), Axis("slip_x", (0, 1)))
+
+
+def test_command_basins(capsys, tmp_path):
+    to = ["--output", str(tmp_path), "--workers", "0"]
+    across = ["--omega-0", "40", "--across", "omega_c=5:45:2", "--up", "slip_x=0:1:2"]
+    assert cli.main(["basins", *across, *to, "--json"]) == 0
+    assert '"shares"' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--range", "mo=1:2"], "unknown group 'mo'"),
-        (["--range", "mu=2:1"], "wrong order"),
-        (["--range", "mu=2"], "write mu=from:to"),
-        (["--range", "mu=-1:1"], "mu = -1"),
-        (["--sets", "0"], "sets = 0"),
-        (["--workers", "-1"], "workers = -1"),
+        ("search --range mo=1:2", "unknown group 'mo'"),
+        ("search --range mu=2:1", "wrong order"),
+        ("search --range mu=2", "write mu=from:to"),
+        ("search --range mu=-1:1", "mu = -1"),
+        ("search --sets 0", "sets = 0"),
+        ("search --workers -1", "workers = -1"),
+        ("basins --across omega=5:45:2 --up slip_x=0:1:2", "unknown state variable 'omega'"),
     ],
 )
 def test_bad_input(words, message, capsys):
-    assert cli.main(["search", *words]) == 2
+    assert cli.main(words.split()) == 2
     assert message in capsys.readouterr().err

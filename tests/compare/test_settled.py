@@ -7,7 +7,7 @@ import pytest
 
 from compare.measure import characteristic, plane, settled, settling
 from compare.measure.lab import Lab, coarse_step, time_unit
-from compare.measure.levels import Level
+from compare.measure.levels import EFFORT, Level
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records
 from compare.measure.sets import sets
@@ -23,8 +23,12 @@ FLOWS = (0.6, 1.4, 2.0, 2.6)
 @pytest.fixture(scope="module")
 def records(lab: Lab) -> Records:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(settled, "QUICK", FLOWS)
-        return Records.of(settled.measure(lab, {"thick": THICK}, Records()))
+        return _measured(lab, patch, THICK, *FLOWS)
+
+
+def _measured(lab: Lab, patch: pytest.MonkeyPatch, p: Parameters, *flows: float) -> Records:
+    patch.setitem(EFFORT, "settled.flows", (flows,) * 3)
+    return Records.of(settled.measure(lab, {"thick": p}, Records()))
 
 
 def _values(records: Records, Omega_0: float, case: Case) -> dict[str, Measurement]:
@@ -72,19 +76,16 @@ class TestSettled:
             assert 0 < 3 * m.uncertainty <= quantity(m.quantity).resolves * settling.scale(m.quantity, m.parameters)
 
     def test_what_does_not_settle_is_missing(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(settled, "QUICK", (0.6,))
         monkeypatch.setattr(settling, "ROUNDS", (1.0,))
         monkeypatch.setattr(settling, "SOLVED", 1e-3)
-        measured = Records.of(settled.measure(lab, {"thick": THICK}, Records()))
+        measured = _measured(lab, monkeypatch, THICK, 0.6)
         assert not measured.measurements
         assert all(isinstance(each, Missing) and "still drifts" in each.reason for each in measured.missing)
         assert len(measured.missing) == 4
 
     def test_what_quadratic_drag_does_not_settle_has_no_values(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
         """A ball that goes round with the fluid keeps a slight lag; one that slips or sinks settles."""
-        monkeypatch.setattr(settled, "QUICK", (0.6, 2.0))
-        blunt = sets(Level.QUICK)["blunt"]
-        measured = Records.of(settled.measure(lab, {"blunt": blunt}, Records()))
+        measured = _measured(lab, monkeypatch, sets(Level.QUICK)["blunt"], 0.6, 2.0)
         cases = {m.conditions["case"] for m in measured.measurements if m.quantity == "omega_c"}
         assert cases == {"SS", "NS"}
         assert any("a slight lag is one for ever" in each.reason for each in measured.missing)
@@ -140,7 +141,7 @@ class TestOthers:
         assert isinstance(only, Missing)
 
     def test_the_newcomer_is_another_engine(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(settled, "QUICK", (0.6,))
+        monkeypatch.setitem(EFFORT, "settled.flows", ((0.6,),) * 3)
         rows = list(settled.newcomer(lab, {"reference": THICK}, Records()))
         assert {row.engine for row in rows if isinstance(row, Measurement)} == {engines.NEWCOMER.name}
 
@@ -156,8 +157,8 @@ class TestPlane:
         assert any(u[0] < 0.6 and u[1] > 0.6 for u in added)
 
     def test_a_few_points_are_measured(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(plane, "SPREAD", {Level.QUICK: 2})
-        monkeypatch.setattr(plane, "ADDED", {Level.QUICK: ()})
+        monkeypatch.setitem(EFFORT, "plane.spread", (2, 2, 2))
+        monkeypatch.setitem(EFFORT, "plane.added", ((), (), ()))
         monkeypatch.setattr(plane, "DRAG", 10.0)
         rows = list(plane.measure(lab, {"reference": THICK}, Records()))
         masks = [row for row in rows if isinstance(row, Measurement)]

@@ -21,7 +21,7 @@ from model import Case, Parameters
 Function = Callable[..., Any]
 Fault = Callable[[Function], Function]
 Change = Callable[[Any], Any]
-PACKAGES = ("analytic", "compare.claims")
+PACKAGES = ("analytic", "compare")
 """Where functions of the theory are known by name."""
 
 

@@ -1,4 +1,4 @@
-"""Write the measured tables of a page: ``python -m compare.scorecard.document docs/mujoco-settings.md`` or engines.md.
+"""Write the measured tables of a page: ``python -m docs.studies.tables docs/mujoco-settings.md`` or engines.md.
 
 Each table stands between two lines ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. Runs are kept in a results
 directory and not computed again.
@@ -17,8 +17,9 @@ from compare import pages
 from compare.pages import Rows
 from compare.runs import progress
 from compare.runs.campaign import Campaign
-from compare.scorecard import accuracy, confirmation, league, scores, standings
+from compare.scorecard import league, scores, standings
 from compare.scorecard.league import Entry
+from docs.studies import accuracy, confirmation
 from model import InputError
 from model.files import write_text
 from model.parameters import check_choice, check_names
@@ -82,7 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     check_choice("page", args.page.name, list(PAGES))
     runs, tables = PAGES[args.page.name]
     check_names(args.only or (), list(tables), "table")
-    with progress.shown() as show, Campaign(args.output / runs, args.workers, report=progress.counted(show)) as campaign:
+    with progress.shown(counted=True) as show, Campaign(args.output / runs, args.workers, report=show) as campaign:
         for name in args.only or tables:
             campaign.doing = name
             write(args.page, name, tables[name](campaign))

@@ -11,7 +11,9 @@ import numpy as np
 from analytic import bifurcation
 from analytic.orbit_branch import Place
 from compare.measure.levels import Level
-from compare.mutants.exchange import (
+from model import Case, Flow, Parameters, State
+from model.drag import STOKES
+from tests.mutants.exchange import (
     Change,
     Fault,
     Function,
@@ -28,8 +30,6 @@ from compare.mutants.exchange import (
     times,
     where,
 )
-from model import Case, Flow, Parameters, State
-from model.drag import STOKES
 
 
 def _of(case: Case | None, change: Change) -> Fault:

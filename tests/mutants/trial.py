@@ -1,23 +1,28 @@
 """Trying the verdicts: which claims notice a wrong theory, and which a wrong engine?
 
-``python -m compare.mutants DIR`` judges the stored measurements of a validation by every wrong theory; with
+``python -m tests.mutants DIR`` judges the stored measurements of a validation by every wrong theory; with
 ``--engines`` it also measures with every wrong engine. It exits with 1 if more of them go unnoticed than may.
 """
 
 from __future__ import annotations
 
 import functools
+import importlib
+import inspect
 import itertools
+import pkgutil
 import signal
 import statistics
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
+from types import CodeType, FrameType
+from typing import TypeVar
 
+import analytic
 from compare import pages, validation
 from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Claim, Outcome, Text, Verdict
@@ -25,14 +30,15 @@ from compare.claims.judge import forget, judge, verdict
 from compare.measure import levels
 from compare.measure.quantities import QUANTITIES
 from compare.measure.record import Records
-from compare.mutants import engines
-from compare.mutants.engines import WRONG_ENGINES
-from compare.mutants.exchange import believed
-from compare.mutants.theories import THEORIES
 from compare.report import results
 from compare.runs.workers import spread
+from tests.mutants import engines
+from tests.mutants.engines import WRONG_ENGINES
+from tests.mutants.exchange import believed
+from tests.mutants.theories import THEORIES
 
 Outcomes = dict[str, Outcome]
+R = TypeVar("R")
 PROVING = frozenset({"settled", "laws", "field", "impacts"})
 """Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in contact and landing."""
 PATIENCE = 40.0
@@ -43,9 +49,17 @@ _PAGE = """\
 Every verdict must be able to be lost. Here the theory is replaced by slightly wrong ones, one at a time,
 and measurements stored at the levels {levels} are judged again{until}.
 Then MuJoCo is replaced by slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim
-changes.
+changes. A prediction that takes longer than {patience:g} s of processor time is given up: its claim says nothing of the
+fault, and faults that hang some claim are counted apart.
 Written by `make mutants`.
 {trials}
+## Functions that nothing tries
+
+Public functions of `analytic` that no claim calls as measurements of the level {level} are judged, and that no wrong
+theory changes. Compiled functions and methods of classes are not watched.
+
+{untried}
+
 ## Resolving power
 
 The smallest relative error of a theory that a check would notice: the largest and the median of all checks of
@@ -74,14 +88,17 @@ class Trial:
     what: str
     noticed: Outcomes
     """Claims whose verdict is another than without the fault, and what it is."""
+    hung: tuple[str, ...] = ()
+    """Claims whose predictions were given up after `PATIENCE`: they neither notice the fault nor miss it."""
     tried: bool = True
     """Whether anything is measured that could notice it."""
 
     @property
     def by(self) -> str:
         """Who noticed it."""
-        named = (name if of is Outcome.REFUTED else f"{name} ({of})" for name, of in self.noticed.items())
-        return ", ".join(named) or ("**nobody**" if self.tried else "not measured")
+        named = [name if of is Outcome.REFUTED else f"{name} ({of})" for name, of in self.noticed.items()]
+        named = named or ["**nobody**" if self.tried else "not measured"]
+        return ", ".join([*named, *(f"{name} hangs" for name in self.hung)])
 
 
 Resolved = tuple[float, str, str]
@@ -97,6 +114,8 @@ class Judged:
     """Of all wrong theories."""
     power: Mapping[str, Sequence[Resolved]]
     """By quantity what its checks resolve, the coarsest first."""
+    untried: Sequence[str] = ()
+    """Public functions of `analytic` that no claim calls and no wrong theory changes, as ``module.function``."""
     whole: bool = True
     """Whether by all claims, or by the quickest ones first and only until one notices."""
 
@@ -106,14 +125,39 @@ def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
 
     By all claims; unless `whole`, by the quickest ones first and only until one notices it.
     """
-    power = defaultdict[str, list[Resolved]](list)
-    for each in judge(CLAIMS, validation.stored(directory)):
+    power, records = defaultdict[str, list[Resolved]](list), validation.stored(directory)
+    verdicts, called = watched(lambda: judge(CLAIMS, records))
+    for each in verdicts:
         if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
             for check in each.checks:
                 power[check.measurement.quantity].append((check.resolves, check.measurement.set, each.claim.id))
     tried = _tried(functools.partial(_theory, directory, whole), len(THEORIES), workers)
     name, coarsest_first = results.load(directory).level.lower(), {q: sorted(rows)[::-1] for q, rows in power.items()}
-    return Judged(name, tried, coarsest_first, whole)
+    return Judged(name, tried, coarsest_first, untried(called), whole)
+
+
+def watched(act: Callable[[], R]) -> tuple[R, set[CodeType]]:
+    """What a function returns, and the code of all Python functions that were called till then."""
+    called = set[CodeType]()
+    sys.setprofile(lambda frame, event, of: called.add(frame.f_code) if event == "call" else None)
+    try:
+        return act(), called
+    finally:
+        sys.setprofile(None)
+
+
+def untried(called: Container[CodeType]) -> list[str]:
+    """Public functions of `analytic`, as ``module.function``, that were not called and that no wrong theory changes."""
+    changed, names = {f"{wrong.module}.{wrong.function}" for wrong in THEORIES}, []
+    for module in pkgutil.walk_packages(analytic.__path__, "analytic."):
+        for name, value in vars(importlib.import_module(module.name)).items():
+            if name.startswith("_") or not callable(value) or hasattr(value, "py_func"):  # private, or numba's
+                continue
+            function = inspect.unwrap(value)
+            own = inspect.isfunction(function) and function.__module__ == module.name
+            if own and function.__code__ not in called and f"{module.name}.{name}" not in changed:
+                names.append(f"{module.name}.{name}".removeprefix("analytic."))
+    return sorted(names)
 
 
 def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
@@ -146,7 +190,16 @@ def page(levels: Sequence[Judged], measured: Sequence[Trial]) -> str:
         " and ".join(level.name for level in each) for each in (levels, [e for e in levels if not e.whole])
     )
     until = f" (at {partly} until a claim notices it, the quickest first)" if partly else ""
-    return _PAGE.format(levels=names, until=until, trials=tables, powers=pages.markdown(rows))
+    words = {"levels": names, "until": until, "patience": PATIENCE, "level": levels[-1].name}
+    lists = {"untried": _by_module(levels[-1].untried), "powers": pages.markdown(rows)}
+    return _PAGE.format(trials=tables, **words, **lists)
+
+
+def _by_module(names: Sequence[str]) -> str:
+    """Functions as a list in Markdown, an item a module."""
+    parts = (name.rpartition(".") for name in names)
+    modules = itertools.groupby(parts, lambda part: part[0])
+    return "\n".join(f"* `{module}`: {', '.join(f'`{name}`' for *_, name in own)}" for module, own in modules)
 
 
 def _power(values: Sequence[float], ceiling: float) -> tuple[str, ...]:
@@ -157,10 +210,11 @@ def _power(values: Sequence[float], ceiling: float) -> tuple[str, ...]:
 
 
 def _table(what: str, tried: Mapping[str, Sequence[Trial]]) -> str:
-    counts = [f"{sum(bool(trial.noticed) for trial in trials)} at {level}" for level, trials in tried.items()]
+    noticed = ", ".join(f"{sum(bool(trial.noticed) for trial in trials)} at {level}" for level, trials in tried.items())
+    hung = ", ".join(f"{sum(bool(trial.hung) for trial in trials)} at {level}" for level, trials in tried.items())
     rows = [[trials[0].what, *(trial.by for trial in trials)] for trials in zip(*tried.values(), strict=True)]
     table = pages.markdown([["fault", *tried], *rows])
-    return f"\n## Wrong {what}, {len(rows)}: noticed {', '.join(counts)}\n\n{table}\n"
+    return f"\n## Wrong {what}, {len(rows)}: noticed {noticed}\n\nFaults that hang a claim: {hung}.\n\n{table}\n"
 
 
 @functools.cache
@@ -174,32 +228,39 @@ def _right(directory: Path) -> tuple[Outcomes, Sequence[Claim]]:
     return outcomes, sorted(CLAIMS, key=lambda claim: took[claim.id])
 
 
+class HangError(BaseException):
+    """A prediction takes too long; no `Exception`, which the judge would take for a breakdown of the theory."""
+
+
 def _theory(directory: Path, whole: bool, number: int) -> Trial:
-    wrong, noticed = THEORIES[number], Outcomes()
+    wrong, noticed, hung = THEORIES[number], Outcomes(), list[str]()
     if wrong.level > levels.Level[results.load(directory).level]:
         return Trial(wrong.what, noticed, tried=False)
     right, quickest_first = _right(directory)
     forget()
     with believed(wrong):
         for claim in CLAIMS if whole else quickest_first:
-            noticed |= _changed(right, [_patiently(claim, validation.stored(directory))])
+            try:
+                noticed |= _changed(right, [_patiently(claim, validation.stored(directory))])
+            except HangError:  # as when a wrong theory never comes to the end of a motion
+                hung.append(claim.id)
             if noticed and not whole:
                 break
-    return Trial(wrong.what, noticed)
+    return Trial(wrong.what, noticed, tuple(hung))
 
 
 def _patiently(claim: Claim, records: Records) -> Verdict:
-    """The verdict; an error if it takes too long, as when a wrong theory never comes to the end of a motion."""
-    signal.signal(signal.SIGVTALRM, _too_long)
+    """The verdict; raises `HangError` if the predictions take longer than `PATIENCE`."""
+
+    def give_up(number: int, frame: FrameType | None) -> None:
+        raise HangError
+
+    signal.signal(signal.SIGVTALRM, give_up)
     signal.setitimer(signal.ITIMER_VIRTUAL, PATIENCE)
     try:
         return verdict(claim, records)
     finally:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
-
-
-def _too_long(number: int, frame: FrameType | None) -> None:
-    raise TimeoutError(f"the predictions took longer than {PATIENCE:g} s")
 
 
 def _engine(directory: Path, number: int) -> Trial:

@@ -1,4 +1,4 @@
-"""Speed as ratios measured within one run: they depend less on the machine and its load than times do."""
+"""Throughput of campaigns, and what they take beside simulating and storing."""
 
 from __future__ import annotations
 
@@ -10,19 +10,13 @@ import tempfile
 import time
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
-from analytic import stable_solutions
-from compare import pages
 from compare.runs.campaign import Campaign, run_batch
 from compare.runs.engines import MUJOCO
 from compare.runs.tasks import Task, carry_out
 from compare.runs.workers import Workers, dask, processes
-from mjsim import benchmark
 from model import Parameters, State, storage
 
 BATCH = 64
@@ -33,48 +27,16 @@ SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
 """Slipping at both points: both contacts closed, and friction on its cone."""
 
 
-@dataclass(frozen=True)
-class Figures:
-    """What `run` measured."""
-
-    single: benchmark.Cost
-    """One simulation."""
-    batch: benchmark.Cost
-    """A batch of `BATCH`."""
-    two_over_one: float
-    """Throughput of a campaign with two processes over that with one."""
-    machine: float
-    """The same of bare arithmetic: what the machine, with all else that runs on it, lets two processes do at best."""
-    bookkeeping: float
-    """Time a campaign spends on a task beside simulating and storing it, s."""
-    resuming: float
-    """Time to find out that `FINISHED` tasks are done, s."""
-    dask_over_processes: float
-    """Throughput of two Dask workers over that of two processes; nan without Dask."""
-
-
-def run() -> Figures:
-    """Measure the loop over bare steps, alone and in a batch; then campaigns."""
-    (state,) = stable_solutions(SLIPPING)
-    x0 = state.x.tolist()
-    two_over_one, machine, dask_over_processes = _campaigns()
-    single, batch = benchmark.cost(SLIPPING, x0), benchmark.cost(SLIPPING, x0, BATCH)
-    return Figures(single, batch, two_over_one, machine, _bookkeeping(), _resuming(), dask_over_processes)
-
-
-def table(figures: Figures) -> Table:
-    """The figures for the terminal."""
-    rows = [["", "bare mj_step", "whole loop", "ratio"]]
-    for name, cost in (("one simulation", figures.single), (f"batch of {figures.batch.runs}", figures.batch)):
-        rows.append([name, f"{1e6 * cost.bare:.2f} µs", f"{1e6 * cost.whole:.2f} µs", f"{cost.ratio:.2f}"])
-    rows += [
-        ["campaign: two processes over one", "", "", f"{figures.two_over_one:.2f}"],
-        ["the same of bare arithmetic: the machine's limit", "", "", f"{figures.machine:.2f}"],
-        ["campaign: two Dask workers over two processes", "", "", f"{figures.dask_over_processes:.2f}"],
-        ["campaign: bookkeeping of a task", "", f"{1e3 * figures.bookkeeping:.1f} ms", ""],
-        [f"campaign: resuming {FINISHED} finished tasks", "", f"{figures.resuming:.1f} s", ""],
+def rows() -> list[list[str]]:
+    """What is measured of campaigns, as rows of the table of `tests.benchmarks`."""
+    two_over_one, machine, dask_over_processes = _ratios()
+    return [
+        ["campaign: two processes over one", "", "", f"{two_over_one:.2f}"],
+        ["the same of bare arithmetic: the machine's limit", "", "", f"{machine:.2f}"],
+        ["campaign: two Dask workers over two processes", "", "", f"{dask_over_processes:.2f}"],
+        ["campaign: bookkeeping of a task", "", f"{1e3 * _bookkeeping():.1f} ms", ""],
+        [f"campaign: resuming {FINISHED} finished tasks", "", f"{_resuming():.1f} s", ""],
     ]
-    return pages.table("Cost of the study's loop", rows)
 
 
 def _tasks(count: int, t_end: float) -> list[Task]:
@@ -83,7 +45,7 @@ def _tasks(count: int, t_end: float) -> list[Task]:
     return [Task(engine=MUJOCO.name, parameters=p, x0=State(), t_end=t_end) for p in sets]
 
 
-def _campaigns() -> tuple[float, float, float]:
+def _ratios() -> tuple[float, float, float]:
     """Throughputs, as medians of ratios of times next to each other: two processes over one, of campaigns and of bare
     arithmetic; then two Dask workers over two processes, apart, since a scheduler takes its share of the time."""
     tasks = _tasks(4 * BATCH, 2.0)  # a few seconds, against which the last batch to end counts little
@@ -170,6 +132,7 @@ def _bookkeeping() -> float:
 
 
 def _resuming() -> float:
+    """Time to find out that `FINISHED` tasks are done, s."""
     with tempfile.TemporaryDirectory() as directory:
         tasks = _tasks(FINISHED, 0.01)
         (run,) = carry_out(tasks[:1])

@@ -6,7 +6,6 @@ import functools
 import statistics
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -19,21 +18,11 @@ from mjsim.stepping import Polar
 from model import Flow, Parameters
 
 
-@dataclass(frozen=True)
-class Cost:
-    """Time per step of one simulation, s, and the ratio of the whole loop to bare steps of the same scene."""
+def cost(p: Parameters, x0: Sequence[float], runs: int = 1, steps: int = 2500, repeats: int = 5) -> list[float]:
+    """Processor time of a bare and of a whole step of one simulation, s, and their ratio: medians over `repeats`.
 
-    runs: int
-    bare: float
-    whole: float
-    ratio: float
-    """Median of the ratios of timings next to each other: a machine that slows down does so for both."""
-
-
-def cost(p: Parameters, x0: Sequence[float], runs: int = 1, steps: int = 2500, repeats: int = 5) -> Cost:
-    """Medians over `repeats` of bare and whole timings, of processor time, with a sample every 100 steps.
-
-    They are taken in turn, each whole one between two bare ones.
+    There is a sample every 100 steps. Timings are taken in turn, each whole one between two bare ones: a machine that
+    slows down does so for both.
 
     Start from a stationary state, or the two don't solve the same contacts: the bare steps are those of a settled run
     with its forces, margins and surface velocities left as they are, and the ball held at its azimuth, where the wall
@@ -55,8 +44,11 @@ def cost(p: Parameters, x0: Sequence[float], runs: int = 1, steps: int = 2500, r
         whole.append(time.process_time() - start)
         bare.append(_bare(settled, runs, steps))
     ratios = [2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)]
-    each = steps * runs
-    return Cost(runs, statistics.median(bare) / each, statistics.median(whole) / each, statistics.median(ratios))
+    return [
+        statistics.median(bare) / (steps * runs),
+        statistics.median(whole) / (steps * runs),
+        statistics.median(ratios),
+    ]
 
 
 def _bare(settled: Polar, runs: int, steps: int) -> float:

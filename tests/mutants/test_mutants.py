@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -11,34 +13,33 @@ import pytest
 import analytic
 from analytic import dynamics, stationary
 from compare.claims import stationary as claims
+from compare.claims.catalogue import CLAIMS
 from compare.claims.claim import Outcome
 from compare.measure.field import constrained
 from compare.measure.lab import Lab
 from compare.measure.levels import Level
-from compare.mutants import engines, trial
-from compare.mutants.engines import WRONG_ENGINES
-from compare.mutants.exchange import WrongTheory, believed, scaled
-from compare.mutants.theories import THEORIES
+from compare.measure.record import Records
 from compare.runs.campaign import Campaign
 from compare.runs.engines import ENGINES, MUJOCO
 from model import Case, Parameters
+from tests.mutants import engines, trial
+from tests.mutants.engines import WRONG_ENGINES
+from tests.mutants.exchange import WrongTheory, believed, scaled
+from tests.mutants.theories import THEORIES
 
 P = Parameters.named("reference").replace(omega_0=25.0)
 
 
-def test_there_are_many() -> None:
+def test_there_are_many_and_each_replaces_a_function_that_exists_and_gives_it_back() -> None:
     assert len(THEORIES) >= 40
     assert len(WRONG_ENGINES) >= 8
     assert len({wrong.what for wrong in THEORIES}) == len(THEORIES)
-
-
-@pytest.mark.parametrize("wrong", THEORIES, ids=lambda wrong: wrong.what)
-def test_each_replaces_a_function_that_exists_and_gives_it_back(wrong: WrongTheory) -> None:
-    module = importlib.import_module(wrong.module)
-    right = getattr(module, wrong.function)
-    with believed(wrong):
-        assert getattr(module, wrong.function) is not right
-    assert getattr(module, wrong.function) is right
+    for wrong in THEORIES:
+        module = importlib.import_module(wrong.module)
+        right = getattr(module, wrong.function)
+        with believed(wrong):
+            assert getattr(module, wrong.function) is not right, wrong.what
+        assert getattr(module, wrong.function) is right, wrong.what
 
 
 @pytest.mark.parametrize("wrong", [w for w in THEORIES if w.module == "analytic.dynamics"], ids=lambda w: w.what)
@@ -116,18 +117,41 @@ def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(
     assert np.abs(other.x - right.x).max() > 1e-6
 
 
-def test_the_page_names_what_nobody_noticed() -> None:
+def test_the_page_names_what_nobody_noticed_and_what_hangs() -> None:
     whats, refuted = ("ω₀₁ high", "ω₀₂ high"), {"table-5-P2": Outcome.REFUTED}
-    quick, default = [{}, refuted], [{"table-5-P3": Outcome.REFUTED}, refuted]
     powers = [(3e-5, "rough-wall", "table-5-P3"), (4e-6, "reference", "table-5-P3"), (1e-6, "wake", "table-5-P3")]
     levels = [
-        trial.Judged(name, [*map(trial.Trial, whats, noticed)], {"omega_01": powers})
-        for name, noticed in (("quick", quick), ("default", default))
+        trial.Judged(name, [*map(trial.Trial, whats, *columns)], {"omega_01": powers}, ["orbits.refine", "orbits.seen"])
+        for name, columns in (
+            ("quick", ([{}, refuted], [("prop-1",), ()])),
+            ("default", ([{"table-5-P3": Outcome.REFUTED}, refuted], [(), ("prop-2",)])),
+        )
     ]
-    page = trial.page(levels, [trial.Trial("no drag", refuted)])
-    assert "## Wrong theories, 2: noticed 1 at quick, 2 at default" in page
-    assert "| ω₀₁ high | **nobody** | table-5-P3 |" in page
-    assert "| ω₀₂ high | table-5-P2 | table-5-P2 |" in page
-    assert "## Wrong engines, 1: noticed 1 at quick" in page
-    numbers = "3e-05 | 4e-06 | 67%"
-    assert f"| ω₀₁ | 0.0001 | {numbers} | {numbers} | rough-wall, table-5-P3 |" in page
+    page, numbers = trial.page(levels, [trial.Trial("no drag", refuted)]), "3e-05 | 4e-06 | 67%"
+    for text in (
+        "## Wrong theories, 2: noticed 1 at quick, 2 at default",
+        "Faults that hang a claim: 1 at quick, 1 at default.",
+        "| ω₀₁ high | **nobody**, prop-1 hangs | table-5-P3 |",
+        "| ω₀₂ high | table-5-P2 | table-5-P2, prop-2 hangs |",
+        "## Wrong engines, 1: noticed 1 at quick",
+        "* `orbits`: `refine`, `seen`",
+        f"| ω₀₁ | 0.0001 | {numbers} | {numbers} | rough-wall, table-5-P3 |",
+    ):
+        assert text in page
+
+
+def test_a_prediction_that_hangs_is_no_breakdown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The judge takes every `Exception` of a prediction for a breakdown of the theory, which would be noticed."""
+    monkeypatch.setattr(trial, "PATIENCE", 0.1)
+    formal = next(claim for claim in CLAIMS if claim.algebra)
+    claim = dataclasses.replace(formal, algebra=lambda: (None for _ in itertools.count()))
+    with pytest.raises(trial.HangError):
+        trial._patiently(claim, Records())
+
+
+def test_functions_that_nothing_tries_are_found() -> None:
+    verdicts, called = trial.watched(lambda: analytic.thresholds(P))
+    assert verdicts == analytic.thresholds(P)
+    names = trial.untried(called)
+    assert not {"bifurcation.thresholds", "slip_bounds.gamma_nr"} & set(names)  # called; changed by a wrong theory
+    assert "flowmeter.operating_limit" in names

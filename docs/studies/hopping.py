@@ -1,12 +1,8 @@
-"""Where the ball hops for ever, and the basins of its attractors: drawn from results that are kept in `compare.runs`.
-
-`dualball search --save` and `dualball basins --save` write such results.
-"""
+"""Where the ball hops for ever, and the basins of its attractors: drawn from what `--save` of `dualball search` and
+`dualball basins` wrote."""
 
 from __future__ import annotations
 
-from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,9 +12,7 @@ from matplotlib.patches import Patch
 
 from analytic.ensemble import interval
 from compare.figures import style
-from compare.runs import regions
-from compare.runs.basins import FATES, Basins
-from compare.runs.search import LOGARITHMIC, Searched
+from compare.runs.search import FATES, LOGARITHMIC, Basins, Searched
 from model.kinematics import UNITS, VARIABLES
 
 _PAIRS = (("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0"))
@@ -26,11 +20,6 @@ _CELLS = 8
 _AXES, _SYMBOLS = style.SYMBOLS | {"Omega_0": style.FREE_0}, style.SYMBOLS | {"Omega_0": "Ω₀"}
 _COLOURS = ("#F0E442", "#0072B2", "#D55E00", "#009E73", "#000000")
 """Of `FATES`."""
-
-
-def where(material: object) -> Searched:
-    """The kept search."""
-    return regions.kept()
 
 
 def draw_where(record: Searched) -> Figure:
@@ -75,11 +64,6 @@ def caption_where(record: Searched) -> str:
 def _share(hits: int, of: int) -> str:
     low, high = interval(hits, of)
     return f"{100 * hits / of:.2f} % ({100 * low:.2f} to {100 * high:.2f} % with 95 % confidence)"
-
-
-def plane(material: object) -> Basins:
-    """The kept basins."""
-    return Basins.load(Path(str(resources.files("compare.runs"))) / "basins.json")
 
 
 def draw_plane(basins: Basins) -> Figure:

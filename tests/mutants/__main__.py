@@ -1,4 +1,4 @@
-"""``python -m compare.mutants``: try the verdicts, and write the page that says what they notice."""
+"""``python -m tests.mutants``: try the verdicts, and write the page that says what they notice."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import os
 import sys
 from pathlib import Path
 
-from compare.mutants import trial
 from model import InputError
 from model.files import write_text
+from tests.mutants import trial
 
 
 def main() -> int:
     """Return 0 if enough faults were noticed, 1 if not, 2 where there is nothing to judge."""
-    parser = argparse.ArgumentParser(prog="python -m compare.mutants", description=trial.__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=trial.__doc__)
     results = "results of 'dualball validate'; a theory is judged on them until a claim notices it, the quickest first"
     parser.add_argument("directories", type=Path, nargs="+", metavar="DIR", help=results)
     parser.add_argument("--engines", action="store_true", help="also measure with every wrong engine")
@@ -34,10 +34,13 @@ def main() -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     trials = [*(trial for level in levels for trial in level.trials if trial.tried), *measured]
-    missed, count = [each.what for each in trials if not each.noticed], len(trials)
-    print(f"{count - len(missed)} of {count} faults were noticed")
-    for what in missed:
-        print(f"nobody noticed: {what}")
+    missed, count = [each for each in trials if not each.noticed], len(trials)
+    hanging = sum(bool(each.hung) for each in trials)
+    print(
+        f"{count - len(missed)} of {count} faults were noticed; with {hanging} of them the predictions of a claim hang"
+    )
+    for each in missed:
+        print(f"nobody noticed: {each.what}: {each.by}")
     return 0 if count - len(missed) >= args.least * count else 1
 
 
