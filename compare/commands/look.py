@@ -11,7 +11,7 @@ from compare.report import results
 from compare.runs import collection
 from compare.view import inspection
 from mjsim import ContactSettings
-from model import InputError, storage
+from model import Flow, InputError, storage
 
 
 def add(commands: options.Commands) -> None:
@@ -93,9 +93,8 @@ def render(args: argparse.Namespace) -> int:
     """Draw a picture or a film."""
     from compare.view import render  # here, because drawing takes a second to load
 
-    film = {name: getattr(args, name) for name in ("start", "seconds", "speed", "rate")}
-    arrows = {name: getattr(args, name) for name in ("force_arrow", "slip_arrow")}
-    print(render.write(storage.load(args.file), args.output, args.at, args.width, arrows, **film))
+    names = ("at", "width", "start", "seconds", "speed", "rate", "force_arrow", "slip_arrow")
+    print(render.write(storage.load(args.file), args.output, **{name: getattr(args, name) for name in names}))
     return 0
 
 
@@ -106,5 +105,5 @@ def view(args: argparse.Namespace) -> int:
     p = options.parameters(args)
     timestep = {} if args.timestep is None else {"timestep": args.timestep}
     settings = ContactSettings.for_problem(p, **timestep)
-    viewer.view(p, running.start(args), running.flow(args), settings, args.speed)
+    viewer.view(p, running.start(args), running.flow(args) or Flow.steady(p.omega_0), settings, args.speed)
     return 0

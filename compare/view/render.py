@@ -8,10 +8,7 @@ with the angular velocity it has, from an arbitrary beginning.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
-from contextlib import closing
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,52 +17,71 @@ from PIL import Image
 
 from compare.figures import style
 from compare.figures.style import BALL, FORCE, SLIP
-from compare.view.stage import Stage
+from compare.view import stage
 from model import InputError, StorageError, Trajectory
-from model.arrays import Array
 from model.files import check_writable
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
 
 WIDTHS = Range(160, 1920)
 """Of pictures, pixels."""
-_IN_RUN = "to be within the run it"
 
 
-def picture(run: Trajectory, at: float | None = None, width: int = 960, **arrows: Any) -> Image.Image:
-    """The run at a time in s, its end if None, in 16:10; `arrows` are `force_arrow` and `slip_arrow` of `Stage`.
-
-    Raises `InputError` for a time outside the run, an empty run, or a machine without OpenGL.
-    """
-    time = float(run.time[-1]) if at is None and len(run.time) else at or 0.0
-    return next(_frames(run, np.array([time]), width, **arrows))
-
-
-def film(
+def write(
     run: Trajectory,
     output: Path,
+    at: float | None = None,
+    width: int | None = None,
     start: float = 0.0,
     seconds: float = 6.0,
     speed: float = 0.25,
     rate: int = 20,
-    width: int = 640,
     **arrows: Any,
-) -> int:
-    """Write a GIF of so many seconds, or up to the end of the run, slowed down by `speed`; return the frames in it.
+) -> str:
+    """Write a picture (png) or a film (gif), as the name of the file says, in 16:10; return in words what was written.
 
-    `arrows` as for `picture`.
+    Parameters
+    ----------
+    at : the time of a picture, s; the end for None
+    width : pixels; 960 for a picture and 640 for a film if None
+    start, seconds, speed, rate : a film begins at `start` in s, is slowed down by `speed`, has `rate` frames a second,
+        and takes so many seconds, fewer if the run ends before
+    arrows : `force_arrow` and `slip_arrow` of `stage.frames`
 
-    Raises as `picture`, and `StorageError` if the file can't be written.
+    Raises `InputError` for what can't be shown, or on a machine without OpenGL; `StorageError` if the file can't be
+    written.
     """
+    if output.suffix not in (".png", ".gif"):
+        raise InputError(f"cannot write {output}: a picture is a .png, a film a .gif")
+    check_writable(output)
+    if len(run.time) == 0:
+        raise InputError("the run has no samples to show")
+    film, end = output.suffix == ".gif", float(run.time[-1])
+    name, begin, width = ("from", start, width or 640) if film else ("time", end if at is None else at, width or 960)
+    check_number(name, begin, "s", Range(float(run.time[0]), end), "to be within the run it")
+    check_number("width", width, "pixels", WIDTHS)
     for name, value, unit in (("seconds", seconds, "s"), ("speed", speed, "1"), ("rate", rate, "s-1")):
         check_number(name, value, unit, POSITIVE)
-    check_number("from", start, "s", _within(run), _IN_RUN)
-    end = min(start + seconds * speed, float(run.time[-1]))
-    images = _frames(run, np.arange(start, end + 1e-12, speed / rate), width, f"× {speed:.3g}", **arrows)
-    first = next(images)
-    palette = _palette(first)
-    frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in itertools.chain([first], images)]
-    _save(frames[0], output, save_all=True, append_images=frames[1:], duration=round(1000 / rate), loop=0)
-    return len(frames)
+    for name, radii in arrows.items():
+        check_number(name, radii, "radii", NOT_NEGATIVE)
+    if film:
+        times = np.arange(start, min(start + seconds * speed, end) + 1e-12, speed / rate)
+        images = stage.frames(run, times, width, f"× {speed:.3g}", **arrows)
+        first = next(images)
+        palette = _palette(first)
+        frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in itertools.chain([first], images)]
+        options: dict[str, Any] = {
+            "save_all": True,
+            "append_images": frames[1:],
+            "duration": round(1000 / rate),
+            "loop": 0,
+        }
+    else:
+        frames, options = list(stage.frames(run, np.array([begin]), width, **arrows)), {"optimize": True}
+    try:
+        frames[0].save(output, **options)
+    except OSError as error:
+        raise StorageError(f"cannot write {output}: {error.strerror or error}") from error
+    return f"{output}: {len(frames)} frames" if film else f"{output}: {width} × {frames[0].height}"
 
 
 def _palette(image: Image.Image) -> Image.Image:
@@ -81,51 +97,3 @@ def _palette(image: Image.Image) -> Image.Image:
     made = Image.new("P", (1, 1))
     made.putpalette([*seen[:360], *np.round(255 * chosen).astype(int).ravel().tolist()])
     return made
-
-
-def write(
-    run: Trajectory,
-    output: Path,
-    at: float | None = None,
-    width: int | None = None,
-    arrows: Mapping[str, Any] = MappingProxyType({}),
-    **film_options: Any,
-) -> str:
-    """Write a picture (png) or a film (gif), as the name of the file says; return what was written, in words.
-
-    `arrows` as for `picture`; `film_options` are those of `film`, which a picture has no use for.
-
-    Raises as `picture` and `film`; `InputError` for another kind of file.
-    """
-    if output.suffix not in (".png", ".gif"):
-        raise InputError(f"cannot write {output}: a picture is a .png, a film a .gif")
-    check_writable(output)
-    if output.suffix == ".gif":
-        count = film(run, output, width=width or 640, **film_options, **arrows)
-        return f"{output}: {count} frames"
-    image = picture(run, at, width or 960, **arrows)
-    _save(image, output, optimize=True)
-    return f"{output}: {image.width} × {image.height}"
-
-
-def _save(image: Image.Image, output: Path, **options: Any) -> None:
-    try:
-        image.save(output, **options)
-    except OSError as error:
-        raise StorageError(f"cannot write {output}: {error.strerror or error}") from error
-
-
-def _within(run: Trajectory) -> Range:
-    if len(run.time) == 0:
-        raise InputError("the run has no samples to show")
-    return Range(float(run.time[0]), float(run.time[-1]))
-
-
-def _frames(run: Trajectory, times: Array, width: int, note: str = "", **arrows: Any) -> Iterator[Image.Image]:
-    check_number("time", times[0], "s", _within(run), _IN_RUN)
-    check_number("width", width, "pixels", WIDTHS)
-    for name, radii in arrows.items():
-        check_number(name, radii, "radii", NOT_NEGATIVE)
-    with closing(Stage(run, width, **arrows)) as stage:
-        for time in times:
-            yield stage.show(float(time), note)
