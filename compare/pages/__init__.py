@@ -18,9 +18,9 @@ def readable(unit: str) -> str:
     """A unit of the files as a reader writes it: rad s-1 is rad/s, 1 is nothing."""
     if unit == "1":
         return ""
-    for written, read in ((" s-2", "/s²"), (" s-1", "/s"), ("s-1", "1/s"), ("rad-1", "1/rad"), ("rad2", "rad²")):
+    for written, read in (" s-2", "/s²"), (" s-1", "/s"), (" m-3", "/m³"), ("s-1", "1/s"), ("rad-1", "1/rad"):
         unit = unit.replace(written, read)
-    return unit
+    return unit.replace("m2", "m²").replace("rad2", "rad²")
 
 
 def render(package: str, template: str, **values: Any) -> str:
