@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
+import html
 import itertools
 import json
 import math
@@ -12,6 +14,7 @@ import shutil
 import subprocess
 import time
 import urllib.request
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +24,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from compare.claims.claim import Bearing, Claim, Outcome, Text, Verdict
+from compare.commands import tables
 from compare.figures.drawing import Drawing, GapError, Material
 from compare.figures.registry import FIGURES
 from compare.measure import record
@@ -28,7 +32,7 @@ from compare.measure.check import Check, Relation
 from compare.measure.levels import Level
 from compare.measure.record import Measurement, Records
 from compare.pages import readable
-from compare.report import pictures, report, results, wording
+from compare.report import numbers, pictures, report, results, wording
 from compare.report.results import Summary
 from compare.runs.workers import spread
 from model import Case, Parameters, StorageError
@@ -124,45 +128,34 @@ def row(text: str, name: str) -> str:
 
 def test_what_the_page_says(page: Path) -> None:
     text = page.read_text("utf-8")
-    assert page.stat().st_size < 5e6
+    good, bad, coarse = (row(text, name) for name in ("good", "bad", "coarse"))
+    assert page.stat().st_size < 4e6
     assert "3 of 5 claims did not come out as expected: bad, coarse, broken" in text
+    assert '<a href="#doubted">doubted</a> (refuted, as expected)' in text
     assert "ValueError: diverged &amp; &lt;so&gt; on" in row(text, "broken")
     assert "rough-wall: no flow &lt;at which&gt; it slips" in row(text, "broken")
     assert "What good states of slip &amp; &lt;roll&gt;." in text
-    assert "dualball validate --claim good --quick -o" in row(text, "good")
-    assert "analytic.solution" in row(text, "good")
-    assert row(text, "good").count("<td>settled</td>") == report.ROWS
-    assert "? inconclusive" in row(text, "coarse")
-    assert "Prop. bad, corrected. A sign." in row(text, "bad")
+    assert "dualball validate --claim good --quick -o" in good
+    assert "analytic.solution" in good
+    assert "? inconclusive" in coarse
+    assert "Prop. bad, corrected. A sign." in bad
     # Nothing is fetched from anywhere.
     assert not re.search(r'(?:src|href)="(?!#|data:|runs/|https://doi\.org)', text)
     assert "@import" not in text
-
-
-def test_resolving_power_is_given_by_quantity(page: Path) -> None:
-    text = page.read_text("utf-8")
-    assert "a relative error of 3e-10 in ω_c" in row(text, "good")  # 3e-9 over 12
-    assert "a relative error of 0.08 in ω_c" in row(text, "coarse")  # 1 over 12
-
-
-def test_a_refutation_that_was_expected_is_not_a_failure(page: Path) -> None:
-    text = page.read_text("utf-8")
+    # Resolving power is given by quantity: 3e-9 and 1, divided by 12.
+    assert "a relative error of 3e-10 in ω_c" in good
+    assert "a relative error of 0.08 in ω_c" in coarse
+    # A refutation that was expected is not a failure.
     assert "Expected:" not in row(text, "doubted")
-    assert "Expected: confirmed." in row(text, "bad")
+    assert "Expected: confirmed." in bad
     assert 'class="verdict other"' in row(text, "doubted")
-
-
-def test_long_tables_show_the_worst_rows(page: Path) -> None:
-    text = page.read_text("utf-8")
-    assert row(text, "good").count('<tr class="pass">') == report.ROWS
-    assert f"{report.ROWS + 40} numbers; here the {report.ROWS} nearest to failing" in row(text, "good")
-    worst = re.findall(r"<td>([-+][\d.e-]+)</td>", row(text, "bad"))
-    assert [float(value) for value in worst] == sorted(map(float, worst), reverse=True)
-
-
-def test_no_empty_sections(page: Path) -> None:
-    """What was not run is named once, outside the sections."""
-    text = page.read_text("utf-8")
+    # Long tables show the worst rows.
+    assert good.count("<td>settled</td>") == good.count('<tr class="pass">') == report.ROWS
+    assert f"The {report.ROWS} numbers nearest to failing" in good
+    assert f'<a href="#numbers" data-claim="good">all {report.ROWS + 40}</a>' in good
+    worst = [float(value) for value in re.findall(r"<td>([-+][\d.e-]+)</td>", bad)]
+    assert worst == sorted(worst, reverse=True)
+    # What was not run is named once, outside the sections, and no section is empty.
     assert "<h3>Laws and cases</h3>" not in text
     assert text.count("<h3>Stability</h3>") == 1
     assert re.search(r"Not part of this run: <code[^>]*>deeper</code>", text)
@@ -170,6 +163,58 @@ def test_no_empty_sections(page: Path) -> None:
     assert (
         "Not drawn: From a newcomer&#39;s settings to the study&#39;s: the ladder of settings was not measured" in text
     )
+
+
+def test_every_number_is_on_the_page() -> None:
+    (check,), far = checks(1), checks(1, 0.5)[0]
+    m = check.measurement
+    alone = dataclasses.replace(m, quantity="case", value=1.0, uncertainty=0.0, conditions={"start": "rest"})
+    again = dataclasses.replace(m)  # a copy, as another process returns it
+    columns = numbers.columns(Records((again, alone)), {"good": (check,), "bad": (far,)})
+    assert columns["claim"] == ["good", "bad", ""]
+    assert columns["omega_0"] == [12.0] * 3
+    assert columns["measured"] == [12.0, 12.0, "RS"]
+    assert columns["predicted"] == [12.0, 11.5, ""]
+    assert columns["deviation"] == [0.0, 0.5, ""]
+    assert columns["mark"] == ["pass", "fail", ""]
+    assert columns["quantity"] == ["ω_c rad/s"] * 2 + ["case"]
+    assert json.loads(zlib.decompress(base64.b64decode(numbers.packed(columns)))) == columns
+
+
+def test_numbers_are_rounded_to_what_is_known() -> None:
+    m = dataclasses.replace(checks(1)[0].measurement, value=1.23456789, uncertainty=2.3e-4)
+    shown = numbers.columns(Records((m,)), {})
+    assert (shown["measured"], shown["uncertainty"]) == ([1.23457], [2.3e-4])
+
+
+def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page: Path) -> None:
+    text = html.unescape(page.read_text("utf-8"))
+    for verdict in RAN:
+        line = tables.line(verdict).plain
+        for heading, found in wording.findings(verdict).items():
+            assert f"{heading.lower()} {found}" in line
+            assert f"<dt>{heading}</dt>" in row(text, verdict.claim.id)
+            assert found in row(text, verdict.claim.id)
+    summary = tables.summary(VERDICTS).plain
+    assert wording.headline(RAN) in summary
+    for count, what in wording.totals(RAN):
+        assert f"{count} {what}" in summary
+        assert f"<b>{count}</b>{what}" in text
+    equal = dataclasses.replace(checks(1)[0].measurement, quantity="case")
+    same = Check(measurement=equal, predicted=12.0, tolerance=0.0, scale=1.0)
+    for predicted, said in ((12.0, "none: all equal"), (1.0, "not equal: case, reference")):
+        verdict = dataclasses.replace(RAN[0], checks=(dataclasses.replace(same, predicted=predicted),))
+        assert wording.findings(verdict) == {"Largest deviation": said}
+
+
+def test_a_figure_of_several_claims_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawing = Drawing("A fall", lambda _: None, lambda _: Figure(figsize=(1, 1)), lambda _: "", ("good", "bad"))
+    monkeypatch.setattr(report, "FIGURES", {})
+    monkeypatch.setattr(report, "figures_of", lambda name: {"fall": drawing})
+    page = report.write(Material(directory=tmp_path), VERDICTS[:2], Summary.of(tmp_path, [], Level.QUICK, []))
+    text = page.read_text("utf-8")
+    assert text.count("data:image/svg+xml") == 1
+    assert '<a href="#figure-fall">A fall</a>: see good.' in row(text, "bad")
 
 
 def test_an_empty_page_is_a_page_too(tmp_path: Path) -> None:
@@ -250,27 +295,21 @@ def test_a_missing_summary_names_the_command(tmp_path: Path) -> None:
         results.open_directory(tmp_path / "file")
 
 
-def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
+def test_a_picture_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawing = Drawing("t", lambda _: None, lambda _: Figure(figsize=(1, 1)), lambda data: f"<&> {data}")
     path = tmp_path / "made.svg"
     assert pictures.kept(path, drawing, ("a", 1.0)) is None
-    first, caption = pictures.drawn(path, drawing, ("a", 1.0))
+    first = pictures.drawn(path, drawing, ("a", 1.0))
     ElementTree.parse(path)
-    assert first.startswith("data:image/svg+xml,<?xml versi")
-    assert caption == "<&> ('a', 1.0)"
-    assert "desc" not in first
-    assert pictures.kept(path, drawing, ("a", 1.0)) == (first, caption)
+    assert first["picture"].startswith("data:image/svg+xml,<?xml versi")
+    assert first["caption"] == "<&> ('a', 1.0)"
+    assert "desc" not in first["picture"]
+    assert pictures.kept(path, drawing, ("a", 1.0)) == first
     assert pictures.kept(path, drawing, ("a", 2.0)) is None
+    monkeypatch.setattr(pictures, "sources", lambda *packages: " ".join(packages))  # the program changes
+    assert pictures.kept(path, drawing, ("a", 1.0)) is None
     path.write_text("something else")
     assert pictures.kept(path, drawing, ("a", 1.0)) is None
-
-
-def test_a_picture_is_drawn_again_when_the_program_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawing = Drawing("t", lambda _: None, lambda _: Figure(), str)
-    pictures.drawn(tmp_path / "made.svg", drawing, 1)
-    assert pictures.kept(tmp_path / "made.svg", drawing, 1)
-    monkeypatch.setattr(pictures, "sources", lambda *packages: " ".join(packages))
-    assert not pictures.kept(tmp_path / "made.svg", drawing, 1)
 
 
 def test_processes_draw_every_figure(tmp_path: Path) -> None:
@@ -402,6 +441,28 @@ def test_filter(tab: Tab) -> None:
     assert tab.value(f"{sections}.map(part => part.firstElementChild.textContent)") == ["Stability"]
     tab.value("outcome.value = ''; outcome.dispatchEvent(new Event('change'))")
     assert len(tab.value(SHOWN)) == len(RAN)
+
+
+def test_numbers_are_found_by_flow_claim_and_words(tab: Tab) -> None:
+    rows = (
+        "[...document.querySelectorAll('#numbers-found tr')].map(row => [...row.cells].map(cell => cell.textContent))"
+    )
+    every = sum(len(verdict.checks) for verdict in RAN)
+    assert tab.value("document.getElementById('found').textContent") == f"{every} of {every}"
+    for change, expected in (
+        ("flow.value = '13.02'", {"13": 4}),
+        ("flow.value = '13.4'; words.value = 'good'", {"13": 1}),  # nothing within 1 %: the nearest
+        ("flow.value = ''; words.value = 'good RR'; document.getElementById('set').value = 'reference'", {"": 52}),
+        ("words.value = 'good SS'", {}),
+    ):
+        tab.value(f"{change}; words.dispatchEvent(new Event('input'))")
+        found = tab.value(rows)
+        assert len(found) == sum(expected.values())
+        assert all(cells[1] in expected or "" in expected for cells in found)
+    tab.value("document.querySelector('[data-claim=good]').click()")
+    found = tab.value(rows)
+    assert len(found) == report.ROWS + 40
+    assert found[0] == ["reference", "12", "ω_c rad/s", found[0][3], "mujoco", "12", "1e-9", " 12", "0", "3e-9", "good"]
 
 
 def test_sort(tab: Tab) -> None:
