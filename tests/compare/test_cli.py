@@ -30,14 +30,13 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
     return captured.err
 
 
-def test_predict_as_a_table(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["predict", "--omega-0", "25"]) == 0
-    assert "the ball slips (SS)" in capsys.readouterr().out
-
-
-def test_predict_says_what_ends_the_operating_range(capsys: pytest.CaptureFixture[str]) -> None:
-    for name, words in (("reference", "slip at both points"), ("high-wall-friction", "the wall can carry it")):
-        assert cli.main(["predict", "--set", name]) == 0
+def test_predict_says_what_the_ball_does_and_what_ends_the_operating_range(capsys: pytest.CaptureFixture[str]) -> None:
+    for options, words in (
+        ("--omega-0 25", "the ball slips (SS)"),
+        ("--set reference", "slip at both points"),
+        ("--set high-wall-friction", "the wall can carry it"),
+    ):
+        assert cli.main(["predict", *options.split()]) == 0
         assert words in " ".join(capsys.readouterr().out.split())
     assert cli.main(["predict", "--mu", "0", "--json"]) == 0
     described = json.loads(capsys.readouterr().out)
@@ -221,10 +220,24 @@ def test_a_long_description_is_that_of_its_parts(
     assert capsys.readouterr().out == whole
 
 
-@pytest.mark.parametrize("name", ["prop-1", "prop-4"])
-def test_claims_are_listed(capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_claims_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["validate", "--list"]) == 0
-    assert name in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in ("prop-1", "prop-4"))
+
+
+def test_help_names_every_command_in_groups_and_says_every_default(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        cli.main(["--help"])
+    shown = capsys.readouterr().out
+    for title, names in cli.GROUPS.items():
+        assert f"{title}:" in shown
+        assert all(f"\n  {name} " in shown for name in names)
+    for name in ("predict", "design", "report", "figures", "inspect", "render", "view"):
+        parser = cli._parser([name])._subparsers._group_actions[0].choices[name]
+        assert all(action.help for action in parser._actions)
+        assert f"Example: dualball {name} " in parser.format_help()
+    assert "(default 6)" in cli._parser(["render"])._subparsers._group_actions[0].choices["render"].format_help()
 
 
 @pytest.mark.parametrize(

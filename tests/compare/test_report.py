@@ -10,6 +10,7 @@ import json
 import math
 import pickle
 import re
+import shlex
 import shutil
 import subprocess
 import time
@@ -28,7 +29,7 @@ from compare.commands import tables
 from compare.figures.drawing import Drawing, GapError, Material
 from compare.figures.registry import FIGURES
 from compare.measure import record
-from compare.measure.check import Check, Relation
+from compare.measure.check import Check
 from compare.measure.levels import Level
 from compare.measure.record import Measurement, Records
 from compare.pages import readable
@@ -39,20 +40,9 @@ from model import Case, Parameters, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-dev-shm-usage",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--hide-scrollbars",
-    "--remote-debugging-port=0",
-    "--remote-allow-origins=*",
-)
+FLAGS = shlex.split("""--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-dev-shm-usage
+--disable-background-networking --disable-component-update --disable-sync --hide-scrollbars --remote-debugging-port=0
+--remote-allow-origins=*""")
 PATIENCE = 120.0
 """How long to wait for the browser, s: long, since machines differ."""
 P = Parameters.named("reference")
@@ -64,29 +54,16 @@ def claim(name: str, section: str = "Stationary states", **changes: Any) -> Clai
     return Claim(id=name, section=section, **(given | changes))
 
 
-def checks(
-    count: int, deviation: float = 0.0, tolerance: float = 3e-9, run: str = "runs/there.h5"
-) -> tuple[Check, ...]:
+def checks(count: int, deviation: float = 0.0, tolerance: float = 3e-9) -> tuple[Check, ...]:
     """Made-up numbers, each with the same tolerance, the k-th off by k parts of `deviation`."""
     conditions = {"case": "RR", "start": "a start with a name that is rather long", "y": 0.02, "v_y": 0.0}
+    given = {"protocol": "settled", "quantity": "omega_c", "engine": "mujoco", "set": "reference", "value": 12.0}
+    given |= {"uncertainty": 1e-9, "conditions": conditions, "runs": ("runs/there.h5",)}
+    made = [Measurement(parameters=P.replace(omega_0=12.0 + k), **given) for k in range(count)]
+    predicted = [12.0 - deviation * (k + 1) / count for k in range(count)]
     return tuple(
-        Check(
-            measurement=Measurement(
-                protocol="settled",
-                quantity="omega_c",
-                value=12.0,
-                uncertainty=1e-9,
-                engine="mujoco",
-                set="reference",
-                parameters=P.replace(omega_0=12.0 + k),
-                conditions=conditions,
-                runs=(run,),
-            ),
-            predicted=12.0 - deviation * (k + 1) / count,
-            tolerance=tolerance,
-            scale=12.0,
-        )
-        for k in range(count)
+        Check(measurement=m, predicted=each, tolerance=tolerance, scale=12.0)
+        for m, each in zip(made, predicted, strict=True)
     )
 
 
@@ -179,12 +156,8 @@ def test_every_number_is_on_the_page() -> None:
     assert columns["mark"] == ["pass", "fail", ""]
     assert columns["quantity"] == ["ω_c rad/s"] * 2 + ["case"]
     assert json.loads(zlib.decompress(base64.b64decode(numbers.packed(columns)))) == columns
-
-
-def test_numbers_are_rounded_to_what_is_known() -> None:
-    m = dataclasses.replace(checks(1)[0].measurement, value=1.23456789, uncertainty=2.3e-4)
-    shown = numbers.columns(Records((m,)), {})
-    assert (shown["measured"], shown["uncertainty"]) == ([1.23457], [2.3e-4])
+    coarse = numbers.columns(Records((dataclasses.replace(m, value=1.23456789, uncertainty=2.3e-4),)), {})
+    assert (coarse["measured"], coarse["uncertainty"]) == ([1.23457], [2.3e-4])  # rounded to what is known
 
 
 def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page: Path) -> None:
@@ -225,22 +198,18 @@ def test_an_empty_page_is_a_page_too(tmp_path: Path) -> None:
 
 
 def test_wording() -> None:
-    assert (
-        wording.conditions({"case": "SS", "side": "from above", "y": 0.02, "v_y": 0.0})
-        == "case SS, from above, y = 0.02 m"
-    )
-    assert [readable(name) for name in ("rad s-1", "m s-2", "s-1", "1")] == ["rad/s", "m/s²", "1/s", ""]
-    (check,) = checks(1)
-    assert wording.value(check.measurement, math.nan) == "none"
-    cases = Measurement(
-        protocol="plane", quantity="cases", value=129.0, uncertainty=0.0, engine="mujoco", set="s", parameters=P
-    )
-    assert wording.value(cases, float(1 << Case.RR | 1 << Case.NS)) == "RR NS"
+    conditions = {"case": "SS", "side": "from above", "y": 0.02, "v_y": 0.0}
+    assert wording.conditions(conditions) == "case SS, from above, y = 0.02 m"
+    units = {"rad s-1": "rad/s", "m s-2": "m/s²", "s-1": "1/s", "1": "", "m2 s-1": "m²/s", "rad-1": "1/rad"}
+    assert [readable(name) for name in units] == list(units.values())
+    m = checks(1)[0].measurement
+    assert wording.value(m, math.nan) == "none"
+    assert wording.value(dataclasses.replace(m, quantity="cases"), float(1 << Case.RR | 1 << Case.NS)) == "RR NS"
 
 
 def test_ranking_puts_failures_first() -> None:
     near, far = checks(1, 2e-9)[0], checks(1, 1.0)[0]
-    unknown = Check(measurement=near.measurement, predicted=math.nan, tolerance=1.0, scale=1.0, relation=Relation.EQUAL)
+    unknown = dataclasses.replace(near, predicted=math.nan, tolerance=1.0, scale=1.0)
     coarse = checks(1, 0.0, 1.0)[0]
     ranked = wording.ranked([checks(1)[0], near, coarse, far, unknown])
     assert ranked[0] is unknown
