@@ -154,12 +154,6 @@ _MEANING = {
 }
 
 
-def _eigenvalue(s: StationarySolution) -> str:
-    """The rightmost eigenvalue, or pair of them."""
-    value = s.eigenvalues[0]
-    return f"{value.real:.4g}" + (f" ± {abs(value.imag):.4g}i" if value.imag else "")
-
-
 _ROWS: dict[str, Callable[[StationarySolution], str]] = {
     "ω_c (rad/s)": lambda s: f"{s.state.omega_c:.8g}",
     "ω̃_x (rad/s)": lambda s: f"{s.state.slip_x:.8g}",
@@ -171,6 +165,8 @@ _ROWS: dict[str, Callable[[StationarySolution], str]] = {
     "forces admissible": lambda s: "yes" if s.exists else "no",
     "within the case": lambda s: s.stability.value.removesuffix(" stable"),
     "against slipping": lambda s: "stable" if s.slip_stable else "unstable",
-    "rightmost eigenvalue (1/s)": _eigenvalue,
+    "rightmost eigenvalue (1/s)": lambda s: (
+        f"{s.eigenvalues[0].real:.4g}" + (f" ± {abs(s.eigenvalues[0].imag):.4g}i" if s.eigenvalues[0].imag else "")
+    ),
     "free": lambda s: ", ".join(s.family) or "-",
 }

@@ -74,6 +74,15 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         shown = dict.fromkeys(own, claim.id) | shown  # a figure of several claims stands beside the first
         sections.setdefault(claim.section, []).append(row)
     apart = [(figures[name], each.background or bool(each.claims)) for name, each in free.items()]
+    checks = [check for verdict in ran for check in verdict.checks if verdict.claim.section == "Stationary states"]
+    orbits = [c for c in checks if c.measurement.quantity == "omega_c" and math.isfinite(c.predicted) and c.scale > 0]
+    lead = "Its closed-form theory by Antali and Stépán is held against simulation."
+    if orbits:
+        lead = (
+            "The angular velocity ω_c of its orbit in stationary states, predicted in closed form by Antali and Stépán, "
+            f"is {len(orbits)} of the numbers below; the largest relative deviation of these is "
+            f"{max(abs(check.deviation / check.scale) for check in orbits):.1e}."
+        )
     measured = {name for m in material.records.measurements for name in m.runs}
     sets = {m.set for m in material.records.measurements}
     known = summary.provenance
@@ -82,7 +91,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         "report.html",
         title=f"{sum(verdict.passed for verdict in ran)} of {len(ran)} claims as expected",
         headline=wording.headline(ran),
-        lead=_lead(ran),
+        lead=f"A ball rolls and slips round a cylinder. {lead}",
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
         tiles=[*wording.totals(ran), (str(len(measured)), f"simulations with {len(sets)} parameter sets")],
         figures=[figure for figure, behind in apart if not behind and not figure["gap"]],
@@ -145,16 +154,3 @@ def _drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
         return pictures.drawn(*new)
     except (GapError, StorageError) as error:
         return {"gap": str(error)}
-
-
-def _lead(ran: Sequence[Verdict]) -> str:
-    checks = [check for verdict in ran for check in verdict.checks if verdict.claim.section == "Stationary states"]
-    orbits = [c for c in checks if c.measurement.quantity == "omega_c" and math.isfinite(c.predicted) and c.scale > 0]
-    what = "A ball rolls and slips round a cylinder. "
-    if not orbits:
-        return what + "Its closed-form theory by Antali and Stépán is held against simulation."
-    return what + (
-        "The angular velocity ω_c of its orbit in stationary states, predicted in closed form by Antali and Stépán, is "
-        f"{len(orbits)} of the numbers below; the largest relative deviation of these is "
-        f"{max(abs(check.deviation / check.scale) for check in orbits):.1e}."
-    )

@@ -30,28 +30,20 @@ MARKS = {
 """Class and sign of each outcome."""
 
 
-def number(value: float) -> str:
-    """A number of a table; of what is tiny its size alone."""
-    if not math.isfinite(value):
-        return "none" if math.isnan(value) else f"{value:g}"
-    return f"{value:.9g}" if abs(value) >= 1e-4 else size(value)
-
-
 def size(value: float, sign: str = "") -> str:
     """The size of a small number: two digits, or 0."""
     return f"{value:{sign}.1e}" if value else "0"
 
 
-def cases(name: str, value: float) -> str:
-    """The cases that a value of the quantity `case` or `cases` stands for; empty for other quantities."""
-    if name not in ("case", "cases") or not math.isfinite(value):
-        return ""
-    return Case(int(value)).name if name == "case" else " ".join(c.name for c in Case if int(value) & 1 << c)
-
-
 def value(m: Measurement, of: float) -> str:
-    """A value of the measurement's quantity; cases by their names."""
-    return cases(m.quantity, of) or number(of)
+    """A value of the measurement's quantity; cases by their names, of what is tiny its size alone."""
+    if not math.isfinite(of):
+        return "none" if math.isnan(of) else f"{of:g}"
+    if m.quantity == "case":
+        return Case(int(of)).name
+    if m.quantity == "cases":
+        return " ".join(case.name for case in Case if int(of) & 1 << case)
+    return f"{of:.9g}" if abs(of) >= 1e-4 else size(of)
 
 
 def conditions(of: Mapping[str, Condition]) -> str:

@@ -11,14 +11,15 @@ import itertools
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.colors import to_rgb
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from compare.figures import style
-from compare.figures.style import BALL, FORCE, SLIP
+from compare.figures.style import BALL, FORCE, INK, SLIP
 from compare.view import stage
-from model import InputError, StorageError, Trajectory
+from model import Case, InputError, StorageError, Trajectory
 from model.files import check_writable
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
 
@@ -63,25 +64,22 @@ def write(
         check_number(name, value, unit, POSITIVE)
     for name, radii in arrows.items():
         check_number(name, radii, "radii", NOT_NEGATIVE)
+    times = np.arange(begin, min(begin + seconds * speed, end) + 1e-12, speed / rate) if film else np.array([begin])
+    shown, note = stage.resampled(run, times), f"× {speed:.3g}" if film else ""
+    slips = bool(np.any(run.slip_speed_A + run.slip_speed_B))
+    pairs = stage.frames(run, times, width, **arrows)
+    images = (_labelled(*pair, shown, k, note, slips) for k, pair in enumerate(pairs))
+    first, options = next(images), dict[str, Any](optimize=True)
     if film:
-        times = np.arange(start, min(start + seconds * speed, end) + 1e-12, speed / rate)
-        images = stage.frames(run, times, width, f"× {speed:.3g}", **arrows)
-        first = next(images)
         palette = _palette(first)
         frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in itertools.chain([first], images)]
-        options: dict[str, Any] = {
-            "save_all": True,
-            "append_images": frames[1:],
-            "duration": round(1000 / rate),
-            "loop": 0,
-        }
-    else:
-        frames, options = list(stage.frames(run, np.array([begin]), width, **arrows)), {"optimize": True}
+        first = frames[0]
+        options = {"save_all": True, "append_images": frames[1:], "duration": round(1000 / rate), "loop": 0}
     try:
-        frames[0].save(output, **options)
+        first.save(output, **options)
     except OSError as error:
         raise StorageError(f"cannot write {output}: {error.strerror or error}") from error
-    return f"{output}: {len(frames)} frames" if film else f"{output}: {width} × {frames[0].height}"
+    return f"{output}: {len(times)} frames" if film else f"{output}: {width} × {first.height}"
 
 
 def _palette(image: Image.Image) -> Image.Image:
@@ -97,3 +95,39 @@ def _palette(image: Image.Image) -> Image.Image:
     made = Image.new("P", (1, 1))
     made.putpalette([*seen[:360], *np.round(255 * chosen).astype(int).ravel().tolist()])
     return made
+
+
+def _labelled(image: Image.Image, small: Image.Image, run: Trajectory, k: int, note: str, slips: bool) -> Image.Image:
+    """The picture from outside, changed in place, with the one from beside the ball in its corner.
+
+    Written over it are the case and numbers of sample k of the run, a note beside the time, and a legend, with slip
+    velocities if there are any.
+    """
+    unit, case = image.width / 960, Case(run.case[k])
+    margin, pad = round(22 * unit), 14 * unit
+    font = Path(matplotlib.get_data_path()) / "fonts/ttf/DejaVuSans.ttf"
+    large, text = (ImageFont.truetype(font, round(size * unit)) for size in (34, 17))
+    draw = ImageDraw.Draw(image)
+    left = image.width - small.width - margin
+    image.paste(small, (left, margin))
+    frame = (left - 1, margin - 1, left + small.width, margin + small.height)
+    draw.rectangle(frame, outline="#8a94a3", width=max(1, round(1.5 * unit)))
+    _, _, width, height = draw.textbbox((0, 0), case.name, font=large)
+    right, bottom = margin + width + 2 * pad, margin + height + 1.2 * pad
+    draw.rounded_rectangle((margin, margin, right, bottom), 8 * unit, fill=style.COLOURS[case])
+    draw.text((margin + pad, margin + 0.5 * pad), case.name, "white", font=large)
+    words = f"floor: {case.A.value}\nwall: {case.B.value}"
+    draw.multiline_text((right + pad, margin + 2 * unit), words, INK, font=text, spacing=5 * unit)
+    lines = (
+        f"t = {run.time[k]:.3f} s   {note}",
+        f"ω₀ = {float(run.header.flow(run.time[k])):.2f} rad/s",
+        f"ω_c = {run.omega_c[k]:.2f} rad/s",
+        f"slip: floor {run.slip_speed_A[k]:.3f} m/s, wall {run.slip_speed_B[k]:.3f} m/s",
+    )
+    draw.multiline_text((margin, bottom + pad), "\n".join(lines), INK, font=text, spacing=6 * unit)
+    legend = [(FORCE, "contact force")] + ([(SLIP, "slip velocity")] if slips else [])
+    for row, (colour, label) in enumerate(legend):
+        y = image.height - margin - (10 + 26 * row) * unit
+        draw.line((margin, y, margin + 30 * unit, y), fill=colour, width=max(2, round(5 * unit)))
+        draw.text((margin + 40 * unit, y), label, INK, font=text, anchor="lm")
+    return image

@@ -1,29 +1,42 @@
-"""The scene of a run drawn at any times: from outside and from beside the ball, with forces, slips and a trail."""
+"""The scene of a run drawn at any times: from outside and from beside the ball, with forces, slips and a trail.
+
+MuJoCo's renderer draws, with a kind of OpenGL that works without a screen.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import importlib
 import math
+import os
+import platform
+import subprocess
+import sys
 from collections.abc import Iterator
 from typing import Any
 
 import mujoco
 import numpy as np
 from matplotlib.colors import to_rgb
+from mujoco.rendering.classic import gl_context
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from compare.figures import style
 from compare.figures.style import BALL, FORCE, SLIP
-from compare.view import opengl, overlay
-from compare.view.motion import orientations, resampled
 from mjsim import ContactSettings, scene
 from model import Case, InputError, Parameters, Trajectory
 from model.arrays import Array
 from model.kinematics import frame, slip_velocities, to_world
+from model.trajectory import columns
 
 STEP = 5e-3
 """Longest time between points of the trail and of the rotation, s."""
 ARROW = 3.0
 """Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball, unless said."""
+OFFSCREEN = ("egl", "osmesa")
+"""Kinds of OpenGL that need no display, the faster first."""
 _HIDDEN = 5
 """A group of geoms that isn't drawn."""
 _SPOTS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / math.sqrt(3)
@@ -35,9 +48,9 @@ _TRAIL = 0.6
 
 
 def frames(
-    run: Trajectory, times: Array, width: int, note: str = "", force_arrow: float = ARROW, slip_arrow: float = ARROW
-) -> Iterator[Image.Image]:
-    """Pictures of a run at times (n,) in s, in 16:10, with a note beside the time.
+    run: Trajectory, times: Array, width: int, force_arrow: float = ARROW, slip_arrow: float = ARROW
+) -> Iterator[tuple[Image.Image, Image.Image]]:
+    """Pictures of a run at times (n,) in s: from outside, in 16:10, and from beside the ball, a small square.
 
     Raises `InputError` if there is no OpenGL, or the run holds no scene with a ball.
     """
@@ -60,7 +73,7 @@ def frames(
     model = _model(run, 2 * width, 2 * height)
     data, ball, most = mujoco.MjData(model), model.geom("ball").id, 100 + math.ceil(_LONGEST_TRAIL / STEP)
     mujoco.mj_forward(model, data)
-    opengl.choose()
+    choose_opengl()
     with (  # twice the size, scaled down: smooth edges without support of the driver
         mujoco.Renderer(model, 2 * height, 2 * width, most) as outside,
         mujoco.Renderer(model, 2 * inset, 2 * inset, most) as beside,
@@ -87,7 +100,7 @@ def frames(
                 renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
                 size = (renderer.width // 2, renderer.height // 2)
                 images.append(Image.fromarray(renderer.render()).resize(size, Image.Resampling.LANCZOS))
-            yield overlay.compose(images[0], images[1], now, k, note, slips=fastest > 0)
+            yield images[0], images[1]
 
 
 def _camera(lookat: Any, distance: float, azimuth: float, elevation: float) -> Any:
@@ -166,3 +179,56 @@ def _add_ring(spec: Any, p: Parameters, sides: int = 120) -> None:
     mesh.smoothnormal = False
     glass = {"rgba": (0.45, 0.65, 0.80, 0.22), "contype": 0, "conaffinity": 0}
     spec.worldbody.add_geom(name="ring", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ring", **glass)
+
+
+def resampled(run: Trajectory, times: Array) -> Trajectory:
+    """The run at times (n,) in s, interpolated linearly; the case is that of the last sample before."""
+    place = np.interp(times, run.time, np.arange(len(run.time)))
+    before = place.astype(int)
+    after, share = np.minimum(before + 1, len(run.time) - 1), place - before
+
+    def at(values: Array) -> Array:
+        change = values[after] - values[before]
+        return np.asarray(values[before] + change * share.reshape(-1, *[1] * (values.ndim - 1)))
+
+    values: dict[str, Any] = {name: at(getattr(run, name)) for name in columns(Trajectory) if name != "case"}
+    return dataclasses.replace(run, **values, case=run.case[before])
+
+
+def orientations(run: Trajectory) -> Rotation:
+    """How the ball is turned at each sample, from its angular velocity in the middle between them; upright at first."""
+    middle = resampled(run, (run.time[1:] + run.time[:-1]) / 2)
+    spin = to_world(middle.x, middle.theta, run.header.parameters).spin
+    turned = [Rotation.identity()]
+    for step in Rotation.from_rotvec(spin * np.diff(run.time)[:, None]):
+        turned.append(step * turned[-1])
+    return Rotation.concatenate(turned)
+
+
+@functools.cache
+def choose_opengl() -> None:
+    """Let `mujoco.Renderer` draw with the kind of OpenGL that MUJOCO_GL names, else with one that works.
+
+    Raises `InputError` if there is none.
+    """
+    chosen = os.environ.get("MUJOCO_GL", "").strip().lower()
+    working = platform.system() != "Linux" or next(filter(works, [chosen] if chosen else OFFSCREEN), None)
+    if not working:
+        remedy = "on Debian and Ubuntu: apt-get install libegl1 libgl1-mesa-dri (or libosmesa6)"
+        if chosen:
+            remedy = f"unset MUJOCO_GL = {chosen!r}, or set it to one of {', '.join(OFFSCREEN)}"
+        raise InputError(f"there is no OpenGL to draw with; {remedy}")
+    if isinstance(working, str) and not chosen:  # MuJoCo chose one that needs a display when it was imported
+        gl_context.GLContext = importlib.import_module(f"mujoco.{working}").GLContext
+
+
+def works(kind: str) -> bool:
+    """Whether a kind of OpenGL works, tried in a process of its own.
+
+    A library that is missing or has no driver may end the process, or leave it unable to load another one.
+    """
+    # OSMesa's context can't be freed while Python shuts down: the process ends at once, without cleaning up.
+    code = "import mujoco, os; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 8, 8); os._exit(0)"
+    environment = os.environ | {"MUJOCO_GL": kind}
+    tried = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, timeout=60, check=False)
+    return tried.returncode == 0
