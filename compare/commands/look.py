@@ -26,7 +26,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument(
         "-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help="where to write them"
     )
-    command.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help=stored)
+    command.add_argument("--results", type=Path, metavar="DIR", help=f"{stored} (default results, if it is there)")
     command.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
 
     command = options.command(commands, "inspect", inspect, "what a trajectory file holds", "run.h5 --plot run.png")
@@ -73,7 +73,9 @@ def figures(args: argparse.Namespace) -> int:
     from compare import validation  # here, because drawing takes a second to load
     from compare.figures import registry
 
-    stored = validation.stored_material(args.results)
+    if args.results and not args.results.is_dir():
+        raise InputError(f"cannot read {args.results}: there is no such directory")
+    stored = validation.stored_material(args.results or Path("results"))
     for name, gap in registry.write(args.output, stored, args.format or ["svg"]):
         print(f"{args.output / name}: {gap or 'written'}")
     return 0

@@ -18,7 +18,7 @@ from compare.runs.tasks import Task
 from compare.runs.workers import Workers, dask, processes
 from model import Flow, InputError, Parameters, State
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import check_names, parse_number
+from model.parameters import POSITIVE, check_names, check_number, parse_number
 
 
 def add_flow(parser: argparse.ArgumentParser) -> None:
@@ -39,6 +39,9 @@ def flow(args: argparse.Namespace) -> Flow | None:
     """The flow that the options of `add_flow` describe; None for a steady one."""
     if args.longest_interval is not None and not args.flow:
         raise InputError("--longest-interval is for --flow")
+    chosen = [name for name in ("ramp", "staircase", "sine", "flow") if getattr(args, name)]
+    if chosen and args.parameter_omega_0 is not None:
+        raise InputError(f"--omega-0 is for a steady flow, and can't be given beside --{chosen[0]}")
     if args.ramp:
         return Flow.ramp(*args.ramp)
     if args.staircase:
@@ -84,6 +87,8 @@ def settings(args: argparse.Namespace, p: Parameters) -> Settings:
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
     """The run of a ball that the options of `add_engine`, `add_start` and ``--time`` describe."""
+    if args.time is not None:
+        check_number("time", args.time, "s", POSITIVE)
     given = {"x0": start(args), "t_end": args.time, "settings": settings(args, p)} | more
     return Task(engine=args.engine.name, parameters=p, **given)
 

@@ -26,10 +26,10 @@ def characteristic(made: Design) -> Figure:
     figure, axes = style.panels(7.0, 4.3)
     flows, low, high, below, above = (np.append(0.0, each) for each in (curve.omega_0, *curve.meant, *curve.band))
     axes.fill_between(flows, below, above, color="0.82", lw=0, label="within the tolerances")
-    axes.plot(flows, low, color=style.COLOURS[Case.SS], lw=2, label="as meant, rising flow")
-    axes.plot(flows, high, color=style.COLOURS[Case.NR], lw=2, ls="--", label="as meant, falling flow")
+    axes.plot(flows, low, color=style.COLOURS[Case.SS], lw=2, label="nominal, rising flow")
+    axes.plot(flows, high, color=style.COLOURS[Case.NR], lw=2, ls="--", label="nominal, falling flow")
     axes.axvspan(request.slowest, request.fastest, color="#0072B2", alpha=0.12, lw=0, label="flows to measure")
-    limit: dict[str, Any] = {"color": style.FORCE, "alpha": 0.25, "lw": 1, "label": "limit, from at worst to as meant"}
+    limit: dict[str, Any] = {"color": style.FORCE, "alpha": 0.25, "lw": 1, "label": "limit, from worst to nominal"}
     axes.axvspan(chosen.worst.omega_0, chosen.limit.omega_0, **limit)
     axes.set(xlim=(0, flows[-1]), ylim=(0, None), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {key: getattr(made.thresholds, key) for key in THRESHOLDS})

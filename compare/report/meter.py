@@ -33,12 +33,12 @@ def sentences(made: Design) -> list[str]:
         said.append(
             "Rolling at both points is the ball's only lasting motion up to at worst "
             f"ω₀ = {_number(chosen.worst.omega_0)} rad/s, {_number(chosen.margin)} times the fastest flow, "
-            f"{request.fastest:g} rad/s ({_number(chosen.limit.omega_0)} as meant): there {chosen.worst.end.value}."
+            f"{request.fastest:g} rad/s ({_number(chosen.limit.omega_0)} nominally): there {chosen.worst.end.value}."
         )
     else:
         said.append(f"It has no operating range: {chosen.worst.end.value}.")
     if chosen.limit.end is End.UNLOADING:
-        said.append("As meant, every motion beyond it reads the flow, too, but for the ball's fall at unloading.")
+        said.append("Nominally, every motion beyond it reads the flow, too, but for the ball's fall at unloading.")
     if chosen.margin:
         said.append(
             "The inertia of the fluid, which the model leaves out, would make the limit at worst about "
@@ -65,12 +65,12 @@ def _titled(made: Design) -> list[tuple[str, pages.Rows]]:
     numbers: dict[str, list[float]] = {_named(name): [c.values[name] for c in choices] for name in made.choice.values}
     numbers |= {
         "limit at worst (rad/s)": [c.worst.omega_0 for c in choices],
-        "limit as meant (rad/s)": [c.limit.omega_0 for c in choices],
+        "nominal limit (rad/s)": [c.limit.omega_0 for c in choices],
         "margin at worst": [c.margin for c in choices],
         "time constant (s)": [c.response for c in choices],
     }
     materials = [["", *names], *([name, *map(_number, row)] for name, row in numbers.items())]
-    thresholds = [["threshold", "as meant (rad/s)", "lowest", "highest"]]
+    thresholds = [["threshold", "nominal (rad/s)", "lowest", "highest"]]
     for key in THRESHOLDS:
         thresholds.append([SYMBOLS[key], *map(_number, (getattr(made.thresholds, key), *made.spread[key]))])
     sensitivities = [["% per %", *(SYMBOLS[key] for key in THRESHOLDS)]]

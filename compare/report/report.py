@@ -79,8 +79,8 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
     lead = "Its closed-form theory by Antali and Stépán is held against simulation."
     if orbits:
         lead = (
-            "The angular velocity ω_c of its orbit in stationary states, predicted in closed form by Antali and Stépán, "
-            f"is {len(orbits)} of the numbers below; the largest relative deviation of these is "
+            "In stationary states the angular velocity ω_c of its orbit, predicted in closed form by Antali and Stépán,"
+            f" is {len(orbits)} of the numbers below; the largest relative deviation of these is "
             f"{max(abs(check.deviation / check.scale) for check in orbits):.1e}."
         )
     measured = {name for m in material.records.measurements for name in m.runs}
