@@ -20,7 +20,8 @@ def line(verdict: Verdict) -> Text:
     shown = Text.assemble((f"{mark} {verdict.outcome:<13}", _STYLES[kind]), f"{verdict.claim.id:<18}")
     if verdict.checks:
         found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
-        shown.append("; ".join([f"{len(verdict.checks):>5} numbers", *found]))
+        count = len(verdict.checks)
+        shown.append("; ".join([f"{count:>5} number{'s' if count > 1 else ''}", *found]))
     if verdict.error:
         shown.append(f"  {verdict.error}", "red")
     if verdict.outcome is Outcome.NOT_RUN and verdict.missing:

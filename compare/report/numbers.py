@@ -17,9 +17,14 @@ from compare.report import wording
 
 def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str, list[Any]]:
     """A row for each check, with the id of its claim, and for each measurement on which no claim bears."""
+
+    def key(m: Measurement) -> tuple[Any, ...]:  # the same for a copy that another process has judged
+        conditions = tuple(sorted(m.conditions.items()))
+        return m.protocol, m.quantity, m.engine, m.set, m.parameters.omega_0, m.value, conditions
+
     judged = [(claim, check.measurement, check) for claim, own in checks.items() for check in own]
-    known = {_key(m) for _, m, _ in judged}
-    rows = [*judged, *(("", m, None) for m in records.measurements if _key(m) not in known)]
+    known = {key(m) for _, m, _ in judged}
+    rows = [*judged, *(("", m, None) for m in records.measurements if key(m) not in known)]
     return {
         "set": [m.set for _, m, _ in rows],
         "omega_0": [float(f"{m.parameters.omega_0:.6g}") for _, m, _ in rows],
@@ -43,11 +48,6 @@ def packed(of: Mapping[str, Sequence[Any]]) -> str:
     """Columns as JSON, compressed (deflate) and written in base64: about a tenth of their length."""
     text = json.dumps(of, ensure_ascii=False, separators=(",", ":"))
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
-
-
-def _key(m: Measurement) -> tuple[Any, ...]:
-    """What tells a measurement apart, also from its copy that another process has judged."""
-    return m.protocol, m.quantity, m.engine, m.set, m.parameters.omega_0, m.value, tuple(sorted(m.conditions.items()))
 
 
 def _shown(m: Measurement, value: float) -> float | str:

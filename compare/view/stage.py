@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from compare.figures import style
 from compare.figures.style import BALL, FORCE, SLIP
 from mjsim import ContactSettings, scene
-from model import Case, InputError, Parameters, Trajectory
+from model import Case, InputError, Trajectory
 from model.arrays import Array
 from model.kinematics import frame, slip_velocities, to_world
 from model.trajectory import columns
@@ -39,6 +39,8 @@ OFFSCREEN = ("egl", "osmesa")
 """Kinds of OpenGL that need no display, the faster first."""
 _HIDDEN = 5
 """A group of geoms that isn't drawn."""
+_SIDES = 120
+"""Of the polygon that is drawn for the wall."""
 _SPOTS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / math.sqrt(3)
 """Directions of the spots that let the eye see the ball turn."""
 _LONGEST_TRAIL = 3.0
@@ -158,27 +160,21 @@ def _model(run: Trajectory, width: int, height: int) -> Any:
         floor.material, floor.rgba = "", (0.80, 0.82, 0.85, 1.0)
     made.visual.global_.offwidth, made.visual.global_.offheight = width, height
     made.visual.quality.offsamples, made.visual.quality.shadowsize = 0, 2048
-    _add_ring(made, p)
-    return made.compile()
-
-
-def _add_ring(spec: Any, p: Parameters, sides: int = 120) -> None:
-    """The vessel's wall, a little higher than the ball, as a mesh."""
-    angle = np.linspace(0.0, 2 * math.pi, sides, endpoint=False)
-    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides)], axis=-1)
+    # The vessel's wall, a little higher than the ball, as a mesh.
+    angle = np.linspace(0.0, 2 * math.pi, _SIDES, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(_SIDES)], axis=-1)
     inside, outside = (p.R + p.r) * circle, (p.R + 1.15 * p.r) * circle
     up = np.array([0.0, 0.0, 2.2 * p.r])
     corners = np.concatenate([inside, inside + up, outside + up, outside])
-    here = np.arange(sides)
-    there = (here + 1) % sides
-    faces = []
-    for k in range(4):
-        a, b = k * sides, (k + 1) % 4 * sides
-        faces += [np.stack([a + here, a + there, b + here], -1), np.stack([a + there, b + there, b + here], -1)]
-    mesh = spec.add_mesh(name="ring", uservert=corners.ravel(), userface=np.concatenate(faces).ravel())
+    here = np.arange(4 * _SIDES).reshape(4, _SIDES)
+    beside, above = np.roll(here, -1, axis=1), np.roll(here, -1, axis=0)
+    faces = [here, beside, above], [beside, np.roll(above, -1, axis=1), above]
+    triangles = np.concatenate([np.stack(corner, axis=-1).reshape(-1, 3) for corner in faces])
+    mesh = made.add_mesh(name="ring", uservert=corners.ravel(), userface=triangles.ravel())
     mesh.smoothnormal = False
     glass = {"rgba": (0.45, 0.65, 0.80, 0.22), "contype": 0, "conaffinity": 0}
-    spec.worldbody.add_geom(name="ring", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ring", **glass)
+    made.worldbody.add_geom(name="ring", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ring", **glass)
+    return made.compile()
 
 
 def resampled(run: Trajectory, times: Array) -> Trajectory:
