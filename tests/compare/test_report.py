@@ -180,14 +180,21 @@ def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page: Path) -> 
         assert wording.findings(verdict) == {"Largest deviation": said}
 
 
-def test_a_figure_of_several_claims_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawing = Drawing("A fall", lambda _: None, lambda _: Figure(figsize=(1, 1)), lambda _: "", ("good", "bad"))
+def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: object) -> Figure:
+        raise GapError("the run <is> lost")
+
+    figures = {
+        "fall": Drawing("A fall", lambda _: None, lambda _: Figure(figsize=(1, 1)), lambda _: "", ("good", "bad")),
+        "gap": Drawing("A gap", lambda _: None, refuse, lambda _: "", ("good",)),
+    }
     monkeypatch.setattr(report, "FIGURES", {})
-    monkeypatch.setattr(report, "figures_of", lambda name: {"fall": drawing})
+    monkeypatch.setattr(report, "figures_of", lambda claim: {n: f for n, f in figures.items() if claim in f.claims})
     page = report.write(Material(directory=tmp_path), VERDICTS[:2], Summary.of(tmp_path, [], Level.QUICK, []))
     text = page.read_text("utf-8")
     assert text.count("data:image/svg+xml") == 1
     assert '<a href="#figure-fall">A fall</a>: see good.' in row(text, "bad")
+    assert "A gap is not drawn: the run &lt;is&gt; lost" in row(text, "good")
 
 
 def test_an_empty_page_is_a_page_too(tmp_path: Path) -> None:
@@ -297,18 +304,6 @@ def test_processes_draw_every_figure(tmp_path: Path) -> None:
     assert report.render(material, VERDICTS, summary, lambda one, new: iter(())) == pages[1]  # has room for no new one
 
 
-def test_a_figure_that_can_not_be_drawn_is_a_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(_: object) -> Figure:
-        raise GapError("the run <is> lost")
-
-    drawing = Drawing("A fall", lambda _: None, refuse, lambda _: "", ("good",))
-    monkeypatch.setattr(report, "FIGURES", {})
-    monkeypatch.setattr(report, "figures_of", lambda name: {"fall": drawing})
-    page = report.write(Material(directory=tmp_path), VERDICTS[:1], Summary.of(tmp_path, [], Level.QUICK, []))
-    text = page.read_text("utf-8")
-    assert "A fall is not drawn: the run &lt;is&gt; lost" in text
-
-
 def test_errata_are_the_documented_ones() -> None:
     text = report.errata()
     documented = (Path(__file__).parents[2] / "docs" / "errata.md").read_text("utf-8")
@@ -394,13 +389,10 @@ ROWS = "[...document.querySelectorAll('details.claim')]"
 SHOWN = f"{ROWS}.filter(row => !row.hidden).map(row => row.id)"
 
 
-def test_the_page_loads_without_complaint(tab: Tab) -> None:
+def test_the_page_loads_and_claims_are_filtered_and_sorted(tab: Tab) -> None:
     assert tab.complaints == []
     assert tab.value(f"{ROWS}.length") == len(RAN)
     assert tab.value("document.title") == "dualball: 2 of 5 claims as expected"
-
-
-def test_filter(tab: Tab) -> None:
     tab.value("find.value = 'slip PROP. bro'; find.dispatchEvent(new Event('input'))")
     assert tab.value(SHOWN) == ["broken"]
     assert tab.value("document.getElementById('shown').textContent") == "1 of 5 shown"
@@ -410,6 +402,11 @@ def test_filter(tab: Tab) -> None:
     assert tab.value(f"{sections}.map(part => part.firstElementChild.textContent)") == ["Stability"]
     tab.value("outcome.value = ''; outcome.dispatchEvent(new Event('change'))")
     assert len(tab.value(SHOWN)) == len(RAN)
+    for _ in range(2):
+        tab.value("document.querySelector('[data-sort=id]').click()")
+    assert tab.value(SHOWN) == ["good", "doubted", "bad", "coarse", "broken"]  # within each section
+    tab.value("document.querySelector('[data-sort=id]').click()")
+    assert tab.value(SHOWN) == ["bad", "doubted", "good", "broken", "coarse"]
 
 
 def test_numbers_are_found_by_flow_claim_and_words(tab: Tab) -> None:
@@ -432,15 +429,6 @@ def test_numbers_are_found_by_flow_claim_and_words(tab: Tab) -> None:
     found = tab.value(rows)
     assert len(found) == report.ROWS + 40
     assert found[0] == ["reference", "12", "ω_c rad/s", found[0][3], "mujoco", "12", "1e-9", " 12", "0", "3e-9", "good"]
-
-
-def test_sort(tab: Tab) -> None:
-    """Within each section."""
-    for _ in range(2):
-        tab.value("document.querySelector('[data-sort=id]').click()")
-    assert tab.value(SHOWN) == ["good", "doubted", "bad", "coarse", "broken"]
-    tab.value("document.querySelector('[data-sort=id]').click()")
-    assert tab.value(SHOWN) == ["bad", "doubted", "good", "broken", "coarse"]
 
 
 def test_rows_open_by_keyboard(tab: Tab) -> None:
