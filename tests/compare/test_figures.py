@@ -226,14 +226,14 @@ def test_claims_have_their_own_figures_or_deviations() -> None:
 
 
 def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    chosen = {name: FIGURES[name] for name in ("fig-6", "ladder")}
+    chosen = {name: FIGURES[name] for name in ("fig-9", "ladder")}
     monkeypatch.setattr(registry, "FIGURES", chosen)
     assert dict(registry.write(tmp_path, Material(), ("svg", "png"))) == {
-        "fig-6": "",
+        "fig-9": "",
         "ladder": "not drawn: the ladder of settings was not measured",
     }
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-6.png", "fig-6.svg"]
-    assert "dimension of the state space" in (tmp_path / "captions.txt").read_text("utf-8")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-9.png", "fig-9.svg"]
+    assert "Stationary solutions off the floor" in (tmp_path / "captions.txt").read_text("utf-8")
     with pytest.raises(InputError, match="bmp"):
         list(registry.write(tmp_path, Material(), ("bmp",)))
     (tmp_path / "file").touch()
