@@ -11,10 +11,22 @@ import importlib
 import os
 import re
 import sys
+import textwrap
 from collections.abc import Sequence
 
 from model import InputError, SimulationError
 from model.trajectory import current_versions
+
+GROUPS = {
+    "study": {"validate": "validate", "judge": "validate", "report": "look", "figures": "look"},
+    "the ball": {
+        **{"predict": "predict", "simulate": "simulate", "inspect": "look", "sweep": "sweep", "collect": "sweep"},
+        **{"attractors": "attractors", "basins": "search", "search": "search", "design": "design"},
+        **{"render": "look", "view": "look"},
+    },
+    "contacts and engines": {"grade": "grade", "league": "league"},
+}
+"""The commands, as help groups them, and the module of each: `predict` doesn't wait for the engines of the others."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -39,32 +51,28 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
 
 
-_MODULES = {
-    "predict": ("predict",),
-    "design": ("design",),
-    "simulate": ("simulate",),
-    "validate": ("validate", "judge"),
-    "sweep": ("sweep", "collect"),
-    "attractors": ("attractors",),
-    "search": ("search", "basins"),
-    "look": ("report", "figures", "inspect", "render", "view"),
-    "grade": ("grade",),
-    "league": ("league",),
-}
-"""The commands in each module of this package: `predict` doesn't wait for the engines and figures of the others."""
-
-
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     """The parser of the command that was asked for, or of all of them."""
     parser = argparse.ArgumentParser(
         prog="dualball",
+        usage="dualball [-h] [--version] COMMAND ...",
         description="A physics engine on trial: the dual-point contact ball, in closed form and in MuJoCo.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"dualball {current_versions()['dualball']}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    asked = [module for module, names in _MODULES.items() if words[0:1] and words[0] in names]
-    for module in asked or _MODULES:
+    commands = parser.add_subparsers(metavar="COMMAND", required=True, prog="dualball", help=argparse.SUPPRESS)
+    known = {name: module for group in GROUPS.values() for name, module in group.items()}
+    asked = known.get(words[0]) if words else None
+    for module in [asked] if asked else dict.fromkeys(known.values()):
         importlib.import_module(f"compare.commands.{module}").add(commands)
+    if not asked:
+        listed = []
+        for title, group in GROUPS.items():
+            listed.append(f"\n{title}:")
+            for name in group:
+                what, indent = commands.choices[name].description or "", " " * 14
+                listed.append(textwrap.fill(what, 100, initial_indent=f"  {name:<12}", subsequent_indent=indent))
+        parser.epilog = "\n".join([*listed, "\n'dualball COMMAND --help' says more."]).lstrip("\n")
     return parser
 
 

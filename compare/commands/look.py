@@ -11,47 +11,52 @@ from compare.report import results
 from compare.runs import collection
 from compare.view import inspection
 from mjsim import ContactSettings
-from model import InputError, storage
+from model import Flow, InputError, storage
 
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    command = options.command(commands, "report", report, "make report.html anew from stored measurements")
-    command.add_argument("directory", type=Path, nargs="?", default=Path("results"), metavar="DIR")
+    summary = "judge stored measurements again and write report.html anew"
+    command = options.command(commands, "report", report, summary, "results")
+    stored = "directory of a validation"
+    command.add_argument("directory", type=Path, nargs="?", default=Path("results"), metavar="DIR", help=stored)
 
-    command = options.command(
-        commands, "figures", figures, "draw the paper's figures, with measured points where there are results"
+    summary = "draw the paper's figures, with measured points where there are results"
+    command = options.command(commands, "figures", figures, summary, "--format pdf")
+    command.add_argument(
+        "-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help="where to write them"
     )
-    command.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="DIR")
-    command.add_argument("--results", type=Path, default=Path("results"), metavar="DIR", help="stored results to draw")
+    command.add_argument("--results", type=Path, metavar="DIR", help=f"{stored} (default results, if it is there)")
     command.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
 
-    command = options.command(commands, "inspect", inspect, "what a trajectory file holds")
-    command.add_argument("file", type=Path, metavar="FILE")
-    command.add_argument("--plot", type=Path, metavar="FILE", help="draw it (png, svg or pdf)")
+    command = options.command(commands, "inspect", inspect, "what a trajectory file holds", "run.h5 --plot run.png")
+    command.add_argument("file", type=Path, metavar="FILE", help="a run, or a collection of 'dualball collect'")
+    command.add_argument("--plot", type=Path, metavar="FILE", help="draw the run (png, svg or pdf)")
     options.outputs(command)
 
-    command = options.command(
-        commands, "render", render, "a picture or film of a run: the scene, contact forces, slip, case"
-    )
-    command.add_argument("file", type=Path, metavar="FILE")
+    summary = "a picture or film of a run: the scene, contact forces, slip, case"
+    command = options.command(commands, "render", render, summary, "run.h5 -o film.gif --from 1 --seconds 10")
+    command.add_argument("file", type=Path, metavar="FILE", help="a run")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="picture.png or film.gif")
     command.add_argument("--width", type=int, metavar="PIXELS", help="default 960 for a picture, 640 for a film")
     command.add_argument("--at", type=options.number, metavar="s", help="time of a picture (default: the end)")
-    command.add_argument("--from", dest="start", type=options.number, default=0.0, metavar="s", help="start of a film")
-    command.add_argument("--seconds", type=options.number, default=6.0, help="length of a film (default 6)")
-    command.add_argument("--speed", type=options.number, default=0.25, help="1 is real time (default 0.25)")
-    command.add_argument("--rate", type=int, default=20, help="frames a second (default 20)")
-    for name, meaning in (("force", "a force m g"), ("slip", "the fastest slip")):
-        text = f"length of the arrow of {meaning}, radii of the ball (default 3)"
-        command.add_argument(f"--{name}-arrow", type=options.number, default=3.0, metavar="RADII", help=text)
+    for option, name, usual, unit, meaning in (
+        ("from", "start", 0.0, "s", "start of a film, in the time of the run"),
+        ("seconds", "seconds", 6.0, "s", "length of a film; shorter if the run ends before"),
+        ("speed", "speed", 0.25, "NUMBER", "of a film; 1 is real time"),
+        ("force-arrow", "force_arrow", 3.0, "RADII", "length of the arrow of a force m g, radii of the ball"),
+        ("slip-arrow", "slip_arrow", 3.0, "RADII", "length of the arrow of the fastest slip, radii of the ball"),
+    ):
+        command.add_argument(f"--{option}", dest=name, type=options.number, default=usual, metavar=unit, help=meaning)
+    command.add_argument("--rate", type=int, default=20, metavar="N", help="frames a second")
 
-    command = options.command(commands, "view", view, "the ball in MuJoCo's viewer, driven by the study's own loop")
+    summary = "the ball in MuJoCo's viewer, driven by the study's own loop"
+    command = options.command(commands, "view", view, summary, "--omega-0 25 --speed 0.5")
     options.add_parameters(command)
     running.add_flow(command)
     running.add_start(command)
-    command.add_argument("--timestep", type=options.number, metavar="s", help="time step")
-    command.add_argument("--speed", type=options.number, default=1.0, help="1 is real time (default)")
+    command.add_argument("--timestep", type=options.number, metavar="s", help="time step (default: that of the study)")
+    command.add_argument("--speed", type=options.number, default=1.0, metavar="NUMBER", help="1 is real time")
 
 
 def report(args: argparse.Namespace) -> int:
@@ -68,7 +73,9 @@ def figures(args: argparse.Namespace) -> int:
     from compare import validation  # here, because drawing takes a second to load
     from compare.figures import registry
 
-    stored = validation.stored_material(args.results)
+    if args.results and not args.results.is_dir():
+        raise InputError(f"cannot read {args.results}: there is no such directory")
+    stored = validation.stored_material(args.results or Path("results"))
     for name, gap in registry.write(args.output, stored, args.format or ["svg"]):
         print(f"{args.output / name}: {gap or 'written'}")
     return 0
@@ -93,9 +100,8 @@ def render(args: argparse.Namespace) -> int:
     """Draw a picture or a film."""
     from compare.view import render  # here, because drawing takes a second to load
 
-    film = {name: getattr(args, name) for name in ("start", "seconds", "speed", "rate")}
-    arrows = {name: getattr(args, name) for name in ("force_arrow", "slip_arrow")}
-    print(render.write(storage.load(args.file), args.output, args.at, args.width, arrows, **film))
+    names = ("at", "width", "start", "seconds", "speed", "rate", "force_arrow", "slip_arrow")
+    print(render.write(storage.load(args.file), args.output, **{name: getattr(args, name) for name in names}))
     return 0
 
 
@@ -104,7 +110,6 @@ def view(args: argparse.Namespace) -> int:
     from compare.view import viewer  # here, because nothing else needs it
 
     p = options.parameters(args)
-    timestep = {} if args.timestep is None else {"timestep": args.timestep}
-    settings = ContactSettings.for_problem(p, **timestep)
-    viewer.view(p, running.start(args), running.flow(args), settings, args.speed)
+    settings = ContactSettings.for_problem(p, **options.given(args, ["timestep"]))
+    viewer.view(p, running.start(args), running.flow(args) or Flow.steady(p.omega_0), settings, args.speed)
     return 0

@@ -11,6 +11,7 @@ from typing import Any
 
 from rich.console import Console
 
+from compare.pages import readable
 from model import Parameters, drag
 
 Parser = argparse.ArgumentParser
@@ -18,9 +19,24 @@ Commands = Any
 """What `argparse` calls the sub-parsers of a program."""
 
 
-def command(commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str) -> Parser:
-    """Declare a command."""
-    declared: Parser = commands.add_parser(name, help=summary, description=summary)
+class _Help(argparse.HelpFormatter):
+    """Help that says the default of each option that has one."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        default, text = action.default, action.help or ""
+        if default is None or default is False or default == [] or default == argparse.SUPPRESS or "default" in text:
+            return text
+        if not isinstance(default, Path):
+            default = f"{default:g}" if isinstance(default, float) else getattr(default, "name", default)
+        return f"{text} (default {default})"
+
+
+def command(
+    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str, example: str = ""
+) -> Parser:
+    """Declare a command; the example is what follows its name."""
+    epilog = f"Example: dualball {name} {example}" if example else None
+    declared: Parser = commands.add_parser(name, description=summary, epilog=epilog, formatter_class=_Help)
     declared.set_defaults(run=run)
     return declared
 
@@ -33,7 +49,8 @@ def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:T
 def outputs(parser: Parser, directory: str = "", shown: str = "print JSON") -> None:
     """``--json``; and what all commands have that fill a directory: its name, workers' progress or none."""
     if directory:
-        parser.add_argument("-o", "--output", type=Path, default=Path(directory), metavar="DIR")
+        where = "directory of the results; what it holds already is not computed again"
+        parser.add_argument("-o", "--output", type=Path, default=Path(directory), metavar="DIR", help=where)
         parser.add_argument("--quiet", action="store_true", help="no progress")
     parser.add_argument("--json", action="store_true", help=shown)
 
@@ -48,14 +65,16 @@ def show(data: dict[str, Any], table: Callable[[dict[str, Any]], Any], as_json: 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:
     """Options that choose a parameter set and change some of its values."""
-    group = parser.add_argument_group("parameters")
+    group = parser.add_argument_group("parameters", "a set, and values that replace its own")
     source = group.add_mutually_exclusive_group()
     source.add_argument("--set", metavar="NAME", default="reference", help=f"one of {', '.join(Parameters.names())}")
     source.add_argument("--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table")
     for field in Parameters.quantities():
-        option, meaning = f"--{field.name.replace('_', '-')}", "{meaning} ({allowed})".format_map(field.metadata)
-        dest, unit = f"parameter_{field.name}", field.metadata["unit"]
-        group.add_argument(option, dest=dest, metavar=unit, type=number, help=meaning)
+        meta, option = field.metadata, f"--{field.name.replace('_', '-')}"
+        unit, allowed = readable(meta["unit"]) or "NUMBER", f", {meta['allowed']}".replace(", any", "")
+        group.add_argument(
+            option, dest=f"parameter_{field.name}", metavar=unit, type=number, help=meta["meaning"] + allowed
+        )
     group.add_argument("--drag", dest="parameter_drag", metavar="LAW", help=f"law of drag: {', '.join(drag.LAWS)}")
 
 

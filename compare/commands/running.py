@@ -18,27 +18,30 @@ from compare.runs.tasks import Task
 from compare.runs.workers import Workers, dask, processes
 from model import Flow, InputError, Parameters, State
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import check_names, parse_number
+from model.parameters import POSITIVE, check_names, check_number, parse_number
 
 
 def add_flow(parser: argparse.ArgumentParser) -> None:
     """Options that let omega_0 change in time."""
     group = parser.add_argument_group("flow", "omega_0 over time, in rad/s and s; steady if none is given")
     choice = group.add_mutually_exclusive_group()
-    choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"))
+    ramp = "rises or falls evenly within so many seconds, and stays"
+    choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp)
     choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help="each level held HOLD s")
     wave = "a mean with waves on it, frequencies in Hz"
     choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
     choice.add_argument("--flow", type=Path, metavar="FILE", help="measured, as CSV: time, omega_0 on each line")
-    group.add_argument(
-        "--longest-interval", type=number, metavar="s", help="between lines of --flow; default: 10 usual ones"
-    )
+    longest = "longest time between lines of --flow (default: ten times the usual one)"
+    group.add_argument("--longest-interval", type=number, metavar="s", help=longest)
 
 
 def flow(args: argparse.Namespace) -> Flow | None:
     """The flow that the options of `add_flow` describe; None for a steady one."""
     if args.longest_interval is not None and not args.flow:
         raise InputError("--longest-interval is for --flow")
+    chosen = [name for name in ("ramp", "staircase", "sine", "flow") if getattr(args, name)]
+    if chosen and args.parameter_omega_0 is not None:
+        raise InputError(f"--omega-0 is for a steady flow, and can't be given beside --{chosen[0]}")
     if args.ramp:
         return Flow.ramp(*args.ramp)
     if args.staircase:
@@ -57,22 +60,23 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     """Options that choose an engine and its accuracy."""
     group = parser.add_argument_group("engine")
     add_engine_name(group)
-    group.add_argument("--timestep", type=number, metavar="s", help="time step; event has none")
-    group.add_argument("--rtol", type=number, help="relative tolerance of event")
-    group.add_argument("--restitution", type=number, help="coefficient of restitution of event and time-stepping")
+    group.add_argument("--timestep", type=number, metavar="s", help="time step (default: the engine's; event has none)")
+    group.add_argument("--rtol", type=number, metavar="NUMBER", help="relative tolerance of event")
+    restitution = "coefficient of restitution of event and time-stepping"
+    group.add_argument("--restitution", type=number, metavar="NUMBER", help=restitution)
 
 
 def add_engine_name(parser: argparse._ActionsContainer) -> None:
     """The option that chooses an engine."""
+
+    def engine(name: str) -> engines.Engine:
+        try:
+            return engines.engine(name)
+        except InputError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
     known = f"{', '.join(engines.ENGINES)}; analytic is event"
-    parser.add_argument("--engine", type=_engine, default=engines.MUJOCO, metavar="NAME", help=known)
-
-
-def _engine(name: str) -> engines.Engine:
-    try:
-        return engines.engine(name)
-    except InputError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+    parser.add_argument("--engine", type=engine, default=engines.MUJOCO, metavar="NAME", help=known)
 
 
 def settings(args: argparse.Namespace, p: Parameters) -> Settings:
@@ -83,6 +87,8 @@ def settings(args: argparse.Namespace, p: Parameters) -> Settings:
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
     """The run of a ball that the options of `add_engine`, `add_start` and ``--time`` describe."""
+    if args.time is not None:
+        check_number("time", args.time, "s", POSITIVE)
     given = {"x0": start(args), "t_end": args.time, "settings": settings(args, p)} | more
     return Task(engine=args.engine.name, parameters=p, **given)
 
@@ -93,13 +99,19 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     choice = group.add_mutually_exclusive_group()
     add_processes(choice)
     choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
-    group.add_argument("--limit", type=number, default=math.inf, metavar="s", help="longest real time a run may take")
+    longest = "longest real time a run may take (default: no limit)"
+    group.add_argument("--limit", type=number, default=math.inf, metavar="s", help=longest)
 
 
 def add_processes(options: Any) -> None:
     """The option that says how many processes of this machine take part, for a parser or a group of one."""
-    here, all_of_them = "processes of this machine (0: this one)", os.cpu_count() or 1
+    here, all_of_them = "processes of this machine; 0: this one", os.cpu_count() or 1
     options.add_argument("--workers", type=int, default=all_of_them, metavar="N", help=here)
+
+
+def workers(args: argparse.Namespace) -> Workers:
+    """What the options of `add_workers` name."""
+    return dask(args.scheduler) if args.scheduler else processes(args.workers)
 
 
 @contextmanager
@@ -112,14 +124,10 @@ def campaign(args: argparse.Namespace, doing: str, directory: str = "", **more: 
         yield made
 
 
-def workers(args: argparse.Namespace) -> Workers:
-    """What the options of `add_workers` name."""
-    return dask(args.scheduler) if args.scheduler else processes(args.workers)
-
-
 def add_start(parser: argparse.ArgumentParser) -> None:
     """Option for the initial state."""
-    meaning = f"initial state, zero (at rest against the wall) where not named; names: {', '.join(VARIABLES)}"
+    units = ", ".join(f"{name} in {unit}" for name, unit in zip(VARIABLES, UNITS, strict=True))
+    meaning = f"initial state: {units}; zero (at rest against the wall) where not named"
     parser.add_argument("--start", nargs="*", default=[], metavar="NAME=VALUE", help=meaning)
 
 

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from rich import box
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from compare import pages
 from compare.claims.claim import Claim, Outcome, Verdict
-from compare.claims.claim import Text as Kind
-from compare.measure.quantities import quantity
 from compare.report import wording
 
 _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}
 
 
 def line(verdict: Verdict) -> Text:
-    """A claim in one line: verdict, worst deviation over tolerance, resolving power; what went wrong below it."""
+    """A claim in one line: verdict, largest deviation, what error of theory would be noticed, or what went wrong."""
     kind, mark = wording.MARKS[Outcome.CONFIRMED if verdict.passed else verdict.outcome]
-    style = _STYLES[kind]
-    shown = Text.assemble((f"{mark} {verdict.outcome:<13}", style), f"{verdict.claim.id:<18}")
+    shown = Text.assemble((f"{mark} {verdict.outcome:<13}", _STYLES[kind]), f"{verdict.claim.id:<18}")
     if verdict.checks:
-        shown.append(f"{len(verdict.checks):>5} numbers, worst {_ratio(verdict.worst)} of its tolerance")
-        power = [f"{quantity(name).symbol} {value:.0e}" for name, value in verdict.resolving_power.items()]
-        shown.append("; notices " + ", ".join(power[:4]) + (" …" if len(power) > 4 else "") if power else "", "dim")
+        found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
+        count = len(verdict.checks)
+        shown.append("; ".join([f"{count:>5} number{'s' if count > 1 else ''}", *found]))
     if verdict.error:
         shown.append(f"  {verdict.error}", "red")
     if verdict.outcome is Outcome.NOT_RUN and verdict.missing:
@@ -36,41 +30,24 @@ def line(verdict: Verdict) -> Text:
 
 
 def summary(verdicts: Sequence[Verdict]) -> Text:
-    """How many came out as expected, and how."""
-    counts = Counter(verdict.outcome for verdict in verdicts)
+    """How many claims and numbers came out how."""
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
-    numbers = sum(len(verdict.checks) for verdict in ran)
-    corrected = sum(v.claim.text is Kind.CORRECTED and v.passed for v in ran)
-    text = f"{sum(v.passed for v in ran)} of {len(ran)} claims came out as expected: "
-    text += ", ".join(f"{n} {outcome}" for outcome, n in counts.items())
-    return Text(f"{text}; {numbers} numbers; {corrected} hold once an erratum is corrected", "bold")
+    return Text("; ".join([wording.headline(ran), *map(" ".join, wording.totals(ran))]), "bold")
 
 
 def checks(verdict: Verdict) -> Table:
     """Every number of one claim."""
-    title = Text(f"{verdict.claim.id}  {verdict.claim.statement}", "bold")
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0), header_style="dim")
-    for column in ("set", "ω₀", "", "predicted", "measured", "deviation", "tolerance", ""):
-        table.add_column(column, justify="left" if column == "set" else "right", no_wrap=True)
+    rows = [["set", "ω₀ (rad/s)", "quantity", "predicted", "measured", "deviation", "tolerance", ""]]
     for check in verdict.checks:
         m = check.measurement
-        mark = Text("pass", "green") if check.agrees and check.conclusive else Text("coarse", "yellow")
-        predicted = "none" if math.isnan(check.predicted) else f"{check.predicted:.9g}"
-        numbers = predicted, f"{m.value:.9g}", f"{check.deviation:+.1e}", f"{check.tolerance:.1e}"
-        mark = mark if check.agrees else Text("FAIL", "bold red")
-        table.add_row(m.set, f"{m.parameters.omega_0:.6g}", quantity(m.quantity).symbol, *numbers, mark)
-    return table
+        numbers = wording.value(m, check.predicted), wording.value(m, m.value)
+        sizes = wording.size(check.deviation, "+"), wording.size(check.tolerance)
+        mark = ("pass" if check.conclusive else "coarse") if check.agrees else "FAIL"
+        rows.append([m.set, f"{m.parameters.omega_0:.6g}", wording.SYMBOLS[m.quantity], *numbers, *sizes, mark])
+    return pages.table(f"{verdict.claim.id}  {verdict.claim.statement}", rows, no_wrap=True)
 
 
 def claims(known: Iterable[Claim]) -> Table:
     """The claims there are."""
-    table = Table(box=box.SIMPLE_HEAD)
-    for column in ("claim", "source", "statement", "text"):
-        table.add_column(column)
-    for claim in known:
-        table.add_row(claim.id, claim.source, escape(claim.statement), claim.text)
-    return table
-
-
-def _ratio(value: float) -> str:
-    return "beyond all" if math.isinf(value) else f"{value:.2g}"
+    rows = [[claim.id, claim.source, claim.statement, str(claim.text)] for claim in known]
+    return pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left")

@@ -23,14 +23,13 @@ _FINE = 51
 def characteristic(made: Design) -> Figure:
     """Reading over flow, with the band of the tolerances, the flows to measure and the limits."""
     curve, chosen, request = made.curve, made.choice, made.request
-    figure = style.figure(7.0, 4.3)
-    axes = figure.add_subplot()
+    figure, axes = style.panels(7.0, 4.3)
     flows, low, high, below, above = (np.append(0.0, each) for each in (curve.omega_0, *curve.meant, *curve.band))
     axes.fill_between(flows, below, above, color="0.82", lw=0, label="within the tolerances")
-    axes.plot(flows, low, color=style.COLOURS[Case.SS], lw=2, label="as meant, rising flow")
-    axes.plot(flows, high, color=style.COLOURS[Case.NR], lw=2, ls="--", label="as meant, falling flow")
+    axes.plot(flows, low, color=style.COLOURS[Case.SS], lw=2, label="nominal, rising flow")
+    axes.plot(flows, high, color=style.COLOURS[Case.NR], lw=2, ls="--", label="nominal, falling flow")
     axes.axvspan(request.slowest, request.fastest, color="#0072B2", alpha=0.12, lw=0, label="flows to measure")
-    limit: dict[str, Any] = {"color": style.FORCE, "alpha": 0.25, "lw": 1, "label": "limit, from at worst to as meant"}
+    limit: dict[str, Any] = {"color": style.FORCE, "alpha": 0.25, "lw": 1, "label": "limit, from worst to nominal"}
     axes.axvspan(chosen.worst.omega_0, chosen.limit.omega_0, **limit)
     axes.set(xlim=(0, flows[-1]), ylim=(0, None), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {key: getattr(made.thresholds, key) for key in THRESHOLDS})
@@ -40,8 +39,7 @@ def characteristic(made: Design) -> Figure:
 
 def sensitivities(made: Design) -> Figure:
     """Bars: by how many per cent each threshold changes if a value does by one."""
-    figure = style.figure(7.0, 3.6)
-    axes = figure.add_subplot()
+    figure, axes = style.panels(7.0, 3.6)
     there = [key for key in THRESHOLDS if np.isfinite(getattr(made.thresholds, key))]
     names = list(made.sensitivities[there[0]])
     width = 0.8 / len(there)
@@ -64,8 +62,7 @@ def friction(made: Design) -> Figure:
     top = {name: max(1.5 * chosen.values[name], 1.25 * chosen.p.j) for name in ("mu", "eta")}
     mu, eta = (np.linspace(top[name] / 50, top[name], _FINE) for name in ("mu", "eta"))
     limits = [[flowmeter.operating_range(chosen.p.replace(mu=float(m), eta=float(e))) for e in eta] for m in mu]
-    figure = style.figure(7.0, 4.3)
-    axes = figure.add_subplot()
+    figure, axes = style.panels(7.0, 4.3)
     shown = axes.contourf(eta, mu, limits, levels=14, cmap="cividis")
     figure.colorbar(shown, label="operating range up to $\\omega_0$ (rad/s)")
     axes.contour(eta, mu, limits, levels=[made.request.fastest], colors="white", linewidths=1.5)
@@ -80,7 +77,7 @@ def friction(made: Design) -> Figure:
 FIGURES: tuple[tuple[Callable[[Design], Figure], str], ...] = (
     (
         characteristic,
-        "Angular velocity of the ball's orbit over that of the fluid. Where the lines part, the reading depends on "
+        "Angular velocity of the ball's orbit, against that of the fluid. Where the lines part, the reading depends on "
         "whether the flow rose or fell. Grey: from the lowest to the highest reading at any corner of the tolerances.",
     ),
     (sensitivities, "Sensitivities: by how many per cent a threshold changes if a value does by one."),

@@ -7,6 +7,7 @@ from typing import Any
 
 import jinja2
 from rich import box
+from rich.console import JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
@@ -18,9 +19,9 @@ def readable(unit: str) -> str:
     """A unit of the files as a reader writes it: rad s-1 is rad/s, 1 is nothing."""
     if unit == "1":
         return ""
-    for written, read in ((" s-2", "/s²"), (" s-1", "/s"), ("s-1", "1/s"), ("rad-1", "1/rad"), ("rad2", "rad²")):
+    for written, read in (" s-2", "/s²"), (" s-1", "/s"), (" m-3", "/m³"), ("s-1", "1/s"), ("rad-1", "1/rad"):
         unit = unit.replace(written, read)
-    return unit
+    return unit.replace("m2", "m²").replace("rad2", "rad²")
 
 
 def render(package: str, template: str, **values: Any) -> str:
@@ -44,12 +45,15 @@ def pairs(rows: Mapping[str, str]) -> Table:
     return shown
 
 
-def table(title: str, rows: Rows, no_wrap: bool = False, **look: Any) -> Table:
-    """A table for the terminal; with `no_wrap` only its head and first column may take several lines."""
+def table(title: str, rows: Rows, no_wrap: bool = False, justify: JustifyMethod = "right", **look: Any) -> Table:
+    """A table for the terminal; with `no_wrap` only its head and first column may take several lines.
+
+    `justify` is for all columns but the first.
+    """
     usual: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "caption_justify": "left"}
     shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
     for k, name in enumerate(rows[0]):
-        shown.add_column(name, justify="right" if k else "left")
+        shown.add_column(name, justify=justify if k else "left")
     for name, *cells in rows[1:]:
         shown.add_row(Text(name), *(Text(cell, no_wrap=no_wrap) for cell in cells))
     return shown

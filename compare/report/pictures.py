@@ -20,25 +20,29 @@ from model.files import write_text
 
 _PROGRAM = ("model", "analytic", "compare", "compare.runs", "compare.measure", "compare.scorecard", "compare.figures")
 """Packages whose constants and functions a picture may show."""
-_KEPT = " !$'()*+,-./:;<=>?@_~"
+_UNESCAPED = " !$'()*+,-./:;<=>?@_~"
 """What needs no escape in an address between double quotes."""
 
 
-def kept(path: Path, drawing: Drawing, data: Any) -> tuple[str, str] | None:
-    """The address and the caption of the picture in an SVG file, if it was made from the same data by this program."""
+def kept(path: Path, drawing: Drawing, data: Any) -> dict[str, str] | None:
+    """Address and caption of the picture in an SVG file, if this program made it from the same data."""
     picture = path.read_text("utf-8") if path.is_file() else ""
-    return _shown(picture) if picture.endswith(_mark(drawing, data)) else None
+    if not picture.endswith(_mark(drawing, data)):
+        return None
+    before, _, caption_on = picture.partition("<desc>")
+    caption, _, after = caption_on.partition("</desc>")
+    return {"picture": address(before + after), "caption": html.unescape(caption)}
 
 
-def drawn(path: Path, drawing: Drawing, data: Any) -> tuple[str, str]:
+def drawn(path: Path, drawing: Drawing, data: Any) -> dict[str, str]:
     """The same of a picture that is drawn and written into the file, where it describes itself by the caption.
 
     Raises what drawing raises, and `StorageError` if it can't be written.
     """
-    caption = f"<desc>{html.escape(drawing.caption(data))}</desc>"
-    picture = svg(drawing.draw(data)).replace("<defs>", f"{caption}<defs>", 1) + _mark(drawing, data)
-    write_text(path, picture)
-    return _shown(picture)
+    picture, caption = svg(drawing.draw(data)), drawing.caption(data)
+    described = picture.replace("<defs>", f"<desc>{html.escape(caption)}</desc><defs>", 1)
+    write_text(path, described + _mark(drawing, data))
+    return {"picture": address(picture + _mark(drawing, data)), "caption": caption}
 
 
 def _mark(drawing: Drawing, data: Any) -> str:
@@ -46,17 +50,10 @@ def _mark(drawing: Drawing, data: Any) -> str:
     return f"<!-- {hashlib.sha256(made_from.encode()).hexdigest()} -->"
 
 
-def _shown(picture: str) -> tuple[str, str]:
-    """The address of a picture that is its own content, as a browser looks into it only to show it; and its caption."""
-    before, _, caption_on = picture.partition("<desc>")
-    caption, _, after = caption_on.partition("</desc>")
-    return address(before + after), html.unescape(caption)
-
-
 def address(picture: str) -> str:
     """An SVG picture as an address, to stand between double quotes as it is; in words it is shorter than in base64."""
     single = picture.replace("'", "&apos;").replace('"', "'")
-    return f"data:image/svg+xml,{urllib.parse.quote(single, safe=_KEPT)}"
+    return f"data:image/svg+xml,{urllib.parse.quote(single, safe=_UNESCAPED)}"
 
 
 def svg(figure: Figure) -> str:

@@ -1,4 +1,4 @@
-"""What a trajectory holds, for a person: in words, as a table, as a plot."""
+"""What a trajectory holds, for a person: as data, and as a table."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def describe(path: Path) -> dict[str, Any]:
                 start = stretches.pop()[1]
             stretches.append((case, start, end))
     header, events = last.header, last.events
-    about = {name: getattr(header, name) for name in ("engine", "failure", "commit", "created")}
-    return about | {
+    return {
+        **{name: getattr(header, name) for name in ("engine", "failure", "commit", "created")},
         "complete": last.complete,
         "parameters": dataclasses.asdict(header.parameters),
         "flow": header.flow.to_mapping(),
@@ -52,39 +52,35 @@ def describe(path: Path) -> dict[str, Any]:
 
 def table(about: dict[str, Any]) -> Table:
     """What `describe` returned as a table of two columns."""
-    units = {f.name: "" if f.metadata["unit"] == "1" else f.metadata["unit"] for f in Parameters.quantities()}
-    parameters = (f"{name} = {about['parameters'][name]:g} {unit}".strip() for name, unit in units.items())
-    last = (f"{n} = {about['last'][n]:.9g} {u}" for n, u in zip(VARIABLES, UNITS, strict=True) if about["last"])
+
+    def listed(items: list[str]) -> str:
+        more = [f"… and {len(items) - LISTED} more"] if len(items) > LISTED else []
+        return "\n".join(items[:LISTED] + more) or "none"
+
+    def short(value: Any) -> str:
+        if isinstance(value, list):
+            return f"[{', '.join(map(short, value))}]"
+        return f"{value:g}" if isinstance(value, float) else str(value)
+
+    parameters, flow = about["parameters"], Flow.from_mapping(about["flow"])
+    units = {field.name: pages.readable(field.metadata["unit"]) for field in Parameters.quantities()}
+    told = f"{flow.kind}, ω₀ from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within {flow.start[-1]:g} s"
+    if flow.is_steady:
+        told = f"steady, ω₀ = {flow.value[0]:g} rad/s"
+    elif len(flow.waves):
+        waves = ", ".join(f"{amplitude:g} rad/s at {frequency:g} Hz" for amplitude, frequency, _ in flow.waves)
+        told = f"{flow.kind}, ω₀ = {flow.value[0]:g} rad/s with waves of {waves}"
+    last = zip(VARIABLES, UNITS, strict=True) if about["last"] else ()
     rows = {
         "engine": f"{about['engine']} ({', '.join(f'{k} {v}' for k, v in about['versions'].items())})",
         "made": f"{about['created']} {about['commit'][:12]}".strip(),
-        "parameters": ", ".join(parameters),
-        "drag": about["parameters"]["drag"],
-        "flow": _flow(Flow.from_mapping(about["flow"])),
-        "settings": ", ".join(f"{k} = {_short(v)}" for k, v in about["settings"].items()),
+        "parameters": ", ".join(f"{name} = {parameters[name]:g} {unit}".strip() for name, unit in units.items()),
+        "drag": parameters["drag"],
+        "flow": told,
+        "settings": ", ".join(f"{k} = {short(v)}" for k, v in about["settings"].items()),
         "samples": f"{about['samples']} over {about['duration']:g} s",
-        "cases": _listed([f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in about["cases"]]),
-        "events": _listed([f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in about["events"]]),
-        "last state": "\n".join(last),
+        "cases": listed([f"{p['case']} {p['from']:.6g}…{p['to']:.6g} s" for p in about["cases"]]),
+        "events": listed([f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in about["events"]]),
+        "last state": "\n".join(f"{n} = {about['last'][n]:.9g} {pages.readable(u)}" for n, u in last),
     }
     return pages.pairs(rows | ({"[red]failure": about["failure"]} if about["failure"] else {}))
-
-
-def _flow(flow: Flow) -> str:
-    if flow.is_steady:
-        return f"steady, omega_0 = {flow.value[0]:g} rad/s"
-    if len(flow.waves):
-        waves = (f"{amplitude:g} rad/s at {frequency:g} Hz" for amplitude, frequency, _ in flow.waves)
-        return f"{flow.kind}, omega_0 = {flow.value[0]:g} rad/s with waves of {', '.join(waves)}"
-    return f"{flow.kind}, omega_0 from {flow.value[0]:g} to {flow.value[-1]:g} rad/s within {flow.start[-1]:g} s"
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, list):
-        return "[" + ", ".join(_short(v) for v in value) + "]"
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _listed(items: list[str]) -> str:
-    more = f"\n… and {len(items) - LISTED} more" if len(items) > LISTED else ""
-    return ("\n".join(items[:LISTED]) + more) or "none"

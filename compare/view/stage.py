@@ -1,150 +1,144 @@
-"""The scene of a run drawn at any time: from outside and from beside the ball, with forces, slips and a trail."""
+"""The scene of a run drawn at any times: from outside and from beside the ball, with forces, slips and a trail.
+
+MuJoCo's renderer draws, with a kind of OpenGL that works without a screen.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import importlib
 import math
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterator
 from typing import Any
 
 import mujoco
 import numpy as np
 from matplotlib.colors import to_rgb
+from mujoco.rendering.classic import gl_context
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from compare.figures import style
 from compare.figures.style import BALL, FORCE, SLIP
-from compare.view import opengl, overlay
-from compare.view.motion import STEP, Moment, Turning
 from mjsim import ContactSettings, scene
-from model import InputError, Parameters, Trajectory
+from model import Case, InputError, Trajectory
 from model.arrays import Array
-from model.kinematics import frame, slip_velocities
+from model.kinematics import frame, slip_velocities, to_world
+from model.trajectory import columns
 
-_HIDDEN = 5
-"""A group of geoms that isn't drawn."""
+STEP = 5e-3
+"""Longest time between points of the trail and of the rotation, s."""
 ARROW = 3.0
 """Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball, unless said."""
+OFFSCREEN = ("egl", "osmesa")
+"""Kinds of OpenGL that need no display, the faster first."""
+_HIDDEN = 5
+"""A group of geoms that isn't drawn."""
+_SIDES = 120
+"""Of the polygon that is drawn for the wall."""
 _SPOTS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / math.sqrt(3)
+"""Directions of the spots that let the eye see the ball turn."""
 _LONGEST_TRAIL = 3.0
 """s."""
 _TRAIL = 0.6
 """How far back the trail reaches, revolutions."""
 
 
-class Stage:
-    """The scene of a run, a context to draw it in, and what depends on the whole run; pictures are 16:10.
+def frames(
+    run: Trajectory, times: Array, width: int, force_arrow: float = ARROW, slip_arrow: float = ARROW
+) -> Iterator[tuple[Image.Image, Image.Image]]:
+    """Pictures of a run at times (n,) in s: from outside, in 16:10, and from beside the ball, a small square.
 
     Raises `InputError` if there is no OpenGL, or the run holds no scene with a ball.
     """
+    p, now = run.header.parameters, resampled(run, times)
+    steps = max(1, math.ceil((run.time[-1] - run.time[0]) / STEP))
+    past = resampled(run, np.linspace(run.time[0], run.time[-1], steps + 1))
+    turns = orientations(past)[np.searchsorted(past.time, times).clip(max=steps)]
+    centres, axes = to_world(now.x, now.theta, p).position, frame(now.theta)
+    # Of floor and wall, (2, n, 3) in world axes: normals, contact points, forces, slips in the tangent plane.
+    normals = np.stack([axes[:, 1], axes[:, 0]])
+    contacts = centres - p.r * normals
+    forces, slips = (
+        np.einsum("nab,cna->cnb", axes, v) for v in ([now.force_A, now.force_B], slip_velocities(now.x, p))
+    )
+    slips -= np.sum(slips * normals, axis=-1, keepdims=True) * normals
+    fastest = max(float(np.abs(v).max()) for v in slip_velocities(run.x, p))
 
-    def __init__(self, run: Trajectory, width: int, force_arrow: float = ARROW, slip_arrow: float = ARROW) -> None:
-        self._run, self._p = run, run.header.parameters
-        self._force_arrow, self._slip_arrow = force_arrow, slip_arrow
-        self._size = (width, width * 10 // 16)
-        self._inset = self._size[1] * 5 // 12
-        spec = _spec(run)
-        spec.visual.global_.offwidth, spec.visual.global_.offheight = (2 * n for n in self._size)
-        spec.visual.quality.offsamples, spec.visual.quality.shadowsize = 0, 2048
-        self._model = spec.compile()
-        self._data = mujoco.MjData(self._model)
-        mujoco.mj_forward(self._model, self._data)
-        self._ball = self._model.geom("ball").id
-        self._context = opengl.context(*(2 * n for n in self._size))
-        self._drawing = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawing)
-        self._scene = mujoco.MjvScene(self._model, maxgeom=100 + math.ceil(_LONGEST_TRAIL / STEP))
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
-        v_A, v_B = slip_velocities(run.x, self._p)
-        self._fastest = max(float(np.abs(v).max()) for v in (v_A, v_B))
-        self._turns = Turning.of(run)
-
-    def close(self) -> None:
-        """Give the context back."""
-        self._drawing.free()
-        self._context.free()
-
-    def show(self, time: float, note: str) -> Image.Image:
-        """The run at a time in s, with a note beside the time."""
-        now, p = Moment(self._run, np.asarray(time)), self._p
-        self._data.geom_xpos[self._ball] = now.centre
-        self._data.geom_xmat[self._ball] = self._turns.at(time).as_matrix().ravel()
-        outside = _camera(np.array([0.0, 0.0, 0.35 * p.r]), 2.9 * (p.R + p.r), 90.0, -38.0)
-        # From behind the ball and a little inwards, so that floor and wall are both seen edge-on.
-        beside = _camera(now.centre, 6.4 * p.r, math.degrees(now.theta) + 78.0, -14.0)
-        image = self._draw(outside, self._size, now, trail=True)
-        small = self._draw(beside, (self._inset, self._inset), now, trail=False)
-        return overlay.compose(image, small, now, p, self._fastest > 0, note)
-
-    def _draw(self, camera: Any, size: tuple[int, int], now: Moment, trail: bool) -> Image.Image:
-        option = mujoco.MjvOption()
-        everything = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(self._model, self._data, option, None, camera, everything, self._scene)
-        if trail:
-            self._add_trail(now)
-        self._add_spots(now.centre)
-        self._add_arrows(now)
-        # Twice the size, scaled down: smooth edges without support of the driver.
-        area = mujoco.MjrRect(0, 0, 2 * size[0], 2 * size[1])
-        pixels = np.empty((area.height, area.width, 3), np.uint8)
-        mujoco.mjr_render(area, self._scene, self._drawing)
-        mujoco.mjr_readPixels(pixels, None, area, self._drawing)
-        return Image.fromarray(np.flipud(pixels)).resize(size, Image.Resampling.LANCZOS)
-
-    def _add_trail(self, now: Moment) -> None:
-        """Where the ball touched the floor's height before, in the colours of the cases, fading."""
-        p, end = self._p, float(now.time)
-        before = Moment(self._run, np.arange(max(float(self._run.time[0]), end - _LONGEST_TRAIL), end, STEP))
-        age = np.abs(before.theta - now.theta) / (2 * math.pi * _TRAIL)
-        points = before.centre - [0.0, 0.0, 0.92 * p.r]
-        for k, case in enumerate(before.cases[:-1]):
-            if max(age[k], age[k + 1]) < 1:
-                rgba = (*to_rgb(style.COLOURS[case]), 0.9 * (1 - age[k]))
-                self._connect(mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[k], points[k + 1], rgba)
-
-    def _add_spots(self, centre: Array) -> None:
-        """Spots on the ball that let the eye see it turn."""
-        turned = self._data.geom_xmat[self._ball].reshape(3, 3)
-        for spot in _SPOTS @ turned.T:
-            geom = self._next(mujoco.mjtGeom.mjGEOM_SPHERE, (*to_rgb("#8a6d1f"), 1.0))
-            geom.size[:] = 0.11 * self._p.r
-            geom.pos[:] = centre + 0.95 * self._p.r * spot
-
-    def _add_arrows(self, now: Moment) -> None:
-        p, centre, axes = self._p, now.centre, frame(now.theta)
-        contacts = (centre - p.r * axes[1], centre - p.r * axes[0])
-        slips = slip_velocities(now.x, p)
-        # Slip lies in the tangent plane; it's lifted off the surface so as to be seen.
-        planes = (np.array([1.0, 0.0, 1.0]), np.array([0.0, 1.0, 1.0]))
-        lift = (0.1 * p.r * axes[1], 0.1 * p.r * axes[0])
-        for k, force in enumerate(now.forces):
-            arrow = force @ axes * (self._force_arrow * p.r / (p.m * p.g))
-            self._arrow(0.16 * p.r, contacts[k], contacts[k] + arrow, FORCE)
-            if self._fastest > 0 and np.any(force):
-                slip = (planes[k] * slips[k]) @ axes * (self._slip_arrow * p.r / self._fastest)
-                self._arrow(0.13 * p.r, contacts[k] + lift[k], contacts[k] + lift[k] + slip, SLIP)
-
-    def _arrow(self, width: float, begin: Array, end: Array, colour: str) -> None:
-        if np.linalg.norm(end - begin) > 2 * width:
-            self._connect(mujoco.mjtGeom.mjGEOM_ARROW, width, begin, end, (*to_rgb(colour), 1.0))
-
-    def _connect(self, kind: Any, width: float, begin: Array, end: Array, rgba: tuple[float, ...]) -> None:
-        mujoco.mjv_connector(self._next(kind, rgba), kind, width, begin, end)
-
-    def _next(self, kind: Any, rgba: tuple[float, ...]) -> Any:
-        """Another thing in the scene."""
-        geom = self._scene.geoms[self._scene.ngeom]
-        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(rgba, np.float32))
-        self._scene.ngeom += 1
-        return geom
+    height = width * 10 // 16
+    inset = height * 5 // 12
+    model = _model(run, 2 * width, 2 * height)
+    data, ball, most = mujoco.MjData(model), model.geom("ball").id, 100 + math.ceil(_LONGEST_TRAIL / STEP)
+    mujoco.mj_forward(model, data)
+    choose_opengl()
+    with (  # twice the size, scaled down: smooth edges without support of the driver
+        mujoco.Renderer(model, 2 * height, 2 * width, most) as outside,
+        mujoco.Renderer(model, 2 * inset, 2 * inset, most) as beside,
+    ):
+        for k, centre in enumerate(centres):
+            data.geom_xpos[ball], data.geom_xmat[ball] = centre, turns[k].as_matrix().ravel()
+            outside.update_scene(data, _camera((0.0, 0.0, 0.35 * p.r), 2.9 * (p.R + p.r), 90.0, -38.0))
+            # From behind the ball and a little inwards, so that floor and wall are both seen edge-on.
+            beside.update_scene(data, _camera(centre, 6.4 * p.r, math.degrees(now.theta[k]) + 78.0, -14.0))
+            _add_trail(outside.scene, past, now.time[k], now.theta[k])
+            images = []
+            for renderer in (outside, beside):
+                for spot in turns[k].apply(_SPOTS):
+                    geom = _add(renderer.scene, mujoco.mjtGeom.mjGEOM_SPHERE, "#8a6d1f")
+                    geom.size[:], geom.pos[:] = 0.11 * p.r, centre + 0.95 * p.r * spot
+                for normal, contact, force, slip in zip(
+                    normals[:, k], contacts[:, k], forces[:, k], slips[:, k], strict=True
+                ):
+                    arrow = force * (force_arrow * p.r / (p.m * p.g))
+                    _add_arrow(renderer.scene, 0.16 * p.r, contact, arrow, FORCE)
+                    if fastest > 0 and np.any(force):
+                        arrow = slip * (slip_arrow * p.r / fastest)
+                        _add_arrow(renderer.scene, 0.13 * p.r, contact + 0.1 * p.r * normal, arrow, SLIP)
+                renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+                size = (renderer.width // 2, renderer.height // 2)
+                images.append(Image.fromarray(renderer.render()).resize(size, Image.Resampling.LANCZOS))
+            yield images[0], images[1]
 
 
-def _camera(lookat: Array, distance: float, azimuth: float, elevation: float) -> Any:
+def _camera(lookat: Any, distance: float, azimuth: float, elevation: float) -> Any:
     camera = mujoco.MjvCamera()
     camera.lookat, camera.distance, camera.azimuth, camera.elevation = lookat, distance, azimuth, elevation
     return camera
 
 
-def _spec(run: Trajectory) -> Any:
-    """The scene as an `mujoco.MjSpec`: what only serves contact is hidden, the vessel is a ring of glass.
+def _add_trail(drawn: Any, past: Trajectory, time: float, theta: float) -> None:
+    """Where the ball touched the floor's height before, in the colours of the cases, fading."""
+    p, some = past.header.parameters, (past.time > time - _LONGEST_TRAIL) & (past.time < time)
+    age = np.abs(past.theta[some] - theta) / (2 * math.pi * _TRAIL)
+    points = to_world(past.x[some], past.theta[some], p).position - [0.0, 0.0, 0.92 * p.r]
+    for k, case in enumerate(past.case[some][:-1]):
+        if max(age[k], age[k + 1]) < 1:
+            geom = _add(drawn, mujoco.mjtGeom.mjGEOM_CAPSULE, style.COLOURS[Case(case)], 0.9 * (1 - age[k]))
+            mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[k], points[k + 1])
+
+
+def _add_arrow(drawn: Any, width: float, begin: Array, arrow: Array, colour: str) -> None:
+    if np.linalg.norm(arrow) > 2 * width:
+        geom = _add(drawn, mujoco.mjtGeom.mjGEOM_ARROW, colour)
+        mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, width, begin, begin + arrow)
+
+
+def _add(drawn: Any, kind: Any, colour: str, alpha: float = 1.0) -> Any:
+    """Another thing in MuJoCo's scene."""
+    geom = drawn.geoms[drawn.ngeom]
+    rgba = np.array([*to_rgb(colour), alpha], np.float32)
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
+    drawn.ngeom += 1
+    return geom
+
+
+def _model(run: Trajectory, width: int, height: int) -> Any:
+    """The scene to be drawn in pixels: what only serves contact is hidden, the vessel is a ring of glass.
 
     It is that of the MJCF which the run holds, or of its parameters if it holds none. Raises `InputError` if the MJCF
     is not valid or has no ball.
@@ -155,33 +149,82 @@ def _spec(run: Trajectory) -> Any:
         made = mujoco.MjSpec.from_string(mjcf)
     except ValueError as error:
         raise InputError(f"the run holds no valid MJCF: {' '.join(str(error).split())}") from error
+    ball, floor = made.geom("ball"), made.geom("floor")
+    if ball is None:
+        raise InputError("the run's MJCF has no geom named 'ball' to show")
     for geom in made.geoms:
         if geom.name not in ("ball", "floor"):
             geom.group = _HIDDEN
-    if made.geom("ball") is None:
-        raise InputError("the run's MJCF has no geom named 'ball' to show")
-    made.geom("ball").material, made.geom("ball").rgba = "", (*to_rgb(BALL), 0.26)  # arrows stand inside
-    floor = made.geom("floor")
+    ball.material, ball.rgba = "", (*to_rgb(BALL), 0.26)  # arrows stand inside
     if floor is not None:
         floor.material, floor.rgba = "", (0.80, 0.82, 0.85, 1.0)
-    _add_ring(made, p)
-    return made
-
-
-def _add_ring(spec: Any, p: Parameters, sides: int = 120) -> None:
-    """The vessel's wall, as high as the ball, as a mesh."""
-    angle = np.linspace(0.0, 2 * math.pi, sides, endpoint=False)
-    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides)], axis=-1)
-    inside, outside = p.R + p.r, p.R + 1.15 * p.r
+    made.visual.global_.offwidth, made.visual.global_.offheight = width, height
+    made.visual.quality.offsamples, made.visual.quality.shadowsize = 0, 2048
+    # The vessel's wall, a little higher than the ball, as a mesh.
+    angle = np.linspace(0.0, 2 * math.pi, _SIDES, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(_SIDES)], axis=-1)
+    inside, outside = (p.R + p.r) * circle, (p.R + 1.15 * p.r) * circle
     up = np.array([0.0, 0.0, 2.2 * p.r])
-    corners = np.concatenate([inside * circle, inside * circle + up, outside * circle + up, outside * circle])
-    this = np.arange(sides)
-    other = (this + 1) % sides
-    faces = []
-    for k in range(4):
-        a, b = k * sides, (k + 1) % 4 * sides
-        faces += [np.stack([a + this, a + other, b + this], -1), np.stack([a + other, b + other, b + this], -1)]
-    mesh = spec.add_mesh(name="ring", uservert=corners.ravel(), userface=np.concatenate(faces).ravel())
+    corners = np.concatenate([inside, inside + up, outside + up, outside])
+    here = np.arange(4 * _SIDES).reshape(4, _SIDES)
+    beside, above = np.roll(here, -1, axis=1), np.roll(here, -1, axis=0)
+    faces = [here, beside, above], [beside, np.roll(above, -1, axis=1), above]
+    triangles = np.concatenate([np.stack(corner, axis=-1).reshape(-1, 3) for corner in faces])
+    mesh = made.add_mesh(name="ring", uservert=corners.ravel(), userface=triangles.ravel())
     mesh.smoothnormal = False
     glass = {"rgba": (0.45, 0.65, 0.80, 0.22), "contype": 0, "conaffinity": 0}
-    spec.worldbody.add_geom(name="ring", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ring", **glass)
+    made.worldbody.add_geom(name="ring", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ring", **glass)
+    return made.compile()
+
+
+def resampled(run: Trajectory, times: Array) -> Trajectory:
+    """The run at times (n,) in s, interpolated linearly; the case is that of the last sample before."""
+    place = np.interp(times, run.time, np.arange(len(run.time)))
+    before = place.astype(int)
+    after, share = np.minimum(before + 1, len(run.time) - 1), place - before
+
+    def at(values: Array) -> Array:
+        change = values[after] - values[before]
+        return np.asarray(values[before] + change * share.reshape(-1, *[1] * (values.ndim - 1)))
+
+    values: dict[str, Any] = {name: at(getattr(run, name)) for name in columns(Trajectory) if name != "case"}
+    return dataclasses.replace(run, **values, case=run.case[before])
+
+
+def orientations(run: Trajectory) -> Rotation:
+    """How the ball is turned at each sample, from its angular velocity in the middle between them; upright at first."""
+    middle = resampled(run, (run.time[1:] + run.time[:-1]) / 2)
+    spin = to_world(middle.x, middle.theta, run.header.parameters).spin
+    turned = [Rotation.identity()]
+    for step in Rotation.from_rotvec(spin * np.diff(run.time)[:, None]):
+        turned.append(step * turned[-1])
+    return Rotation.concatenate(turned)
+
+
+@functools.cache
+def choose_opengl() -> None:
+    """Let `mujoco.Renderer` draw with the kind of OpenGL that MUJOCO_GL names, else with one that works.
+
+    Raises `InputError` if there is none.
+    """
+    chosen = os.environ.get("MUJOCO_GL", "").strip().lower()
+    working = platform.system() != "Linux" or next(filter(works, [chosen] if chosen else OFFSCREEN), None)
+    if not working:
+        remedy = "on Debian and Ubuntu: apt-get install libegl1 libgl1-mesa-dri (or libosmesa6)"
+        if chosen:
+            remedy = f"unset MUJOCO_GL = {chosen!r}, or set it to one of {', '.join(OFFSCREEN)}"
+        raise InputError(f"there is no OpenGL to draw with; {remedy}")
+    if isinstance(working, str) and not chosen:  # MuJoCo chose one that needs a display when it was imported
+        gl_context.GLContext = importlib.import_module(f"mujoco.{working}").GLContext
+
+
+def works(kind: str) -> bool:
+    """Whether a kind of OpenGL works, tried in a process of its own.
+
+    A library that is missing or has no driver may end the process, or leave it unable to load another one.
+    """
+    # OSMesa's context can't be freed while Python shuts down: the process ends at once, without cleaning up.
+    code = "import mujoco, os; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 8, 8); os._exit(0)"
+    environment = os.environ | {"MUJOCO_GL": kind}
+    tried = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, timeout=60, check=False)
+    return tried.returncode == 0

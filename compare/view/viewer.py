@@ -22,13 +22,7 @@ BEHIND = 0.1
 """How far a slow machine may lag behind before the clock is set back, s."""
 
 
-def view(
-    p: Parameters,
-    x0: npt.ArrayLike,
-    flow: Flow | None = None,
-    settings: ContactSettings | None = None,
-    speed: float = 1.0,
-) -> None:
+def view(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSettings, speed: float = 1.0) -> None:
     """Open a window and simulate in real time, times `speed`, until it is closed.
 
     Raises `InputError` if there is no display, or for a speed out of range.
@@ -40,8 +34,6 @@ def view(
         )
     from mujoco import viewer  # here, because it needs a window system
 
-    settings = settings or ContactSettings.for_problem(p)
-    flow = flow or Flow.steady(p.omega_0)
     stepper = start(p, x0, flow, settings)
     try:
         handle = viewer.launch_passive(stepper.model, stepper.data, show_left_ui=False, show_right_ui=False)
@@ -59,8 +51,7 @@ def start(p: Parameters, x0: npt.ArrayLike, flow: Flow, settings: ContactSetting
     limits.check_start(x0, p, settings)
     model, _ = scene.build(p, settings)
     model.geom("wall").rgba = (0.0, 0.0, 0.0, 0.0)
-    omega_0 = flow([0.5 * settings.timestep])
-    return Polar([model], [p], settings, [x0], 0.0, omega_0, batched=False)
+    return Polar([model], [p], settings, [x0], 0.0, flow([0.5 * settings.timestep]), batched=False)
 
 
 def run(
@@ -76,11 +67,10 @@ def run(
 
     The simulation follows the clock; where it can't, it runs as fast as it can.
     """
-    steps, begin = 0, clock()
+    steps, begin, most = 0, clock(), max(1, int(BEHIND * speed / timestep))
     while handle.is_running():
         frame = clock()
         due = int((frame - begin) * speed / timestep) - steps
-        most = max(1, int(BEHIND * speed / timestep))
         if due > most:
             begin += (due - most) * timestep / speed
             due = most

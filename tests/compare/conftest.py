@@ -18,7 +18,7 @@ from compare.runs.engines import MUJOCO
 def few_figures() -> Iterator[None]:
     """Reports with two figures, of which one was not measured: each is drawn in the tests of figures."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "FIGURES", {name: FIGURES[name] for name in ("ladder", "fig-10")})
+        patch.setattr(report, "FIGURES", {name: FIGURES[name] for name in ("ladder", "fig-9")})
         yield
 
 

@@ -16,7 +16,7 @@ import analytic
 import mjsim
 from analytic import orbit_branch, thresholds
 from compare.claims.catalogue import CLAIMS
-from compare.figures import bifurcation_diagrams, deviations, registry, slipping, style, unloading, unsteady
+from compare.figures import bifurcation_diagrams, deviations, drawing, registry, slipping, style, unloading, unsteady
 from compare.figures.drawing import Diagram, GapError, Material, Motion
 from compare.figures.registry import FIGURES, figures_of
 from compare.measure.check import Check
@@ -168,18 +168,14 @@ def test_the_path_of_slip_bends_and_ends_as_the_paper_says(name: str) -> None:
     assert (np.linalg.norm(path[-1]) > slipping.SLIP) == (name == "fig-5")
 
 
-def test_the_bistable_region_is_named() -> None:
+def test_the_bistable_region_is_named_and_points_not_as_predicted_are_crossed(material: Material) -> None:
     for name in ("fig-7", "fig-8"):
-        (axes,) = FIGURES[name].draw(FIGURES[name].select(Material())).axes
+        data = FIGURES[name].select(material)
+        (axes,) = FIGURES[name].draw(data).axes
         assert any("bistable" in text.get_text() for text in axes.texts)
-
-
-def test_points_not_as_predicted_are_crossed(material: Material) -> None:
-    data = FIGURES["fig-7"].select(material)
-    (axes,) = FIGURES["fig-7"].draw(data).axes
-    (cross,) = (line for line in axes.lines if line.get_label() == "not as predicted")
-    assert [float(x) for x in cross.get_ydata()] == [10.0]
-    assert "1 crossed" in FIGURES["fig-7"].caption(data)
+        crosses = [line for line in axes.lines if line.get_label() == "not as predicted"]
+        assert [float(x) for line in crosses for x in line.get_ydata()] == [10.0] * (name == "fig-7")
+        assert ("1 crossed" in FIGURES[name].caption(data)) == (name == "fig-7")
 
 
 def test_measured_states_have_their_engines_marks(material: Material) -> None:
@@ -225,14 +221,14 @@ def test_claims_have_their_own_figures_or_deviations() -> None:
 
 
 def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    chosen = {name: FIGURES[name] for name in ("fig-10", "ladder")}
+    chosen = {name: FIGURES[name] for name in ("fig-9", "ladder")}
     monkeypatch.setattr(registry, "FIGURES", chosen)
     assert dict(registry.write(tmp_path, Material(), ("svg", "png"))) == {
-        "fig-10": "",
+        "fig-9": "",
         "ladder": "not drawn: the ladder of settings was not measured",
     }
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-10.png", "fig-10.svg"]
-    assert "Fig. 10" in (tmp_path / "captions.txt").read_text("utf-8")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-9.png", "fig-9.svg"]
+    assert "Stationary solutions off the floor" in (tmp_path / "captions.txt").read_text("utf-8")
     with pytest.raises(InputError, match="bmp"):
         list(registry.write(tmp_path, Material(), ("bmp",)))
     (tmp_path / "file").touch()
@@ -240,6 +236,24 @@ def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.
         list(registry.write(tmp_path / "file", Material()))
 
 
-def test_every_case_has_its_colour() -> None:
+def test_how_figures_look(material: Material) -> None:
     assert set(style.COLOURS) == set(Case)
     assert len(set(style.COLOURS.values())) == len(Case)
+    labels = {"omega_c": "$ω_c$ (rad/s)", "slip_x": r"$\tilde{ω}_x$ (rad/s)", "wall_spin": "$ω_x^0$ (rad/s)"}
+    labels |= {"force_Ax-By": "$A_x$ − $B_y$ (N)", "gamma": "γ (rad/s²)", "hops": "hops on"}
+    assert {name: style.label(name) for name in labels} == labels
+    _, axes = style.panels(4, 3)
+    states = list(material.select("omega_c", "case"))[:2]
+    style.deviations(axes, states, lambda m: 10.0)
+    assert sorted(float(y) for line in axes.lines for y in line.get_ydata()) == pytest.approx([style.LEAST, 0.1])
+    words = style.caption(Parameters.named("reference"), "What it is.", states=states, names=("mu",))
+    assert words.startswith("What it is. μ = 0.2. Marks: 2 measured values")
+
+
+def test_what_a_figure_file_is_called_decides_its_format(tmp_path: Path) -> None:
+    figure, _ = style.panels(1, 1)
+    with pytest.raises(StorageError, match=r"cannot write .*a\.xyz: Format 'xyz' is not supported"):
+        drawing.save(figure, tmp_path / "a.xyz")
+    for name in ("a.svg", "b.svg"):
+        drawing.save(figure, tmp_path / name)
+    assert (tmp_path / "a.svg").stat().st_size == (tmp_path / "b.svg").stat().st_size

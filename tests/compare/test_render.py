@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import analytic
 import mjsim
 from compare.commands import cli
 from compare.figures import style
-from compare.view import motion, opengl, render
+from compare.view import render, stage
 from model import Case, InputError, Parameters, Trajectory, storage
 from model.kinematics import angular_velocity
 
@@ -29,27 +30,41 @@ def run() -> Trajectory:
 
 @pytest.fixture
 def draws() -> None:
-    opengl.backend.cache_clear()
+    stage.choose_opengl.cache_clear()
     try:
-        opengl.backend()
+        stage.choose_opengl()
     except InputError as error:
         pytest.skip(str(error))
+
+
+@pytest.fixture
+def picture(tmp_path: Path, draws: None) -> Callable[..., Image.Image]:
+    """A picture of a run at a time in s, small."""
+
+    def drawn(run: Trajectory, at: float | None, **arrows: float) -> Image.Image:
+        render.write(run, tmp_path / "p.png", at, WIDTH, **arrows)
+        return Image.open(tmp_path / "p.png").convert("RGB")
+
+    return drawn
 
 
 def sign(image: Image.Image) -> str:
     """Colour of the sign with the case, beside its letters."""
     unit = image.width / 960
-    return "#{:02x}{:02x}{:02x}".format(*image.convert("RGB").getpixel((round(27 * unit), round(50 * unit))))
+    return "#{:02x}{:02x}{:02x}".format(*image.getpixel((round(27 * unit), round(50 * unit))))
 
 
-@pytest.mark.usefixtures("draws")
-def test_a_picture_shows_the_case_and_the_ball_moves(run: Trajectory) -> None:
-    early, late = render.picture(run, 0.1, WIDTH), render.picture(run, None, WIDTH)
+def test_a_picture_shows_the_case_and_the_ball_moves(run: Trajectory, picture: Callable[..., Image.Image]) -> None:
+    early, late = picture(run, 0.1), picture(run, None)
     assert early.size == (WIDTH, WIDTH * 10 // 16)
     cases = [Case(run.case[np.searchsorted(run.time, 0.1)]), Case(run.case[-1])]
     assert [sign(early), sign(late)] == [style.COLOURS[case].lower() for case in cases]
     assert np.mean(np.asarray(early) != np.asarray(late)) > 0.01
-    assert render.picture(run, None, WIDTH, force_arrow=0.0, slip_arrow=0.0) != late
+    assert picture(run, None, force_arrow=0.0, slip_arrow=0.0) != late
+    # A run of another engine is shown in the scene of its parameters.
+    event = analytic.simulate(run.header.parameters, run.x[0], 0.3)
+    assert event.header.mjcf == ""
+    assert picture(event, 0.3).size == early.size
 
 
 @pytest.mark.usefixtures("draws")
@@ -65,25 +80,21 @@ def test_command_writes_pictures_and_films(run: Trajectory, tmp_path: Path, caps
     assert "320 × 200" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("draws")
-def test_runs_of_other_engines_are_shown_in_the_scene_of_their_parameters(run: Trajectory) -> None:
-    p = run.header.parameters
-    event = analytic.simulate(p, run.x[0], 0.3)
-    assert event.header.mjcf == ""
-    assert render.picture(event, 0.3, WIDTH).size == (WIDTH, WIDTH * 10 // 16)
-
-
 def test_the_ball_turns_with_its_angular_velocity(reference: Parameters) -> None:
     """Rolling steadily, about an axis that itself goes round: the mean turn about z is that of o_y."""
-    p = reference.replace(omega_0=5.0)
-    x = np.array([0, 0, 5.0, 0, 0, 0])
+    p, x = reference.replace(omega_0=5.0), np.array([0, 0, 5.0, 0, 0, 0])
     run = mjsim.simulate(p, x, 0.05, sample_interval=0.005)
-    turning = motion.Turning.of(run)
-    times, rotations = turning.times, turning.rotations
-    assert times[-1] == pytest.approx(0.05)
-    step = (rotations[1] * rotations[0].inv()).magnitude() / (times[1] - times[0])
+    rotations = stage.orientations(run)
+    step = (rotations[1] * rotations[0].inv()).magnitude() / (run.time[1] - run.time[0])
     # The rotation vector over a step is that of its middle, exact to the second order.
     assert step == pytest.approx(float(np.linalg.norm(angular_velocity(x, p))), rel=(5.0 * 5e-3) ** 2)
+
+
+def test_a_run_is_shown_between_its_samples(run: Trajectory) -> None:
+    between = stage.resampled(run, np.array([0.104, 0.8]))
+    assert between.omega_c == pytest.approx([0.6 * run.omega_c[10] + 0.4 * run.omega_c[11], run.omega_c[-1]])
+    assert between.force_A[1] == pytest.approx(run.force_A[-1])
+    assert between.case.tolist() == [run.case[10], run.case[-1]]
 
 
 @pytest.mark.parametrize(
@@ -104,19 +115,19 @@ def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name: str, options: di
     assert not list(tmp_path.iterdir())
 
 
-def test_a_scene_without_a_ball(run: Trajectory) -> None:
+def test_a_scene_without_a_ball(run: Trajectory, tmp_path: Path) -> None:
     for mjcf, message in (("<mujoco/>", "no geom named 'ball'"), ("<mujoco", "no valid MJCF")):
         other = dataclasses.replace(run, header=dataclasses.replace(run.header, mjcf=mjcf))
         with pytest.raises(InputError, match=message):
-            render.picture(other, 0.0, WIDTH)
+            render.write(other, tmp_path / "p.png", 0.0, WIDTH)
 
 
 def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(opengl, "works", lambda name: False)
+    monkeypatch.setattr(stage, "works", lambda name: False)
     monkeypatch.setattr("platform.system", lambda: "Linux")
     for chosen, message in (("", "apt-get install libegl1"), ("glfw", "unset MUJOCO_GL = 'glfw'")):
         monkeypatch.setenv("MUJOCO_GL", chosen)
-        opengl.backend.cache_clear()
+        stage.choose_opengl.cache_clear()
         with pytest.raises(InputError, match=message):
-            opengl.backend()
-    opengl.backend.cache_clear()
+            stage.choose_opengl()
+    stage.choose_opengl.cache_clear()

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
+import html
 import itertools
 import json
 import math
 import pickle
 import re
+import shlex
 import shutil
 import subprocess
 import time
 import urllib.request
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,34 +25,24 @@ import pytest
 from matplotlib.figure import Figure
 
 from compare.claims.claim import Bearing, Claim, Outcome, Text, Verdict
+from compare.commands import tables
 from compare.figures.drawing import Drawing, GapError, Material
 from compare.figures.registry import FIGURES
 from compare.measure import record
-from compare.measure.check import Check, Relation
+from compare.measure.check import Check
 from compare.measure.levels import Level
 from compare.measure.record import Measurement, Records
 from compare.pages import readable
-from compare.report import pictures, report, results, wording
+from compare.report import numbers, pictures, report, results, wording
 from compare.report.results import Summary
 from compare.runs.workers import spread
 from model import Case, Parameters, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-dev-shm-usage",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--hide-scrollbars",
-    "--remote-debugging-port=0",
-    "--remote-allow-origins=*",
-)
+FLAGS = shlex.split("""--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-dev-shm-usage
+--disable-background-networking --disable-component-update --disable-sync --hide-scrollbars --remote-debugging-port=0
+--remote-allow-origins=*""")
 PATIENCE = 120.0
 """How long to wait for the browser, s: long, since machines differ."""
 P = Parameters.named("reference")
@@ -60,29 +54,16 @@ def claim(name: str, section: str = "Stationary states", **changes: Any) -> Clai
     return Claim(id=name, section=section, **(given | changes))
 
 
-def checks(
-    count: int, deviation: float = 0.0, tolerance: float = 3e-9, run: str = "runs/there.h5"
-) -> tuple[Check, ...]:
+def checks(count: int, deviation: float = 0.0, tolerance: float = 3e-9) -> tuple[Check, ...]:
     """Made-up numbers, each with the same tolerance, the k-th off by k parts of `deviation`."""
     conditions = {"case": "RR", "start": "a start with a name that is rather long", "y": 0.02, "v_y": 0.0}
+    given = {"protocol": "settled", "quantity": "omega_c", "engine": "mujoco", "set": "reference", "value": 12.0}
+    given |= {"uncertainty": 1e-9, "conditions": conditions, "runs": ("runs/there.h5",)}
+    made = [Measurement(parameters=P.replace(omega_0=12.0 + k), **given) for k in range(count)]
+    predicted = [12.0 - deviation * (k + 1) / count for k in range(count)]
     return tuple(
-        Check(
-            measurement=Measurement(
-                protocol="settled",
-                quantity="omega_c",
-                value=12.0,
-                uncertainty=1e-9,
-                engine="mujoco",
-                set="reference",
-                parameters=P.replace(omega_0=12.0 + k),
-                conditions=conditions,
-                runs=(run,),
-            ),
-            predicted=12.0 - deviation * (k + 1) / count,
-            tolerance=tolerance,
-            scale=12.0,
-        )
-        for k in range(count)
+        Check(measurement=m, predicted=each, tolerance=tolerance, scale=12.0)
+        for m, each in zip(made, predicted, strict=True)
     )
 
 
@@ -124,45 +105,34 @@ def row(text: str, name: str) -> str:
 
 def test_what_the_page_says(page: Path) -> None:
     text = page.read_text("utf-8")
-    assert page.stat().st_size < 5e6
+    good, bad, coarse = (row(text, name) for name in ("good", "bad", "coarse"))
+    assert page.stat().st_size < 4e6
     assert "3 of 5 claims did not come out as expected: bad, coarse, broken" in text
+    assert '<a href="#doubted">doubted</a> (refuted, as expected)' in text
     assert "ValueError: diverged &amp; &lt;so&gt; on" in row(text, "broken")
     assert "rough-wall: no flow &lt;at which&gt; it slips" in row(text, "broken")
     assert "What good states of slip &amp; &lt;roll&gt;." in text
-    assert "dualball validate --claim good --quick -o" in row(text, "good")
-    assert "analytic.solution" in row(text, "good")
-    assert row(text, "good").count("<td>settled</td>") == report.ROWS
-    assert "? inconclusive" in row(text, "coarse")
-    assert "Prop. bad, corrected. A sign." in row(text, "bad")
+    assert "dualball validate --claim good --quick -o" in good
+    assert "analytic.solution" in good
+    assert "? inconclusive" in coarse
+    assert "Prop. bad, corrected. A sign." in bad
     # Nothing is fetched from anywhere.
     assert not re.search(r'(?:src|href)="(?!#|data:|runs/|https://doi\.org)', text)
     assert "@import" not in text
-
-
-def test_resolving_power_is_given_by_quantity(page: Path) -> None:
-    text = page.read_text("utf-8")
-    assert "a relative error of 3e-10 in ω_c" in row(text, "good")  # 3e-9 over 12
-    assert "a relative error of 0.08 in ω_c" in row(text, "coarse")  # 1 over 12
-
-
-def test_a_refutation_that_was_expected_is_not_a_failure(page: Path) -> None:
-    text = page.read_text("utf-8")
+    # Resolving power is given by quantity: 3e-9 and 1, divided by 12.
+    assert "a relative error of 3e-10 in ω_c" in good
+    assert "a relative error of 0.08 in ω_c" in coarse
+    # A refutation that was expected is not a failure.
     assert "Expected:" not in row(text, "doubted")
-    assert "Expected: confirmed." in row(text, "bad")
+    assert "Expected: confirmed." in bad
     assert 'class="verdict other"' in row(text, "doubted")
-
-
-def test_long_tables_show_the_worst_rows(page: Path) -> None:
-    text = page.read_text("utf-8")
-    assert row(text, "good").count('<tr class="pass">') == report.ROWS
-    assert f"{report.ROWS + 40} numbers; here the {report.ROWS} nearest to failing" in row(text, "good")
-    worst = re.findall(r"<td>([-+][\d.e-]+)</td>", row(text, "bad"))
-    assert [float(value) for value in worst] == sorted(map(float, worst), reverse=True)
-
-
-def test_no_empty_sections(page: Path) -> None:
-    """What was not run is named once, outside the sections."""
-    text = page.read_text("utf-8")
+    # Long tables show the worst rows.
+    assert good.count("<td>settled</td>") == good.count('<tr class="pass">') == report.ROWS
+    assert f"The {report.ROWS} numbers nearest to failing" in good
+    assert f'<a href="#numbers" data-claim="good">all {report.ROWS + 40}</a>' in good
+    worst = [float(value) for value in re.findall(r"<td>([-+][\d.e-]+)</td>", bad)]
+    assert worst == sorted(worst, reverse=True)
+    # What was not run is named once, outside the sections, and no section is empty.
     assert "<h3>Laws and cases</h3>" not in text
     assert text.count("<h3>Stability</h3>") == 1
     assert re.search(r"Not part of this run: <code[^>]*>deeper</code>", text)
@@ -170,6 +140,61 @@ def test_no_empty_sections(page: Path) -> None:
     assert (
         "Not drawn: From a newcomer&#39;s settings to the study&#39;s: the ladder of settings was not measured" in text
     )
+
+
+def test_every_number_is_on_the_page() -> None:
+    (check,), far = checks(1), checks(1, 0.5)[0]
+    m = check.measurement
+    alone = dataclasses.replace(m, quantity="case", value=1.0, uncertainty=0.0, conditions={"start": "rest"})
+    again = dataclasses.replace(m)  # a copy, as another process returns it
+    columns = numbers.columns(Records((again, alone)), {"good": (check,), "bad": (far,)})
+    assert columns["claim"] == ["good", "bad", ""]
+    assert columns["omega_0"] == [12.0] * 3
+    assert columns["measured"] == [12.0, 12.0, "RS"]
+    assert columns["predicted"] == [12.0, 11.5, ""]
+    assert columns["deviation"] == [0.0, 0.5, ""]
+    assert columns["mark"] == ["pass", "fail", ""]
+    assert columns["quantity"] == ["ω_c rad/s"] * 2 + ["case"]
+    assert json.loads(zlib.decompress(base64.b64decode(numbers.packed(columns)))) == columns
+    coarse = numbers.columns(Records((dataclasses.replace(m, value=1.23456789, uncertainty=2.3e-4),)), {})
+    assert (coarse["measured"], coarse["uncertainty"]) == ([1.23457], [2.3e-4])  # rounded to what is known
+
+
+def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page: Path) -> None:
+    text = html.unescape(page.read_text("utf-8"))
+    for verdict in RAN:
+        line = tables.line(verdict).plain
+        for heading, found in wording.findings(verdict).items():
+            assert f"{heading.lower()} {found}" in line
+            assert f"<dt>{heading}</dt>" in row(text, verdict.claim.id)
+            assert found in row(text, verdict.claim.id)
+    summary = tables.summary(VERDICTS).plain
+    assert wording.headline(RAN) in summary
+    for count, what in wording.totals(RAN):
+        assert f"{count} {what}" in summary
+        assert f"<b>{count}</b>{what}" in text
+    equal = dataclasses.replace(checks(1)[0].measurement, quantity="case")
+    same = Check(measurement=equal, predicted=12.0, tolerance=0.0, scale=1.0)
+    for predicted, said in ((12.0, "none: all equal"), (1.0, "not equal: case, reference")):
+        verdict = dataclasses.replace(RAN[0], checks=(dataclasses.replace(same, predicted=predicted),))
+        assert wording.findings(verdict) == {"Largest deviation": said}
+
+
+def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: object) -> Figure:
+        raise GapError("the run <is> lost")
+
+    figures = {
+        "fall": Drawing("A fall", lambda _: None, lambda _: Figure(figsize=(1, 1)), lambda _: "", ("good", "bad")),
+        "gap": Drawing("A gap", lambda _: None, refuse, lambda _: "", ("good",)),
+    }
+    monkeypatch.setattr(report, "FIGURES", {})
+    monkeypatch.setattr(report, "figures_of", lambda claim: {n: f for n, f in figures.items() if claim in f.claims})
+    page = report.write(Material(directory=tmp_path), VERDICTS[:2], Summary.of(tmp_path, [], Level.QUICK, []))
+    text = page.read_text("utf-8")
+    assert text.count("data:image/svg+xml") == 1
+    assert '<a href="#figure-fall">A fall</a>: see good.' in row(text, "bad")
+    assert "A gap is not drawn: the run &lt;is&gt; lost" in row(text, "good")
 
 
 def test_an_empty_page_is_a_page_too(tmp_path: Path) -> None:
@@ -180,22 +205,18 @@ def test_an_empty_page_is_a_page_too(tmp_path: Path) -> None:
 
 
 def test_wording() -> None:
-    assert (
-        wording.conditions({"case": "SS", "side": "from above", "y": 0.02, "v_y": 0.0})
-        == "case SS, from above, y = 0.02 m"
-    )
-    assert [readable(name) for name in ("rad s-1", "m s-2", "s-1", "1")] == ["rad/s", "m/s²", "1/s", ""]
-    (check,) = checks(1)
-    assert wording.value(check.measurement, math.nan) == "none"
-    cases = Measurement(
-        protocol="plane", quantity="cases", value=129.0, uncertainty=0.0, engine="mujoco", set="s", parameters=P
-    )
-    assert wording.value(cases, float(1 << Case.RR | 1 << Case.NS)) == "RR NS"
+    conditions = {"case": "SS", "side": "from above", "y": 0.02, "v_y": 0.0}
+    assert wording.conditions(conditions) == "case SS, from above, y = 0.02 m"
+    units = {"rad s-1": "rad/s", "m s-2": "m/s²", "s-1": "1/s", "1": "", "m2 s-1": "m²/s", "rad-1": "1/rad"}
+    assert [readable(name) for name in units] == list(units.values())
+    m = checks(1)[0].measurement
+    assert wording.value(m, math.nan) == "none"
+    assert wording.value(dataclasses.replace(m, quantity="cases"), float(1 << Case.RR | 1 << Case.NS)) == "RR NS"
 
 
 def test_ranking_puts_failures_first() -> None:
     near, far = checks(1, 2e-9)[0], checks(1, 1.0)[0]
-    unknown = Check(measurement=near.measurement, predicted=math.nan, tolerance=1.0, scale=1.0, relation=Relation.EQUAL)
+    unknown = dataclasses.replace(near, predicted=math.nan, tolerance=1.0, scale=1.0)
     coarse = checks(1, 0.0, 1.0)[0]
     ranked = wording.ranked([checks(1)[0], near, coarse, far, unknown])
     assert ranked[0] is unknown
@@ -251,27 +272,21 @@ def test_a_missing_summary_names_the_command(tmp_path: Path) -> None:
         results.open_directory(tmp_path / "file")
 
 
-def test_a_picture_is_drawn_once(tmp_path: Path) -> None:
+def test_a_picture_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawing = Drawing("t", lambda _: None, lambda _: Figure(figsize=(1, 1)), lambda data: f"<&> {data}")
     path = tmp_path / "made.svg"
     assert pictures.kept(path, drawing, ("a", 1.0)) is None
-    first, caption = pictures.drawn(path, drawing, ("a", 1.0))
+    first = pictures.drawn(path, drawing, ("a", 1.0))
     ElementTree.parse(path)
-    assert first.startswith("data:image/svg+xml,<?xml versi")
-    assert caption == "<&> ('a', 1.0)"
-    assert "desc" not in first
-    assert pictures.kept(path, drawing, ("a", 1.0)) == (first, caption)
+    assert first["picture"].startswith("data:image/svg+xml,<?xml versi")
+    assert first["caption"] == "<&> ('a', 1.0)"
+    assert "desc" not in first["picture"]
+    assert pictures.kept(path, drawing, ("a", 1.0)) == first
     assert pictures.kept(path, drawing, ("a", 2.0)) is None
+    monkeypatch.setattr(pictures, "sources", lambda *packages: " ".join(packages))  # the program changes
+    assert pictures.kept(path, drawing, ("a", 1.0)) is None
     path.write_text("something else")
     assert pictures.kept(path, drawing, ("a", 1.0)) is None
-
-
-def test_a_picture_is_drawn_again_when_the_program_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawing = Drawing("t", lambda _: None, lambda _: Figure(), str)
-    pictures.drawn(tmp_path / "made.svg", drawing, 1)
-    assert pictures.kept(tmp_path / "made.svg", drawing, 1)
-    monkeypatch.setattr(pictures, "sources", lambda *packages: " ".join(packages))
-    assert not pictures.kept(tmp_path / "made.svg", drawing, 1)
 
 
 def test_processes_draw_every_figure(tmp_path: Path) -> None:
@@ -288,18 +303,6 @@ def test_processes_draw_every_figure(tmp_path: Path) -> None:
     assert there.replace("/there", "/here") == here  # but for the names within pictures, which matplotlib draws by lot
     assert here.count("data:image/svg+xml") > 1
     assert report.render(material, VERDICTS, summary, lambda one, new: iter(())) == pages[1]  # has room for no new one
-
-
-def test_a_figure_that_can_not_be_drawn_is_a_gap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(_: object) -> Figure:
-        raise GapError("the run <is> lost")
-
-    drawing = Drawing("A fall", lambda _: None, refuse, lambda _: "", ("good",))
-    monkeypatch.setattr(report, "FIGURES", {})
-    monkeypatch.setattr(report, "figures_of", lambda name: {"fall": drawing})
-    page = report.write(Material(directory=tmp_path), VERDICTS[:1], Summary.of(tmp_path, [], Level.QUICK, []))
-    text = page.read_text("utf-8")
-    assert "A fall is not drawn: the run &lt;is&gt; lost" in text
 
 
 def test_errata_are_the_documented_ones() -> None:
@@ -387,13 +390,10 @@ ROWS = "[...document.querySelectorAll('details.claim')]"
 SHOWN = f"{ROWS}.filter(row => !row.hidden).map(row => row.id)"
 
 
-def test_the_page_loads_without_complaint(tab: Tab) -> None:
+def test_the_page_loads_and_claims_are_filtered_and_sorted(tab: Tab) -> None:
     assert tab.complaints == []
     assert tab.value(f"{ROWS}.length") == len(RAN)
     assert tab.value("document.title") == "dualball: 2 of 5 claims as expected"
-
-
-def test_filter(tab: Tab) -> None:
     tab.value("find.value = 'slip PROP. bro'; find.dispatchEvent(new Event('input'))")
     assert tab.value(SHOWN) == ["broken"]
     assert tab.value("document.getElementById('shown').textContent") == "1 of 5 shown"
@@ -403,15 +403,33 @@ def test_filter(tab: Tab) -> None:
     assert tab.value(f"{sections}.map(part => part.firstElementChild.textContent)") == ["Stability"]
     tab.value("outcome.value = ''; outcome.dispatchEvent(new Event('change'))")
     assert len(tab.value(SHOWN)) == len(RAN)
-
-
-def test_sort(tab: Tab) -> None:
-    """Within each section."""
     for _ in range(2):
         tab.value("document.querySelector('[data-sort=id]').click()")
-    assert tab.value(SHOWN) == ["good", "doubted", "bad", "coarse", "broken"]
+    assert tab.value(SHOWN) == ["good", "doubted", "bad", "coarse", "broken"]  # within each section
     tab.value("document.querySelector('[data-sort=id]').click()")
     assert tab.value(SHOWN) == ["bad", "doubted", "good", "broken", "coarse"]
+
+
+def test_numbers_are_found_by_flow_claim_and_words(tab: Tab) -> None:
+    rows = (
+        "[...document.querySelectorAll('#numbers-found tr')].map(row => [...row.cells].map(cell => cell.textContent))"
+    )
+    every = sum(len(verdict.checks) for verdict in RAN)
+    assert tab.value("document.getElementById('found').textContent") == f"{every} of {every}"
+    for change, expected in (
+        ("flow.value = '13.02'", {"13": 4}),
+        ("flow.value = '13.4'; words.value = 'good'", {"13": 1}),  # nothing within 1 %: the nearest
+        ("flow.value = ''; words.value = 'good RR'; document.getElementById('set').value = 'reference'", {"": 52}),
+        ("words.value = 'good SS'", {}),
+    ):
+        tab.value(f"{change}; words.dispatchEvent(new Event('input'))")
+        found = tab.value(rows)
+        assert len(found) == sum(expected.values())
+        assert all(cells[1] in expected or "" in expected for cells in found)
+    tab.value("document.querySelector('[data-claim=good]').click()")
+    found = tab.value(rows)
+    assert len(found) == report.ROWS + 40
+    assert found[0] == ["reference", "12", "ω_c rad/s", found[0][3], "mujoco", "12", "1e-9", " 12", "0", "3e-9", "good"]
 
 
 def test_rows_open_by_keyboard(tab: Tab) -> None:
