@@ -18,7 +18,6 @@ import numpy as np
 
 from analytic import charts_off_wall, drag, dynamics
 from analytic.motion import Chart, Fluid, Moment, Path, natural_units
-from analytic.rigid_body import Forces
 from model import Case, Parameters, State
 from model.arrays import Array
 
@@ -32,19 +31,17 @@ def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -
     return _CHARTS[case](case, at, p, omega_0, floor)
 
 
-def _power(x: State, f: Forces, p: Parameters, omega_0: float) -> float:
-    """Power of drag and contacts on the wall, W: the contact points move with (6)."""
+def _rates(case: Case, x: State, p: Parameters, omega_0: float, *slips: dynamics.Direction) -> tuple[State, float]:
+    """Rates of a state with the slip directions given, A before B, and the power of drag and contacts, W.
+
+    The contact points move with (6).
+    """
+    f = dynamics.FORCES[case](x, p, omega_0, *slips)
     c = drag.of_velocity(0.0, x.v_y, p.R * (x.omega_c - omega_0), p)
     fluid = -p.m * c * (p.R**2 * x.omega_c * (x.omega_c - omega_0) + x.v_y**2)
     at_A = f.A_x * (x.v_y + p.r * x.slip_z) + f.A_y * x.v_y - f.A_z * p.r * x.slip_x
     at_B = -f.B_y * p.r * x.slip_z + f.B_z * p.r * x.slip_y
-    return float(fluid + at_A + at_B)
-
-
-def _rates(case: Case, x: State, p: Parameters, omega_0: float, *slips: dynamics.Direction) -> tuple[State, float]:
-    """Rates of a state with the slip directions given, A before B, and the power of drag and contacts, W."""
-    f = dynamics.FORCES[case](x, p, omega_0, *slips)
-    return dynamics.newton_euler(case, x, f, p, omega_0), _power(x, f, p, omega_0)
+    return dynamics.newton_euler(case, x, f, p, omega_0), float(fluid + at_A + at_B)
 
 
 def _one_slip(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
@@ -108,58 +105,46 @@ def _ss(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
     return Chart(case, start, [1.0, 1 / T, w, 1.0, w, 1.0, E], rates, ends, guards, path, slips=(2, 4))
 
 
-def _nr(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """NR: (theta, y, v_y, omega_c, slip_x, work)."""
-    (T, v, w, E), G = natural_units(p), p.m * p.g
+def _off_floor(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
+    """NR: (theta, y, v_y, omega_c, slip_x, work); NS: (theta, y, v_y, omega_c, slip_x, q_B, beta, work)."""
+    (T, v, w, E), G, slips = natural_units(p), p.m * p.g, case is Case.NS
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
-        dx, power = _rates(case, State(*z[1:5]), p, omega_0(t))
-        return [z[3], *dx[:4], power]
-
-    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        x = State(*z[1:5])
-        f = dynamics.FORCES[case](x, p, omega_0(t))
-        return (p.eta * f.B_x - math.hypot(f.B_y, f.B_z)) / G, x.y / p.R
-
-    def path(t: Array, z: Array) -> Path:
-        none = np.full_like(t, math.nan)
-        return Path(t, z[0], State(*z[1:5]).stacked(), none, none, z[5])
-
-    return Chart(
-        case, [at.theta, *at.x[:4], at.work], [1.0, p.R, v, 1 / T, w, E], rates, ("B slips", "A lands"), guards, path
-    )
-
-
-def _ns(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """NS: (theta, y, v_y, omega_c, slip_x, q_B, beta, work)."""
-    (T, v, w, E), least = natural_units(p), floor * natural_units(p)[2]
-
-    def rates(t: float, z: Sequence[float]) -> list[float]:
+        if not slips:
+            dx, power = _rates(case, State(*z[1:5]), p, omega_0(t))
+            return [z[3], *dx[:4], power]
         _, y, v_y, omega_c, slip_x, q, beta, _ = z
         s, c = math.sin(beta), math.cos(beta)
         dx, power = _rates(case, State(y, v_y, omega_c, slip_x, q * s, q * c), p, omega_0(t), (s, c))
-        dq, turn = dx.slip_y * s + dx.slip_z * c, (dx.slip_y * c - dx.slip_z * s) / max(q, least)
+        dq, turn = dx.slip_y * s + dx.slip_z * c, (dx.slip_y * c - dx.slip_z * s) / max(q, floor * w)
         return [omega_c, *dx[:4], dq, turn, power]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        return z[5] / w, z[1] / p.R
+        if slips:
+            return z[5] / w, z[1] / p.R
+        f = dynamics.FORCES[case](State(*z[1:5]), p, omega_0(t))
+        return (p.eta * f.B_x - math.hypot(f.B_y, f.B_z)) / G, z[1] / p.R
 
     def path(t: Array, z: Array) -> Path:
+        none = np.full_like(t, math.nan)
+        if not slips:
+            return Path(t, z[0], State(*z[1:5]).stacked(), none, none, z[5])
         theta, y, v_y, omega_c, slip_x, q, beta, work = z
         x = State(y, v_y, omega_c, slip_x, q * np.sin(beta), q * np.cos(beta)).stacked()
-        return Path(t, theta, x, np.full_like(t, math.nan), beta, work)
+        return Path(t, theta, x, none, beta, work)
 
-    start = [at.theta, *at.x[:4], math.hypot(at.x.slip_y, at.x.slip_z), at.beta, at.work]
-    scale = [1.0, p.R, v, 1 / T, w, w, 1.0, E]
-    return Chart(case, start, scale, rates, ("B sticks", "A lands"), guards, path, slips=(5,))
+    slip, unit = ([math.hypot(at.x.slip_y, at.x.slip_z), at.beta], [w, 1.0]) if slips else ([], [])
+    start, scale = [at.theta, *at.x[:4], *slip, at.work], [1.0, p.R, v, 1 / T, w, *unit, E]
+    ends = ("B sticks" if slips else "B slips", "A lands")
+    return Chart(case, start, scale, rates, ends, guards, path, slips=(5,) if slips else ())
 
 
 _CHARTS = {
     Case.RS: _one_slip,
     Case.SR: _one_slip,
     Case.SS: _ss,
-    Case.NR: _nr,
-    Case.NS: _ns,
+    Case.NR: _off_floor,
+    Case.NS: _off_floor,
     Case.RN: charts_off_wall.rolling,
     Case.SN: charts_off_wall.slipping,
     Case.NN: charts_off_wall.flying,

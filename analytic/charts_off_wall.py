@@ -25,22 +25,18 @@ from model.drag import STOKES
 
 def rolling(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """RN: (Z, dZ/dt, work); the spin follows."""
-    start, _, _, upright = _start(at, p)
-    unit, energy = _units(p)
-
-    def lag_and_share(t: float, Z: complex, V: complex) -> tuple[complex, float]:
-        lag = _lag(Z, V, omega_0(t))
-        return lag, _coefficient(lag, p) / (1 + p.j)
+    (start, _, _, upright), (_, v, _, energy) = _start(at, p), natural_units(p)
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         Z, V = _centre(z)
-        lag, share = lag_and_share(t, Z, V)
-        return [V.real, V.imag, -share * lag.real, -share * lag.imag, _power(lag, V, p)]
+        lag, c, power = _drag(Z, V, omega_0(t), p)
+        share = c / (1 + p.j)
+        return [V.real, V.imag, -share * lag.real, -share * lag.imag, power]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
         Z, V = _centre(z)
-        lag, share = lag_and_share(t, Z, V)
-        return p.mu - p.j * share * abs(lag) / p.g, _gap(Z, p)
+        lag, c, _ = _drag(Z, V, omega_0(t), p)
+        return p.mu - p.j * (c / (1 + p.j)) * abs(lag) / p.g, 1 - abs(Z) / p.R
 
     def path(t: Array, z: Array) -> Path:
         _, V = _centre(z)
@@ -48,27 +44,25 @@ def rolling(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float)
         x = State.of(rolled.x)  # slip_x = 0 and v_h + r slip_z = 0 hold exactly
         return rolled._replace(x=x._replace(slip_x=0.0, slip_z=-x.v_h / p.r).stacked())
 
-    return Chart(case, [*start, at.work], [*unit, energy], rates, ("A slips", "B lands"), guards, path)
+    return Chart(case, [*start, at.work], [p.R, p.R, v, v, energy], rates, ("A slips", "B lands"), guards, path)
 
 
 def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
     """SN: (Z, dZ/dt, sliding speed at A, its direction in the resting frame, work)."""
-    start, V, spin, upright = _start(at, p)
-    unit, energy = _units(p)
-    (*_, v), lever = unit, 1 + 1 / p.j
+    (start, V, spin, upright), (_, v, _, energy) = _start(at, p), natural_units(p)
+    lever = 1 + 1 / p.j
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         *_, speed, phase, _ = z
         (Z, V), along = _centre(z), cmath.rect(1.0, phase)
-        lag, friction = _lag(Z, V, omega_0(t)), -p.mu * p.g * along
-        c = _coefficient(lag, p)
+        (lag, c, power), friction = _drag(Z, V, omega_0(t), p), -p.mu * p.g * along
         force, turning = -c * lag + friction, (-c * lag + lever * friction) / along
-        work = _power(lag, V, p) - p.m * p.mu * p.g * speed
+        work = power - p.m * p.mu * p.g * speed
         return [V.real, V.imag, force.real, force.imag, turning.real, turning.imag / max(speed, floor * v), work]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
         *_, speed, _, _ = z
-        return speed / v, _gap(_centre(z)[0], p)
+        return speed / v, 1 - abs(_centre(z)[0]) / p.R
 
     def path(t: Array, z: Array) -> Path:
         *_, speed, phase, _ = z
@@ -81,7 +75,7 @@ def slipping(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float
     # The velocity of the lowest point; at the onset it is zero and only alpha tells its direction.
     speed = abs(V + 1j * p.r * spin)
     phase = cmath.phase(cmath.exp(1j * at.theta) * complex(-math.cos(at.alpha), -math.sin(at.alpha)))
-    first, scale = [*start, speed, phase, at.work], [*unit, v, 1.0, energy]
+    first, scale = [*start, speed, phase, at.work], [p.R, p.R, v, v, v, 1.0, energy]
     return Chart(case, first, scale, rates, ("A sticks", "B lands"), guards, path, slips=(4,))
 
 
@@ -90,18 +84,18 @@ def flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) 
 
     Else c depends on all components of the velocity: (Z, dZ/dt, y, v_y, work).
     """
-    start, _, spin, upright = _start(at, p)
-    (unit, energy), y, v_y, known = _units(p), at.x.y, at.x.v_y, p.drag == STOKES
+    (start, _, spin, upright), (_, v, _, energy) = _start(at, p), natural_units(p)
+    y, v_y, known = at.x.y, at.x.v_y, p.drag == STOKES
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         Z, V = _centre(z)
-        lag, rise = _lag(Z, V, omega_0(t)), flight.speed(t - at.time, v_y, p) if known else z[5]
-        c = _coefficient(lag, p, rise)
+        rise = flight.speed(t - at.time, v_y, p) if known else z[5]
+        lag, c, power = _drag(Z, V, omega_0(t), p, rise)
         fall = [] if known else [rise, -p.g - c * rise]
-        return [V.real, V.imag, -c * lag.real, -c * lag.imag, *fall, _power(lag, V, p, rise)]
+        return [V.real, V.imag, -c * lag.real, -c * lag.imag, *fall, power]
 
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        gap = _gap(_centre(z)[0], p)
+        gap = 1 - abs(_centre(z)[0]) / p.R
         return (gap,) if known else (gap, z[4] / p.R)
 
     def path(t: Array, z: Array) -> Path:
@@ -111,9 +105,9 @@ def flying(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) 
     if known:
         landing, more, scale = at.time + flight.fall_time(y, v_y, p), [at.work], [energy]
     else:
-        landing, more, scale = math.inf, [y, v_y, at.work], [p.R, unit[-1], energy]
+        landing, more, scale = math.inf, [y, v_y, at.work], [p.R, v, energy]
     ends = ("B lands",) if known else ("B lands", "A lands")
-    return Chart(case, [*start, *more], [*unit, *scale], rates, ends, guards, path, landing=landing)
+    return Chart(case, [*start, *more], [p.R, p.R, v, v, *scale], rates, ends, guards, path, landing=landing)
 
 
 def _start(at: Moment, p: Parameters) -> tuple[list[float], complex, complex, float]:
@@ -123,36 +117,17 @@ def _start(at: Moment, p: Parameters) -> tuple[list[float], complex, complex, fl
     return [Z.real, Z.imag, V.real, V.imag], V, turn * complex(-u.o_x, u.o_z), u.o_y
 
 
-def _units(p: Parameters) -> tuple[list[float], float]:
-    """Natural sizes of (Z, dZ/dt), and of the work."""
-    _, v, _, energy = natural_units(p)
-    return [p.R, p.R, v, v], energy
-
-
 def _centre(z: Any) -> tuple[Any, Any]:
     """Z and dZ/dt from the coordinates, of one time or of many."""
     Z_x, Z_y, V_x, V_y, *_ = z
     return Z_x + 1j * Z_y, V_x + 1j * V_y
 
 
-def _lag(Z: complex, V: complex, omega_0: float) -> complex:
-    """Horizontal velocity relative to the fluid, m s-1."""
-    return V - 1j * omega_0 * Z
-
-
-def _coefficient(lag: complex, p: Parameters, v_y: float = 0.0) -> float:
-    """c(|w|), s-1."""
-    return float(drag.of_velocity(lag.real, v_y, lag.imag, p))
-
-
-def _power(lag: complex, V: complex, p: Parameters, v_y: float = 0.0) -> float:
-    """Power of the drag, W."""
-    mc = p.m * _coefficient(lag, p, v_y)
-    return -mc * (lag * V.conjugate()).real - mc * v_y**2
-
-
-def _gap(Z: complex, p: Parameters) -> float:
-    return 1 - abs(Z) / p.R
+def _drag(Z: complex, V: complex, omega_0: float, p: Parameters, v_y: float = 0.0) -> tuple[complex, float, float]:
+    """Horizontal velocity relative to the fluid, m s-1; c(|w|), s-1; and the power of the drag, W."""
+    lag = V - 1j * omega_0 * Z
+    c = float(drag.of_velocity(lag.real, v_y, lag.imag, p))
+    return lag, c, -p.m * c * (lag * V.conjugate()).real - p.m * c * v_y**2
 
 
 def _path(

@@ -67,7 +67,7 @@ def simulate_many(
     InputError
         If numbers of runs differ, or as `simulate` for the first run that can't start.
     """
-    from analytic import marching, time_stepping  # here, because numba takes a while to load
+    from analytic import stepping, time_stepping  # here, because numba takes a while to load
 
     settings = settings or Settings(method="time-stepping")
     sets = [parameters] if isinstance(parameters, Parameters) else list(parameters)
@@ -94,7 +94,7 @@ def simulate_many(
     def carry_out(k: int) -> None:
         fluid = flows[k] or Flow.steady(sets[k].omega_0)
         ball, stretches, omega_0, given = time_stepping.prepared(states[k], 0.0, sets[k], fluid, settings, times)
-        end[k] = marching.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k])
+        end[k] = stepping.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k])
         if end[k] < 0:
             end[k] *= -1
             failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"
