@@ -169,7 +169,7 @@ def project(need: Impulse, friction: Friction) -> Impulse:
 
 
 def _held(need: Impulse, friction: Friction) -> Impulse:
-    """Which share of a need `project` meets along the disk, and the direction there: none if open, 0, or sticking, 1."""
+    """Share of a need that `project` meets along the disk, and the direction there: none if open, 0, or sticking, 1."""
     if need.n <= 0:
         return Impulse(0.0, 0.0, 0.0)
     if friction.s != 0 or friction.t != 0:

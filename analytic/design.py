@@ -54,27 +54,24 @@ def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Se
     By central differences in the logarithm, extrapolated from two widths (Richardson). omega_01 to omega_03 have
     closed forms (docs/design.md), with which tests compare; the differences serve any law of drag, and the fold.
     """
-    by_name = {name: _log_derivatives(lambda x, name=name: make(**{**at, name: x}), at[name]) for name in at}  # type: ignore[misc]
-    return {
-        key: {name: Sensitivity(float(value[k]), float(error[k])) for name, (value, error) in by_name.items()}
-        for k, key in enumerate(THRESHOLDS)
-    }
 
-
-def _log_derivatives(make: Callable[[float], Parameters], x: float) -> tuple[Array, Array]:
-    """Derivatives of the logarithms of all thresholds by that of x, and their errors, shape (4,) each."""
-
-    def logarithms(step: float) -> Array:
+    def logarithms(name: str, step: float) -> Array:
         try:
-            t = bifurcation.thresholds(make(x * math.exp(step)))
+            t = bifurcation.thresholds(make(**{**at, name: at[name] * math.exp(step)}))
         except InputError:  # beyond what the value may be: no derivative there
             return np.full(len(THRESHOLDS), np.nan)
         with np.errstate(divide="ignore"):
             return np.log([getattr(t, key) for key in THRESHOLDS])
 
+    by_name = {}
     with np.errstate(invalid="ignore"):
-        wide, narrow = ((logarithms(h) - logarithms(-h)) / (2 * h) for h in (_STEP, _STEP / 2))
-        return (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
+        for name in at:
+            wide, narrow = ((logarithms(name, h) - logarithms(name, -h)) / (2 * h) for h in (_STEP, _STEP / 2))
+            by_name[name] = (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
+    return {
+        key: {name: Sensitivity(float(value[k]), float(error[k])) for name, (value, error) in by_name.items()}
+        for k, key in enumerate(THRESHOLDS)
+    }
 
 
 def corners(make: Make, at: Mapping[str, float], tolerances: Mapping[str, float]) -> Iterator[Parameters]:

@@ -8,7 +8,7 @@ it part exponentially, else quasi-periodic. A run whose time is over before that
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -153,39 +153,38 @@ def attractors(
 def settle(
     p: Parameters, x0: npt.ArrayLike, lasting: float, run: Run = event_driven, known: Sequence[Fate] = ()
 ) -> Fate:
-    """What the motion from x0 comes to within `lasting` seconds; `known` fates are recognised without a closer look."""
-    solutions, seen = stable_solutions(p), list[Trajectory]()
-    try:
-        for now in windows(p, full_state(x0), lasting, run):
-            if seen and (fate := _decided(seen[-1], now, solutions, known)):
-                return fate
-            seen = [*seen[-1:], now]
-    except SimulationError as error:
-        return Fate(Kind.UNDECIDED, error.trajectory, failure=str(error))
-    return _aperiodic(seen[-1], run) if len(seen) == 2 and _alike(*seen) else Fate(Kind.UNDECIDED, seen[-1])
+    """What the motion from x0 comes to within `lasting` seconds; `known` fates are recognised without a closer look.
 
-
-def _decided(
-    before: Trajectory, now: Trajectory, solutions: Sequence[StationarySolution], known: Sequence[Fate]
-) -> Fate | None:
-    """What two windows of a motion show that it comes to; None if not enough."""
-    if extent(now) < STILL and extent(now) <= extent(before):
-        return Fate(Kind.STATIONARY, now, solution=_nearest(now, solutions))
-    if not _alike(before, now):
-        return None
-    same = (fate for fate in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
-    return next(same, None) or closed(now)
-
-
-def windows(p: Parameters, x: Array, lasting: float, run: Run) -> Iterator[Trajectory]:
-    """The motion from x in windows, each from where the last one ended."""
-    window = WINDOW * natural_units(p)[0]
+    It is followed in windows. Stationary is what hardly moves, and less than before. Where two windows are alike the
+    motion is recurrent: it has one of the known fates, or closes; if it does neither, its largest Lyapunov exponent
+    decides.
+    """
+    solutions, x, unit = stable_solutions(p), full_state(x0), natural_units(p)[0]
+    window, seen, recurrent = WINDOW * unit, list[Trajectory](), False
     for _ in range(math.ceil(lasting / window)):
-        part = run(p, x, window, window / SAMPLES)
-        if part.header.failure:
-            raise SimulationError(part.header.failure, part)
-        yield part
-        x = part.x[-1]
+        try:
+            now = run(p, x, window, window / SAMPLES)
+        except SimulationError as error:
+            return Fate(Kind.UNDECIDED, error.trajectory, failure=str(error))
+        if now.header.failure:
+            return Fate(Kind.UNDECIDED, now, failure=now.header.failure)
+        x, seen = now.x[-1], [*seen[-1:], now]
+        if len(seen) < 2:
+            continue
+        before = seen[0]
+        if extent(now) < STILL and extent(now) <= extent(before):
+            return Fate(Kind.STATIONARY, now, solution=_nearest(now, solutions))
+        if recurrent := _alike(before, now):
+            same = (fate for fate in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
+            if fate := next(same, None) or closed(now):
+                return fate
+    if not recurrent:
+        return Fate(Kind.UNDECIDED, seen[-1])
+    try:
+        exponent, deviation = lyapunov(p, _state(seen[-1]), GROWING * unit, unit, run=run)
+    except (SimulationError, InputError) as reason:
+        return Fate(Kind.UNDECIDED, seen[-1], failure=str(reason))
+    return Fate(Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC, seen[-1], exponent=exponent)
 
 
 def _alike(a: Trajectory, b: Trajectory) -> bool:
@@ -245,16 +244,6 @@ def _state(last: Trajectory) -> Array:
     k = int(np.argmax(last.y))
     held = TRAITS[last.cases[k]].constraints
     return np.where([name in held for name in VARIABLES], 0.0, last.x[k])
-
-
-def _aperiodic(last: Trajectory, run: Run) -> Fate:
-    """A recurrent motion that no stable orbit is found for."""
-    p, unit = last.header.parameters, natural_units(last.header.parameters)[0]
-    try:
-        exponent, error = lyapunov(p, _state(last), GROWING * unit, unit, run=run)
-    except (SimulationError, InputError) as reason:
-        return Fate(Kind.UNDECIDED, last, failure=str(reason))
-    return Fate(Kind.CHAOTIC if exponent > 3 * error else Kind.QUASI_PERIODIC, last, exponent=exponent)
 
 
 def lyapunov(

@@ -7,7 +7,7 @@ between two orbits, the place is located.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -142,10 +142,21 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
             return
         yield there
         step = min(LONGEST, 1.5 * step if there.steps <= EASY else 0.7 * step)
-        here, along = _renewed(there, along)
+        # The same orbit through a section anew: on the floor orbits may shrink away from one.
+        if State.of(there.loop.x).y > 0:
+            here = replace(there, loop=replace(there.loop, extent=extent(there.cycle)))
+        else:
+            here = close(Loop.of(there.p, there.loop.x, there.period))
+            if (here.loop.case, here.loop.fixed) != (there.loop.case, there.loop.fixed):
+                # The section is another: the parameter alone says which way the branch goes on.
+                along = np.append(np.zeros(len(here.loop.free)), along[-1])
         before.append(here)
         if here.loop.extent < SMALL * max(each.loop.extent for each in before):
-            yield _birth(name, before[-3:])
+            # The extent will be zero where a parabola through the last three orbits says.
+            last, (kind, power) = before[-3:], (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2)
+            sizes = np.array([each.loop.extent for each in last]) ** power
+            values = np.array([getattr(each.p, name) for each in last])
+            yield Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), here)
             return
     yield Place(Bifurcation.LOST, getattr(here.p, name), here, f"not followed beyond {most} orbits")
 
@@ -156,19 +167,6 @@ def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
     if _strays(here, by, orbit.changes):
         raise NoOrbitError("the nearest orbit is one of another branch")
     return orbit
-
-
-def _renewed(orbit: Orbit, along: Array) -> tuple[Orbit, Array]:
-    """The same orbit through a section anew: on the floor orbits may shrink away from one.
-
-    Where the section is another, the parameter alone says which way the branch goes on.
-    """
-    if State.of(orbit.loop.x).y > 0:
-        return replace(orbit, loop=replace(orbit.loop, extent=extent(orbit.cycle))), along
-    fresh = close(Loop.of(orbit.p, orbit.loop.x, orbit.period))
-    if (fresh.loop.case, fresh.loop.fixed) == (orbit.loop.case, orbit.loop.fixed):
-        return fresh, along
-    return fresh, np.append(np.zeros(len(fresh.loop.free)), along[-1])
 
 
 def _edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) -> Iterator[Orbit | Place]:
@@ -188,7 +186,8 @@ def _edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) -> It
 def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:
     """What happens between an orbit and the next, a step away."""
     for kind, sign in _TESTS.items():
-        if _outside(here) == _outside(there) or (sign(here.multipliers) > 0) == (sign(there.multipliers) > 0):
+        outside = [np.sum(np.abs(each.multipliers) > 1) for each in (here, there)]
+        if outside[0] == outside[1] or (sign(here.multipliers) > 0) == (sign(there.multipliers) > 0):
             continue
 
         def test(share: float, sign: Callable[[Any], float] = sign) -> float:
@@ -224,14 +223,6 @@ def _change(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) ->
     return Place(kind, getattr(loop.p, name), nearest)
 
 
-def _birth(name: str, last: Sequence[Orbit]) -> Place:
-    """Where the extent of shrinking orbits will be zero: by a parabola through the last three."""
-    kind, power = (Bifurcation.BIRTH, 1) if last[-1].changes else (Bifurcation.HOPF, 2)
-    sizes = np.array([each.loop.extent for each in last]) ** power
-    values = np.array([getattr(each.p, name) for each in last])
-    return Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), last[-1])
-
-
 def _sequence(changes: Changes) -> Changes:
     """The changes of case of a period, from wherever it is the least in order."""
     turns = [changes[k:] + changes[:k] for k in range(len(changes))]
@@ -245,10 +236,6 @@ def _strays(here: Orbit, by: Array, changes: Changes) -> bool:
 
 def _landings(changes: Changes) -> int:
     return sum(before.A is Contact.N is not after.A for before, after in changes)
-
-
-def _outside(orbit: Orbit) -> int:
-    return int(np.sum(np.abs(orbit.multipliers) > 1))
 
 
 def _reals(multipliers: npt.NDArray[np.complex128]) -> Array:

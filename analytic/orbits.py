@@ -121,38 +121,32 @@ class Loop:
         It is simulated for the period, and then followed to the section nearby, forwards or backwards, by the
         equations of the case.
         """
-        run = _simulated(self.p, self.x, self.period, 1)
+
+        def rates(t: float, z: Array) -> list[float]:
+            return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))
+
+        run, tolerance = _simulated(self.p, self.x, self.period, 1), RTOL * scale(self.p)
         if run.cases[-1] is not self.case:
             raise NoOrbitError(f"after {self.period:g} s the ball is in {run.cases[-1].name}, not in {self.case.name}")
         x, late = run.x[-1], 0.0
         for _ in range(ITERATIONS):
-            short = (self.x - x)[self.fixed] / dynamics.rates(self.case, x.tolist(), self.p, self.p.omega_0)[self.fixed]
+            short = (self.x - x)[self.fixed] / rates(0.0, x)[self.fixed]
             if abs(short) < 1e-15 * self.period:
                 break
             late += short
             if not abs(late) < self.period / 4:
                 raise NoOrbitError(f"after {self.period:g} s the ball is far from where it was")
-            x = self._followed(x, short)
+            x = np.asarray(solve_ivp(rates, (0.0, short), x, "DOP853", rtol=RTOL, atol=tolerance).y[:, -1])
         changes = tuple((Case(a), Case(b)) for a, b in zip(run.events.from_case, run.events.to_case, strict=True))
         turn = run.theta[-1] - run.theta[0] + late * (State.of(x).omega_c + run.omega_c[-1]) / 2
         return Return(x, float(self.period + late), changes, float(turn))
 
-    def _followed(self, x: Array, duration: float) -> Array:
-        def rates(t: float, z: Array) -> list[float]:
-            return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))
-
-        tolerance = RTOL * scale(self.p)
-        return np.asarray(solve_ivp(rates, (0.0, duration), x, "DOP853", rtol=RTOL, atol=tolerance).y[:, -1])
-
     def derivative(self) -> Array:
         """Derivative (d - 1, d - 1) of the return map."""
-        return np.stack([self._slope(unit) for unit in np.eye(len(self.free))], axis=-1)
+        return np.stack([self.slope(unit) for unit in np.eye(len(self.free))], axis=-1)
 
-    def slope(self, varied: str) -> Array:
-        """Derivative (d - 1,) of the return map by the logarithm of a parameter."""
-        return self._slope(np.eye(len(self.free) + 1)[-1], varied)
-
-    def _slope(self, along: Array, varied: str | None = None) -> Array:
+    def slope(self, along: Array, varied: str | None = None) -> Array:
+        """Derivative (d - 1,) of the return map in a direction as in `moved`."""
         shift = SHIFT * self.extent
         high, low = (self.moved(sign * shift * along, varied).back().x for sign in (1, -1))
         return self.coordinates(high - low) / (2 * shift)
@@ -269,7 +263,7 @@ def closed(loop: Loop, varied: str | None = None, neighbour: Array | None = None
 def jacobian(loop: Loop, derivative: Array, varied: str | None = None) -> Array:
     """Derivative (d - 1, d - 1) of the defect of a loop; with one more column if a parameter is varied."""
     by_state = derivative - np.eye(len(derivative))
-    return np.column_stack([by_state, loop.slope(varied)]) if varied else by_state
+    return np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)]) if varied else by_state
 
 
 def extent(run: Trajectory) -> float:

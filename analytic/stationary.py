@@ -21,8 +21,8 @@ from model import Case, InputError, Parameters, State
 from model.arrays import Array
 from model.drag import QUADRATIC, STOKES
 
-_MIRROR = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
-"""Signs of the state of the other sense of rotation."""
+_MIRROR, _MIRROR_FORCE = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0), np.array([1.0, 1.0, -1.0])
+"""Signs of state and forces of the other sense of rotation."""
 _ROUND_OFF = 1e-9
 """Real part over modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
 
@@ -89,7 +89,16 @@ def stationary_solutions(p: Parameters, cases: Collection[Case] = tuple(Case)) -
     c = 0 RR, SR and NR, with omega_c undetermined in RR; SS needs mu, c > 0 and eta < j.
     """
     if p.omega_0 < 0:
-        return [_mirrored(s) for s in stationary_solutions(p.replace(omega_0=-p.omega_0), cases)]
+        return [
+            replace(
+                s,
+                x=np.multiply(_MIRROR, s.x) + 0.0,
+                force_A=_MIRROR_FORCE * s.force_A + 0.0,
+                force_B=_MIRROR_FORCE * s.force_B + 0.0,
+                alpha=-s.alpha,
+            )
+            for s in stationary_solutions(p.replace(omega_0=-p.omega_0), cases)
+        ]
     solvers = {Case.RR: _rr, Case.RS: _rs, Case.SR: _sr, Case.SS: _ss, Case.NR: _nr, Case.NS: _ns}
     return [s for case, solve in solvers.items() if case in cases for s in solve(p)]
 
@@ -247,9 +256,3 @@ def _lifting_spin(p: Parameters) -> float:
 def _wall_carries(p: Parameters) -> bool:
     """Whether friction at the wall carries the weight: (35), whose sign is misprinted, and (46)."""
     return p.eta * p.Omega_0**2 >= 1
-
-
-def _mirrored(s: StationarySolution) -> StationarySolution:
-    flip = np.array([1.0, 1.0, -1.0])
-    x = np.multiply(_MIRROR, s.x)
-    return replace(s, x=x + 0.0, force_A=flip * s.force_A + 0.0, force_B=flip * s.force_B + 0.0, alpha=-s.alpha)
