@@ -55,7 +55,7 @@ WARY, BOLD = 1.0, 1.3
 """Factor by which the change may rise from one sweep to the next before it counts as a setback, the two in turns from
 attempt to attempt. Wary where the sweeps swing; bold where impulses that hardly move the ball have to pile up in the
 corner until one of them finds the limit of friction."""
-SPAN, GROWTH, LONGEST = 1.0, 8.0, 1e8
+SPAN, GROWTH, LONGEST_SPAN = 1.0, 8.0, 1e8
 """Length of the first step of the continuation, in sweeps; by which factor steps grow; and the longest, by when a step
 is one of Newton's."""
 SHORTER, CALMER, LEAST_GROWTH = 20.0, 0.7, 1.1
@@ -114,10 +114,7 @@ def solve(
     tolerance : the largest change in a sweep at which to stop, relative to the velocities of the problem, those that
         the impulses cause among them; a sweep rounds a dozen times, so that less than some eps may never be reached
 
-    Raises
-    ------
-    NotConvergedError
-        After `MAX_SWEEPS`.
+    Raises `NotConvergedError` after `MAX_SWEEPS`.
     """
     share = p.j / (1 + p.j)  # of the mass, that a tangential impulse feels at the contact point
     (v_h, v_y, *_), (s_A, t_A), (s_B, t_B) = free, rigid_body.slip_at_A(free, p), rigid_body.slip_at_B(free, p)
@@ -280,7 +277,7 @@ def both(
         pace = DAMPED if attempt else 1.0
         if sweeps >= PLAIN_SWEEPS * (1 + attempt):
             if change <= last * (BOLD if attempt % 2 else WARY):
-                span = min(span * growth, LONGEST)
+                span = min(span * growth, LONGEST_SPAN)
             else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
                 span, growth = max(span / SHORTER, 1 / (10 + rough)), max(growth**CALMER, LEAST_GROWTH)
             step, pace = _continued(need_A, need_B, step, span, A, B, k), 1.0

@@ -32,7 +32,7 @@ Interval: TypeAlias = tuple[float, float]
 INEXACT = ("mu", "eta", "r", "R")
 """What may have a tolerance: friction and size."""
 THRESHOLDS = ("omega_01", "omega_02", "omega_03", "omega_04")
-_STEP = 1e-3
+_LOG_STEP = 1e-3
 """Of the differences, in the logarithm of a value."""
 _TIE = 1e-3
 """What the logarithm of the response time counts beside the margin: it decides where the margin doesn't."""
@@ -66,7 +66,7 @@ def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Se
     by_name = {}
     with np.errstate(invalid="ignore"):
         for name in at:
-            wide, narrow = ((logarithms(name, h) - logarithms(name, -h)) / (2 * h) for h in (_STEP, _STEP / 2))
+            wide, narrow = ((logarithms(name, h) - logarithms(name, -h)) / (2 * h) for h in (_LOG_STEP, _LOG_STEP / 2))
             by_name[name] = (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
     return {
         key: {name: Sensitivity(float(value[k]), float(error[k])) for name, (value, error) in by_name.items()}
@@ -157,10 +157,7 @@ def best(
     tolerances; among equals the quickest. Differential evolution (scipy), as the margin has a ridge at eta = j; the
     seed settles the result.
 
-    Raises
-    ------
-    InputError
-        If no meter within the bounds answers so fast; the message says how fast one can.
+    Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one can.
     """
     from scipy.optimize import Bounds, differential_evolution  # here, because `predict` shall not wait for it
 

@@ -41,10 +41,7 @@ def vector_field(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.Array
     Array
         dx/dt, shape of x. Whether the contact forces are admissible is not checked, see `contact_forces`.
 
-    Raises
-    ------
-    InputError
-        If x isn't a state of the case (`check_state`).
+    Raises `InputError` if x isn't a state of the case (`check_state`).
     """
     state, fluid = _checked(case, x, p, omega_0)
     return rates(case, state, p, fluid).stacked()[..., : np.shape(x)[-1]]

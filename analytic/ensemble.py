@@ -62,10 +62,7 @@ def simulate_many(
     quiet : end a run in which nothing has landed for that long, s; its last state stands for the rest
     threads : number of threads, that of the cores if None
 
-    Raises
-    ------
-    InputError
-        If numbers of runs differ, or as `simulate` for the first run that can't start.
+    Raises `InputError` if numbers of runs differ, or as `simulate` for the first run that can't start.
     """
     from analytic import stepping, time_stepping  # here, because numba takes a while to load
 

@@ -1,8 +1,8 @@
-"""What motions come to, from one start or many: a stationary motion, a periodic one, or neither.
+"""Attractors: whether motions from one start or many become stationary, periodic, or neither.
 
-A run is followed window by window until what it does no longer changes. Any simulator may carry it out. What is
-recurrent is closed to an orbit by theory (`orbits`); what is recurrent and no stable orbit is chaotic if neighbours of
-it part exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with what it did last.
+A run is followed window by window until it repeats what it did; any simulator may carry it out. A recurrent motion is
+closed to an orbit by theory (`orbits`). One for which no stable orbit is found is chaotic if neighbours of it part
+exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with what it did last.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from model.cases import TRAITS
 from model.kinematics import VARIABLES, full_state
 from model.parameters import POSITIVE, check_number
 
-WINDOW, SAMPLES = 100.0, 4000
+WINDOW, WINDOW_SAMPLES = 100.0, 4000
 """Length of a window in units of sqrt(R/g), and samples in it."""
 LASTING = 60.0
 """How long a run is followed, in units of 1/c."""
-STILL = 1e-3
+STATIONARY_RANGE = 1e-3
 """Range of the variables over a window, in natural units, below which a motion that still shrinks is stationary."""
 NEAR = 1e-2
 """Distance in natural units up to which it is that of a stationary solution."""
@@ -130,10 +130,7 @@ def attractors(
     lasting : how long a run is followed at most, s; `LASTING`/c if None
     run : the simulator that carries out the runs
 
-    Raises
-    ------
-    InputError
-        If a start is outside of the vessel, a number out of range, or c = 0 without `lasting`.
+    Raises `InputError` if a start is outside of the vessel, a number out of range, or c = 0 without `lasting`.
     """
     states = random_starts(p, starts, seed) if isinstance(starts, int) else np.atleast_2d(full_state(starts))
     if lasting is None and p.c == 0:
@@ -163,7 +160,7 @@ def settle(
     window, seen, recurrent = WINDOW * unit, list[Trajectory](), False
     for _ in range(math.ceil(lasting / window)):
         try:
-            now = run(p, x, window, window / SAMPLES)
+            now = run(p, x, window, window / WINDOW_SAMPLES)
         except SimulationError as error:
             return Fate(Kind.UNDECIDED, error.trajectory, failure=str(error))
         if now.header.failure:
@@ -172,11 +169,11 @@ def settle(
         if len(seen) < 2:
             continue
         before = seen[0]
-        if extent(now) < STILL and extent(now) <= extent(before):
+        if extent(now) < STATIONARY_RANGE and extent(now) <= extent(before):
             return Fate(Kind.STATIONARY, now, solution=_nearest(now, solutions))
         if recurrent := _alike(before, now):
             same = (fate for fate in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
-            if fate := next(same, None) or closed(now):
+            if fate := next(same, None) or periodic(now):
                 return fate
     if not recurrent:
         return Fate(Kind.UNDECIDED, seen[-1])
@@ -189,7 +186,7 @@ def settle(
 
 def _alike(a: Trajectory, b: Trajectory) -> bool:
     """Whether means and extremes of two windows agree, over the range of the motion."""
-    size = scale(a.header.parameters) * max(extent(a), STILL)
+    size = scale(a.header.parameters) * max(extent(a), STATIONARY_RANGE)
     return all(
         bool(np.all(np.abs(of(a.x, axis=0) - of(b.x, axis=0)) <= ALIKE * size)) for of in (np.mean, np.min, np.max)
     )
@@ -208,7 +205,7 @@ def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> Stati
     return min(near, key=lambda each: (each.case is not case, distance(each)), default=None)
 
 
-def closed(last: Trajectory) -> Fate | None:
+def periodic(last: Trajectory) -> Fate | None:
     """A recurrent motion that closes: with the stable orbit that theory has near it, or after all that one sees.
 
     None if it doesn't close.
@@ -221,7 +218,7 @@ def closed(last: Trajectory) -> Fate | None:
             continue
         if orbit.stable and abs(orbit.period / period - 1) < ALIKE:
             return Fate(Kind.PERIODIC, last, period, orbit=orbit)
-    exact = [period for period, defect in seen if defect < STILL * extent(last)]
+    exact = [period for period, defect in seen if defect < STATIONARY_RANGE * extent(last)]
     return Fate(Kind.PERIODIC, last, exact[0]) if exact else None
 
 

@@ -23,7 +23,7 @@ from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
 from model.drag import STOKES
 
-_ROUND_OFF = 1e-12
+_LEAST_JUMP = 1e-12
 """Part of the flow by which it may differ before and after a knot without a jump."""
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
@@ -32,10 +32,8 @@ MAX_EVENTS_AT_ONCE = 100
 def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
     """Simulate from state x0 and record; the contract of `simulation.simulate`.
 
-    Raises
-    ------
-    StalledError, NotConvergedError
-        If the integrator, the contact problem or the sequence of cases gets stuck.
+    Raises `StalledError`, `NotConvergedError` if the integrator, the contact problem or the sequence of cases gets
+    stuck.
     """
     t_end = float(recorder.times[-1])
     knots = [0.0, *(t for t in flow.start.tolist() if 0 < t < t_end), t_end]
@@ -44,7 +42,7 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     for start, end in pairwise(knots):
         fluid = Fluid.of(flow, start)
         step = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
-        if case is None or step > _ROUND_OFF * np.abs(flow.value).max():
+        if case is None or step > _LEAST_JUMP * np.abs(flow.value).max():
             before, (case, at, impulse) = case, simulator.settle(at, fluid)
             if (before is not None and before is not case) or impulse is not NOTHING:
                 recorder.events.append(Event(start, case if before is None else before, case, impulse))

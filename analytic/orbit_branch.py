@@ -21,7 +21,7 @@ from model import Contact, InputError, Parameters, State
 from model.arrays import Array
 from model.parameters import check_names, check_number
 
-FIRST, SMALLEST, LONGEST = 0.05, 1e-5, 0.5
+FIRST_STEP, LEAST_STEP, LONGEST_STEP = 0.05, 1e-5, 0.5
 """Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
 GRAZING = 0.01
 """Longest step in which the number of landings may change: other branches, as of balls that ride the wall, are near."""
@@ -96,10 +96,7 @@ class OrbitBranch:
 def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) -> OrbitBranch:
     """Follow an orbit both ways in a parameter until it leaves [low, high], ends, or `most` orbits are known each way.
 
-    Raises
-    ------
-    InputError
-        If there is no such parameter, or the orbit isn't within the range.
+    Raises `InputError` if there is no such parameter, or the orbit isn't within the range.
     """
     check_names([name], [field.name for field in Parameters.quantities()], "parameter")
     low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
@@ -116,7 +113,7 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
 
 def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: int) -> Iterator[Orbit | Place]:
     """Orbits and places one way from an orbit, to the end."""
-    here, step, before, reason = start, FIRST, [start], ""
+    here, step, before, reason = start, FIRST_STEP, [start], ""
     along = np.append(np.zeros(len(start.loop.free)), sign)
     for _ in range(most):
         try:
@@ -127,7 +124,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
         tangent = np.linalg.svd(matrix)[2][-1]
         along = tangent if tangent @ along >= 0 else -tangent
         there = None
-        while there is None and step > SMALLEST:
+        while there is None and step > LEAST_STEP:
             try:
                 there = _beside(here, step * along, name, matrix)
             except NoOrbitError as error:
@@ -141,7 +138,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
             yield from _edge(here, there, name, span)
             return
         yield there
-        step = min(LONGEST, 1.5 * step if there.steps <= EASY else 0.7 * step)
+        step = min(LONGEST_STEP, 1.5 * step if there.steps <= EASY else 0.7 * step)
         # The same orbit through a section anew: on the floor orbits may shrink away from one.
         if State.of(there.loop.x).y > 0:
             here = replace(there, loop=replace(there.loop, extent=extent(there.cycle)))

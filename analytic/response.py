@@ -19,7 +19,7 @@ from model.drag import STOKES
 AIRY_ZERO = 2.338107410459767
 """-z at the first zero of Airy's function Ai(z)."""
 _GRID = 20_000
-_STEP = 1e-3
+_BRANCH_STEP = 1e-3
 """Step of differences along the branch at the fold: their errors are its square."""
 
 
@@ -71,10 +71,10 @@ def ramp_coefficient(p: Parameters) -> float:
     s = float(slipping_branch.fold(p))
     if np.isnan(s):
         raise InputError(f"there is no fold at eta = {p.eta:g}: the branch of SS doesn't turn back")
-    places = s + _STEP * np.array([-1.0, 0.0, 1.0])
+    places = s + _BRANCH_STEP * np.array([-1.0, 0.0, 1.0])
     flows, values = branch_stability.states(places, p)[1], branch_stability.eigenvalues_at(places, p)
     slow = np.take_along_axis(values, np.abs(values).argmin(axis=-1)[:, None], axis=-1)[:, 0].real
-    slope, curvature = (slow[2] - slow[0]) / (2 * _STEP), (flows[0] - 2 * flows[1] + flows[2]) / _STEP**2
+    slope, curvature = (slow[2] - slow[0]) / (2 * _BRANCH_STEP), (flows[0] - 2 * flows[1] + flows[2]) / _BRANCH_STEP**2
     return float(AIRY_ZERO * (-(slope**2) / (2 * curvature)) ** (-1 / 3))
 
 

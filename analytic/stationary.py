@@ -23,7 +23,7 @@ from model.drag import QUADRATIC, STOKES
 
 _MIRROR, _MIRROR_FORCE = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0), np.array([1.0, 1.0, -1.0])
 """Signs of state and forces of the other sense of rotation."""
-_ROUND_OFF = 1e-9
+_LEAST_REAL_PART = 1e-9
 """Real part over modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
 
 
@@ -108,10 +108,8 @@ def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = F
 
     `formal` takes it even if its contact forces are inadmissible: NR below omega_02, SR with A_y < 0.
 
-    Raises
-    ------
-    InputError
-        If there is none, or more than one (two are unstable between the Hopf points of a very rough floor).
+    Raises `InputError` if there is none, or more than one (two are unstable between the Hopf points of a very rough
+    floor).
     """
     those = [s for s in stationary_solutions(p, (case,)) if s.stable == stable and (formal or s.exists)]
     if len(those) != 1:
@@ -134,7 +132,7 @@ def slowest_time_constant(of: StationarySolution) -> float:
     if of.stability is Stability.ALGEBRAIC:
         return np.inf
     rates = -of.eigenvalues.real
-    decaying = rates[rates > _ROUND_OFF * np.abs(of.eigenvalues).max()]
+    decaying = rates[rates > _LEAST_REAL_PART * np.abs(of.eigenvalues).max()]
     return float(1 / decaying.min()) if decaying.size else np.inf
 
 
@@ -182,7 +180,7 @@ def _solution(
 def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) -> Stability:
     """By the rightmost of the eigenvalues, without the `zeros` that belong to the free variables of a family."""
     rest = values[np.argsort(np.abs(values))][zeros:]
-    if np.any(rest.real > _ROUND_OFF * np.abs(rest)):
+    if np.any(rest.real > _LEAST_REAL_PART * np.abs(rest)):
         return Stability.UNSTABLE
     return Stability.NEUTRAL if neutral else Stability.ASYMPTOTIC
 
