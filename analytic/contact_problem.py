@@ -141,7 +141,7 @@ def solve(
 
 
 def unlocked(error: NotConvergedError, p: Parameters) -> Closed:
-    """What a contact can aim at when no impulses make both rebound: to stay closed.
+    """The target of a contact when no impulses make both rebound: to stay closed.
 
     Raises the error again if friction can't have locked the ball.
     """

@@ -129,7 +129,7 @@ class Choice:
     worst: OperatingLimit
     """At the corner of the tolerances where the operating range is the shortest."""
     margin: float
-    """The worst limit over the fastest flow: covered if >= 1."""
+    """The worst limit divided by the fastest flow: covered if >= 1."""
     response: float
     """Time constant, s."""
 
@@ -193,7 +193,7 @@ def best(
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What a meter is wanted for, and what it may be made of."""
+    """Requirements on a meter: flows, fluid, materials, tolerances and response."""
 
     fluid: Mapping[str, Any]
     """Arguments of `Parameters.from_fluid`: nu_f, rho_f, gravity, and perhaps drag and C_D."""

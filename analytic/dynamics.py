@@ -2,7 +2,7 @@
 
 The forces follow from the state, case by case (`forces`); the rates follow from the forces by Newton and Euler (20),
 the same way in every case (`rates`). Both take floats or arrays and check nothing, since an integrator calls them in
-its innermost loop. `contact_forces` and `vector_field` are for everyone else: they take arrays of states and check
+its innermost loop. `contact_forces` and `vector_field` are the public functions: they take arrays of states and check
 them against the case.
 
 Away from the wall the drag (9) is extended by a radial part -m c rho', and the fluid rotates as one rigid body. c is

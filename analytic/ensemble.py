@@ -1,4 +1,4 @@
-"""Many runs at once, by time stepping: what comes of many parameter sets and starts, without every motion in full."""
+"""Many runs at once, by time stepping: states at a few times, for many parameter sets and starts."""
 
 from __future__ import annotations
 

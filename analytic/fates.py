@@ -36,7 +36,7 @@ STATIONARY_RANGE = 1e-3
 NEAR = 1e-2
 """Distance in natural units up to which it is that of a stationary solution."""
 ALIKE = 0.05
-"""Distance over the range of the motion up to which states, means and extremes are the same."""
+"""Distance divided by the range of the motion up to which states, means and extremes are the same."""
 GROWING = 400.0
 """Duration over which the Lyapunov exponent is taken, in units of sqrt(R/g)."""
 APART = 1e-6
@@ -47,7 +47,7 @@ Run = Callable[[Parameters, Array, float, float], Trajectory]
 
 
 class Kind(StrEnum):
-    """What a motion comes to."""
+    """The kind of attractor that a motion approaches."""
 
     STATIONARY = "stationary"
     PERIODIC = "periodic"
@@ -122,7 +122,7 @@ def attractors(
     lasting: float | None = None,
     run: Run = event_driven,
 ) -> list[Attractor]:
-    """What balls come to from many starts, the most frequent first.
+    """The attractors that balls approach from many starts, the most frequent first.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def attractors(
 def settle(
     p: Parameters, x0: npt.ArrayLike, lasting: float, run: Run = event_driven, known: Sequence[Fate] = ()
 ) -> Fate:
-    """What the motion from x0 comes to within `lasting` seconds; `known` fates are recognised without a closer look.
+    """The attractor that the motion from x0 approaches within `lasting` seconds; `known` fates are simply recognised.
 
     It is followed in windows. Stationary is what hardly moves, and less than before. Where two windows are alike the
     motion is recurrent: it has one of the known fates, or closes; if it does neither, its largest Lyapunov exponent
@@ -185,7 +185,7 @@ def settle(
 
 
 def _alike(a: Trajectory, b: Trajectory) -> bool:
-    """Whether means and extremes of two windows agree, over the range of the motion."""
+    """Whether means and extremes of two windows agree, relative to the range of the motion."""
     size = scale(a.header.parameters) * max(extent(a), STATIONARY_RANGE)
     return all(
         bool(np.all(np.abs(of(a.x, axis=0) - of(b.x, axis=0)) <= ALIKE * size)) for of in (np.mean, np.min, np.max)

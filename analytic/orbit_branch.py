@@ -31,7 +31,7 @@ SHARP = 1e-6
 """How sharply a change of stability is located along the branch; a change of the sequence of cases by `HALVINGS`."""
 HALVINGS = 10
 SMALL = 0.05
-"""Extent over the largest of the branch below which an orbit is followed no further, but on to none at all."""
+"""Extent divided by the largest of the branch, below which the branch is extrapolated to extent zero."""
 
 
 class Bifurcation(StrEnum):

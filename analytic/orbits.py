@@ -153,7 +153,7 @@ class Loop:
 
 
 class Return(NamedTuple):
-    """What a loop comes to."""
+    """Where and when the motion of a loop returns to the section."""
 
     x: Array
     period: float
@@ -238,7 +238,7 @@ def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None)
 
 
 def closed(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> tuple[Loop, Return, int]:
-    """The loop of `close`, what it comes to, and the steps that Newton's method took."""
+    """The loop of `close`, its return, and the steps that Newton's method took."""
     before = math.inf
     for step in range(ITERATIONS + 1):
         back = loop.back()

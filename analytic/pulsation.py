@@ -28,10 +28,10 @@ PHASES, CLOSER = 360, 32
 HARMONICS, FINE = 32, 128
 """Of the lag: odd ones, as a sine and every law of drag are; those left out are some 10^-6 of it, and 10^-7."""
 LAG_STEPS, SOLVED = 50, 1e-9
-"""Most steps of Newton's method for it, and what may be left of its equation, over the flow's acceleration."""
+"""Most steps of Newton's method for it, and the largest residual, divided by the flow's acceleration."""
 ROUNDS, DEPTH, SETTLED, PERIODIC_RTOL = 100, 2, 1e-6, 1e-6
 """Most periods that `mean_error` simulates; how many differences point to the next; by how much the last may change the
-motion, over the flow; and the integrator's rtol. The mean is then known to some 1e-6 of the flow."""
+motion, divided by the flow; and the integrator's rtol. The mean is then known to some 1e-6 of the flow."""
 
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
@@ -46,7 +46,7 @@ def _swing(p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], pha
 
 
 def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex:
-    """That of omega_c in `swing` over that of omega_0; with Stokes' law `response.transfer` at any amplitude."""
+    """First harmonic of omega_c in `swing` divided by that of omega_0; with Stokes' law that is `response.transfer`."""
     return complex(1 + 1j * lag_harmonics(p, amplitude, frequency, FINE)[0] / amplitude)
 
 

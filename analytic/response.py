@@ -31,7 +31,7 @@ def rolling_rate(p: Parameters) -> float:
 
 
 def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-    """omega_c over omega_0, complex, where the flow pulsates a little about p.omega_0 at frequencies in Hz, same shape.
+    """omega_c divided by omega_0, complex, in small pulsations about p.omega_0 at frequencies in Hz, same shape.
 
     About the stable motion of the case; its modulus is the gain, its argument the phase lead (negative: a lag).
     Raises `InputError` if there is no such motion.
@@ -42,7 +42,7 @@ def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray
 
 
 def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
-    """Change of omega_c at times t >= 0 in s after a small jump of the flow, over the jump; same shape.
+    """Change of omega_c at times t >= 0 in s after a small jump of the flow, divided by the jump; same shape.
 
     About the stable motion of the case at p.omega_0, as in `transfer`.
     """
@@ -53,7 +53,7 @@ def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
 
 
 def peak(p: Parameters, case: Case) -> tuple[float, float]:
-    """Time in s and height, over that at the end, of the highest point of the `step_response`; inf, 1 if it creeps."""
+    """Time in s and height of the top of the `step_response`, divided by its end value; inf, 1 if it creeps."""
     slowest = 1 / np.abs(np.linalg.eigvals(_linear(p, case)[0]).real).min()
     t = np.linspace(0.0, 8 * slowest, _GRID)
     y = step_response(p, case, t) / np.real(transfer(p, case, 0.0))

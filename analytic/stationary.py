@@ -24,7 +24,7 @@ from model.drag import QUADRATIC, STOKES
 _MIRROR, _MIRROR_FORCE = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0), np.array([1.0, 1.0, -1.0])
 """Signs of state and forces of the other sense of rotation."""
 _LEAST_REAL_PART = 1e-9
-"""Real part over modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
+"""Real part divided by modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
 
 
 class Stability(Enum):

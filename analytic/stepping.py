@@ -38,7 +38,7 @@ callable_when_compiled(drag.rate, mean, rigid_body.state, *contact_problem.COMPI
 
 
 class Constants(NamedTuple):
-    """What a step needs of parameters and settings."""
+    """Parameters and settings of a step."""
 
     law: drag.Law
     m: float
@@ -131,8 +131,8 @@ def _solved(
     enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
     still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
     rest = j / (1 + j)  # share of m that a tangential impulse feels at the contact point
-    # Slip to come is added to what there is: half of that is the mean, which friction opposes where a contact slides
-    # on. Where it may stop friction opposes what is left at the end, lest it reverse the slip.
+    # Old and new slip are added, since friction opposes their mean where a contact slides on. Where slip may stop
+    # within the step, friction opposes the final slip, so that it cannot reverse.
     slip_A, slip_B = (v_h + r * o_z, v_k - r * o_x), (v_y - r * o_z, v_k + r * o_y)
     load = SLIDES * (max(p.g * dt - v_y, 0.0) + max(v_k * v_k / (p.R - at.h) * dt - v_h, 0.0))
     if dt == 0 or rest * _size(slip_A[0], slip_A[1]) <= p.mu * load:

@@ -96,7 +96,7 @@ class Shortest(NamedTuple):
 
 
 def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, shortest: Shortest) -> tuple[Moment, Forces]:
-    """What an impact makes of a moment, and its impulses: all contacts that touch at once, by Newton's restitution.
+    """The moment after an impact, and its impulses: all contacts that touch at once, by Newton's restitution.
 
     Friction opposes the slip that is left. A single contact of a sphere obeys p_n = (1+e) m |v_n| and
     p_t = min(friction p_n, m_t |slip|) against the slip; two contacts are solved together, without a rebound if

@@ -145,10 +145,7 @@ def test_solution_of_a_case() -> None:
     slow = P.replace(omega_0=9.0)
     assert solution(slow, Case.NR, formal=True).exists is False
     for ask, message in (
-        (
-            lambda: solution(slow, Case.NR),
-            r"case NR has no stable stationary solution at omega_0 = 9 rad s-1 \(mu",
-        ),
+        (lambda: solution(slow, Case.NR), r"case NR has no stable stationary solution at omega_0 = 9 rad s-1 \(mu"),
         (lambda: solution(slow, Case.SS), "case SS has no stable stationary solution"),
         (lambda: solution(slow, Case.RR, stable=False), "case RR has no unstable stationary solution"),
         (lambda: solution(p, Case.NN), "case NN has no stable"),
