@@ -6,9 +6,7 @@ The law, the branch of SS and the equations of motion are written out here again
 
 from __future__ import annotations
 
-import importlib.util
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,10 +34,7 @@ from analytic.branch_stability import eigenvalues_at
 from model import Case, Contact, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS, QUADRATIC, SCHILLER_NAUMANN, STOKES
-
-spec = importlib.util.spec_from_file_location("newton_euler", Path(__file__).with_name("newton_euler.py"))
-ne = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(ne)
+from tests.analytic import newton_euler as ne
 
 P = Parameters.named("reference").replace(nu_f=2e-4)
 LIGHT = {STOKES: 1.0, SCHILLER_NAUMANN: 1.0, QUADRATIC: 0.0}
