@@ -225,57 +225,40 @@ def _sense(need: Impulse, given: Impulse) -> int:
     return 1 if given.s == need.s and given.t == need.t else 2
 
 
-def _quickly(
-    a: Impulse, b: Impulse, start: Impulse, A: Friction, B: Friction, k: float, enough: float
-) -> tuple[Impulse, Impulse, float]:
-    """`both` by Newton's method, as long as no contact begins to stick, slide or open; else the change is inf."""
-    at_B, before = start, -1
-    for _ in range(EAGER):
-        need_A = _less(a, at_B, k)
-        at_A = project(need_A, A)
-        need_B = _less(b, at_A, k)
-        after = project(need_B, B)
-        sense = 3 * _sense(need_A, at_A) + _sense(need_B, after)
-        if before not in (-1, sense):
-            break
-        step = Impulse(after.n - at_B.n, after.s - at_B.s, after.t - at_B.t)
-        change = abs(step.n) + abs(step.s) + abs(step.t)
-        if change <= enough:
-            return at_A, after, change
-        step, before = _continued(need_A, need_B, step, WHOLE, A, B, k), sense
-        at_B = Impulse(at_B.n + step.n, at_B.s + step.s, at_B.t + step.t)
-    return start, start, math.inf
-
-
 def both(
     a: Impulse, b: Impulse, start: Impulse, A: Friction, B: Friction, j: float, enough: float
 ) -> tuple[Impulse, Impulse, float]:
     """Impulses of A and B that obey Coulomb's law, from a first guess of B; and by how much they still changed.
 
-    That is at most `enough` (m s-1) unless `MAX_SWEEPS` were not enough.
+    That is at most `enough` (m s-1) unless `MAX_SWEEPS` were not enough. Sweeps with Newton's method count from
+    -`EAGER` up to 0, those after it from 0 on.
     """
-    k, rough = 1 / (1 + j), A.coefficient * B.coefficient
-    if rough < 1:
-        at_A, at_B, change = _quickly(a, b, start, A, B, k, enough)
-        if change <= enough:
-            return at_A, at_B, change
-    at_A, at_B = start, start
+    k, rough, zero, before = 1 / (1 + j), A.coefficient * B.coefficient, Impulse(0.0, 0.0, 0.0), -1
+    at_A, at_B, count = start, start, -EAGER if rough < 1 else 0
     change, last, span, growth = math.inf, math.inf, SPAN, GROWTH
-    for count in range(MAX_SWEEPS):
+    while count < MAX_SWEEPS:
         attempt, sweeps = count // ATTEMPT, count % ATTEMPT
-        if sweeps == 0:
+        if count >= 0 and sweeps == 0:
             last, span, growth = math.inf, SPAN, GROWTH
-            at_B = Impulse(0.0, 0.0, 0.0) if attempt == 1 else at_B
+            at_B = start if attempt == 0 else zero if attempt == 1 else at_B
         need_A = _less(a, at_B, k)
         at_A = project(need_A, A)
         need_B = _less(b, at_A, k)
         after = project(need_B, B)
         step = Impulse(after.n - at_B.n, after.s - at_B.s, after.t - at_B.t)
         change = abs(step.n) + abs(step.s) + abs(step.t)
+        pace = DAMPED if attempt > 0 else 1.0
+        if count < 0:
+            sense = 3 * _sense(need_A, at_A) + _sense(need_B, after)
+            if before != -1 and sense != before:  # a contact begins to stick, slide or open
+                count = 0
+                continue
+            before = sense
         if change <= enough:
             return at_A, after, change
-        pace = DAMPED if attempt else 1.0
-        if sweeps >= PLAIN_SWEEPS * (1 + attempt):
+        if count < 0:
+            step = _continued(need_A, need_B, step, WHOLE, A, B, k)
+        elif sweeps >= PLAIN_SWEEPS * (1 + attempt):
             if change <= last * (BOLD if attempt % 2 else WARY):
                 span = min(span * growth, LONGEST_SPAN)
             else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
@@ -283,8 +266,9 @@ def both(
             step, pace = _continued(need_A, need_B, step, span, A, B, k), 1.0
         last = change
         at_B = Impulse(at_B.n + pace * step.n, at_B.s + pace * step.s, at_B.t + pace * step.t)
+        count += 1
     return at_A, at_B, change
 
 
-COMPILED = (both, project, _quickly, _continued, _sense, _cross, _dot, _sweep_rate, _less, _project_rate, _held)
+COMPILED = (both, project, _continued, _sense, _cross, _dot, _sweep_rate, _less, _project_rate, _held)
 """Called by what `stepping` compiles."""

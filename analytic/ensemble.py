@@ -36,9 +36,6 @@ class Ensemble:
     failure: tuple[str, ...]
     """Why a run failed, empty if it didn't; what it has from there on is nan."""
 
-    def __len__(self) -> int:
-        return len(self.x)
-
 
 def simulate_many(
     parameters: Parameters | Sequence[Parameters],

@@ -108,28 +108,9 @@ def solve(
 
     Smooth forces, at the mean of both velocities, and contacts are iterated together; `start` guesses the impulses.
     """
-    s = _solved(at, dt, omega_0, in_A, in_B, to_A, to_B, start, p, TOLERANCE)
-    return s if s.residual == 0 else _solved(at, dt, omega_0, in_A, in_B, to_A, to_B, start, p, BARELY)
-
-
-@compiled
-def _solved(
-    at: At,
-    dt: float,
-    omega_0: float,
-    in_A: bool,
-    in_B: bool,
-    to_A: float,
-    to_B: float,
-    start: Forces,
-    p: Constants,
-    tolerance: float,
-) -> Solved:
     v_h, v_y, v_k, o_x, o_y, o_z = old = at.u
     m, r, j = p.m, p.r, p.j
     fastest = max(abs(v_h), abs(v_y), abs(v_k), r * max(abs(o_x), abs(o_y), abs(o_z)))
-    enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
-    still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
     rest = j / (1 + j)  # share of m that a tangential impulse feels at the contact point
     # Old and new slip are added, since friction opposes their mean where a contact slides on. Where slip may stop
     # within the step, friction opposes the final slip, so that it cannot reverse.
@@ -140,43 +121,49 @@ def _solved(
     if dt == 0 or rest * _size(slip_B[0], slip_B[1]) <= p.eta * load:
         slip_B = (0.0, 0.0)
     on_A, on_B = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0)
-    A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
-    if in_A:
-        A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
-    if in_B:
-        B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m)
-    new, last, change = old, 0.0, p.g * dt
-    for _ in range(MAX_ITERATIONS):
-        u = mean(old, new)
-        x_i = at.h - p.R + dt / 2 * u.v_h
-        x_k, spin = (0.0, -u.v_k / x_i) if in_B else (dt / 2 * u.v_k, 0.0)
-        # (20) with (9), no contact
-        w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
-        c = drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law) if p.law.blunt > 0 else p.law.linear
-        f_h = v_h - dt * (spin * u.v_k + c * w_h)
-        f_y = v_y - dt * (p.g + c * u.v_y)
-        f_k = v_k + dt * (spin * u.v_h - c * w_k)
-        f_x = o_x - dt * spin * u.o_z  # f_z takes the new o_x, which saves two iterations of seven
-        f_z = o_z + dt * spin * (o_x + f_x - A.t / (j * r)) / 2
-        a = Impulse(to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1]))
-        b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * o_y + slip_B[1]))
-        residual, aim = 0.0, max(enough, ROUGH * change)
-        if in_A and in_B:
-            A, B, residual = both(a, b, B, on_A, on_B, j, aim)
-        elif in_A:
-            A = project(a, on_A)
-        elif in_B:
-            B = project(b, on_B)
-        n_h, n_y, n_k = f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t
-        after = Velocities(n_h, n_y, n_k, f_x - A.t / (j * r), o_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r))
-        change = abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)  # a sum, since max overlooks nan
-        change += r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
-        new = after
-        # Changes shrink at a steady rate: what is left is this one times the rate.
-        settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
-        if (settled and residual <= enough) or not residual <= aim:
+    for tolerance in (TOLERANCE, BARELY):
+        enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
+        still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
+        A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
+        if in_A:
+            A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
+        if in_B:
+            B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m)
+        new, last, change = old, 0.0, p.g * dt
+        for _ in range(MAX_ITERATIONS):
+            u = mean(old, new)
+            x_i = at.h - p.R + dt / 2 * u.v_h
+            x_k, spin = (0.0, -u.v_k / x_i) if in_B else (dt / 2 * u.v_k, 0.0)
+            # (20) with (9), no contact
+            w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
+            c = drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law) if p.law.blunt > 0 else p.law.linear
+            f_h = v_h - dt * (spin * u.v_k + c * w_h)
+            f_y = v_y - dt * (p.g + c * u.v_y)
+            f_k = v_k + dt * (spin * u.v_h - c * w_k)
+            f_x = o_x - dt * spin * u.o_z  # f_z takes the new o_x, which saves two iterations of seven
+            f_z = o_z + dt * spin * (o_x + f_x - A.t / (j * r)) / 2
+            a = Impulse(to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1]))
+            b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * o_y + slip_B[1]))
+            residual, aim = 0.0, max(enough, ROUGH * change)
+            if in_A and in_B:
+                A, B, residual = both(a, b, B, on_A, on_B, j, aim)
+            elif in_A:
+                A = project(a, on_A)
+            elif in_B:
+                B = project(b, on_B)
+            n_h, n_y, n_k = f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t
+            after = Velocities(n_h, n_y, n_k, f_x - A.t / (j * r), o_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r))
+            change = abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)  # a sum, since max overlooks nan
+            change += r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
+            new = after
+            # Changes shrink at a steady rate: what is left is this one times the rate.
+            settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
+            if (settled and residual <= enough) or not residual <= aim:
+                break
+            last = change
+        converged = settled and residual <= enough
+        if converged:
             break
-        last = change
     u = mean(old, new)
     power = u.v_h * (u.v_h - omega_0 * x_k) + u.v_y * u.v_y + u.v_k * (u.v_k + omega_0 * x_i)
     at_A = A.s * (u.v_h + r * u.o_z) + A.n * u.v_y + A.t * (u.v_k - r * u.o_x)
@@ -185,7 +172,7 @@ def _solved(
     # A loaded contact has met its target, and round-off must not open it again.
     new = Velocities(to_B if B.n > 0 else new.v_h, to_A if A.n > 0 else new.v_y, new.v_k, new.o_x, new.o_y, new.o_z)
     P = Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)
-    return Solved(new, P, work, spin, 0.0 if settled and residual <= enough else _worse(change, residual))
+    return Solved(new, P, work, spin, 0.0 if converged else _worse(change, residual))
 
 
 @compiled
