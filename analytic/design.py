@@ -278,11 +278,11 @@ def design(request: Request, seed: int = 0) -> Design:
     )
 
 
-def characteristic(meters: Sequence[Parameters], top: float, count: int = 61) -> Curve:
+def characteristic(meters: Sequence[Parameters], top: float) -> Curve:
     """The curve of the first meter up to the flow `top`, rad s-1, with a band over all of them."""
     t = dataclasses.astuple(bifurcation.thresholds(meters[0]))[: len(THRESHOLDS)]
     sides = np.outer(t, (1 - 1e-6, 1 + 1e-6)).ravel()  # of the jumps
-    flows = np.union1d(np.linspace(0.0, top, count)[1:], sides[sides < top])
+    flows = np.union1d(np.linspace(0.0, top, 61)[1:], sides[sides < top])
     each = [readings(p, flows) for p in meters]
     band = np.min([low for low, _ in each], axis=0), np.max([high for _, high in each], axis=0)
     return Curve(flows, each[0], band)

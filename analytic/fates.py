@@ -222,8 +222,8 @@ def periodic(last: Trajectory) -> Fate | None:
     return Fate(Kind.PERIODIC, last, exact[0]) if exact else None
 
 
-def _periods(last: Trajectory, most: int = 3) -> list[tuple[float, float]]:
-    """Times after which the motion comes back to about where it was, and by how much it misses; the shortest first.
+def _periods(last: Trajectory) -> list[tuple[float, float]]:
+    """Up to three times after which the motion nearly returns, the shortest first, and by how much it misses.
 
     As far as half the window shows.
     """
@@ -233,7 +233,7 @@ def _periods(last: Trajectory, most: int = 3) -> list[tuple[float, float]]:
     left = int(np.argmax(away > size / 2))
     dips = np.array([k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]], dtype=int)
     good = dips[away[dips] <= 2 * away[dips].min(initial=size) + ALIKE * size]
-    return [(float(k * interval), float(away[k])) for k in good[:most]]
+    return [(float(k * interval), float(away[k])) for k in good[:3]]
 
 
 def _state(last: Trajectory) -> Array:
@@ -244,7 +244,7 @@ def _state(last: Trajectory) -> Array:
 
 
 def lyapunov(
-    p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, seed: int = 0, run: Run = event_driven
+    p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, run: Run = event_driven
 ) -> tuple[float, float]:
     """Largest Lyapunov exponent of the motion from x over a duration, and its standard error, s-1.
 
@@ -256,7 +256,7 @@ def lyapunov(
     case = run(p, first, renewed, renewed).cases[0]
     active = [VARIABLES.index(name) for name in TRAITS[case].active]
     push = np.zeros(8)
-    push[active] = np.random.default_rng(seed).normal(size=len(active))
+    push[active] = np.random.default_rng(0).normal(size=len(active))
     second = first + push * scale(p) * APART / np.linalg.norm(push)
     growth, before = [], APART
     for _ in range(math.ceil(duration / renewed)):
