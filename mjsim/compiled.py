@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,17 +21,21 @@ from mjsim import corrections as source
 from mjsim.corrections import Ball, Velocity
 from model.arrays import Array
 
+# numba keeps what it compiles on disk, and compiles a function again when its own file has changed, but not when that
+# of a function has that it calls: then what it kept is deleted here.
+_KEPT = Path(__file__).with_name("__pycache__")
+_NOTE, _MADE_OF = _KEPT / "compiled-from.txt", hashlib.sha256(Path(source.__file__).read_bytes()).hexdigest()
+if os.access(_KEPT, os.W_OK) and not (_NOTE.exists() and _NOTE.read_text() == _MADE_OF):
+    for stale in _KEPT.glob("*.nb?"):
+        stale.unlink(missing_ok=True)
+    _NOTE.write_text(_MADE_OF)
+
 for each in (source.slip, source.resistance, source.lands, source.hovering):  # the others call them
     register_jitable(each)
-# What is compiled is kept on disk. Of itself numba compiles a function again when its own file has changed; it must
-# also do so when that of the functions has which it calls.
-_STAMP = hashlib.sha256(b"".join(Path(each).read_bytes() for each in (__file__, source.__file__))).hexdigest()
 
 
 def _kept(function: Callable[..., Any]) -> Any:
-    dispatcher = numba.njit(cache=True)(function)
-    dispatcher._cache._cache_file._source_stamp = _STAMP
-    return dispatcher
+    return numba.njit(cache=True)(function)
 
 
 _corrections, _eventful, _followed = (_kept(each) for each in (source.corrections, source.eventful, source.followed))
