@@ -3,31 +3,46 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
-SOURCES = ("compiling", "corner", "drag", "marching", "rigid_body", "stepping")
-"""Modules of this package that what is compiled is made of, its named tuples included."""
 
 try:
     import numba
+    from numba.extending import register_jitable
 except ImportError:
 
     def compiled(function: F) -> F:
         """The function itself."""
         return function
 
+    def callable_when_compiled(*functions: Callable[..., Any]) -> None:
+        """Nothing to do."""
+
 else:
-    # What is compiled is kept on disk. Of itself numba compiles a function again when its own file has changed; it
-    # must also do so when one of those has that it calls.
-    _CODE = b"".join(Path(__file__).with_name(f"{name}.py").read_bytes() for name in SOURCES)
-    _STAMP = hashlib.sha256(_CODE).hexdigest()
 
     def compiled(function: F) -> F:
-        """The function, compiled at its first call; threads can run it at once."""
-        dispatcher: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-        if not numba.config.DISABLE_JIT:
-            dispatcher._cache._cache_file._source_stamp = _STAMP
-        return dispatcher  # type: ignore[no-any-return]
+        """The function, compiled at its first call and kept on disk; threads can run it at once."""
+        return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+
+    def callable_when_compiled(*functions: Callable[..., Any]) -> None:
+        """Let functions `compiled` in this folder call plain ones from elsewhere, which are compiled with them."""
+        for each in functions:
+            register_jitable(error_model="numpy")(each)
+        forget_stale(Path(__file__).with_name("__pycache__"), {each.__code__.co_filename for each in functions})
+
+
+def forget_stale(directory: Path, sources: Iterable[str]) -> None:
+    """Delete what numba keeps in a directory if one of the sources has changed, which numba doesn't notice itself.
+
+    It compiles a function again when its own file has changed, but not when that of a function has that it calls.
+    """
+    made_of = hashlib.sha256(b"".join(Path(each).read_bytes() for each in sorted(sources))).hexdigest()
+    note = directory / "compiled-from.txt"
+    if os.access(directory, os.W_OK) and not (note.exists() and note.read_text() == made_of):
+        for stale in directory.glob("*.nb?"):
+            stale.unlink(missing_ok=True)
+        note.write_text(made_of)

@@ -32,7 +32,7 @@ Interval: TypeAlias = tuple[float, float]
 INEXACT = ("mu", "eta", "r", "R")
 """What may have a tolerance: friction and size."""
 THRESHOLDS = ("omega_01", "omega_02", "omega_03", "omega_04")
-_STEP = 1e-3
+_LOG_STEP = 1e-3
 """Of the differences, in the logarithm of a value."""
 _TIE = 1e-3
 """What the logarithm of the response time counts beside the margin: it decides where the margin doesn't."""
@@ -54,27 +54,24 @@ def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Se
     By central differences in the logarithm, extrapolated from two widths (Richardson). omega_01 to omega_03 have
     closed forms (docs/design.md), with which tests compare; the differences serve any law of drag, and the fold.
     """
-    by_name = {name: _log_derivatives(lambda x, name=name: make(**{**at, name: x}), at[name]) for name in at}  # type: ignore[misc]
-    return {
-        key: {name: Sensitivity(float(value[k]), float(error[k])) for name, (value, error) in by_name.items()}
-        for k, key in enumerate(THRESHOLDS)
-    }
 
-
-def _log_derivatives(make: Callable[[float], Parameters], x: float) -> tuple[Array, Array]:
-    """Derivatives of the logarithms of all thresholds by that of x, and their errors, shape (4,) each."""
-
-    def logarithms(step: float) -> Array:
+    def logarithms(name: str, step: float) -> Array:
         try:
-            t = bifurcation.thresholds(make(x * math.exp(step)))
+            t = bifurcation.thresholds(make(**{**at, name: at[name] * math.exp(step)}))
         except InputError:  # beyond what the value may be: no derivative there
             return np.full(len(THRESHOLDS), np.nan)
         with np.errstate(divide="ignore"):
             return np.log([getattr(t, key) for key in THRESHOLDS])
 
+    by_name = {}
     with np.errstate(invalid="ignore"):
-        wide, narrow = ((logarithms(h) - logarithms(-h)) / (2 * h) for h in (_STEP, _STEP / 2))
-        return (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
+        for name in at:
+            wide, narrow = ((logarithms(name, h) - logarithms(name, -h)) / (2 * h) for h in (_LOG_STEP, _LOG_STEP / 2))
+            by_name[name] = (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
+    return {
+        key: {name: Sensitivity(float(value[k]), float(error[k])) for name, (value, error) in by_name.items()}
+        for k, key in enumerate(THRESHOLDS)
+    }
 
 
 def corners(make: Make, at: Mapping[str, float], tolerances: Mapping[str, float]) -> Iterator[Parameters]:
@@ -132,7 +129,7 @@ class Choice:
     worst: OperatingLimit
     """At the corner of the tolerances where the operating range is the shortest."""
     margin: float
-    """The worst limit over the fastest flow: covered if >= 1."""
+    """The worst limit divided by the fastest flow: covered if >= 1."""
     response: float
     """Time constant, s."""
 
@@ -160,10 +157,7 @@ def best(
     tolerances; among equals the quickest. Differential evolution (scipy), as the margin has a ridge at eta = j; the
     seed settles the result.
 
-    Raises
-    ------
-    InputError
-        If no meter within the bounds answers so fast; the message says how fast one can.
+    Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one can.
     """
     from scipy.optimize import Bounds, differential_evolution  # here, because `predict` shall not wait for it
 
@@ -199,7 +193,7 @@ def best(
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What a meter is wanted for, and what it may be made of."""
+    """Requirements on a meter: flows, fluid, materials, tolerances and response."""
 
     fluid: Mapping[str, Any]
     """Arguments of `Parameters.from_fluid`: nu_f, rho_f, gravity, and perhaps drag and C_D."""
@@ -284,11 +278,11 @@ def design(request: Request, seed: int = 0) -> Design:
     )
 
 
-def characteristic(meters: Sequence[Parameters], top: float, count: int = 61) -> Curve:
+def characteristic(meters: Sequence[Parameters], top: float) -> Curve:
     """The curve of the first meter up to the flow `top`, rad s-1, with a band over all of them."""
     t = dataclasses.astuple(bifurcation.thresholds(meters[0]))[: len(THRESHOLDS)]
     sides = np.outer(t, (1 - 1e-6, 1 + 1e-6)).ravel()  # of the jumps
-    flows = np.union1d(np.linspace(0.0, top, count)[1:], sides[sides < top])
+    flows = np.union1d(np.linspace(0.0, top, 61)[1:], sides[sides < top])
     each = [readings(p, flows) for p in meters]
     band = np.min([low for low, _ in each], axis=0), np.max([high for _, high in each], axis=0)
     return Curve(flows, each[0], band)

@@ -20,7 +20,7 @@ from model.drag import QUADRATIC, REYNOLDS, SCHILLER_NAUMANN, STOKES
 
 EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
 """Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
-NEWTON = 8
+SPEED_STEPS = 8
 """Steps to the last digit from a speed less than twice too high: 6, and 2 to spare for the corner of `Law`."""
 POWERS = (1.0, 1.0 + EXPONENT, 2.0)
 """How the force of each term of `Law` grows with the speed."""
@@ -87,7 +87,7 @@ def speed_of(acceleration: npt.ArrayLike, p: Parameters) -> Array:
         return speed
     # One term alone makes the drag of this speed too great, but that of half of it is too small. The drag is convex, so
     # that Newton's method comes down to the root from there, with twice as many digits each time.
-    for _ in range(NEWTON):
+    for _ in range(SPEED_STEPS):
         speed = speed - (rate(speed, terms) * speed - given) / slope(speed, p)
     return speed
 

@@ -2,7 +2,7 @@
 
 The forces follow from the state, case by case (`forces`); the rates follow from the forces by Newton and Euler (20),
 the same way in every case (`rates`). Both take floats or arrays and check nothing, since an integrator calls them in
-its innermost loop. `contact_forces` and `vector_field` are for everyone else: they take arrays of states and check
+its innermost loop. `contact_forces` and `vector_field` are the public functions: they take arrays of states and check
 them against the case.
 
 Away from the wall the drag (9) is extended by a radial part -m c rho', and the fluid rotates as one rigid body. c is
@@ -41,10 +41,7 @@ def vector_field(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.Array
     Array
         dx/dt, shape of x. Whether the contact forces are admissible is not checked, see `contact_forces`.
 
-    Raises
-    ------
-    InputError
-        If x isn't a state of the case (`check_state`).
+    Raises `InputError` if x isn't a state of the case (`check_state`).
     """
     state, fluid = _checked(case, x, p, omega_0)
     return rates(case, state, p, fluid).stacked()[..., : np.shape(x)[-1]]
@@ -62,25 +59,23 @@ def contact_forces(
     """
     state, fluid = _checked(case, x, p, omega_0)
     if case is Case.RR:
-        components = rolling_family(state.omega_c, p, fluid, _rolling_B_y(state.omega_c, p, fluid))
+        best = rolling_forces.least_utilisation(state.omega_c, p, fluid)
+        greatest = rolling_forces.admissible_interval(state.omega_c, p, fluid)[1]  # where the ball can jam
+        B_y = np.where(np.isfinite(best.B_y), best.B_y, greatest)
+        if np.any(stuck := (best.utilisation > 1) | np.isnan(B_y)):
+            value, need = (
+                np.extract(stuck, np.broadcast_to(a, B_y.shape))[0] for a in (state.omega_c, best.utilisation)
+            )
+            raise InputError(
+                f"omega_c = {value:g} rad s-1 cannot be rolled at both points: "
+                f"it takes {need:.4g} times the friction there is, the limit is 1"
+            )
+        components = rolling_family(state.omega_c, p, fluid, B_y)
     else:
         components = forces(case, state, p, fluid)
     shape = np.broadcast_shapes(np.shape(state.omega_c), np.shape(fluid))
     both = np.stack([np.broadcast_to(component, shape) for component in components], axis=-1)
     return both[..., :3], both[..., 3:]
-
-
-def _rolling_B_y(omega_c: Array, p: Parameters, omega_0: Array) -> Array:
-    """The free force of RR with the least utilisation, or the greatest if that is infinite; `InputError` if none."""
-    best = rolling_forces.least_utilisation(omega_c, p, omega_0)
-    B_y = np.where(np.isfinite(best.B_y), best.B_y, rolling_forces.admissible_interval(omega_c, p, omega_0)[1])
-    if np.any(stuck := (best.utilisation > 1) | np.isnan(B_y)):
-        value, need = (np.extract(stuck, np.broadcast_to(a, B_y.shape))[0] for a in (omega_c, best.utilisation))
-        raise InputError(
-            f"omega_c = {value:g} rad s-1 cannot be rolled at both points: "
-            f"it takes {need:.4g} times the friction there is, the limit is 1"
-        )
-    return B_y
 
 
 def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> State:

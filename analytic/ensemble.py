@@ -1,4 +1,4 @@
-"""Many runs at once, by time stepping: what comes of many parameter sets and starts, without every motion in full."""
+"""Many runs at once, by time stepping: states at a few times, for many parameter sets and starts."""
 
 from __future__ import annotations
 
@@ -36,9 +36,6 @@ class Ensemble:
     failure: tuple[str, ...]
     """Why a run failed, empty if it didn't; what it has from there on is nan."""
 
-    def __len__(self) -> int:
-        return len(self.x)
-
 
 def simulate_many(
     parameters: Parameters | Sequence[Parameters],
@@ -62,12 +59,9 @@ def simulate_many(
     quiet : end a run in which nothing has landed for that long, s; its last state stands for the rest
     threads : number of threads, that of the cores if None
 
-    Raises
-    ------
-    InputError
-        If numbers of runs differ, or as `simulate` for the first run that can't start.
+    Raises `InputError` if numbers of runs differ, or as `simulate` for the first run that can't start.
     """
-    from analytic import marching, time_stepping  # here, because numba takes a while to load
+    from analytic import stepping, time_stepping  # here, because numba takes a while to load
 
     settings = settings or Settings(method="time-stepping")
     sets = [parameters] if isinstance(parameters, Parameters) else list(parameters)
@@ -94,7 +88,7 @@ def simulate_many(
     def carry_out(k: int) -> None:
         fluid = flows[k] or Flow.steady(sets[k].omega_0)
         ball, stretches, omega_0, given = time_stepping.prepared(states[k], 0.0, sets[k], fluid, settings, times)
-        end[k] = marching.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k])
+        end[k] = stepping.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k])
         if end[k] < 0:
             end[k] *= -1
             failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"

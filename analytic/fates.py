@@ -1,14 +1,14 @@
-"""What motions come to, from one start or many: a stationary motion, a periodic one, or neither.
+"""Attractors: whether motions from one start or many become stationary, periodic, or neither.
 
-A run is followed window by window until what it does no longer changes. Any simulator may carry it out. What is
-recurrent is closed to an orbit by theory (`orbits`); what is recurrent and no stable orbit is chaotic if neighbours of
-it part exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with what it did last.
+A run is followed window by window until it repeats what it did; any simulator may carry it out. A recurrent motion is
+closed to an orbit by theory (`orbits`). One for which no stable orbit is found is chaotic if neighbours of it part
+exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with what it did last.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -27,16 +27,16 @@ from model.cases import TRAITS
 from model.kinematics import VARIABLES, full_state
 from model.parameters import POSITIVE, check_number
 
-WINDOW, SAMPLES = 100.0, 4000
+WINDOW, WINDOW_SAMPLES = 100.0, 4000
 """Length of a window in units of sqrt(R/g), and samples in it."""
 LASTING = 60.0
 """How long a run is followed, in units of 1/c."""
-STILL = 1e-3
+STATIONARY_RANGE = 1e-3
 """Range of the variables over a window, in natural units, below which a motion that still shrinks is stationary."""
 NEAR = 1e-2
 """Distance in natural units up to which it is that of a stationary solution."""
 ALIKE = 0.05
-"""Distance over the range of the motion up to which states, means and extremes are the same."""
+"""Distance divided by the range of the motion up to which states, means and extremes are the same."""
 GROWING = 400.0
 """Duration over which the Lyapunov exponent is taken, in units of sqrt(R/g)."""
 APART = 1e-6
@@ -47,7 +47,7 @@ Run = Callable[[Parameters, Array, float, float], Trajectory]
 
 
 class Kind(StrEnum):
-    """What a motion comes to."""
+    """The kind of attractor that a motion approaches."""
 
     STATIONARY = "stationary"
     PERIODIC = "periodic"
@@ -122,7 +122,7 @@ def attractors(
     lasting: float | None = None,
     run: Run = event_driven,
 ) -> list[Attractor]:
-    """What balls come to from many starts, the most frequent first.
+    """The attractors that balls approach from many starts, the most frequent first.
 
     Parameters
     ----------
@@ -130,10 +130,7 @@ def attractors(
     lasting : how long a run is followed at most, s; `LASTING`/c if None
     run : the simulator that carries out the runs
 
-    Raises
-    ------
-    InputError
-        If a start is outside of the vessel, a number out of range, or c = 0 without `lasting`.
+    Raises `InputError` if a start is outside of the vessel, a number out of range, or c = 0 without `lasting`.
     """
     states = random_starts(p, starts, seed) if isinstance(starts, int) else np.atleast_2d(full_state(starts))
     if lasting is None and p.c == 0:
@@ -153,44 +150,43 @@ def attractors(
 def settle(
     p: Parameters, x0: npt.ArrayLike, lasting: float, run: Run = event_driven, known: Sequence[Fate] = ()
 ) -> Fate:
-    """What the motion from x0 comes to within `lasting` seconds; `known` fates are recognised without a closer look."""
-    solutions, seen = stable_solutions(p), list[Trajectory]()
-    try:
-        for now in windows(p, full_state(x0), lasting, run):
-            if seen and (fate := _decided(seen[-1], now, solutions, known)):
-                return fate
-            seen = [*seen[-1:], now]
-    except SimulationError as error:
-        return Fate(Kind.UNDECIDED, error.trajectory, failure=str(error))
-    return _aperiodic(seen[-1], run) if len(seen) == 2 and _alike(*seen) else Fate(Kind.UNDECIDED, seen[-1])
+    """The attractor that the motion from x0 approaches within `lasting` seconds; `known` fates are simply recognised.
 
-
-def _decided(
-    before: Trajectory, now: Trajectory, solutions: Sequence[StationarySolution], known: Sequence[Fate]
-) -> Fate | None:
-    """What two windows of a motion show that it comes to; None if not enough."""
-    if extent(now) < STILL and extent(now) <= extent(before):
-        return Fate(Kind.STATIONARY, now, solution=_nearest(now, solutions))
-    if not _alike(before, now):
-        return None
-    same = (fate for fate in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
-    return next(same, None) or closed(now)
-
-
-def windows(p: Parameters, x: Array, lasting: float, run: Run) -> Iterator[Trajectory]:
-    """The motion from x in windows, each from where the last one ended."""
-    window = WINDOW * natural_units(p)[0]
+    It is followed in windows. Stationary is what hardly moves, and less than before. Where two windows are alike the
+    motion is recurrent: it has one of the known fates, or closes; if it does neither, its largest Lyapunov exponent
+    decides.
+    """
+    solutions, x, unit = stable_solutions(p), full_state(x0), natural_units(p)[0]
+    window, seen, recurrent = WINDOW * unit, list[Trajectory](), False
     for _ in range(math.ceil(lasting / window)):
-        part = run(p, x, window, window / SAMPLES)
-        if part.header.failure:
-            raise SimulationError(part.header.failure, part)
-        yield part
-        x = part.x[-1]
+        try:
+            now = run(p, x, window, window / WINDOW_SAMPLES)
+        except SimulationError as error:
+            return Fate(Kind.UNDECIDED, error.trajectory, failure=str(error))
+        if now.header.failure:
+            return Fate(Kind.UNDECIDED, now, failure=now.header.failure)
+        x, seen = now.x[-1], [*seen[-1:], now]
+        if len(seen) < 2:
+            continue
+        before = seen[0]
+        if extent(now) < STATIONARY_RANGE and extent(now) <= extent(before):
+            return Fate(Kind.STATIONARY, now, solution=_nearest(now, solutions))
+        if recurrent := _alike(before, now):
+            same = (fate for fate in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
+            if fate := next(same, None) or periodic(now):
+                return fate
+    if not recurrent:
+        return Fate(Kind.UNDECIDED, seen[-1])
+    try:
+        exponent, deviation = lyapunov(p, _state(seen[-1]), GROWING * unit, unit, run=run)
+    except (SimulationError, InputError) as reason:
+        return Fate(Kind.UNDECIDED, seen[-1], failure=str(reason))
+    return Fate(Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC, seen[-1], exponent=exponent)
 
 
 def _alike(a: Trajectory, b: Trajectory) -> bool:
-    """Whether means and extremes of two windows agree, over the range of the motion."""
-    size = scale(a.header.parameters) * max(extent(a), STILL)
+    """Whether means and extremes of two windows agree, relative to the range of the motion."""
+    size = scale(a.header.parameters) * max(extent(a), STATIONARY_RANGE)
     return all(
         bool(np.all(np.abs(of(a.x, axis=0) - of(b.x, axis=0)) <= ALIKE * size)) for of in (np.mean, np.min, np.max)
     )
@@ -209,7 +205,7 @@ def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> Stati
     return min(near, key=lambda each: (each.case is not case, distance(each)), default=None)
 
 
-def closed(last: Trajectory) -> Fate | None:
+def periodic(last: Trajectory) -> Fate | None:
     """A recurrent motion that closes: with the stable orbit that theory has near it, or after all that one sees.
 
     None if it doesn't close.
@@ -222,12 +218,12 @@ def closed(last: Trajectory) -> Fate | None:
             continue
         if orbit.stable and abs(orbit.period / period - 1) < ALIKE:
             return Fate(Kind.PERIODIC, last, period, orbit=orbit)
-    exact = [period for period, defect in seen if defect < STILL * extent(last)]
+    exact = [period for period, defect in seen if defect < STATIONARY_RANGE * extent(last)]
     return Fate(Kind.PERIODIC, last, exact[0]) if exact else None
 
 
-def _periods(last: Trajectory, most: int = 3) -> list[tuple[float, float]]:
-    """Times after which the motion comes back to about where it was, and by how much it misses; the shortest first.
+def _periods(last: Trajectory) -> list[tuple[float, float]]:
+    """Up to three times after which the motion nearly returns, the shortest first, and by how much it misses.
 
     As far as half the window shows.
     """
@@ -237,7 +233,7 @@ def _periods(last: Trajectory, most: int = 3) -> list[tuple[float, float]]:
     left = int(np.argmax(away > size / 2))
     dips = np.array([k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]], dtype=int)
     good = dips[away[dips] <= 2 * away[dips].min(initial=size) + ALIKE * size]
-    return [(float(k * interval), float(away[k])) for k in good[:most]]
+    return [(float(k * interval), float(away[k])) for k in good[:3]]
 
 
 def _state(last: Trajectory) -> Array:
@@ -247,18 +243,8 @@ def _state(last: Trajectory) -> Array:
     return np.where([name in held for name in VARIABLES], 0.0, last.x[k])
 
 
-def _aperiodic(last: Trajectory, run: Run) -> Fate:
-    """A recurrent motion that no stable orbit is found for."""
-    p, unit = last.header.parameters, natural_units(last.header.parameters)[0]
-    try:
-        exponent, error = lyapunov(p, _state(last), GROWING * unit, unit, run=run)
-    except (SimulationError, InputError) as reason:
-        return Fate(Kind.UNDECIDED, last, failure=str(reason))
-    return Fate(Kind.CHAOTIC if exponent > 3 * error else Kind.QUASI_PERIODIC, last, exponent=exponent)
-
-
 def lyapunov(
-    p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, seed: int = 0, run: Run = event_driven
+    p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, run: Run = event_driven
 ) -> tuple[float, float]:
     """Largest Lyapunov exponent of the motion from x over a duration, and its standard error, s-1.
 
@@ -270,7 +256,7 @@ def lyapunov(
     case = run(p, first, renewed, renewed).cases[0]
     active = [VARIABLES.index(name) for name in TRAITS[case].active]
     push = np.zeros(8)
-    push[active] = np.random.default_rng(seed).normal(size=len(active))
+    push[active] = np.random.default_rng(0).normal(size=len(active))
     second = first + push * scale(p) * APART / np.linalg.norm(push)
     growth, before = [], APART
     for _ in range(math.ceil(duration / renewed)):

@@ -78,10 +78,7 @@ def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
     ----------
     case : which attractor; needed between omega_02 and omega_04 only, where SS lags and SR and NR don't
 
-    Raises
-    ------
-    InputError
-        If there is no attractor (of that case), or if `case` is needed.
+    Raises `InputError` if there is no attractor (of that case), or if `case` is needed.
     """
     followed = stationary.stable_solutions(p) if case is None else [stationary.solution(p, case)]
     if p.c == 0 or not followed:

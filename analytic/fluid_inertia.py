@@ -13,15 +13,15 @@ import math
 from analytic import bifurcation
 from model import Parameters
 
-THRESHOLDS = ("omega_01", "omega_02")
+SHIFTED = ("omega_01", "omega_02")
 """Those that shift: at omega_03 the spin alone carries the weight, and the fold of SS has no closed form any more."""
 
 
 def thresholds(p: Parameters) -> dict[str, float]:
-    """`THRESHOLDS` with the fluid's inertia, rad s-1, nan for what doesn't exist."""
+    """`SHIFTED` with the fluid's inertia, rad s-1, nan for what doesn't exist."""
     rest = 1 - p.density_ratio
     curves = bifurcation.curves_without_drag(p.j / rest, p.mu, p.eta)
-    return {name: float(curves[name]) * math.sqrt(p.g / rest / p.R) for name in THRESHOLDS}
+    return {name: float(curves[name]) * math.sqrt(p.g / rest / p.R) for name in SHIFTED}
 
 
 def shifts(p: Parameters) -> dict[str, float]:
@@ -29,6 +29,6 @@ def shifts(p: Parameters) -> dict[str, float]:
     added mass makes c/(1 + 2j + s/2) whatever the law of drag.
     """
     before, after = bifurcation.thresholds(p), thresholds(p)
-    changes = {name: after[name] / getattr(before, name) - 1 for name in THRESHOLDS if getattr(before, name) != 0}
+    changes = {name: after[name] / getattr(before, name) - 1 for name in SHIFTED if getattr(before, name) != 0}
     rolling = 1 + 2 * p.j
     return changes | {"rolling_rate": rolling / (rolling + p.density_ratio / 2) - 1}

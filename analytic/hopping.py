@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.ensemble import simulate_many
-from analytic.fates import closed
+from analytic.fates import periodic
 from analytic.settings import Settings, fitting_step
 from analytic.simulation import simulate
 from model import Case, Contact, Flow, Parameters, State
@@ -22,7 +22,7 @@ QUIET, LOOKS = 3.0, 12
 """Without a landing for this long, in 1/c, a ball has settled; how often that is looked for in this time."""
 STEPS = 70
 """Steps of the screen in sqrt(R/g)."""
-SEEN, SAMPLES = 25.0, 4000
+SEEN, SEEN_SAMPLES = 25.0, 4000
 """How long the ball is watched for a period, in sqrt(R/g): twice the longest that is looked for; and samples."""
 CONFIRMING = 12.0
 """How long a ball with no period is followed, in 1/c, or four times `SEEN`; the last third of it counts."""
@@ -64,16 +64,16 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     Raises `SimulationError` if the simulation can't go on.
     """
     unit = math.sqrt(p.R / p.g)
-    seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SAMPLES)
+    seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SEEN_SAMPLES)
     if not any(map(_lands, seen.events.from_case, seen.events.to_case)):
         return None
-    fate = closed(seen)
+    fate = periodic(seen)
     if fate and fate.orbit and (landings := sum(itertools.starmap(_lands, fate.orbit.changes))):
         orbit = fate.orbit
         omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R
         return Hopping(landings, orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max()))
     lasts = max(CONFIRMING / p.c, 4 * SEEN * unit)
-    run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SAMPLES)
+    run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SEEN_SAMPLES)
     last = run.time > run.time[-1] * 2 / 3
     times = run.events.time[list(map(_lands, run.events.from_case, run.events.to_case))]
     times = times[times > run.time[-1] * 2 / 3]

@@ -7,7 +7,6 @@ drag RR is known in closed form), and `transitions` says how to go on.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy.typing as npt
 
 from analytic import charts, dynamics, rolling_forces, transitions, two_point_rolling
 from analytic.integrator import StalledError, Stretch
-from analytic.motion import Chart, Fluid, Moment, Path
+from analytic.motion import Fluid, Moment, Path, natural_units
 from analytic.records import REPORT_EVERY, Event, Recorder
 from analytic.rigid_body import NOTHING, Forces
 from analytic.settings import Settings
@@ -24,7 +23,7 @@ from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
 from model.drag import STOKES
 
-_ROUND_OFF = 1e-12
+_LEAST_JUMP = 1e-12
 """Part of the flow by which it may differ before and after a knot without a jump."""
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
@@ -33,10 +32,8 @@ MAX_EVENTS_AT_ONCE = 100
 def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
     """Simulate from state x0 and record; the contract of `simulation.simulate`.
 
-    Raises
-    ------
-    StalledError, NotConvergedError
-        If the integrator, the contact problem or the sequence of cases gets stuck.
+    Raises `StalledError`, `NotConvergedError` if the integrator, the contact problem or the sequence of cases gets
+    stuck.
     """
     t_end = float(recorder.times[-1])
     knots = [0.0, *(t for t in flow.start.tolist() if 0 < t < t_end), t_end]
@@ -45,30 +42,24 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     for start, end in pairwise(knots):
         fluid = Fluid.of(flow, start)
         step = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
-        if case is None or step > _ROUND_OFF * np.abs(flow.value).max():
+        if case is None or step > _LEAST_JUMP * np.abs(flow.value).max():
             before, (case, at, impulse) = case, simulator.settle(at, fluid)
             if (before is not None and before is not case) or impulse is not NOTHING:
                 recorder.events.append(Event(start, case if before is None else before, case, impulse))
         case, at = simulator.advance(case, at, end, fluid)
 
 
-@dataclass
 class _Simulator:
-    p: Parameters
-    settings: Settings
-    recorder: Recorder
-
-    @property
-    def absolute(self) -> float:
+    def __init__(self, p: Parameters, settings: Settings, recorder: Recorder) -> None:
+        self.p, self.settings, self.recorder = p, settings, recorder
+        self.absolute = settings.rtol / 1e3
         """Absolute tolerance in natural units."""
-        return self.settings.rtol / 1e3
-
-    @property
-    def shortest(self) -> Shortest:
-        """A hop that lasts T rises by g T^2/8, well above the tolerance of lengths where it is integrated."""
-        unit = math.sqrt(self.p.R / self.p.g)
-        integrated = math.sqrt(8 * self.absolute) * unit
-        return Shortest(self.settings.rtol * unit if self.p.drag == STOKES else integrated, integrated)
+        time, *_ = natural_units(p)
+        # A hop that lasts T rises by g T^2/8, well above the tolerance of lengths where it is integrated.
+        integrated = math.sqrt(8 * self.absolute) * time
+        self.shortest = Shortest(settings.rtol * time if p.drag == STOKES else integrated, integrated)
+        self.still = 10 * settings.rtol * math.sqrt(p.g * p.R) / p.r
+        """Slip in rad s-1 that counts as zero where the other contact has just stuck."""
 
     def advance(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[Case, Moment]:
         """Go on through all events before `until`."""
@@ -111,22 +102,17 @@ class _Simulator:
                 return *transitions.leave(at, self.p, fluid(at.time)), NOTHING
             case "A sticks":
                 x = x._replace(slip_x=0.0, slip_z=-(x.v_h + x.v_y) / self.p.r)
-                if case.B is Contact.S and abs(x.slip_y) <= self._still:
+                if case.B is Contact.S and abs(x.slip_y) <= self.still:
                     x = x._replace(slip_y=0.0)
             case "B sticks":
                 x = x._replace(slip_y=0.0, slip_z=0.0)
-                if case.A is Contact.S and abs(x.slip_x) <= self._still:
+                if case.A is Contact.S and abs(x.slip_x) <= self.still:
                     x = x._replace(slip_x=0.0)
             case "A lands":
                 x = x._replace(y=0.0)
             case "B lands":
                 x = x._replace(h=0.0)
         return self.settle(at._replace(x=x), fluid)
-
-    @property
-    def _still(self) -> float:
-        """Slip in rad s-1 that counts as zero where the other contact has just stuck."""
-        return 10 * self.settings.rtol * math.sqrt(self.p.g * self.p.R) / self.p.r
 
     def _forces_at(self, case: Case, at: Moment, fluid: Fluid) -> Forces:
         path = Path(*(np.array([value]) for value in at))
@@ -137,7 +123,9 @@ class _Simulator:
         p = self.p
         end = two_point_rolling.end(at, until, p, fluid, self.settings.leave_rolling)
         stop = until if end is None else end
-        times = self._samples(at.time, stop)
+        times = self.recorder.times
+        first = int(np.searchsorted(times, at.time, side="right")) if self.recorder.taken else 0
+        times = times[first : int(np.searchsorted(times, stop, side="right"))]
         path = two_point_rolling.path(np.append(times, stop), at, p, fluid)
         self._record(Case.RR, path, np.append(np.full(len(times), True), False), fluid)
         return None if end is None else "RR ends", _moment(path, -1)
@@ -153,7 +141,11 @@ class _Simulator:
         sampled, guard = [self.recorder.taken == 0], None
         tolerances = self.settings.rtol, self.absolute
         stretch = Stretch(motion, at.time, until, self.recorder.times, *tolerances, fluid.steady)
-        hop = self._hop(motion, at, fluid)
+        x, hop = at.x, math.inf
+        if (x.y == 0 < x.v_y and motion.landing == math.inf) or x.h == 0 < x.v_h:  # it is just rebounding
+            dx = dynamics.newton_euler(case, x, self._forces_at(case, at, fluid), self.p, fluid(at.time))
+            hops = ((x.y, x.v_y, dx.v_y), (x.h, x.v_h, dx.v_h))
+            hop = min((2 * v / -a for gap, v, a in hops if gap == 0 < v and a < 0), default=math.inf)
         try:
             for count, step in enumerate(stretch.steps(hop / 20 if hop < until - at.time else None), 1):
                 times += [*step.sample_times, step.time]
@@ -166,22 +158,6 @@ class _Simulator:
             path = motion.path(np.array(times), np.array(states).T)
             self._record(case, path, np.array(sampled), fluid)
         return guard or ("A lands" if lands else None), _moment(path, -1)
-
-    def _hop(self, motion: Chart, at: Moment, fluid: Fluid) -> float:
-        """About how long the ball will be off floor or wall if it is just rebounding from it, s; else inf."""
-        x = at.x
-        if not ((x.y == 0 < x.v_y and motion.landing == math.inf) or x.h == 0 < x.v_h):
-            return math.inf
-        forces = self._forces_at(motion.case, at, fluid)
-        dx = dynamics.newton_euler(motion.case, x, forces, self.p, fluid(at.time))
-        hops = [2 * v / -a for gap, v, a in ((x.y, x.v_y, dx.v_y), (x.h, x.v_h, dx.v_h)) if gap == 0 < v and a < 0]
-        return min(hops, default=math.inf)
-
-    def _samples(self, start: float, stop: float) -> Array:
-        """Times to sample within (start, stop], and the very first."""
-        times = self.recorder.times
-        first = int(np.searchsorted(times, start, side="right")) if self.recorder.taken else 0
-        return times[first : int(np.searchsorted(times, stop, side="right"))]
 
     def _record(self, case: Case, path: Path, wanted: npt.NDArray[np.bool_], fluid: Fluid) -> None:
         if not np.any(wanted):

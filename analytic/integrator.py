@@ -32,11 +32,7 @@ LOCAL = 0.25
 
 
 class StalledError(ArithmeticError):
-    """The run makes no progress."""
-
-
-class _SolverError(ArithmeticError):
-    """A solver can't go on."""
+    """A solver can't go on, or the run makes no progress."""
 
 
 class Step(NamedTuple):
@@ -95,10 +91,10 @@ class Stretch:
                         return
                     if grown if small else slow > PATIENCE:
                         break
-            except _SolverError as error:
+            except StalledError:
                 failures += 1
                 if failures > MAX_RESTARTS:
-                    raise StalledError(str(error)) from error
+                    raise
             small = not small
 
     def _straight(self, t: float, z: Sequence[float]) -> Step | None:
@@ -140,7 +136,7 @@ class Stretch:
             message = solver.step()
             z = solver.y.tolist()
             if solver.status == "failed" or not math.isfinite(sum(z)):
-                raise _SolverError(f"{method.__name__} in case {motion.case.name}: {message}")
+                raise StalledError(f"{method.__name__} in case {motion.case.name}: {message}")
             t = self.until if solver.t == solver.t_bound else start + float(solver.t)
             fired = watch.fired(t, z)
             if not fired and (taken == len(times) or times[taken] > t):

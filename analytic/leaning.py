@@ -20,10 +20,8 @@ def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArra
     of slip_x the sum of the two is -(c + mu s (g/(R omega_0) - (1+j) omega_0))/(1+j), their product
     -mu s c omega_0/(1+j), where c is that of a vanishing lag.
 
-    Raises
-    ------
-    InputError
-        If SR has no stationary solution that leans: for mu = 0, omega_0 = 0, and at omega_03, where slip_x = 0.
+    Raises `InputError` if SR has no stationary solution that leans: for mu = 0, omega_0 = 0, and at omega_03, where
+    slip_x = 0.
     """
     leaning = [s.state for s in stationary.stationary_solutions(p, (Case.SR,)) if p.mu > 0]
     if not leaning:

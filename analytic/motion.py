@@ -1,4 +1,4 @@
-"""What a stretch of motion is made of: a moment, a path, and the chart of a case, its regular coordinates."""
+"""Data of the event-driven simulation: a moment, a path of one case, and the chart of a case, its coordinates."""
 
 from __future__ import annotations
 

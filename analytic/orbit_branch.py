@@ -7,7 +7,7 @@ between two orbits, the place is located.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -21,7 +21,7 @@ from model import Contact, InputError, Parameters, State
 from model.arrays import Array
 from model.parameters import check_names, check_number
 
-FIRST, SMALLEST, LONGEST = 0.05, 1e-5, 0.5
+FIRST_STEP, LEAST_STEP, LONGEST_STEP = 0.05, 1e-5, 0.5
 """Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
 GRAZING = 0.01
 """Longest step in which the number of landings may change: other branches, as of balls that ride the wall, are near."""
@@ -31,7 +31,7 @@ SHARP = 1e-6
 """How sharply a change of stability is located along the branch; a change of the sequence of cases by `HALVINGS`."""
 HALVINGS = 10
 SMALL = 0.05
-"""Extent over the largest of the branch below which an orbit is followed no further, but on to none at all."""
+"""Extent divided by the largest of the branch, below which the branch is extrapolated to extent zero."""
 
 
 class Bifurcation(StrEnum):
@@ -96,10 +96,7 @@ class OrbitBranch:
 def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) -> OrbitBranch:
     """Follow an orbit both ways in a parameter until it leaves [low, high], ends, or `most` orbits are known each way.
 
-    Raises
-    ------
-    InputError
-        If there is no such parameter, or the orbit isn't within the range.
+    Raises `InputError` if there is no such parameter, or the orbit isn't within the range.
     """
     check_names([name], [field.name for field in Parameters.quantities()], "parameter")
     low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
@@ -116,7 +113,7 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
 
 def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: int) -> Iterator[Orbit | Place]:
     """Orbits and places one way from an orbit, to the end."""
-    here, step, before, reason = start, FIRST, [start], ""
+    here, step, before, reason = start, FIRST_STEP, [start], ""
     along = np.append(np.zeros(len(start.loop.free)), sign)
     for _ in range(most):
         try:
@@ -127,7 +124,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
         tangent = np.linalg.svd(matrix)[2][-1]
         along = tangent if tangent @ along >= 0 else -tangent
         there = None
-        while there is None and step > SMALLEST:
+        while there is None and step > LEAST_STEP:
             try:
                 there = _beside(here, step * along, name, matrix)
             except NoOrbitError as error:
@@ -141,11 +138,22 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
             yield from _edge(here, there, name, span)
             return
         yield there
-        step = min(LONGEST, 1.5 * step if there.steps <= EASY else 0.7 * step)
-        here, along = _renewed(there, along)
+        step = min(LONGEST_STEP, 1.5 * step if there.steps <= EASY else 0.7 * step)
+        # The same orbit through a section anew: on the floor orbits may shrink away from one.
+        if State.of(there.loop.x).y > 0:
+            here = replace(there, loop=replace(there.loop, extent=extent(there.cycle)))
+        else:
+            here = close(Loop.of(there.p, there.loop.x, there.period))
+            if (here.loop.case, here.loop.fixed) != (there.loop.case, there.loop.fixed):
+                # The section is another: the parameter alone says which way the branch goes on.
+                along = np.append(np.zeros(len(here.loop.free)), along[-1])
         before.append(here)
         if here.loop.extent < SMALL * max(each.loop.extent for each in before):
-            yield _birth(name, before[-3:])
+            # The extent will be zero where a parabola through the last three orbits says.
+            last, (kind, power) = before[-3:], (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2)
+            sizes = np.array([each.loop.extent for each in last]) ** power
+            values = np.array([getattr(each.p, name) for each in last])
+            yield Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), here)
             return
     yield Place(Bifurcation.LOST, getattr(here.p, name), here, f"not followed beyond {most} orbits")
 
@@ -156,19 +164,6 @@ def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
     if _strays(here, by, orbit.changes):
         raise NoOrbitError("the nearest orbit is one of another branch")
     return orbit
-
-
-def _renewed(orbit: Orbit, along: Array) -> tuple[Orbit, Array]:
-    """The same orbit through a section anew: on the floor orbits may shrink away from one.
-
-    Where the section is another, the parameter alone says which way the branch goes on.
-    """
-    if State.of(orbit.loop.x).y > 0:
-        return replace(orbit, loop=replace(orbit.loop, extent=extent(orbit.cycle))), along
-    fresh = close(Loop.of(orbit.p, orbit.loop.x, orbit.period))
-    if (fresh.loop.case, fresh.loop.fixed) == (orbit.loop.case, orbit.loop.fixed):
-        return fresh, along
-    return fresh, np.append(np.zeros(len(fresh.loop.free)), along[-1])
 
 
 def _edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) -> Iterator[Orbit | Place]:
@@ -188,7 +183,8 @@ def _edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) -> It
 def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:
     """What happens between an orbit and the next, a step away."""
     for kind, sign in _TESTS.items():
-        if _outside(here) == _outside(there) or (sign(here.multipliers) > 0) == (sign(there.multipliers) > 0):
+        outside = [np.sum(np.abs(each.multipliers) > 1) for each in (here, there)]
+        if outside[0] == outside[1] or (sign(here.multipliers) > 0) == (sign(there.multipliers) > 0):
             continue
 
         def test(share: float, sign: Callable[[Any], float] = sign) -> float:
@@ -224,14 +220,6 @@ def _change(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) ->
     return Place(kind, getattr(loop.p, name), nearest)
 
 
-def _birth(name: str, last: Sequence[Orbit]) -> Place:
-    """Where the extent of shrinking orbits will be zero: by a parabola through the last three."""
-    kind, power = (Bifurcation.BIRTH, 1) if last[-1].changes else (Bifurcation.HOPF, 2)
-    sizes = np.array([each.loop.extent for each in last]) ** power
-    values = np.array([getattr(each.p, name) for each in last])
-    return Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), last[-1])
-
-
 def _sequence(changes: Changes) -> Changes:
     """The changes of case of a period, from wherever it is the least in order."""
     turns = [changes[k:] + changes[:k] for k in range(len(changes))]
@@ -245,10 +233,6 @@ def _strays(here: Orbit, by: Array, changes: Changes) -> bool:
 
 def _landings(changes: Changes) -> int:
     return sum(before.A is Contact.N is not after.A for before, after in changes)
-
-
-def _outside(orbit: Orbit) -> int:
-    return int(np.sum(np.abs(orbit.multipliers) > 1))
 
 
 def _reals(multipliers: npt.NDArray[np.complex128]) -> Array:

@@ -27,17 +27,17 @@ from model.arrays import Array
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
 
-RTOL = 1e-12
+RETURN_RTOL = 1e-12
 """Relative tolerance of the simulation under the return map."""
 SHIFT = 3e-5
-"""Half width of the differences over the extent of the orbit: what they cut off and what RTOL leaves is below 1e-6."""
+"""Half width of the differences divided by the extent of the orbit: truncation and RETURN_RTOL leave less than 1e-6."""
 CLOSED = 1e-10
 """Defect in natural units at which an orbit is closed."""
 ITERATIONS = 8
 """Steps of Newton's method after which an orbit is given up."""
 FAST = 10.0
 """Factor by which a step must reduce the defect for the derivatives of a neighbour to be used once more."""
-SAMPLES = 4000
+ORBIT_SAMPLES = 4000
 """Samples of a period from which means and extremes are taken: a parabola's top is then good to 1e-6 of its height."""
 
 Changes = tuple[tuple[Case, Case], ...]
@@ -73,7 +73,7 @@ class Loop:
         Of a ball that hops the top of its highest hop, v_y = 0. On the floor, within the middle half of the longest
         stretch in one case other than RR, where the case's fastest variable is fastest, in natural units.
         """
-        run = _simulated(p, x, 2 * period, SAMPLES)
+        run = _simulated(p, x, 2 * period, ORBIT_SAMPLES)
         size, y = extent(run), run.y
         tops = 1 + np.flatnonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:]))
         if len(tops):
@@ -121,45 +121,39 @@ class Loop:
         It is simulated for the period, and then followed to the section nearby, forwards or backwards, by the
         equations of the case.
         """
-        run = _simulated(self.p, self.x, self.period, 1)
+
+        def rates(t: float, z: Array) -> list[float]:
+            return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))
+
+        run, tolerance = _simulated(self.p, self.x, self.period, 1), RETURN_RTOL * scale(self.p)
         if run.cases[-1] is not self.case:
             raise NoOrbitError(f"after {self.period:g} s the ball is in {run.cases[-1].name}, not in {self.case.name}")
         x, late = run.x[-1], 0.0
         for _ in range(ITERATIONS):
-            short = (self.x - x)[self.fixed] / dynamics.rates(self.case, x.tolist(), self.p, self.p.omega_0)[self.fixed]
+            short = (self.x - x)[self.fixed] / rates(0.0, x)[self.fixed]
             if abs(short) < 1e-15 * self.period:
                 break
             late += short
             if not abs(late) < self.period / 4:
                 raise NoOrbitError(f"after {self.period:g} s the ball is far from where it was")
-            x = self._followed(x, short)
+            x = np.asarray(solve_ivp(rates, (0.0, short), x, "DOP853", rtol=RETURN_RTOL, atol=tolerance).y[:, -1])
         changes = tuple((Case(a), Case(b)) for a, b in zip(run.events.from_case, run.events.to_case, strict=True))
         turn = run.theta[-1] - run.theta[0] + late * (State.of(x).omega_c + run.omega_c[-1]) / 2
         return Return(x, float(self.period + late), changes, float(turn))
 
-    def _followed(self, x: Array, duration: float) -> Array:
-        def rates(t: float, z: Array) -> list[float]:
-            return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))
-
-        tolerance = RTOL * scale(self.p)
-        return np.asarray(solve_ivp(rates, (0.0, duration), x, "DOP853", rtol=RTOL, atol=tolerance).y[:, -1])
-
     def derivative(self) -> Array:
         """Derivative (d - 1, d - 1) of the return map."""
-        return np.stack([self._slope(unit) for unit in np.eye(len(self.free))], axis=-1)
+        return np.stack([self.slope(unit) for unit in np.eye(len(self.free))], axis=-1)
 
-    def slope(self, varied: str) -> Array:
-        """Derivative (d - 1,) of the return map by the logarithm of a parameter."""
-        return self._slope(np.eye(len(self.free) + 1)[-1], varied)
-
-    def _slope(self, along: Array, varied: str | None = None) -> Array:
+    def slope(self, along: Array, varied: str | None = None) -> Array:
+        """Derivative (d - 1,) of the return map in a direction as in `moved`."""
         shift = SHIFT * self.extent
         high, low = (self.moved(sign * shift * along, varied).back().x for sign in (1, -1))
         return self.coordinates(high - low) / (2 * shift)
 
 
 class Return(NamedTuple):
-    """What a loop comes to."""
+    """Where and when the motion of a loop returns to the section."""
 
     x: Array
     period: float
@@ -211,8 +205,8 @@ class Orbit:
 
     @cached_property
     def cycle(self) -> Trajectory:
-        """One period, `SAMPLES` equal parts of it."""
-        return _simulated(self.p, self.loop.x, self.period, SAMPLES)
+        """One period, `ORBIT_SAMPLES` equal parts of it."""
+        return _simulated(self.p, self.loop.x, self.period, ORBIT_SAMPLES)
 
     @property
     def mean(self) -> Array:
@@ -227,11 +221,8 @@ def refine(p: Parameters, x: npt.ArrayLike, period: float) -> Orbit:
 
     The guess may be off by some percent of the orbit.
 
-    Raises
-    ------
-    NoOrbitError
-        If Newton's method does not converge to `CLOSED` within `ITERATIONS` steps, or the ball doesn't come back from
-        beside the orbit, so that the return map has no derivative.
+    Raises `NoOrbitError` if Newton's method does not converge to `CLOSED` within `ITERATIONS` steps, or the ball
+    doesn't come back from beside the orbit, so that the return map has no derivative.
     """
     return close(Loop.of(p, x, period))
 
@@ -247,7 +238,7 @@ def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None)
 
 
 def closed(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> tuple[Loop, Return, int]:
-    """The loop of `close`, what it comes to, and the steps that Newton's method took."""
+    """The loop of `close`, its return, and the steps that Newton's method took."""
     before = math.inf
     for step in range(ITERATIONS + 1):
         back = loop.back()
@@ -269,7 +260,7 @@ def closed(loop: Loop, varied: str | None = None, neighbour: Array | None = None
 def jacobian(loop: Loop, derivative: Array, varied: str | None = None) -> Array:
     """Derivative (d - 1, d - 1) of the defect of a loop; with one more column if a parameter is varied."""
     by_state = derivative - np.eye(len(derivative))
-    return np.column_stack([by_state, loop.slope(varied)]) if varied else by_state
+    return np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)]) if varied else by_state
 
 
 def extent(run: Trajectory) -> float:
@@ -286,7 +277,7 @@ def scale(p: Parameters) -> Array:
 def _simulated(p: Parameters, x: npt.ArrayLike, duration: float, samples: int) -> Trajectory:
     """The motion from a state; `NoOrbitError` if it breaks down or can't begin."""
     try:
-        return simulate(p, x, duration, sample_interval=duration / samples, rtol=RTOL)
+        return simulate(p, x, duration, sample_interval=duration / samples, rtol=RETURN_RTOL)
     except (SimulationError, InputError) as error:
         raise NoOrbitError(f"no motion for {duration:g} s: {error}") from error
 

@@ -27,11 +27,11 @@ PHASES, CLOSER = 360, 32
 """Phases of a period at which slip is looked for, and twice more in the two cells around the least margin."""
 HARMONICS, FINE = 32, 128
 """Of the lag: odd ones, as a sine and every law of drag are; those left out are some 10^-6 of it, and 10^-7."""
-NEWTON, SOLVED = 50, 1e-9
-"""Most steps of Newton's method for it, and what may be left of its equation, over the flow's acceleration."""
-ROUNDS, DEPTH, SETTLED, RTOL = 100, 2, 1e-6, 1e-6
+LAG_STEPS, SOLVED = 50, 1e-9
+"""Most steps of Newton's method for it, and the largest residual, divided by the flow's acceleration."""
+ROUNDS, DEPTH, SETTLED, PERIODIC_RTOL = 100, 2, 1e-6, 1e-6
 """Most periods that `mean_error` simulates; how many differences point to the next; by how much the last may change the
-motion, over the flow; and the integrator's rtol. The mean is then known to some 1e-6 of the flow."""
+motion, divided by the flow; and the integrator's rtol. The mean is then known to some 1e-6 of the flow."""
 
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
@@ -46,7 +46,7 @@ def _swing(p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], pha
 
 
 def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex:
-    """That of omega_c in `swing` over that of omega_0; with Stokes' law `response.transfer` at any amplitude."""
+    """First harmonic of omega_c in `swing` divided by that of omega_0; with Stokes' law that is `response.transfer`."""
     return complex(1 + 1j * lag_harmonics(p, amplitude, frequency, FINE)[0] / amplitude)
 
 
@@ -63,7 +63,7 @@ def lag_harmonics(
     push = amplitude * turn * np.cos(phase)
     rate = drag.coefficient(p.R * amplitude, p) / inertia
     lag = -amplitude * turn * np.real(np.exp(1j * phase) / (rate + 1j * turn))
-    for _ in range(NEWTON):
+    for _ in range(LAG_STEPS):
         speed = p.R * np.abs(lag)
         left = turn * (derivative @ lag) + drag.coefficient(speed, p) * lag / inertia + push
         if np.abs(left).max() <= SOLVED * amplitude * turn:
@@ -140,7 +140,7 @@ def mean_error(
     amplitude: float,
     frequency: float,
     settled: float = SETTLED,
-    rtol: float = RTOL,
+    rtol: float = PERIODIC_RTOL,
     leave_rolling: str = "slip-stability",
 ) -> float:
     """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic; frequency in Hz.

@@ -57,23 +57,20 @@ class Recorder:
         block["force_A"], block["force_B"], block["case"] = forces[:, :3], forces[:, 3:], case
         self._blocks.append(block)
         self.taken += len(block)
-        self._balance(rigid_body.energy(state.y, rigid_body.velocities(state, self.p), self.p), work)
-        if len(time):
-            self.reached(float(time[-1]))
+        if not len(time):
+            return
+        energy = rigid_body.energy(state.y, rigid_body.velocities(state, self.p), self.p)
+        if math.isnan(self._first):
+            self._first = float(energy[0] - work[0])  # an impact may precede the first sample
+        self._residual = max(self._residual, float(np.max(np.abs(energy - work - self._first))))
+        self._scale = max(self._scale, float(np.max(np.abs(energy))), float(np.max(np.abs(work))))
+        self.reached(float(time[-1]))
 
     def reached(self, time: float) -> None:
         """Note how far the run has come."""
         self.time = max(self.time, time)
         if self._progress:
             self._progress(self.time / float(self.times[-1]))
-
-    def _balance(self, energy: Array, work: Array) -> None:
-        """Keep the largest change of E - W, and of the energies in play."""
-        if len(energy):
-            if math.isnan(self._first):
-                self._first = float(energy[0] - work[0])  # an impact may precede the first sample
-            self._residual = max(self._residual, float(np.max(np.abs(energy - work - self._first))))
-            self._scale = max(self._scale, float(np.max(np.abs(energy))), float(np.max(np.abs(work))))
 
     def trajectory(self, header: Header) -> Trajectory:
         """The run so far; adds ``energy_residual`` and ``energy_scale`` in J to the settings of the header.

@@ -19,7 +19,7 @@ from model.drag import STOKES
 AIRY_ZERO = 2.338107410459767
 """-z at the first zero of Airy's function Ai(z)."""
 _GRID = 20_000
-_STEP = 1e-3
+_BRANCH_STEP = 1e-3
 """Step of differences along the branch at the fold: their errors are its square."""
 
 
@@ -31,7 +31,7 @@ def rolling_rate(p: Parameters) -> float:
 
 
 def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-    """omega_c over omega_0, complex, where the flow pulsates a little about p.omega_0 at frequencies in Hz, same shape.
+    """omega_c divided by omega_0, complex, in small pulsations about p.omega_0 at frequencies in Hz, same shape.
 
     About the stable motion of the case; its modulus is the gain, its argument the phase lead (negative: a lag).
     Raises `InputError` if there is no such motion.
@@ -42,7 +42,7 @@ def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray
 
 
 def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
-    """Change of omega_c at times t >= 0 in s after a small jump of the flow, over the jump; same shape.
+    """Change of omega_c at times t >= 0 in s after a small jump of the flow, divided by the jump; same shape.
 
     About the stable motion of the case at p.omega_0, as in `transfer`.
     """
@@ -53,7 +53,7 @@ def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
 
 
 def peak(p: Parameters, case: Case) -> tuple[float, float]:
-    """Time in s and height, over that at the end, of the highest point of the `step_response`; inf, 1 if it creeps."""
+    """Time in s and height of the top of the `step_response`, divided by its end value; inf, 1 if it creeps."""
     slowest = 1 / np.abs(np.linalg.eigvals(_linear(p, case)[0]).real).min()
     t = np.linspace(0.0, 8 * slowest, _GRID)
     y = step_response(p, case, t) / np.real(transfer(p, case, 0.0))
@@ -71,10 +71,10 @@ def ramp_coefficient(p: Parameters) -> float:
     s = float(slipping_branch.fold(p))
     if np.isnan(s):
         raise InputError(f"there is no fold at eta = {p.eta:g}: the branch of SS doesn't turn back")
-    places = s + _STEP * np.array([-1.0, 0.0, 1.0])
+    places = s + _BRANCH_STEP * np.array([-1.0, 0.0, 1.0])
     flows, values = branch_stability.states(places, p)[1], branch_stability.eigenvalues_at(places, p)
     slow = np.take_along_axis(values, np.abs(values).argmin(axis=-1)[:, None], axis=-1)[:, 0].real
-    slope, curvature = (slow[2] - slow[0]) / (2 * _STEP), (flows[0] - 2 * flows[1] + flows[2]) / _STEP**2
+    slope, curvature = (slow[2] - slow[0]) / (2 * _BRANCH_STEP), (flows[0] - 2 * flows[1] + flows[2]) / _BRANCH_STEP**2
     return float(AIRY_ZERO * (-(slope**2) / (2 * curvature)) ** (-1 / 3))
 
 

@@ -17,10 +17,7 @@ from model.parameters import POSITIVE, Range, check_choice, check_number
 class Settings:
     """How to simulate.
 
-    Raises
-    ------
-    InputError
-        If a value is out of range.
+    Raises `InputError` if a value is out of range.
     """
 
     method: str = "event"

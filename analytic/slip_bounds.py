@@ -1,8 +1,8 @@
 """Where slip begins to grow (sections 3.2 and 4): gamma in closed form along each arrow, with its zero and its slope.
 
 Out of NR gamma is known at every state, (56)-(61). Where the ball goes round with the fluid gamma is a straight line
-over omega_0^2, (61), (67), (74), (82), (83): `SlipBound`. At a fixed omega_c, for a ball that lags behind the fluid or
-leads, it is one over the fluid's push, with Stokes' law over omega_0, (66), (73): `HeldBound`. `slip_stability.gamma`
+in omega_0^2, (61), (67), (74), (82), (83): `SlipBound`. At a fixed omega_c, for a ball that lags behind the fluid or
+leads, it is one in the fluid's push, with Stokes' law in omega_0, (66), (73): `HeldBound`. `slip_stability.gamma`
 gives the same from the vector fields, along any direction.
 """
 

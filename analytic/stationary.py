@@ -21,10 +21,10 @@ from model import Case, InputError, Parameters, State
 from model.arrays import Array
 from model.drag import QUADRATIC, STOKES
 
-_MIRROR = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
-"""Signs of the state of the other sense of rotation."""
-_ROUND_OFF = 1e-9
-"""Real part over modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
+_MIRROR, _MIRROR_FORCE = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0), np.array([1.0, 1.0, -1.0])
+"""Signs of state and forces of the other sense of rotation."""
+_LEAST_REAL_PART = 1e-9
+"""Real part divided by modulus below which an eigenvalue counts as imaginary: the pair of NS is so, exactly."""
 
 
 class Stability(Enum):
@@ -89,7 +89,16 @@ def stationary_solutions(p: Parameters, cases: Collection[Case] = tuple(Case)) -
     c = 0 RR, SR and NR, with omega_c undetermined in RR; SS needs mu, c > 0 and eta < j.
     """
     if p.omega_0 < 0:
-        return [_mirrored(s) for s in stationary_solutions(p.replace(omega_0=-p.omega_0), cases)]
+        return [
+            replace(
+                s,
+                x=np.multiply(_MIRROR, s.x) + 0.0,
+                force_A=_MIRROR_FORCE * s.force_A + 0.0,
+                force_B=_MIRROR_FORCE * s.force_B + 0.0,
+                alpha=-s.alpha,
+            )
+            for s in stationary_solutions(p.replace(omega_0=-p.omega_0), cases)
+        ]
     solvers = {Case.RR: _rr, Case.RS: _rs, Case.SR: _sr, Case.SS: _ss, Case.NR: _nr, Case.NS: _ns}
     return [s for case, solve in solvers.items() if case in cases for s in solve(p)]
 
@@ -99,10 +108,8 @@ def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = F
 
     `formal` takes it even if its contact forces are inadmissible: NR below omega_02, SR with A_y < 0.
 
-    Raises
-    ------
-    InputError
-        If there is none, or more than one (two are unstable between the Hopf points of a very rough floor).
+    Raises `InputError` if there is none, or more than one (two are unstable between the Hopf points of a very rough
+    floor).
     """
     those = [s for s in stationary_solutions(p, (case,)) if s.stable == stable and (formal or s.exists)]
     if len(those) != 1:
@@ -125,7 +132,7 @@ def slowest_time_constant(of: StationarySolution) -> float:
     if of.stability is Stability.ALGEBRAIC:
         return np.inf
     rates = -of.eigenvalues.real
-    decaying = rates[rates > _ROUND_OFF * np.abs(of.eigenvalues).max()]
+    decaying = rates[rates > _LEAST_REAL_PART * np.abs(of.eigenvalues).max()]
     return float(1 / decaying.min()) if decaying.size else np.inf
 
 
@@ -173,7 +180,7 @@ def _solution(
 def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) -> Stability:
     """By the rightmost of the eigenvalues, without the `zeros` that belong to the free variables of a family."""
     rest = values[np.argsort(np.abs(values))][zeros:]
-    if np.any(rest.real > _ROUND_OFF * np.abs(rest)):
+    if np.any(rest.real > _LEAST_REAL_PART * np.abs(rest)):
         return Stability.UNSTABLE
     return Stability.NEUTRAL if neutral else Stability.ASYMPTOTIC
 
@@ -247,9 +254,3 @@ def _lifting_spin(p: Parameters) -> float:
 def _wall_carries(p: Parameters) -> bool:
     """Whether friction at the wall carries the weight: (35), whose sign is misprinted, and (46)."""
     return p.eta * p.Omega_0**2 >= 1
-
-
-def _mirrored(s: StationarySolution) -> StationarySolution:
-    flip = np.array([1.0, 1.0, -1.0])
-    x = np.multiply(_MIRROR, s.x)
-    return replace(s, x=x + 0.0, force_A=flip * s.force_A + 0.0, force_B=flip * s.force_B + 0.0, alpha=-s.alpha)

@@ -1,14 +1,18 @@
-"""One Moreau-Jean step, compiled where numba is installed: plain floats in named tuples."""
+"""Moreau-Jean steps and the loops over them, compiled where numba is installed: plain floats in named tuples."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from analytic import drag
-from analytic.compiling import compiled
-from analytic.corner import Impulse, both, project
-from analytic.rigid_body import Forces, Velocities
+import numpy as np
+import numpy.typing as npt
+
+from analytic import contact_problem, drag, rigid_body
+from analytic.compiling import callable_when_compiled, compiled
+from analytic.contact_problem import Friction, Impulse, both, project
+from analytic.rigid_body import Forces, Velocities, mean
+from model.arrays import Array
 
 TOLERANCE, BARELY = 1e-14, 1e-11
 """Change of an impulse per mass in a sweep at which it stops, relative to sqrt(g R) or the fastest velocity; and what
@@ -30,11 +34,11 @@ ROLLS, SLIPS, OPEN = 0, 1, 2
 """State of a contact; three times that of A plus that of B is the code of the case, see `model.Case`."""
 
 
-_rate = compiled(drag.rate)
+callable_when_compiled(drag.rate, mean, rigid_body.state, *contact_problem.COMPILED)
 
 
 class Constants(NamedTuple):
-    """What a step needs of parameters and settings."""
+    """Parameters and settings of a step."""
 
     law: drag.Law
     m: float
@@ -46,6 +50,15 @@ class Constants(NamedTuple):
     g: float
     e: float
     """Coefficient of restitution."""
+
+
+class FlowArrays(NamedTuple):
+    """Arrays of a `model.Flow`."""
+
+    start: Array
+    value: Array
+    slope: Array
+    waves: Array
 
 
 class At(NamedTuple):
@@ -95,75 +108,63 @@ def solve(
 
     Smooth forces, at the mean of both velocities, and contacts are iterated together; `start` guesses the impulses.
     """
-    s = _solved(at, dt, omega_0, in_A, in_B, to_A, to_B, start, p, TOLERANCE)
-    return s if s.residual == 0 else _solved(at, dt, omega_0, in_A, in_B, to_A, to_B, start, p, BARELY)
-
-
-@compiled
-def _solved(
-    at: At,
-    dt: float,
-    omega_0: float,
-    in_A: bool,
-    in_B: bool,
-    to_A: float,
-    to_B: float,
-    start: Forces,
-    p: Constants,
-    tolerance: float,
-) -> Solved:
     v_h, v_y, v_k, o_x, o_y, o_z = old = at.u
     m, r, j = p.m, p.r, p.j
     fastest = max(abs(v_h), abs(v_y), abs(v_k), r * max(abs(o_x), abs(o_y), abs(o_z)))
-    enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
-    still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
     rest = j / (1 + j)  # share of m that a tangential impulse feels at the contact point
-    # Slip to come is added to what there is: half of that is the mean, which friction opposes where a contact slides
-    # on. Where it may stop friction opposes what is left at the end, lest it reverse the slip.
+    # Old and new slip are added, since friction opposes their mean where a contact slides on. Where slip may stop
+    # within the step, friction opposes the final slip, so that it cannot reverse.
     slip_A, slip_B = (v_h + r * o_z, v_k - r * o_x), (v_y - r * o_z, v_k + r * o_y)
     load = SLIDES * (max(p.g * dt - v_y, 0.0) + max(v_k * v_k / (p.R - at.h) * dt - v_h, 0.0))
     if dt == 0 or rest * _size(slip_A[0], slip_A[1]) <= p.mu * load:
         slip_A = (0.0, 0.0)
     if dt == 0 or rest * _size(slip_B[0], slip_B[1]) <= p.eta * load:
         slip_B = (0.0, 0.0)
-    A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
-    if in_A:
-        A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
-    if in_B:
-        B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m)
-    new, last, change = old, 0.0, p.g * dt
-    for _ in range(MAX_ITERATIONS):
-        u = _mean(old, new)
-        x_i = at.h - p.R + dt / 2 * u.v_h
-        x_k, spin = (0.0, -u.v_k / x_i) if in_B else (dt / 2 * u.v_k, 0.0)
-        # (20) with (9), no contact
-        w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
-        c = _rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law) if p.law.blunt > 0 else p.law.linear
-        f_h = v_h - dt * (spin * u.v_k + c * w_h)
-        f_y = v_y - dt * (p.g + c * u.v_y)
-        f_k = v_k + dt * (spin * u.v_h - c * w_k)
-        f_x = o_x - dt * spin * u.o_z  # f_z takes the new o_x, which saves two iterations of seven
-        f_z = o_z + dt * spin * (o_x + f_x - A.t / (j * r)) / 2
-        a = Impulse(to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1]))
-        b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * o_y + slip_B[1]))
-        residual, aim = 0.0, max(enough, ROUGH * change)
-        if in_A and in_B:
-            A, B, residual = both(a, b, B, p.mu, p.eta, j, aim)
-        elif in_A:
-            A = project(a.n, a.s, a.t, p.mu)
-        elif in_B:
-            B = project(b.n, b.s, b.t, p.eta)
-        n_h, n_y, n_k = f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t
-        after = Velocities(n_h, n_y, n_k, f_x - A.t / (j * r), o_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r))
-        change = abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)  # a sum, since max overlooks nan
-        change += r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
-        new = after
-        # Changes shrink at a steady rate: what is left is this one times the rate.
-        settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
-        if (settled and residual <= enough) or not residual <= aim:
+    on_A, on_B = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0)
+    for tolerance in (TOLERANCE, BARELY):
+        enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
+        still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
+        A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
+        if in_A:
+            A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
+        if in_B:
+            B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m)
+        new, last, change = old, 0.0, p.g * dt
+        for _ in range(MAX_ITERATIONS):
+            u = mean(old, new)
+            x_i = at.h - p.R + dt / 2 * u.v_h
+            x_k, spin = (0.0, -u.v_k / x_i) if in_B else (dt / 2 * u.v_k, 0.0)
+            # (20) with (9), no contact
+            w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
+            c = drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law) if p.law.blunt > 0 else p.law.linear
+            f_h = v_h - dt * (spin * u.v_k + c * w_h)
+            f_y = v_y - dt * (p.g + c * u.v_y)
+            f_k = v_k + dt * (spin * u.v_h - c * w_k)
+            f_x = o_x - dt * spin * u.o_z  # f_z takes the new o_x, which saves two iterations of seven
+            f_z = o_z + dt * spin * (o_x + f_x - A.t / (j * r)) / 2
+            a = Impulse(to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1]))
+            b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * o_y + slip_B[1]))
+            residual, aim = 0.0, max(enough, ROUGH * change)
+            if in_A and in_B:
+                A, B, residual = both(a, b, B, on_A, on_B, j, aim)
+            elif in_A:
+                A = project(a, on_A)
+            elif in_B:
+                B = project(b, on_B)
+            n_h, n_y, n_k = f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t
+            after = Velocities(n_h, n_y, n_k, f_x - A.t / (j * r), o_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r))
+            change = abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)  # a sum, since max overlooks nan
+            change += r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
+            new = after
+            # Changes shrink at a steady rate: what is left is this one times the rate.
+            settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
+            if (settled and residual <= enough) or not residual <= aim:
+                break
+            last = change
+        converged = settled and residual <= enough
+        if converged:
             break
-        last = change
-    u = _mean(old, new)
+    u = mean(old, new)
     power = u.v_h * (u.v_h - omega_0 * x_k) + u.v_y * u.v_y + u.v_k * (u.v_k + omega_0 * x_i)
     at_A = A.s * (u.v_h + r * u.o_z) + A.n * u.v_y + A.t * (u.v_k - r * u.o_x)
     at_B = B.n * u.v_h + B.s * (u.v_y - r * u.o_z) + B.t * (u.v_k + r * u.o_y)
@@ -171,18 +172,12 @@ def _solved(
     # A loaded contact has met its target, and round-off must not open it again.
     new = Velocities(to_B if B.n > 0 else new.v_h, to_A if A.n > 0 else new.v_y, new.v_k, new.o_x, new.o_y, new.o_z)
     P = Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)
-    return Solved(new, P, work, spin, 0.0 if settled and residual <= enough else _worse(change, residual))
+    return Solved(new, P, work, spin, 0.0 if converged else _worse(change, residual))
 
 
 @compiled
 def _size(x: float, y: float) -> float:
     return math.sqrt(x * x + y * y)  # several times as fast as math.hypot
-
-
-@compiled
-def _mean(a: Velocities, b: Velocities) -> Velocities:
-    o_x, o_y, o_z = (a.o_x + b.o_x) / 2, (a.o_y + b.o_y) / 2, (a.o_z + b.o_z) / 2
-    return Velocities((a.v_h + b.v_h) / 2, (a.v_y + b.v_y) / 2, (a.v_k + b.v_k) / 2, o_x, o_y, o_z)
 
 
 @compiled
@@ -193,7 +188,7 @@ def _sum(a: Forces, b: Forces) -> Forces:
 @compiled
 def _moved(at: At, dt: float, s: Solved, in_A: bool, in_B: bool, R: float) -> At:
     """Where the ball comes within dt; a closed contact that carries load stays, or is now, closed."""
-    u, new = _mean(at.u, s.new), s.new
+    u, new = mean(at.u, s.new), s.new
     y = 0.0 if in_A and s.P.A_y > 0 else at.y + dt * u.v_y
     if in_B:
         return At(at.theta + dt * s.spin, y, 0.0 if s.P.B_x > 0 else at.h + dt * u.v_h, new)
@@ -297,3 +292,79 @@ def _case(in_A: bool, in_B: bool, s: Solved, p: Constants) -> int:
     if in_B and (s.P.B_x > 0 or v_h <= 0):
         B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
     return 3 * A + B
+
+
+@compiled
+def advance(
+    ball: Ball, start: float, dt: float, first: int, count: int, flow: FlowArrays, p: Constants, events: Array
+) -> tuple[Ball, int, int]:
+    """Go on from step `first` of `count` that begin at `start`; return the ball, the next step, and events noted.
+
+    A row of `events` takes time, code of the case before and after, impulses of landings. It ends early when no row
+    is left, or when a step doesn't converge.
+    """
+    noted, k = 0, first
+    while k < count and noted < len(events):
+        before, ball = ball.case, step(ball, dt, _fluid(flow, start + (k + 0.5) * dt), p)
+        k += 1
+        if ball.residual != 0:
+            break
+        if ball.case != before or ball.impact.A_y > 0 or ball.impact.B_x > 0:
+            events[noted, 0], events[noted, 1], events[noted, 2] = start + k * dt, before, ball.case
+            events[noted, 3], events[noted, 4], events[noted, 5] = ball.impact.A_x, ball.impact.A_y, ball.impact.A_z
+            events[noted, 6], events[noted, 7], events[noted, 8] = ball.impact.B_x, ball.impact.B_y, ball.impact.B_z
+            noted += 1
+    return ball, k, noted
+
+
+@compiled
+def follow(
+    ball: Ball,
+    starts: Array,
+    dts: Array,
+    counts: npt.NDArray[np.int64],
+    sampled: npt.NDArray[np.bool_],
+    quiet: float,
+    flow: FlowArrays,
+    p: Constants,
+    x: Array,
+    case: npt.NDArray[np.int8],
+    landings: npt.NDArray[np.int64],
+) -> float:
+    """One run through stretches of steps, into the rows of an `Ensemble`; return its end, less than 0 if it failed.
+
+    Rows beyond the end of a run that has been quiet for long repeat its last state.
+    """
+    row, now, landed, known = 1, 0.0, 0.0, 0
+    for s in range(len(starts)):
+        for k in range(counts[s]):
+            now = float(starts[s] + (k + 1) * dts[s])
+            ball = step(ball, dts[s], _fluid(flow, now - dts[s] / 2), p)
+            if ball.residual != 0:
+                return -now
+            if ball.landings > known:
+                landings[row] += ball.landings - known
+                known, landed = ball.landings, now
+        if sampled[s]:
+            state = rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p)  # type: ignore[arg-type]  # R and r are all
+            for i in range(8):
+                x[row, i] = state[i]
+            case[row] = ball.case
+            row += 1
+            if now - landed > quiet:
+                x[row:] = x[row - 1]
+                case[row:] = case[row - 1]
+                return now
+    return now
+
+
+@compiled
+def _fluid(flow: FlowArrays, time: float) -> float:
+    """`model.Flow` at a time."""
+    k = 0
+    if len(flow.start) > 1:
+        k = max(int(np.searchsorted(flow.start, time, side="right")) - 1, 0)
+    omega_0 = flow.value[k] + flow.slope[k] * max(time - flow.start[k], 0.0)
+    for n in range(len(flow.waves)):
+        omega_0 += flow.waves[n, 0] * math.sin(2 * math.pi * flow.waves[n, 1] * time + flow.waves[n, 2])
+    return float(omega_0)

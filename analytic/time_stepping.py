@@ -11,8 +11,7 @@ While the ball is at the wall, velocities are taken along axes that turn with it
 constant within the step and a ball that is held at the wall neither drifts off nor into it; a stationary orbit is
 reproduced exactly. Otherwise the axes stand still, and the vessel's axis is a place like any other.
 
-The step itself is in `stepping`, both contacts at once in `corner`, loops over steps in `marching`: these three numba
-compiles where it is installed (the extra `fast`).
+Steps and loops over them are in `stepping`, which numba compiles where it is installed (the extra `fast`).
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from analytic import drag, marching, rigid_body, stepping
+from analytic import drag, rigid_body, stepping
 from analytic.contact_problem import NotConvergedError
 from analytic.records import Event, Recorder
 from analytic.rigid_body import NOTHING, Forces
@@ -74,7 +73,7 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
             taken = 0
             while taken < count:
                 until = min(count, taken + AT_ONCE)
-                now, taken, noted = marching.advance(now, start, dt, taken, until, fluid, given, events)
+                now, taken, noted = stepping.advance(now, start, dt, taken, until, fluid, given, events)
                 for time, before, after, *impulse in events[:noted].tolist():
                     recorder.events.append(Event(time, Case(int(before)), Case(int(after)), Forces(*impulse)))
                 recorder.reached(start + taken * dt)
@@ -94,7 +93,7 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
 
 def prepared(
     x: State, theta: float, p: Parameters, flow: Flow, settings: Settings, times: Array
-) -> tuple[stepping.Ball, Stretches, marching.Flow, stepping.Constants]:
+) -> tuple[stepping.Ball, Stretches, stepping.FlowArrays, stepping.Constants]:
     """What the compiled loops take: the ball in a state that no step has led to, its steps, the flow, and constants.
 
     Raises `InputError` if the time step is too large for the problem.
@@ -107,7 +106,7 @@ def prepared(
     return (
         stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),
         Stretches.of(times, flow, timestep),
-        marching.Flow(flow.start, flow.value, flow.slope, flow.waves),
+        stepping.FlowArrays(flow.start, flow.value, flow.slope, flow.waves),
         stepping.Constants(drag.law(p), *map(float, given)),  # an integer would be compiled for itself
     )
 

@@ -17,10 +17,10 @@ from analytic.motion import Moment
 from analytic.rigid_body import NOTHING, Forces
 from model import Case, Contact, Parameters
 
-STILL = 1e-9
+LEAST_ACCELERATION = 1e-9
 """Acceleration in units of g below which a contact point is at rest, well above what the contact problem leaves."""
 AT_ONSET = 1e-7
-"""Slip margin up to which slip is at its onset: the accelerations are hardly more than `STILL`."""
+"""Slip margin up to which slip is at its onset: the accelerations are hardly more than `LEAST_ACCELERATION`."""
 
 EPS = math.ulp(1.0)
 AT_REST = 1e-12
@@ -67,7 +67,7 @@ def _by_accelerations(
 ) -> tuple[Case, Moment]:
     """Case and slip directions by the contact problem of the accelerations, solved from the forces `start`."""
     free = rigid_body.smooth_rates(rigid_body.velocities(at.x, p), at.x.h, omega_0, p)
-    rates, force = contact_problem.solve(free, A, B, p, start, tolerance=STILL / 1e4)
+    rates, force = contact_problem.solve(free, A, B, p, start, tolerance=LEAST_ACCELERATION / 1e4)
     contact_A, along_A = _contact(A, force.A_y, rates.v_y, rigid_body.slip_at_A(rates, p), p)
     contact_B, along_B = _contact(B, force.B_x, rates.v_h, rigid_body.slip_at_B(rates, p), p)
     alpha = math.atan2(-along_A[1], along_A[0]) if contact_A is Contact.S else math.nan
@@ -79,7 +79,7 @@ def _contact(
     contact: Closed | None, load: float, rise: float, slip_rate: tuple[float, float], p: Parameters
 ) -> tuple[Contact, tuple[float, float]]:
     """State of a contact from its force and accelerations, and the direction in which it slips if it does."""
-    still = STILL * p.g
+    still = LEAST_ACCELERATION * p.g
     if contact is None or (load <= 0 and rise > still):
         return Contact.N, (0.0, 0.0)
     if contact.slip:
@@ -96,7 +96,7 @@ class Shortest(NamedTuple):
 
 
 def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, shortest: Shortest) -> tuple[Moment, Forces]:
-    """What an impact makes of a moment, and its impulses: all contacts that touch at once, by Newton's restitution.
+    """The moment after an impact, and its impulses: all contacts that touch at once, by Newton's restitution.
 
     Friction opposes the slip that is left. A single contact of a sphere obeys p_n = (1+e) m |v_n| and
     p_t = min(friction p_n, m_t |slip|) against the slip; two contacts are solved together, without a rebound if

@@ -34,13 +34,13 @@ def omega_c(t: npt.ArrayLike, at: Moment, p: Parameters, omega_0: Fluid) -> Arra
     t = np.asarray(t, dtype=float)
     k, tau = p.c / (1 + 2 * p.j), t - at.time
     a, b = omega_0.value + omega_0.slope * (at.time - omega_0.start), omega_0.slope
-    start = at.x.omega_c - float(_swing(at.time, k, omega_0))
+    start = at.x.omega_c - float(_forced(at.time, k, omega_0))
     # k tau^2 (1 - tau k/3 + …): the lag behind a ramp, without the cancellation of tau - (1 - exp(-k tau))/k.
     line = start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * flight.second(k * tau)
-    return np.asarray(line + _swing(t, k, omega_0))
+    return np.asarray(line + _forced(t, k, omega_0))
 
 
-def _swing(t: npt.ArrayLike, k: float, omega_0: Fluid) -> Array:
+def _forced(t: npt.ArrayLike, k: float, omega_0: Fluid) -> Array:
     """What the waves make of omega_c once they have gone on for long: each times k/(k + i omega)."""
     swing = np.zeros_like(t, dtype=float)
     for amplitude, omega, phase in omega_0.waves:

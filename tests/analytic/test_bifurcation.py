@@ -142,30 +142,31 @@ def test_slope_is_the_derivative() -> None:
         np.testing.assert_allclose(numeric, exact, rtol=1e-7, atol=1e-8)
 
 
-@pytest.mark.parametrize("eta", [0.2, 0.02, 0.6])
-def test_solutions_appear_and_vanish_at_the_thresholds(eta: float) -> None:
-    """What `stationary_solutions` finds changes exactly at the special points (relative 1e-9 on either side)."""
+@pytest.mark.parametrize(
+    ("eta", "changes"),
+    [
+        (
+            0.2,
+            {
+                "omega_01": {"RR": -1, "SS": 1},
+                "omega_02": {"SS": 1, "SR": 1, "NR": 1, "NS": -1},
+                "omega_04": {"SS": -2},
+            },
+        ),
+        (0.02, {"omega_01": {"RR": -1, "SS": 1}, "omega_02": {"SS": -1, "SR": 1, "NR": 1, "NS": -1}}),
+        (0.6, {"omega_02": {"SR": 1, "NR": 1, "NS": -1}, "omega_03": {"RR": -1}}),
+    ],
+)
+def test_solutions_appear_and_vanish_at_the_thresholds(eta: float, changes: dict[str, dict[str, int]]) -> None:
+    """The number of solutions that exist changes exactly at the special points (relative 1e-9 on either side)."""
     p = P.replace(eta=eta)
-
-    def count(omega_0: float) -> dict[str, int]:
-        existing = [s for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.exists]
-        return {case.name: sum(s.case is case for s in existing) for case in Case}
-
-    def change(omega_0: float) -> dict[str, int]:
-        low, high = count(omega_0 * (1 - 1e-9)), count(omega_0 * (1 + 1e-9))
-        return {name: high[name] - low[name] for name in low if high[name] != low[name]}
-
-    t = thresholds(p)
-    if eta == 0.2:
-        assert change(t.omega_01) == {"RR": -1, "SS": 1}
-        assert change(t.omega_02) == {"SS": 1, "SR": 1, "NR": 1, "NS": -1}
-        assert change(t.omega_04) == {"SS": -2}
-    elif eta == 0.02:
-        assert change(t.omega_01) == {"RR": -1, "SS": 1}
-        assert change(t.omega_02) == {"SS": -1, "SR": 1, "NR": 1, "NS": -1}
-    else:
-        assert change(t.omega_02) == {"SR": 1, "NR": 1, "NS": -1}
-        assert change(t.omega_03) == {"RR": -1}
+    for name, expected in changes.items():
+        low, high = (
+            [s.case for s in stationary_solutions(p.replace(omega_0=getattr(thresholds(p), name) * side)) if s.exists]
+            for side in (1 - 1e-9, 1 + 1e-9)
+        )
+        change = {case.name: high.count(case) - low.count(case) for case in Case}
+        assert {case: number for case, number in change.items() if number} == expected
 
 
 @pytest.mark.parametrize("trial", range(40))

@@ -6,9 +6,7 @@ The law, the branch of SS and the equations of motion are written out here again
 
 from __future__ import annotations
 
-import importlib.util
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,10 +34,8 @@ from analytic.branch_stability import eigenvalues_at
 from model import Case, Contact, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS, QUADRATIC, SCHILLER_NAUMANN, STOKES
-
-spec = importlib.util.spec_from_file_location("newton_euler", Path(__file__).with_name("newton_euler.py"))
-ne = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(ne)
+from tests import drag_laws
+from tests.analytic import newton_euler as ne
 
 P = Parameters.named("reference").replace(nu_f=2e-4)
 LIGHT = {STOKES: 1.0, SCHILLER_NAUMANN: 1.0, QUADRATIC: 0.0}
@@ -48,13 +44,8 @@ NOT_STOKES = [law for law in LAWS if law != STOKES]
 
 
 def resistance(speed: float, p: Parameters) -> float:
-    """Drag per mass, m s-2, from the drag coefficients of a sphere."""
-    if p.drag == STOKES or speed == 0:
-        return p.c * speed
-    Re = 2 * p.r * speed / p.nu_f
-    wake = 24 / Re * (1 + 0.15 * Re**0.687)
-    C_D = p.C_D if p.drag == QUADRATIC else max(wake, 0.44)
-    return p.c * C_D * Re / 24 * speed
+    """Drag per mass, m s-2."""
+    return float(drag_laws.resistance(speed, p)) * speed if speed else 0.0
 
 
 def at_angle(angle: float, p: Parameters) -> tuple[float, float]:

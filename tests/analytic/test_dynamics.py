@@ -7,8 +7,6 @@ measured against the largest term of the equation they enter, as round-off is.
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,11 +21,8 @@ from model import Case, Contact, InputError, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS
 from model.kinematics import VARIABLES, slip_velocities
+from tests.analytic import newton_euler as ne
 from tests.drag_laws import resistance
-
-spec = importlib.util.spec_from_file_location("newton_euler", Path(__file__).with_name("newton_euler.py"))
-ne = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(ne)
 
 P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
 N = 10_000

@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import pytest
 
-from analytic import Settings, corner, marching, simulate, simulate_many, stationary_solutions, stepping
-from analytic.compiling import SOURCES, compiled
+from analytic import Settings, simulate, simulate_many, stationary_solutions
+from analytic.compiling import compiled, forget_stale
 from model import Case, Flow, InputError, Parameters, State
 
 P = Parameters.named("reference")
@@ -129,16 +129,14 @@ def test_compiled_and_not_are_the_same(tmp_path):
     np.testing.assert_allclose(results[0], results[1], rtol=1e-9, atol=1e-12)
 
 
-def test_a_change_in_any_compiled_file_compiles_again():
-    """The stamp that numba compares is that of all sources together that compiled code is made of."""
-    made_of = {
-        getattr(each, "__module__", "") for module in (corner, marching, stepping) for each in vars(module).values()
-    }
-    assert {f"analytic.{name}" for name in SOURCES} == {name for name in made_of if name.startswith("analytic.")}
-    numba = pytest.importorskip("numba")
-    if numba.config.DISABLE_JIT:
-        pytest.skip("nothing is compiled")
-    stamps = {function._cache._cache_file._source_stamp for function in (corner.both, stepping.step, stepping.solve)}
-    assert len(stamps) == 1
-    assert isinstance(stamps.pop(), str)
+def test_what_was_compiled_from_other_sources_is_deleted(tmp_path):
+    source, kept = tmp_path / "called.py", tmp_path / "stepping.step-1.py311.nbi"
+    for text, compiles_again in (("a", True), ("a", False), ("b", True)):
+        source.write_text(text)
+        kept.write_text("")
+        forget_stale(tmp_path, [str(source)])
+        assert kept.exists() is not compiles_again
+
+
+def test_functions_are_compiled_or_run_as_they_are():
     assert compiled(lambda x: x + 1)(1) == 2

@@ -360,12 +360,7 @@ def test_a_state_of_another_case_is_refused() -> None:
 
 @pytest.mark.parametrize(
     ("case", "eta", "name"),
-    [
-        (Case.RR, 0.2, "omega_01"),
-        (Case.RR, 0.6, "omega_03"),
-        (Case.NR, 0.2, "omega_02"),
-        (Case.SR, 0.6, "omega_02"),
-    ],
+    [(Case.RR, 0.2, "omega_01"), (Case.RR, 0.6, "omega_03"), (Case.NR, 0.2, "omega_02"), (Case.SR, 0.6, "omega_02")],
 )
 def test_neutral_between_stable_and_unstable(case: Case, eta: float, name: str) -> None:
     """Definition 3 at the thresholds of (82), (74) and (61), from wherever it is looked for."""

@@ -145,10 +145,7 @@ def test_solution_of_a_case() -> None:
     slow = P.replace(omega_0=9.0)
     assert solution(slow, Case.NR, formal=True).exists is False
     for ask, message in (
-        (
-            lambda: solution(slow, Case.NR),
-            r"case NR has no stable stationary solution at omega_0 = 9 rad s-1 \(mu",
-        ),
+        (lambda: solution(slow, Case.NR), r"case NR has no stable stationary solution at omega_0 = 9 rad s-1 \(mu"),
         (lambda: solution(slow, Case.SS), "case SS has no stable stationary solution"),
         (lambda: solution(slow, Case.RR, stable=False), "case RR has no unstable stationary solution"),
         (lambda: solution(p, Case.NN), "case NN has no stable"),
@@ -370,53 +367,50 @@ def test_mirror_image(omega_0: float) -> None:
             )
 
 
-def kinds(p: Parameters) -> dict[str, tuple[bool, str, tuple[str, ...]]]:
-    return {s.case.name: (s.exists, s.stability.name, s.family) for s in stationary_solutions(p)}
+VANISHING = [  # what exists, is how stable, and is free
+    (
+        {"omega_0": 0.0},  # nothing holds the ball to the wall: in NS it sinks
+        {"RR": (True, "ASYMPTOTIC", ()), "RS": (True, "NEUTRAL", ("slip_y",)), "NS": (True, "NEUTRAL", ("y",))},
+        "RR RS NS",
+    ),
+    (
+        {"c": 0.0},  # nothing fixes omega_c, and nothing feeds a steady slip: no SS, no steady sinking
+        {
+            "RR": (True, "NEUTRAL", ("omega_c",)),
+            "RS": (True, "NEUTRAL", ("slip_y", "omega_c")),
+            "SR": (False, "UNSTABLE", ("omega_c",)),
+            "NR": (False, "NEUTRAL", ("y", "omega_c")),
+        },
+        "RR RS SR NR",
+    ),
+    # mu = 0: the ball goes round with the fluid, sliding on the floor with any spin about the radius.
+    ({"mu": 0.0}, {"RR": False, "SR": (True, "NEUTRAL", ("slip_x",))}, None),
+    # eta = 0: the wall never carries the weight (NR, SR can't exist), and the spin about the axis is free.
+    (
+        {"eta": 0.0},
+        {
+            **dict.fromkeys(("RR", "RS", "SR", "NR"), False),
+            "SS": (True, "NEUTRAL", ("slip_y",)),
+            "NS": (True, "NEUTRAL", ("y", "slip_y")),
+        },
+        None,
+    ),
+    ({"eta": 0.0, "omega_0": 9.0}, {"RR": True, "RS": True}, None),
+    # The ball goes round with the fluid and spins as it likes about the axis.
+    ({"mu": 0.0, "eta": 0.0}, {"SS": (True, "NEUTRAL", ("slip_y",))}, None),
+]
 
 
-def test_fluid_at_rest() -> None:
-    assert kinds(P.replace(omega_0=0.0)) == {
-        "RR": (True, "ASYMPTOTIC", ()),
-        "RS": (True, "NEUTRAL", ("slip_y",)),
-        "NS": (True, "NEUTRAL", ("y",)),  # nothing holds the ball to the wall: it sinks
-    }
-
-
-def test_without_drag() -> None:
-    """Nothing fixes omega_c, and nothing feeds a steady slip: no SS, no steady sinking."""
-    assert kinds(P.replace(c=0.0)) == {
-        "RR": (True, "NEUTRAL", ("omega_c",)),
-        "RS": (True, "NEUTRAL", ("slip_y", "omega_c")),
-        "SR": (False, "UNSTABLE", ("omega_c",)),
-        "NR": (False, "NEUTRAL", ("y", "omega_c")),
-    }
-
-
-def test_smooth_floor() -> None:
-    """mu = 0: the ball goes round with the fluid, sliding on the floor with any spin about the radius."""
-    by_case = kinds(P.replace(mu=0.0))
-    assert by_case["RR"][0] is False
-    assert by_case["SR"] == (True, "NEUTRAL", ("slip_x",))
-    assert "SS" not in by_case
-
-
-def test_smooth_wall() -> None:
-    """eta = 0: the wall never carries the weight (NR, SR can't exist), and the spin about the axis is free."""
-    by_case = kinds(P.replace(eta=0.0))
-    assert by_case["RR"][0] is False
-    assert by_case["RS"][0] is False
-    assert by_case["SR"][0] is False
-    assert by_case["NR"][0] is False
-    assert by_case["SS"] == (True, "NEUTRAL", ("slip_y",))
-    assert by_case["NS"] == (True, "NEUTRAL", ("y", "slip_y"))
-    slow = kinds(P.replace(eta=0.0, omega_0=9.0))
-    assert slow["RR"][0] is slow["RS"][0] is True
-
-
-def test_nothing_at_all() -> None:
-    """mu = eta = 0: the ball goes round with the fluid and spins as it likes about the axis."""
-    by_case = kinds(P.replace(mu=0.0, eta=0.0))
-    assert by_case["SS"] == (True, "NEUTRAL", ("slip_y",))
-    for s in stationary_solutions(P.replace(mu=0.0, eta=0.0)):
-        rate = vector_field(s.case, s.x, P.replace(mu=0.0, eta=0.0))
-        assert np.abs(rate[1:]).max() <= 1e-11
+@pytest.mark.parametrize(("change", "expected", "those"), VANISHING)
+def test_vanishing_parameters(change: dict[str, float], expected: dict[str, object], those: str | None) -> None:
+    """Existence alone where the table says only that; all cases with a solution where it lists them."""
+    p = P.replace(**change)
+    solutions = stationary_solutions(p)
+    kinds = {s.case.name: (s.exists, s.stability.name, s.family) for s in solutions}
+    for case, kind in expected.items():
+        assert (kinds[case][0] if isinstance(kind, bool) else kinds[case]) == kind
+    assert those is None or set(kinds) == set(those.split())
+    assert "SS" not in kinds or p.mu > 0 or p.eta == 0
+    if p.mu == p.eta == 0:
+        for s in solutions:
+            assert np.abs(vector_field(s.case, s.x, p)[1:]).max() <= 1e-11
