@@ -131,12 +131,8 @@ def test_edge_tells_by_the_way_a_run_still_goes():
     slipping, lifted = np.eye(8)[2] * 10.0, np.eye(8)[2] * 30.0
     edge = Edge("reference", REFERENCE, slipping, lifted, slipping, lifted - slipping)
     time = np.arange(101)
-    for omega_c, falls in (
-        (25 - 0.1 * time, True),
-        (25 + 0.1 * time, False),
-        (10 + 0 * time, True),
-        (30 + 0 * time, False),
-    ):
+    for begins, rate, falls in ((25, -0.1, True), (25, 0.1, False), (10, 0, True), (30, 0, False)):
+        omega_c = begins + rate * time
         assert ends_slipping(SimpleNamespace(time=time, omega_c=omega_c), edge) is falls
 
 
@@ -146,11 +142,8 @@ def _settled(name, p, flows):
         q = p.replace(omega_0=flow / time_unit(p))
         cases = {s.case for s in analytic.stable_solutions(q)}
         floor = Case.RR if Case.RR in cases else Case.SS if Case.SS in cases else Case.NR
-        for start, case in (
-            ("rest", floor),
-            ("with the fluid", floor),
-            ("on the wall", Case.NR if Case.NR in cases else Case.NS),
-        ):
+        wall = Case.NR if Case.NR in cases else Case.NS
+        for start, case in (("rest", floor), ("with the fluid", floor), ("on the wall", wall)):
             yield measured("settled", "case", float(case), 0.0, q, name, start=start, case=case.name)
 
 
