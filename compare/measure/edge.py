@@ -79,13 +79,11 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             limits[name] = holds.value, folds.value
         else:
             yield Missing(PROTOCOL, name, "at no flow are a slipping ball and a lifted one both settled")
-    parts = dict.fromkeys(limits, lab.effort("edge.flows"))
-    if limits and lab.level is Level.QUICK:
-        parts[max(limits, key=lambda name: sets[name].c)] = CLOSING
+    soonest = max(limits, key=lambda name: sets[name].c, default="") if lab.level is Level.QUICK else ""
     flows = [
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
-        for part in parts[name]
+        for part in (CLOSING if name == soonest else lab.effort("edge.flows"))
     ]
     starts = [[begin(name, q, "rest"), begin(name, q, "on the wall")] for name, q in flows]
     edges = []
@@ -174,9 +172,8 @@ def _uncertainty(edge: Edge) -> Array:
     alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
     off, along = (onward.centre - edge.crossing) * alike, onward.line * alike
     ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
-    return np.asarray(
-        np.hypot(edge.bracket.place.uncertainty * edge.line, np.maximum(edge.moves[-1] / (1 - ratio), ahead))
-    )
+    moves = np.maximum(edge.moves[-1] / (1 - ratio), ahead)
+    return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
 
 
 def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
@@ -202,9 +199,6 @@ def _closing(lab: Lab, name: str, edges: Sequence[Edge]) -> Iterator[Measurement
     apart = [Measured(float(State.of(edge.crossing).omega_c - State.of(edge.lifted).omega_c), noise) for edge in edges]
     place = vanishing(np.array([edge.p.omega_0 for edge in edges]), apart)
     if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
-        tasks, by = (
-            [t for edge in edges if edge.bracket for t in edge.bracket.tasks],
-            "unstable slipping meets the lifted ball",
-        )
-        q = edges[0].p.replace(omega_0=place.value)
-        yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", by=by)
+        tasks = [task for edge in edges if edge.bracket for task in edge.bracket.tasks]
+        q, at = edges[0].p.replace(omega_0=place.value), {"by": "unstable slipping meets the lifted ball"}
+        yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", **at)
