@@ -33,11 +33,11 @@ CLOSING = (0.1, 0.17, 0.26, 0.38)
 """Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
 FIRST, NEXT = 3e-4, 2.5e-6
 """Widths of the last brackets on the first line and on the others, in parts of the distance of the attractors."""
-REACH = 5e-3
+HALF_LENGTH = 5e-3
 """Half the length of a later line, in those parts; after each line that missed the border four times as much."""
 TOGETHER = 2e-3
 """The distance up to which two runs count as being together, in those parts."""
-UNDAMPED = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
+SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     Not under the quadratic law: near SR the ball lags so little that this hardly damps its swing along the border. At
     the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
     """
-    yield from (Missing(PROTOCOL, name, UNDAMPED) for name, p in sets.items() if p.drag == QUADRATIC)
+    yield from (Missing(PROTOCOL, name, SWINGS_ON) for name, p in sets.items() if p.drag == QUADRATIC)
     limits: dict[str, tuple[float, float]] = {}
     for name in (name for name, p in sets.items() if p.drag != QUADRATIC):
         holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
@@ -126,7 +126,7 @@ def _followed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
 def _search(lab: Lab, edge: Edge) -> Search:
     """On which part of the line the border is, first between the attractors."""
     t_end, step = lasting(edge.p, lab.effort("edge.time")), coarse_step(edge.p)
-    reach = REACH * 4.0**edge.missed
+    reach = HALF_LENGTH * 4.0**edge.missed
     around, width = (Bracket(-reach, reach), NEXT) if edge.bracket else (Bracket(0.0, 1.0), FIRST)
 
     def task(s: float, bracket: Bracket, care: Care) -> Task:

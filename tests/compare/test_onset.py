@@ -22,7 +22,7 @@ from compare.measure.levels import Level
 from compare.measure.record import Missing, Records
 from compare.measure.sets import sets
 from compare.measure.settling import begin, lasting, settles
-from compare.measure.thresholds import ASKED, NEAR, TURNS
+from compare.measure.thresholds import ASKED, BESIDE, TURNS
 from compare.statistics import Measured
 from model import Case, Parameters
 from tests.measured import measured
@@ -66,7 +66,7 @@ def test_a_change_that_moves_with_the_time_step_is_uncertain():
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6])
 def test_extrapolated_zero_is_as_sure_as_it_says(noise):
-    where = 2.0 * (1 + NEAR)
+    where = 2.0 * (1 + BESIDE)
     values = [Measured(math.sin(w - 2) * (1 + w), noise) for w in where]
     bracket = vanishing(where, values)
     assert abs(bracket.value - 2.0) < 3 * bracket.uncertainty
@@ -77,7 +77,7 @@ def test_extrapolated_zero_is_as_sure_as_it_says(noise):
 def test_extrapolated_zero_of_what_is_no_power_series_is_as_sure_as_it_says(power):
     """As omega_0 is none of the lag where drag isn't linear."""
     for part in (0.02, 0.1, 0.5):
-        order = NEAR / NEAR[-1]
+        order = BESIDE / BESIDE[-1]
         where = 1.0 + 0.05 * (order + part * order**power + 0.1 * order**3)
         place = vanishing(where, [Measured(float(value), 1e-12) for value in order])
         assert abs(place.value - 1.0) < 3 * place.uncertainty
