@@ -56,9 +56,10 @@ def caption(curves: tuple[Diagram, ...]) -> str:
     """Of the characteristic curves with all settled states."""
     sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in zip(("left", "right"), curves, strict=True))
     states = [m for curve in curves for m in curve.states]
-    crosses = ", crosses: MuJoCo's own contact parameters from rest" * any(m.engine == NEWCOMER.name for m in states)
+    own = any(m.engine == NEWCOMER.name for m in states)
+    crosses = ", crosses: MuJoCo's own contact parameters from rest" if own else ""
     return (
-        f"Angular velocity ω_c of the ball's orbit over that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
+        f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
         "dashed where unstable; SR and NR lie on one line. Settled states were measured from rest, going round "
         f"with the fluid, and high up on the wall{crosses}. Below: relative deviation from the nearest attracting "
         f"solution; what is below 1e-16 is drawn there.{style.marks(states)}"
@@ -89,8 +90,9 @@ def draw(curves: tuple[Diagram, ...]) -> Figure:
         (_fold_curve if p.eta < p.j else _plain_curve)(above, p, fastest)
         above.set_title(f"η = {p.eta:g} {'<' if p.eta < p.j else '>'} j = {p.j:g}", fontsize=11)
         for engine, own in style.by_engine(curve.states, lambda m: m.engine).items():
-            off = [max(_deviation(m), _LEAST) for m in own]
-            below.plot([*map(style.omega_0, own)], off, ls="none", ms=5, **style.mark_of(engine))
+            near = [(m.value, analytic.stable_solutions(m.parameters)) for m in own]
+            off = [min((abs(w / float(s.state.omega_c) - 1) for s in states), default=np.nan) for w, states in near]
+            below.plot([*map(style.omega_0, own)], np.maximum(off, _LEAST), ls="none", ms=5, **style.mark_of(engine))
         style.points(above, curve.states)
         above.set(ylim=(0, 1.05 * max([fastest, *(m.value for m in curve.states)])), ylabel=style.OMEGA_C)
         style.legend(above, loc="upper left", frameon=False)
@@ -99,11 +101,6 @@ def draw(curves: tuple[Diagram, ...]) -> Figure:
         for axes in (above, below):
             axes.grid(alpha=0.25)
     return figure
-
-
-def _deviation(m: Measurement) -> float:
-    near = [float(abs(m.value / s.state.omega_c - 1)) for s in analytic.stable_solutions(m.parameters)]
-    return min(near, default=np.nan)
 
 
 def draw_figure_13(of: Diagram) -> Figure:

@@ -145,13 +145,16 @@ def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
             samples = round(hold / (STEPS_A_SAMPLE * coarse_step(p))) * len(flows)
             q, start, flow = p.replace(omega_0=flows[0]), State(omega_c=flows[0]), Flow.staircase(flows, hold)
             tasks.append(lab.task(q, start, hold * len(flows), coarse_step(p), flow=flow, samples=samples))
-        else:
+    runs = zip(tasks, lab.each(tasks), strict=True)
+    for name in sets:
+        if name not in loops:
             yield Missing("hysteresis", name, "no flow at which slipping on the floor gives way to riding the wall")
-    for (name, levels), task, run in zip(loops.items(), tasks, lab.each(tasks), strict=True):
+            continue
+        task, run = next(runs)
         if isinstance(run, str):
             yield Missing("hysteresis", name, f"the run {run}")
         else:
-            yield from _held(lab, name, task, run, levels, records)
+            yield from _held(lab, name, task, run, loops[name], records)
 
 
 def _levels(name: str, records: Records, parts: int) -> list[float]:

@@ -33,11 +33,11 @@ CLOSING = (0.1, 0.17, 0.26, 0.38)
 """Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
 FIRST, NEXT = 3e-4, 2.5e-6
 """Widths of the last brackets on the first line and on the others, in parts of the distance of the attractors."""
-REACH = 5e-3
+HALF_LENGTH = 5e-3
 """Half the length of a later line, in those parts; after each line that missed the border four times as much."""
 TOGETHER = 2e-3
 """The distance up to which two runs count as being together, in those parts."""
-UNDAMPED = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
+SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     Not under the quadratic law: near SR the ball lags so little that this hardly damps its swing along the border. At
     the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
     """
-    yield from (Missing(PROTOCOL, name, UNDAMPED) for name, p in sets.items() if p.drag == QUADRATIC)
+    yield from (Missing(PROTOCOL, name, SWINGS_ON) for name, p in sets.items() if p.drag == QUADRATIC)
     limits: dict[str, tuple[float, float]] = {}
     for name in (name for name, p in sets.items() if p.drag != QUADRATIC):
         holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
@@ -79,13 +79,11 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             limits[name] = holds.value, folds.value
         else:
             yield Missing(PROTOCOL, name, "at no flow are a slipping ball and a lifted one both settled")
-    parts = dict.fromkeys(limits, lab.effort("edge.flows"))
-    if limits and lab.level is Level.QUICK:
-        parts[max(limits, key=lambda name: sets[name].c)] = CLOSING
+    soonest = max(limits, key=lambda name: sets[name].c, default="") if lab.level is Level.QUICK else ""
     flows = [
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
-        for part in parts[name]
+        for part in (CLOSING if name == soonest else lab.effort("edge.flows"))
     ]
     starts = [[begin(name, q, "rest"), begin(name, q, "on the wall")] for name, q in flows]
     edges = []
@@ -128,7 +126,7 @@ def _followed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
 def _search(lab: Lab, edge: Edge) -> Search:
     """On which part of the line the border is, first between the attractors."""
     t_end, step = lasting(edge.p, lab.effort("edge.time")), coarse_step(edge.p)
-    reach = REACH * 4.0**edge.missed
+    reach = HALF_LENGTH * 4.0**edge.missed
     around, width = (Bracket(-reach, reach), NEXT) if edge.bracket else (Bracket(0.0, 1.0), FIRST)
 
     def task(s: float, bracket: Bracket, care: Care) -> Task:
@@ -174,9 +172,8 @@ def _uncertainty(edge: Edge) -> Array:
     alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
     off, along = (onward.centre - edge.crossing) * alike, onward.line * alike
     ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
-    return np.asarray(
-        np.hypot(edge.bracket.place.uncertainty * edge.line, np.maximum(edge.moves[-1] / (1 - ratio), ahead))
-    )
+    moves = np.maximum(edge.moves[-1] / (1 - ratio), ahead)
+    return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
 
 
 def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
@@ -202,9 +199,6 @@ def _closing(lab: Lab, name: str, edges: Sequence[Edge]) -> Iterator[Measurement
     apart = [Measured(float(State.of(edge.crossing).omega_c - State.of(edge.lifted).omega_c), noise) for edge in edges]
     place = vanishing(np.array([edge.p.omega_0 for edge in edges]), apart)
     if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
-        tasks, by = (
-            [t for edge in edges if edge.bracket for t in edge.bracket.tasks],
-            "unstable slipping meets the lifted ball",
-        )
-        q = edges[0].p.replace(omega_0=place.value)
-        yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", by=by)
+        tasks = [task for edge in edges if edge.bracket for task in edge.bracket.tasks]
+        q, at = edges[0].p.replace(omega_0=place.value), {"by": "unstable slipping meets the lifted ball"}
+        yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", **at)

@@ -128,7 +128,11 @@ def settle(
     todo = dict(enumerate(starts))
     left = [[*(SHORT if start.p.drag != STOKES else ()), *ROUNDS] for start in starts]
     while todo:
-        tasks = {n: _round(lab, start, refine, span * left[n].pop(0)) for n, start in todo.items()}
+        tasks = {}
+        for n, start in todo.items():
+            step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0))
+            samples = round(t_end / (STEPS_A_SAMPLE * step))
+            tasks[n] = lab.task(start.p, start.x0, t_end, step / refine, samples=samples)
         todo = {}
         for (n, task), run in zip(tasks.items(), lab.each(list(tasks.values())), strict=True):
             start = starts[n]
@@ -150,11 +154,6 @@ def settle_groups(lab: Lab, groups: Sequence[Sequence[Start]], **how: float) -> 
     """The same for groups of starts, all of them together."""
     states = iter(settle(lab, [start for group in groups for start in group], **how))
     return [[next(states) for _ in group] for group in groups]
-
-
-def _round(lab: Lab, start: Start, refine: float, span: float) -> Task:
-    step, t_end = coarse_step(start.p), duration(start.p, span)
-    return lab.task(start.p, start.x0, t_end, step / refine, samples=round(t_end / (STEPS_A_SAMPLE * step)))
 
 
 def duration(p: Parameters, span: float = SPAN) -> float:

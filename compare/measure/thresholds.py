@@ -43,21 +43,21 @@ from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 
 PROTOCOL = "thresholds"
-ROUGH = 1e-2
+COARSE = 1e-2
 """Relative width of a bracket where only the neighbourhood is wanted."""
-NEAR: Array = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
+BESIDE: Array = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
 """Relative distances of settled states from a flow at which something vanishes."""
 TURNS: Array = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
 """The same below a fold, where slip goes like the root of the distance; in parts of the range of slipping."""
 RIDES: Array = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
 """The same of the states that are continued to where a ball rides the wall as slowly as it can."""
-SLIPS = 3e-8
+SLIPPING_SPEED = 3e-8
 """Slip speed, divided by sqrt(g R), that counts as slip: far above what contacts are solved to, 1e-12, and reached
 within the time of a run by a ball whose friction falls short by a millionth."""
-STRONG, BEYOND = (2.0, 4.0), (1.6, 2.6)
-"""Drags at which slopes are measured for the birth of a fold: first two values of c sqrt(R/g), at which the fluid takes
-a ball along within a fraction of the time of its fall; then multiples of the drag to which those two point, near to it
-but so far off that states still settle soon."""
+FIRST_DRAGS, NEARER_DRAGS = (2.0, 4.0), (1.6, 2.6)
+"""Drags at which the birth of a fold is looked for: two values of c sqrt(R/g), at which the fluid takes a ball along
+within a fraction of the time of its fall; then multiples of the drag extrapolated from those two, near to it but so far
+off that states still settle soon."""
 BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
 """Distances of the states from omega_02 there, in parts of the range of slipping."""
 
@@ -91,11 +91,11 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     brackets, searches = _narrowed(lab, searches), {}
     for (name, kind), change in around.items():
         if kind == "riding":
-            searches[name, kind] = _search(lab, sets[name], "sinking", change, kinds[kind], ROUGH * change.low)
+            searches[name, kind] = _search(lab, sets[name], "sinking", change, kinds[kind], COARSE * change.low)
         end = brackets.get((name, "rolling"))
         if kind == "slipping" and end and not lifts(end) and end.high < change.high:
             change = replace(change, low=max(change.low, end.high))
-            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], ROUGH * change.low)
+            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], COARSE * change.low)
     brackets |= _narrowed(lab, searches, careful=False)
     brackets = {key: bracket for key, bracket in brackets.items() if bracket.runs[1] or bracket.high in seen[key]}
     states, searches = _settled_beside(lab, sets, brackets), {}
@@ -109,7 +109,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             searches[name, "riding"] = _search(lab, p, "riding", begins, ride, fine * begins.high)
         if end and len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
             pressed = rider(lifted, height=0.0, less=1e-3)
-            change = Bracket(end.low * (1 - ROUGH), end.high * (1 + ROUGH))
+            change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
             searches[name, "leaning"] = _search(lab, p, "leaning", change, pressed, fine * end.high)
     brackets |= _narrowed(lab, searches)
 
@@ -139,13 +139,13 @@ def _settled_beside(lab: Lab, sets: Mapping[str, Parameters], of: Mapping[Key, B
     for name in sets:
         if carried := of.get((name, "riding")):
             places[name, "riding"] = carried.high * (1 + RIDES), "on the wall"
-            places[name, "sinking"] = carried.low * (1 - NEAR), "on the wall"
+            places[name, "sinking"] = carried.low * (1 - BESIDE), "on the wall"
         end, last = of.get((name, "rolling")), of.get((name, "slipping"))
         if end and lifts(end):
             places[name, "lifted"] = end.high * (1 + RIDES), "on the wall"
         elif end and last:
             span = last.low - end.high
-            places[name, "slipping"] = end.high + NEAR * min(span, end.high), "rest"
+            places[name, "slipping"] = end.high + BESIDE * min(span, end.high), "rest"
             places[name, "turning"] = last.low - TURNS * span, "rest"
     starts = [
         [begin(name, sets[name].replace(omega_0=flow), how) for flow in flows.tolist()]
@@ -203,9 +203,9 @@ def lifts(end: Bracket) -> bool:
 
 
 def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
-    """Largest of the slip speeds (n,) in the last part of a run, in units of `SLIPS` sqrt(g R)."""
+    """Largest of the slip speeds (n,) in the last part of a run, in units of `SLIPPING_SPEED` sqrt(g R)."""
     p = run.header.parameters
-    return float(speeds[tail(run, share)].max() / (SLIPS * math.sqrt(p.g * p.R)))
+    return float(speeds[tail(run, share)].max() / (SLIPPING_SPEED * math.sqrt(p.g * p.R)))
 
 
 def stays_rolling(run: Trajectory) -> bool | None:
@@ -243,14 +243,11 @@ def extrapolated(
     """The flow to which a quantity of settled states points; None if they are too few, or point nowhere."""
     if len(states) < POINTS:
         return None
-    omegas = np.array([state.start.p.omega_0 for state in states])
+    flows = [state.start.p.omega_0 for state in states]
     values = [state.values["omega_c" if quantity == "lag" else quantity] for state in states]
     if quantity == "lag":
-        values = [
-            Measured(omega - orbit.value, orbit.uncertainty)
-            for omega, orbit in zip(omegas.tolist(), values, strict=True)
-        ]
-    place = to(omegas, values)
+        values = [Measured(flow - orbit.value, orbit.uncertainty) for flow, orbit in zip(flows, values, strict=True)]
+    place = to(np.array(flows), values)
     return place if math.isfinite(place.uncertainty) else None
 
 
@@ -338,8 +335,8 @@ def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             ranges[name] = begins.value, ends.value
     slopes: dict[str, list[tuple[float, Measured, list[Settled]]]] = {name: [] for name in ranges}
     lags: dict[str, Measured] = {}
-    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in STRONG]
-    for _ in (STRONG, BEYOND):
+    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
+    for _ in (FIRST_DRAGS, NEARER_DRAGS):
         starts = [
             [begin(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest") for part in BEFORE_END]
             for name, c in drags
@@ -351,14 +348,14 @@ def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
                 slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
                 slopes[name].append((1 / c, slope, states))
         for name, points in slopes.items():
-            if len(points) >= len(STRONG):
+            if len(points) >= len(FIRST_DRAGS):
                 at, measured = [lag for lag, *_ in points], [slope for _, slope, _ in points]
                 lags[name], _ = straight_line(at, [m.value for m in measured], [m.uncertainty for m in measured])
-        drags = [(name, 1 / lag.value * k) for name, lag in lags.items() if lag.value > 0 for k in BEYOND]
+        drags = [(name, 1 / lag.value * k) for name, lag in lags.items() if lag.value > 0 for k in NEARER_DRAGS]
     for name, p in sets.items():
         if name not in ranges:
             yield Missing("birth", name, "there is no range of slipping at both points that ends at the wall")
-        elif len(slopes[name]) < len(STRONG) + len(BEYOND):
+        elif len(slopes[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
             yield Missing("birth", name, "too few states of slipping at both points settle near the end of the branch")
         else:
             drag = Measured(1 / lags[name].value, lags[name].uncertainty / lags[name].value ** 2)

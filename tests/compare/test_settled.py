@@ -53,23 +53,16 @@ class TestSettled:
         assert seen[2.6, "rest"] is Case.NR
         assert [seen[flow, "on the wall"] for flow in FLOWS] == [Case.NS, Case.NS, Case.NS, Case.NR]
 
-    def test_rolling_has_the_sums_of_its_forces_only(self, records: Records) -> None:
-        values = _values(records, 0.6, Case.RR)
-        assert {q for q in values if q.startswith("force")} == set(settling.SUMS)
-        weight = THICK.m * THICK.g
-        assert values["force_Ay+By"].value == pytest.approx(weight, abs=3 * values["force_Ay+By"].uncertainty)
-
-    def test_a_ball_on_the_wall_carries_its_own_way_round(self, records: Records) -> None:
-        values = _values(records, 2.6, Case.NR)
-        pressed = THICK.m * THICK.R * values["omega_c"].value ** 2
-        assert values["force_Bx"].value == pytest.approx(pressed, rel=1e-6)
-        assert values["force_Ay"].value == 0.0
-
-    def test_a_sinking_ball_balances_weight_friction_and_drag(self, records: Records) -> None:
-        values = _values(records, 1.4, Case.NS)
-        drag = -THICK.m * THICK.c * values["v_y"].value
-        assert drag + values["force_By"].value == pytest.approx(THICK.m * THICK.g, rel=1e-6)
-        assert values["force_By"].value == pytest.approx(THICK.eta * values["force_Bx"].value, rel=1e-9)
+    def test_forces_balance(self, records: Records) -> None:
+        """Rolling has the sums of its forces only; drag carries a part of the weight of a ball that sinks."""
+        p, weight = THICK, THICK.m * THICK.g
+        rolls, rides, sinks = (_values(records, *at) for at in ((0.6, Case.RR), (2.6, Case.NR), (1.4, Case.NS)))
+        assert {q for q in rolls if q.startswith("force")} == set(settling.SUMS)
+        assert rolls["force_Ay+By"].value == pytest.approx(weight, abs=3 * rolls["force_Ay+By"].uncertainty)
+        assert rides["force_Bx"].value == pytest.approx(p.m * p.R * rides["omega_c"].value ** 2, rel=1e-6)
+        assert rides["force_Ay"].value == 0.0
+        assert sinks["force_By"].value - p.m * p.c * sinks["v_y"].value == pytest.approx(weight, rel=1e-6)
+        assert sinks["force_By"].value == pytest.approx(p.eta * sinks["force_Bx"].value, rel=1e-9)
 
     def test_values_resolve_what_they_should(self, records: Records) -> None:
         for m in records.select("settled", where=lambda m: m.quantity != "case"):
@@ -137,8 +130,7 @@ class TestOthers:
         assert Case.NR in {Case(int(m.value)) for m in measured.select("hysteresis", "case")}
 
     def test_no_loop_without_a_change_from_slipping_to_riding(self, lab: Lab) -> None:
-        (only,) = characteristic.hysteresis(lab, {"thick": THICK}, Records())
-        assert isinstance(only, Missing)
+        assert [type(row) for row in characteristic.hysteresis(lab, {"thick": THICK}, Records())] == [Missing]
 
     def test_the_newcomer_is_another_engine(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(EFFORT, "settled.flows", ((0.6,),) * 3)

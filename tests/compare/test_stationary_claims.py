@@ -70,16 +70,8 @@ def _outcomes(records: Records) -> dict[str, Outcome]:
 
 
 JUDGED = (
-    "prop-1",
-    "prop-1-rough",
-    "prop-2-forces",
-    "prop-3-5",
-    "prop-4",
-    "prop-6",
-    "fig-7",
-    "fig-9",
-    "fig-10",
-    "fig-11",
+    *("prop-1", "prop-1-rough", "prop-2-forces", "prop-3-5", "prop-4", "prop-6"),
+    *("fig-7", "fig-9", "fig-10", "fig-11"),
 )
 
 
@@ -147,6 +139,10 @@ WRONG = {
     "forces of SS 1 % off": (_scaled(Case.SS, force_A=1.01), {"prop-4"}),
     "forces of RR 1 % off": (_scaled(Case.RR, force_B=1.01), {"prop-1"}),
     "forces of RS 1 % off": (_scaled(Case.RS, force_A=1.01), {"prop-2-forces"}),
+    "the wall carries at fast flows only": (
+        lambda s, p: None if s.case in (Case.NR, Case.SR) and p.Omega_0 < 3.0 else s,
+        {"prop-3-5", "fig-7"},
+    ),
     "a state of NS off by a millionth": (_scaled(Case.NS, x=1 + 1e-6), {"prop-6"}),
 }
 
@@ -160,80 +156,66 @@ def test_a_wrong_theory_is_refuted(name: str, records: Records, monkeypatch: pyt
     assert Outcome.ERROR not in outcome_of.values()
 
 
-def test_a_wall_that_carries_at_other_flows_is_refuted(records: Records, monkeypatch: pytest.MonkeyPatch) -> None:
-    def change(s: StationarySolution, p: Parameters) -> StationarySolution | None:
-        return None if s.case in (Case.NR, Case.SR) and p.Omega_0 < 3.0 else s
-
-    _changed(monkeypatch, change)
-    outcome_of = _outcomes(records)
-    assert outcome_of["prop-3-5"] is outcome_of["fig-7"] is Outcome.REFUTED
+_T = analytic.thresholds
 
 
-def test_a_wrong_range_is_refuted(records: Records, monkeypatch: pytest.MonkeyPatch) -> None:
-    t = analytic.thresholds
-    monkeypatch.setattr(analytic, "operating_range", lambda p: t(p).omega_02)
-    assert _outcomes(records)["operating-range"] is Outcome.REFUTED
-    monkeypatch.undo()
-    monkeypatch.setattr(analytic, "unloading_limit", lambda p: 2 * t(p).omega_02)
-    assert _outcomes(records)["unloading-limit"] is Outcome.REFUTED
+@pytest.mark.parametrize(
+    ("function", "wrong", "claim"),
+    [
+        ("operating_range", lambda p: _T(p).omega_02, "operating-range"),
+        ("unloading_limit", lambda p: 2 * _T(p).omega_02, "unloading-limit"),
+        ("thresholds", lambda p: replace(_T(p), omega_03=0.8 * _T(p).omega_03), "prop-1-rough"),
+    ],
+)
+def test_a_wrong_range_is_refuted(
+    function: str, wrong: Any, claim: str, records: Records, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(analytic, function, wrong)
+    assert _outcomes(records)[claim] is Outcome.REFUTED
 
 
-def test_rolling_that_should_end_earlier_is_refuted(records: Records, monkeypatch: pytest.MonkeyPatch) -> None:
-    t = analytic.thresholds
-    monkeypatch.setattr(analytic, "thresholds", lambda p: replace(t(p), omega_03=0.8 * t(p).omega_03))
-    assert _outcomes(records)["prop-1-rough"] is Outcome.REFUTED
-
-
-class TestLoop:
+@pytest.mark.parametrize(
+    ("Omega_0", "case", "before", "outcome"),
+    [
+        (2.6, Case.SS, "SS", Outcome.CONFIRMED),  # a ball keeps to its branch
+        (2.6, Case.NR, "NR", Outcome.CONFIRMED),
+        (2.6, Case.SS, "NR", Outcome.REFUTED),
+        (2.6, Case.NR, "SS", Outcome.REFUTED),
+        (1.7, Case.SS, "NR", Outcome.CONFIRMED),  # and leaves it where it has ended
+    ],
+)
+def test_a_ball_keeps_to_its_branch_of_the_loop(Omega_0: float, case: Case, before: str, outcome: Outcome) -> None:
     p = SETS["slipping"]
-
-    def _level(self, Omega_0: float, case: Case, before: str) -> Records:
-        q = self.p.replace(omega_0=Omega_0 * np.sqrt(self.p.g / self.p.R))
-        s = next(s for s in analytic.stable_solutions(q) if s.case is case)
-        at = {"case": case.name, "before": before, "side": "up", "level": 1.0}
-        sure = 1e-9 * q.omega_0
-        return Records(
-            (
-                measured("hysteresis", "case", float(case), 0.0, q, "slipping", **at),
-                measured("hysteresis", "omega_c", float(s.x[2]), sure, q, "slipping", **at),
-            )
-        )
-
-    def test_a_ball_keeps_to_its_branch(self) -> None:
-        for case, before in ((Case.SS, "SS"), (Case.NR, "NR")):
-            assert _outcomes(self._level(2.6, case, before))["fig-13-left"] is Outcome.CONFIRMED
-
-    def test_a_ball_that_leaves_it_is_a_refutation(self) -> None:
-        for case, before in ((Case.SS, "NR"), (Case.NR, "SS")):
-            assert _outcomes(self._level(2.6, case, before))["fig-13-left"] is Outcome.REFUTED
-
-    def test_where_its_branch_has_ended_it_changes(self) -> None:
-        assert _outcomes(self._level(1.7, Case.SS, "NR"))["fig-13-left"] is Outcome.CONFIRMED
+    q = p.replace(omega_0=Omega_0 * np.sqrt(p.g / p.R))
+    s = next(s for s in analytic.stable_solutions(q) if s.case is case)
+    at = {"case": case.name, "before": before, "side": "up", "level": 1.0}
+    values = {"case": (float(case), 0.0), "omega_c": (float(s.x[2]), 1e-9 * q.omega_0)}
+    rows = (measured("hysteresis", what, *value, q, "slipping", **at) for what, value in values.items())
+    assert _outcomes(Records(tuple(rows)))["fig-13-left"] is outcome
 
 
-class TestSlope:
+def _slope(by: str, case: Case, value: float) -> Records:
     p = SETS["slipping"].replace(omega_0=24.0)
+    return Records((measured("slope", "slope", value, 1e-6, p, "slipping", by=by, case=case.name),))
 
-    def _records(self, by: str, case: Case, value: float) -> Records:
-        return Records((measured("slope", "slope", value, 1e-6, self.p, "slipping", by=by, case=case.name),))
 
-    def test_slopes(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        right = analytic.characteristic_slope(self.p, Case.SS)
-        records = self._records("neighbours", Case.SS, right)
-        assert _outcomes(records)["slope-slipping"] is Outcome.CONFIRMED
-        assert _outcomes(self._records("neighbours", Case.SS, 1.01 * right))["slope-slipping"] is Outcome.REFUTED
-        monkeypatch.setattr(analytic, "characteristic_slope", lambda p, case: 0.99 * right)
-        assert _outcomes(records)["slope-slipping"] is Outcome.REFUTED
+def test_a_slope_of_a_state_that_theory_does_not_know_is_a_refutation() -> None:
+    assert _outcomes(_slope("neighbours", Case.NR, 1.0))["slope-rolling"] is Outcome.REFUTED
 
-    def test_a_state_that_theory_does_not_know_is_a_refutation(self) -> None:
-        slow = self._records("neighbours", Case.NR, 1.0)
-        assert _outcomes(slow)["slope-rolling"] is Outcome.REFUTED
 
-    @pytest.mark.parametrize(("by", "claim"), [("jump", "slope-jump"), ("mean", "slope-mean")])
-    def test_jump_and_mean(self, by: str, claim: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        name = {"jump": "slope_jump", "mean": "mean_slope"}[by]
-        right = getattr(analytic, name)
-        records = self._records(by, Case.SS, right(self.p))
-        assert _outcomes(records)[claim] is Outcome.CONFIRMED
-        monkeypatch.setattr(analytic, name, lambda p: right(p) + 0.001)
-        assert _outcomes(records)[claim] is Outcome.REFUTED
+@pytest.mark.parametrize(
+    ("by", "claim", "function", "args"),
+    [
+        ("neighbours", "slope-slipping", "characteristic_slope", (Case.SS,)),
+        ("jump", "slope-jump", "slope_jump", ()),
+        ("mean", "slope-mean", "mean_slope", ()),
+    ],
+)
+def test_slopes(by: str, claim: str, function: str, args: tuple[Case, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    right = getattr(analytic, function)
+    value = right(SETS["slipping"].replace(omega_0=24.0), *args)
+    off = min(0.001, 0.01 * abs(value))
+    assert _outcomes(_slope(by, Case.SS, value))[claim] is Outcome.CONFIRMED
+    assert _outcomes(_slope(by, Case.SS, value + off))[claim] is Outcome.REFUTED
+    monkeypatch.setattr(analytic, function, lambda p, *more: right(p, *more) + off)
+    assert _outcomes(_slope(by, Case.SS, value))[claim] is Outcome.REFUTED
