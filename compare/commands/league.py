@@ -33,7 +33,7 @@ def add(commands: options.Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Measure what isn't there yet, show the table, write JSON and page."""
     from compare.report import league as page  # here, because drawing takes a second to load
-    from compare.scorecard import league, standings
+    from compare.scorecard import league
 
     check_names(args.engine or (), list(ENGINES), "engine")
     those = league.contestants(args.engine, league.QUICK if args.quick else league.STEPS)
@@ -52,6 +52,6 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(data, indent=1))
     else:
         console = Console()
-        console.print(*standings.tables(entries), standings.CAPTION)
+        console.print(*league.tables(entries), league.CAPTION)
         console.print(f"page: {args.output / PAGE}", soft_wrap=True)
     return 0

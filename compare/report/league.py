@@ -7,7 +7,7 @@ from typing import Any
 from compare import pages
 from compare.figures import settings
 from compare.report.pictures import address, svg
-from compare.scorecard import league, standings
+from compare.scorecard import league
 
 
 def html(data: dict[str, Any]) -> str:
@@ -19,5 +19,5 @@ def html(data: dict[str, Any]) -> str:
         for entry in entries
         for name, reason in entry.failures.items()
     ]
-    shown = {"rows": standings.rows(entries), "settings": standings.settings(data), "caption": standings.CAPTION}
+    shown = {"rows": league.rows(entries), "settings": league.settings_table(data), "caption": league.CAPTION}
     return pages.render("compare.report", "league.html", **shown, failures=failures, picture=picture)

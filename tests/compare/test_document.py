@@ -10,7 +10,7 @@ import pytest
 
 from compare import pages
 from compare.runs.campaign import Campaign
-from compare.scorecard import standings
+from compare.scorecard import league
 from docs.studies import accuracy
 from docs.studies import tables as document
 from docs.studies.accuracy import REACHED
@@ -82,4 +82,4 @@ def test_splits_lie_in_the_admissible_interval(tmp_path: Path) -> None:
 
 
 def test_numbers_of_tables() -> None:
-    assert [standings.number(value) for value in (1.23e-5, 1e-16, math.nan)] == ["1.2e-05", "< 1e-14", "diverged"]
+    assert [league.number(value) for value in (1.23e-5, 1e-16, math.nan)] == ["1.2e-05", "< 1e-14", "diverged"]

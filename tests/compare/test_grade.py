@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from compare.commands import cli
-from compare.scorecard import card, contenders, grade, native, trials
+from compare.scorecard import grade, native, trials
 from compare.scorecard.grade import Column
-from compare.scorecard.native import Native, Touch
+from compare.scorecard.native import Native, Pair
 from compare.scorecard.trials import EPS, ROLLING, SLIPPING
 from mjsim import ContactSettings, scene
 from mjsim.scene import SCENE
@@ -31,7 +31,7 @@ def mjcf(world: str, rest: str = "") -> str:
 
 @pytest.fixture(scope="module")
 def columns() -> list[Column]:
-    return grade.grade(ELLIPTIC, [contenders.OURS, contenders.PLAIN])
+    return grade.grade(ELLIPTIC, [grade.OURS, grade.PLAIN])
 
 
 def test_the_settings_of_the_study_pass(columns: list[Column]) -> None:
@@ -74,17 +74,17 @@ def test_creep_and_hovering_are_as_predicted(columns: list[Column]) -> None:
 
 
 def test_card_as_table_and_page(columns: list[Column]) -> None:
-    page = card.html(columns, "cone <elliptic>")
+    page = grade.html(columns, "cone <elliptic>")
     assert "cone &lt;elliptic&gt;" in page
-    assert page.count("<td") >= len(card.lines(columns)) * len(columns)
-    assert card.table(columns).row_count >= len(card.lines(columns))
-    assert card.headline(columns[1]).startswith("dualball: 9 of 9 cases reproduced")
+    assert page.count("<td") >= len(grade.lines(columns)) * len(columns)
+    assert grade.table(columns).row_count >= len(grade.lines(columns))
+    assert grade.headline(columns[1]).startswith("dualball: 9 of 9 cases reproduced")
 
 
 def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, columns, capsys) -> None:
     asked = []
 
-    def measured(yours: Native, engine: object, progress: object) -> list[Column]:
+    def measured(yours: Native, others: object, show: object) -> list[Column]:
         asked.append(yours)
         return columns
 
@@ -113,10 +113,10 @@ def test_settings_come_through_to_the_engine() -> None:
         iterations=33,
         tolerance=1e-5,
         noslip_iterations=2,
-        A=Touch(solref=(0.005, 0.8), margin=1e-4),
-        B=Touch(solimp=(0.2, 0.3, 0.01, 0.4, 3)),
+        A=Pair(solref=(0.005, 0.8), margin=1e-4),
+        B=Pair(solimp=(0.2, 0.3, 0.01, 0.4, 3)),
     )
-    model = given.build(Parameters.named("reference"), given.loop())
+    model, _ = given.build(Parameters.named("reference"), given.loop())
     assert model.opt.timestep == given.timestep
     assert model.pair("A").solref.tolist() == [0.005, 0.8]
     assert model.pair("A").margin[0] == 1e-4
@@ -166,7 +166,7 @@ def test_impedance_is_the_engines(depth: float) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     if data.nefc:
-        assert Touch().impedance(depth) == pytest.approx(data.efc_KBIP[0, 2], rel=1e-6)
+        assert Pair().impedance(depth) == pytest.approx(data.efc_KBIP[0, 2], rel=1e-6)
     else:
         assert depth == 0
 
