@@ -34,6 +34,8 @@ from model.kinematics import slip_speeds
 
 GOOD, GOOD_SPEED = 1e-3, 1e-4
 """Relative error, and error of a speed in m/s, up to which a number is shown as good."""
+FINE = 10_000
+"""Samples of a run into a stationary state: enough of them at its end to see how often contact is lost."""
 TIMED = 10 * APPROACH.lasts
 """How long a run lasts whose cost is measured, s."""
 CAPTION = (
@@ -141,7 +143,7 @@ def _column(each: Contestant, ours: float) -> Column:
         name=each.name,
         timestep=each.step or math.nan,
         cases={case.name: trials.share(run(trials.scenario(case)), case) for case in Case},
-        stationary=tuple(state.held(run(state.run)) for state in STATES),
+        stationary=tuple(state.held(run((*state.run[:3], state.settles / FINE))) for state in STATES),
         omega_01=trials.onset([run(state.run) for state in trials.beyond_rolling()]),
         transient=APPROACH.errors(passing.time, passing.x)[0] if passing.complete else math.nan,
         cost=1.0 if each is OURS else _cost(each) / ours,
