@@ -95,7 +95,8 @@ def _of_mujoco(args: argparse.Namespace) -> tuple[Native, str]:
     if "solimp" in pair:
         pair["solimp"] = [*values, *base.A.solimp[len(values) :]]
     pair = {name: tuple(v) if isinstance(v, list) else v for name, v in pair.items()}
-    yours = dataclasses.replace(base, **own).with_contacts(**pair)
+    A, B = (dataclasses.replace(each, **pair) for each in (base.A, base.B))
+    yours = dataclasses.replace(base, **own, A=A, B=B)
     return yours, f"{described} {yours.note}".rstrip()
 
 

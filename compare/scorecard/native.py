@@ -20,22 +20,19 @@ from model import InputError, Parameters, StorageError
 from model.parameters import NOT_NEGATIVE, POSITIVE, check_choice, check_number
 
 _NUMBERS = ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations")
-
-
-def _constants(kind: Any, prefix: str, *names: str) -> dict[str, int]:
-    return {name: int(getattr(kind, prefix + name.upper())) for name in names}
-
-
 CHOICES = {
-    "integrator": _constants(mujoco.mjtIntegrator, "mjINT_", "Euler", "RK4", "implicit", "implicitfast", "discrete"),
-    "cone": _constants(mujoco.mjtCone, "mjCONE_", "pyramidal", "elliptic"),
-    "solver": _constants(mujoco.mjtSolver, "mjSOL_", "PGS", "CG", "Newton"),
+    option: {name: int(getattr(kind, f"{prefix}_{name.upper()}")) for name in names.split()}
+    for option, kind, prefix, names in (
+        ("integrator", mujoco.mjtIntegrator, "mjINT", "Euler RK4 implicit implicitfast discrete"),
+        ("cone", mujoco.mjtCone, "mjCONE", "pyramidal elliptic"),
+        ("solver", mujoco.mjtSolver, "mjSOL", "PGS CG Newton"),
+    )
 }
 """Options of the engine that are chosen by name, and its numbers for the names."""
 _DOWN = 0.7
 """Least share of down in the way from the ball to its floor."""
 _FAR = 1024.0
-"""A margin within which the ball pairs everything that it can, m."""
+"""A margin within which the ball touches everything that it can, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,12 +84,6 @@ class Native:
             check_number(name, getattr(self, name), "1", NOT_NEGATIVE)
         for name, known in CHOICES.items():
             check_choice(name, getattr(self, name), list(known))
-
-    def with_contacts(self, **changes: Any) -> Native:
-        """A copy with the given fields of both contacts changed."""
-        return dataclasses.replace(
-            self, A=dataclasses.replace(self.A, **changes), B=dataclasses.replace(self.B, **changes)
-        )
 
     def loop(self, **changes: Any) -> ContactSettings:
         """Settings of the study's loop round the engine, with all its corrections off."""
