@@ -177,12 +177,6 @@ def test_settings_out_of_range_are_refused(name):
         settings(coordinates="polar")
 
 
-@engines(*ALL)
-def test_a_step_too_long_for_the_problem_is_refused(name):
-    with pytest.raises(InputError, match="half of sqrt"):
-        run(name, REFERENCE, (0,) * 6, 1.0, 0.1)
-
-
 def test_the_league_of_theory_alone(tmp_path, capsys):
     command = ["league", "--quick", "--engine", "event", "-o", str(tmp_path), "--workers", "0", "--quiet"]
     assert cli.main([*command, "--json"]) == 0

@@ -13,7 +13,7 @@ import pytest
 import analytic
 from compare.runs.campaign import Campaign
 from compare.runs.engines import newcomer
-from compare.scorecard import scores
+from compare.scorecard import league, scores
 from compare.scorecard.league import COST, ERRORS, OPEN
 from compare.scorecard.trials import APPROACH, ROLLING, SLIPPING, STATES
 from docs.studies import tables
@@ -110,3 +110,7 @@ def test_frontier_has_a_cost_that_is_measured_once(campaign: Campaign, monkeypat
     assert [(e.name, e.step) for e in entries] == [("ours", STEP), ("time-stepping", STEP), ("event", None)]
     assert all(entry.scores[COST] > 0 for entry in entries)
     assert scores.frontier(campaign, [STEP]) == entries
+
+
+def test_numbers_of_tables() -> None:
+    assert [league.number(value) for value in (1.23e-5, 1e-16, math.nan)] == ["1.2e-05", "< 1e-14", "diverged"]
