@@ -1,4 +1,4 @@
-"""Errors: of all engines in the league or of ways of setting one over cost, and along the ladder of settings."""
+"""Error against cost, of the engines in the league or of ways to set MuJoCo; and error along the ladder of settings."""
 
 from __future__ import annotations
 
@@ -52,9 +52,9 @@ def select_frontier(material: Material) -> Entries:
 
 
 def caption_frontier(entries: Entries) -> str:
-    """Of error over cost."""
+    """Of error against cost."""
     return (
-        f"Relative error of ω_c over the processor time that a simulated second takes, in {_OF_STATES} and in a "
+        f"Relative error of ω_c against processor time divided by simulated time, in {_OF_STATES} and in a "
         "transient. Marks of one kind: one method at several time steps, joined. What is below 1e-16 is drawn there."
     )
 

@@ -1,4 +1,4 @@
-"""The league: every engine that is installed on the same tasks, over the time step, against theory.
+"""The league: every engine that is installed on the same tasks at several time steps, against theory.
 
 Each discipline is a set of runs and what they are off by. Stationary states start at rest and are judged once that
 start is forgotten, as in `trials`; the approach to SS and the motions through landings are held against the
@@ -281,8 +281,9 @@ def _open(runs: Runs) -> float:
 
 
 ERRORS = (*map(_stationary, STATES), _motion(APPROACH))
-"""Of ways of setting MuJoCo, and, beside them, how often contact is lost."""
+"""Those of ways to set MuJoCo."""
 CONTACT = Discipline(OPEN, tuple(run for each in ERRORS for run in each.runs), _open)
+"""How often contact is lost in the runs of `ERRORS`."""
 
 
 @functools.cache

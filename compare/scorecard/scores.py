@@ -60,7 +60,7 @@ def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
 
 
 def frontier(campaign: Campaign, steps: Sequence[float]) -> list[Entry]:
-    """Entries, with their cost, of MuJoCo under several settings and of the two simulators of theory, over the step."""
+    """Entries, with their cost, of MuJoCo under several settings and of theory's two simulators, at several steps."""
     ways = [each for alike in zip(*(_contestants(rivals(step)) for step in steps), strict=True) for each in alike]
     theory = [each for name in (MOREAU.name, EVENT.name) for each in league.contestants([name], steps)]
     return league.scored(campaign, [*ways, *theory], ERRORS, _cost)

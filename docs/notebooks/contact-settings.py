@@ -167,7 +167,7 @@ REPAIRED = MINE.replace("<option ", '<option cone="elliptic" impratio="3000" ').
 </mujoco>""",
 )
 Path("repaired.xml").write_text(REPAIRED)
-(better,) = grade(native.read(Path("repaired.xml")), others=())
+(better,) = grade.grade(native.read(Path("repaired.xml")), others=())
 for name, column in (("mine", graded), ("repaired", better)):
     print(f"{name:>9}: {grade.headline(column).removeprefix('yours: ')}")
     for held in column.stationary:
