@@ -2,8 +2,8 @@
 
 TAMSI solves the step by Newton's method, with friction mu v/v_s up to the stiction tolerance v_s: a contact that should
 roll creeps at a part of v_s, and a ball sinks in by its load divided by the stiffness. Both can be made small, as far
-as Newton's method converges. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of their
-own, and creep.
+as Newton's method converges. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of
+their own, and creep.
 
 Traps: friction is the harmonic mean 2 a b/(a + b) of both bodies' coefficients, stiffness k1 k2/(k1 + k2); without
 `SetUseSampledOutputPorts(False)` there is no update to be evaluated by itself; a plane has to be a half space, since

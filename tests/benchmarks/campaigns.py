@@ -47,7 +47,7 @@ def _tasks(count: int, t_end: float) -> list[Task]:
 
 def _ratios() -> tuple[float, float, float]:
     """Throughput of two processes divided by that of one, of campaigns and of bare arithmetic; of two Dask workers
-    divided by that of two processes, apart, since a scheduler takes its share. Medians of timings next to each other."""
+    divided by that of two processes, apart, since a scheduler takes its share. Medians of neighbouring timings."""
     tasks = _tasks(4 * BATCH, 2.0)  # a few seconds, against which the last batch to end counts little
     kinds = processes(1), processes(2)
     times = [[*(_timed(kind, tasks) for kind in kinds), *map(_computing, kinds)] for _ in range(REPEATS)]
