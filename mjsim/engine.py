@@ -47,6 +47,7 @@ class Run:
         to the bit; a single run outside is faster and rounds differently.
     journal : keeps what was done, and knows what an earlier process did
     progress : called with the fraction done, from time to time
+    build : makes the MuJoCo model, and its MJCF as text, of parameters and settings; `scene.build` if None
 
     Each iteration yields `Blocks`. A run that diverges or reaches the vessel's axis yields what it has, then empty
     blocks, and its header says why.
@@ -70,6 +71,7 @@ class Run:
         batched: bool = True,
         journal: Journal | None = None,
         progress: Callable[[float], None] | None = None,
+        build: Callable[[Parameters, ContactSettings], tuple[Any, str]] | None = None,
     ) -> None:
         if not len(parameters) == len(x0s) == len(flows) or len(parameters) == 0:
             raise InputError(
@@ -85,7 +87,7 @@ class Run:
             limits.check_timestep(settings.timestep, p, flow, t_end)
             limits.check_start(x, p, settings)
         scenes = [p.replace(omega_0=0.0) for p in parameters]  # the fluid is no part of a scene
-        built = {p: scene.build(p, settings) for p in dict.fromkeys(scenes)}
+        built = {p: (build or scene.build)(p, settings) for p in dict.fromkeys(scenes)}
         models = [built[p][0] for p in scenes]
         self._stepper = start(models, parameters, settings, states, theta_0, next(self._omega_0(0, 1)), batched)
         shown = settings.to_mapping() | {"t_end": float(t_end), "sample_interval": self._interval * settings.timestep}

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from typing import Any
 
 from rich.console import Console
 
+from compare import pages
 from compare.commands import options, running
 from compare.runs.engines import ENGINES
 from model import InputError
@@ -32,8 +34,7 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure what isn't there yet, show the table, write JSON and page."""
-    from compare.report import league as page  # here, because drawing takes a second to load
-    from compare.scorecard import league, standings
+    from compare.scorecard import league  # here, because nothing else needs it
 
     check_names(args.engine or (), list(ENGINES), "engine")
     those = league.contestants(args.engine, league.QUICK if args.quick else league.STEPS)
@@ -47,11 +48,28 @@ def run(args: argparse.Namespace) -> int:
         entries = league.measure(campaign, those, args.quick)
     data = league.to_mapping(those, entries)
     write_text(args.output / JSON, json.dumps(data, indent=1))
-    write_text(args.output / PAGE, page.html(data))
+    write_text(args.output / PAGE, html(data))
     if args.json:
         print(json.dumps(data, indent=1))
     else:
         console = Console()
-        console.print(*standings.tables(entries), standings.CAPTION)
+        console.print(*league.tables(entries), league.CAPTION)
         console.print(f"page: {args.output / PAGE}", soft_wrap=True)
     return 0
+
+
+def html(data: dict[str, Any]) -> str:
+    """The league of `league.to_mapping` as one page, which needs nothing but itself."""
+    from compare.figures import settings  # here, because drawing takes a second to load
+    from compare.report.pictures import address, svg
+    from compare.scorecard import league
+
+    entries = league.from_mapping(data)
+    failures = [
+        (f"{entry.name}, {1e3 * (entry.step or 0):g} ms, {name}", reason)
+        for entry in entries
+        for name, reason in entry.failures.items()
+    ]
+    shown = {"rows": league.rows(entries), "settings": league.settings_table(data), "caption": league.CAPTION}
+    shown |= {"failures": failures, "picture": address(svg(settings.draw_league(entries)))}
+    return pages.render("compare.report", "league.html", **shown)

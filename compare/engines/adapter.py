@@ -96,7 +96,7 @@ class Scene(Protocol):
     """A ball in an engine. Its axes are the world's; on joints, those in which the azimuth is zero."""
 
     def start(self, place: Floats, velocity: Floats) -> None:
-        """Put the ball somewhere: what the three and six numbers are, `compare.engines.loop.Coordinates` say."""
+        """Put the ball somewhere: what the three and six numbers are, `compare.engines.loop` says."""
 
     def advance(self, force: Floats) -> tuple[Floats, Floats]:
         """Take a step under a (generalised) force of three components; return place and velocity after it.

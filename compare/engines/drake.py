@@ -1,9 +1,9 @@
 """Drake: a discrete `MultibodyPlant` with point contact, normal forces implicit, friction regularised below a speed.
 
 TAMSI solves the step by Newton's method, with friction mu v/v_s up to the stiction tolerance v_s: a contact that should
-roll creeps at a part of v_s, and a ball sinks in by its load over the stiffness. Both can be made small, as far as
-Newton's method converges. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of their
-own, and creep.
+roll creeps at a part of v_s, and a ball sinks in by its load divided by the stiffness. Both can be made small, as far
+as Newton's method converges. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of
+their own, and creep.
 
 Traps: friction is the harmonic mean 2 a b/(a + b) of both bodies' coefficients, stiffness k1 k2/(k1 + k2); without
 `SetUseSampledOutputPorts(False)` there is no update to be evaluated by itself; a plane has to be a half space, since
@@ -85,7 +85,8 @@ class _Plant(Scene):
         plant.set_discrete_contact_approximation(getattr(approximations, _APPROXIMATIONS[settings.approximation]))
         plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -p.g])
         plant.SetUseSampledOutputPorts(False)
-        ball = plant.AddRigidBody("ball", _inertia(engine, p.m, p.j * p.r**2))
+        turning = engine.UnitInertia(*[p.j * p.r**2] * 3)
+        ball = plant.AddRigidBody("ball", engine.SpatialInertia(p.m, [0.0, 0.0, 0.0], turning))
         if self._joints:
             _hang(engine, plant, ball, p)
         springs = {"dissipation": settings.dissipation, "point_stiffness": settings.stiffness}
@@ -149,26 +150,21 @@ class _Plant(Scene):
 
     def touches(self) -> list[Touch]:
         results = self._results.Eval(self._context)
-        infos = [results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())]
-        return [self._touch(info) for info in infos]
-
-    def _touch(self, info: Any) -> Touch:
-        force, pair = info.contact_force(), info.point_pair()  # the force acts on the second body
-        force = force if info.bodyB_index() == self._ball else -force
-        return Touch(int(self._floor not in (pair.id_A, pair.id_B)), force, -pair.depth)
+        shown = []
+        for info in (results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())):
+            pair, sign = info.point_pair(), 1 if info.bodyB_index() == self._ball else -1  # it acts on the second body
+            contact = int(self._floor not in (pair.id_A, pair.id_B))
+            shown.append(Touch(contact, sign * info.contact_force(), -pair.depth))
+        return shown
 
     def close(self) -> None:
         del self._diagram, self._root, self._plant, self._context, self._force, self._results
 
 
-def _inertia(engine: Any, mass: float, per_mass: float) -> Any:
-    unit = engine.UnitInertia(per_mass, per_mass, per_mass)
-    return engine.SpatialInertia(mass, [0.0, 0.0, 0.0], unit, skip_validity_check=True)  # joints have no mass
-
-
 def _hang(engine: Any, plant: Any, ball: Any, p: Parameters) -> None:
     """Join the ball to the world by an azimuth hinge, an inward and an upward slide, and a ball joint."""
-    hinge, inward, upward = (plant.AddRigidBody(name, _inertia(engine, 0.0, 0.0)) for name in ("hinge", "in", "up"))
+    nothing = engine.SpatialInertia(0.0, [0.0, 0.0, 0.0], engine.UnitInertia(0.0, 0.0, 0.0), skip_validity_check=True)
+    hinge, inward, upward = (plant.AddRigidBody(name, nothing) for name in ("hinge", "in", "up"))
     up, frame = [0.0, 0.0, 1.0], plant.world_body().body_frame()
     plant.AddJoint(engine.RevoluteJoint("azimuth", frame, hinge.body_frame(), up, 0.0))
     place = engine.FixedOffsetFrame("place", hinge.body_frame(), engine.RigidTransform([p.R, 0.0, p.r]))

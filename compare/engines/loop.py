@@ -1,12 +1,13 @@
 """The loop round an engine: the fluid's drag, samples, cases, and what becomes of a run that breaks down.
 
-An engine shows itself as a `Scene` of a ball, a floor and a wall, in one of two kinds of `Coordinates`:
+An engine shows itself as a `Scene` of a ball, a floor and a wall, in one of two kinds of coordinates:
 
-* `JOINTS`: the ball hangs on an azimuth hinge, an inward and an upward slide, and a ball joint. Before each step the
+* ``joints``: the ball hangs on an azimuth hinge, an inward and an upward slide, and a ball joint. Before each step the
   scene turns its azimuth and the ball's orientation back to zero, so that the wall is one fixed plane. A stationary
   orbit is then a fixed point of the step. Engines that take gyroscopic moments at the beginning of the step spin a
-  ball up by omega_c^2 h/2 a second where nothing rubs against its spin.
-* `FREE`: a free ball in world axes, in a vessel of fixed walls.
+  ball up by omega_c^2 h/2 a second where nothing rubs against its spin. Place: (angle, h, y) in rad and m; velocity:
+  (omega_c, v_h, v_y, spin about the scene's axes against the joints).
+* ``free``: a free ball in world axes, in a vessel of fixed walls. Place and velocity with spin in m, m s-1 and rad s-1.
 
 The engine is driven by -m c(|w|) w (9) alone, with the velocity w relative to the fluid at the beginning of each step.
 """
@@ -16,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -35,70 +36,11 @@ from model.trajectory import current_versions, samples
 
 _HUGE = 1e8
 """A coordinate, velocity or force beyond this, in SI units, has diverged."""
-
-
-@dataclass(frozen=True)
-class Coordinates:
-    """What place and velocity of a scene are."""
-
-    start: Callable[[State, Parameters], tuple[Array, Array]]
-    drag: Callable[[Floats, Floats, float, Ball], Floats]
-    """The force of the fluid at a place, a velocity and an omega_0."""
-    azimuth: Callable[[float, Floats], float]
-    """The azimuth, not wrapped, from that before the step."""
-    states: Callable[[Array, Array, Parameters], State]
-    """States of places (n, 3) and velocities (n, 6)."""
-    turning: bool
-    """Whether the axes of the scene turn with the ball."""
-
-
-def _joint_start(x: State, p: Parameters) -> tuple[Array, Array]:
-    qpos, qvel = recorder.joint_state(x, 0.0, p)
-    return qpos[:3], qvel @ _SPIN.T
-
-
-def _joint_drag(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
-    rho, (omega_c, v_h, v_y, *_) = ball.R - place[1], velocity
-    along = rho * (omega_c - omega_0)
-    mc = resistance(along, v_h, v_y, ball)
-    return -mc * rho * along, -mc * v_h, -mc * v_y
-
-
-def _joint_states(place: Array, velocity: Array, p: Parameters) -> State:
-    upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(place), 4))
-    return recorder.state(np.concatenate([place, upright], axis=1), velocity @ _SPIN, p)
-
-
-def _free_start(x: State, p: Parameters) -> tuple[Array, Array]:
-    motion = to_world(x, 0.0, p)
-    return motion.position, np.concatenate([motion.velocity, motion.spin])
-
-
-def _free_drag(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
-    (x, y, _), (v_x, v_y, v_z, *_) = place, velocity
-    w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
-    mc = resistance(w_x, w_y, v_z, ball)
-    return -mc * w_x, -mc * w_y, -mc * v_z
-
-
-def _free_states(place: Array, velocity: Array, p: Parameters) -> State:
-    return from_world(Motion(place, velocity[:, :3], velocity[:, 3:]), p)[0]
-
-
+_WIDTH = 1 + 3 + 6 + 2 * 5
+"""A row: azimuth, place, velocity, and for each contact whether it touches, force (3,), gap."""
 _SPIN = np.eye(6)
 _SPIN[3:, 3:] = frame(0.0).T
-"""Turns the spin from the paper's axes to those of the scene."""
-JOINTS = Coordinates(_joint_start, _joint_drag, lambda theta, place: theta + place[0], _joint_states, True)
-"""Place (angle, h, y) in rad and m; velocity (omega_c, v_h, v_y, spin about the scene's axes against the joints)."""
-FREE = Coordinates(
-    _free_start,
-    _free_drag,
-    lambda theta, place: theta + math.remainder(math.atan2(place[1], place[0]) - theta, math.tau),
-    _free_states,
-    False,
-)
-"""Place and velocity with spin in world axes, m, m s-1 and rad s-1."""
-COORDINATES = {"joints": JOINTS, "free": FREE}
+"""Turns the spin from the paper's axes to those of a scene on joints."""
 
 
 def simulate(
@@ -126,22 +68,32 @@ def simulate(
     """
     every, count = limits.sampling(t_end, settings.timestep, sample_interval)
     limits.check_timestep(settings.timestep, p, flow, t_end)
-    x = State.one(x0)
+    x, joints = State.one(x0), settings.coordinates == "joints"
     check_number("h", x.h, "m", Range(high=p.R, below=True), "to be off the axis it")
-    rows, failure = np.empty((count, _WIDTH)), ""
-    coordinates = COORDINATES[settings.coordinates]
+    drag = _drag_on_joints if joints else _drag_in_world
+    ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
+    rows, done, failure = np.empty((count, _WIDTH)), 0, ""
     with closing(build(library.load(), p, settings)) as scene:
-        place, velocity = coordinates.start(x, p)
-        scene.start(place.tolist(), velocity.tolist())
-        ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
-        run = _Run(scene, coordinates, ball, place.tolist(), velocity.tolist())
-        done = 0
+        place, velocity = _start(x, p, joints)
+        scene.start(place, velocity)
+        theta = 0.0
         try:
             while done < count:
-                steps = every if done + 1 < count else 1  # nothing is needed after the forces of the last sample
+                row, steps = rows[done], every if done + 1 < count else 1  # of the last sample only forces are needed
+                row[:10], row[10:] = [theta, *place, *velocity], 0.0
                 times = (done * every + np.arange(steps) + 0.5) * settings.timestep
-                run.sample(rows[done], flow(times).tolist())
-                if not (np.abs(rows[done]) < _HUGE).all():
+                for number, omega_0 in enumerate(flow(times).tolist()):
+                    place, velocity = scene.advance(drag(place, velocity, omega_0, ball))
+                    if joints and place[1] >= p.R:
+                        raise BreakdownError("reached the vessel's axis, where polar coordinates end,")
+                    azimuth = math.remainder(math.atan2(place[1], place[0]) - theta, math.tau)
+                    theta += place[0] if joints else azimuth
+                    if number == 0:
+                        for contact, force, gap in scene.touches():
+                            of = row[10 + 5 * contact :][:5]
+                            of[4] = min(gap, of[4]) if of[0] else gap
+                            of[0], of[1:4] = 1.0, of[1:4] + force
+                if not (np.abs(row) < _HUGE).all():
                     raise BreakdownError("diverged")
                 done += 1
                 progress(done / count)
@@ -152,47 +104,45 @@ def simulate(
     versions = {**current_versions(), library.name: library.version}
     header = Header(engine, p, flow, asdict(settings) | given, failure=failure, versions=versions)
     classifier = Classifier(p, settings)
-    block = classifier.add(_samples(time, rows[:done], coordinates, p), last=True)
+    block = classifier.add(_samples(time, rows[:done], joints, p), last=True)
     return Trajectory.from_blocks(header, [block], classifier.events)
 
 
-_WIDTH = 1 + 3 + 6 + 2 * 5
-"""A row: azimuth, place, velocity, and for each contact whether it touches, force (3,), gap."""
+def _start(x: State, p: Parameters, joints: bool) -> tuple[Floats, Floats]:
+    """Place and velocity of a state."""
+    if joints:
+        qpos, qvel = recorder.joint_state(x, 0.0, p)
+        return qpos[:3].tolist(), (qvel @ _SPIN.T).tolist()
+    motion = to_world(x, 0.0, p)
+    return motion.position.tolist(), [*motion.velocity.tolist(), *motion.spin.tolist()]
 
 
-@dataclass
-class _Run:
-    scene: Scene
-    coordinates: Coordinates
-    ball: Ball
-    place: Floats
-    velocity: Floats
-    theta: float = 0.0
-
-    def sample(self, row: Array, omega_0: list[float]) -> None:
-        """Fill in the present state, take a step for each omega_0, and fill in the contacts of the first."""
-        row[:10], row[10:] = [self.theta, *self.place, *self.velocity], 0.0
-        self._step(omega_0[0])
-        for contact, force, gap in self.scene.touches():
-            of = row[10 + 5 * contact :][:5]
-            of[4] = min(gap, of[4]) if of[0] else gap
-            of[0], of[1:4] = 1.0, of[1:4] + force
-        for fluid in omega_0[1:]:
-            self._step(fluid)
-
-    def _step(self, omega_0: float) -> None:
-        drag = self.coordinates.drag(self.place, self.velocity, omega_0, self.ball)
-        self.place, self.velocity = self.scene.advance(drag)
-        if self.coordinates.turning and self.place[1] >= self.ball.R:
-            raise BreakdownError("reached the vessel's axis, where polar coordinates end,")
-        self.theta = self.coordinates.azimuth(self.theta, self.place)
+def _drag_on_joints(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
+    """The generalised force of the fluid."""
+    rho, (omega_c, v_h, v_y, *_) = ball.R - place[1], velocity
+    along = rho * (omega_c - omega_0)
+    mc = resistance(along, v_h, v_y, ball)
+    return -mc * rho * along, -mc * v_h, -mc * v_y
 
 
-def _samples(time: Array, rows: Array, coordinates: Coordinates, p: Parameters) -> npt.NDArray[np.void]:
+def _drag_in_world(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
+    """The force of the fluid."""
+    (x, y, _), (v_x, v_y, v_z, *_) = place, velocity
+    w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
+    mc = resistance(w_x, w_y, v_z, ball)
+    return -mc * w_x, -mc * w_y, -mc * v_z
+
+
+def _samples(time: Array, rows: Array, joints: bool, p: Parameters) -> npt.NDArray[np.void]:
     """Samples of dtype `SAMPLE`, shape (n,), all but the case."""
     theta, place, velocity, *contacts = np.split(rows, [1, 4, 10, 15], axis=1)
-    axes = frame(np.zeros(len(rows)) if coordinates.turning else theta[:, 0])
-    block = samples(time, theta[:, 0], coordinates.states(place, velocity, p), p)
+    if joints:
+        upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(rows), 4))
+        state = recorder.state(np.concatenate([place, upright], axis=1), velocity @ _SPIN, p)
+    else:
+        state, _ = from_world(Motion(place, velocity[:, :3], velocity[:, 3:]), p)
+    block = samples(time, theta[:, 0], state, p)
+    axes = frame(np.zeros(len(rows)) if joints else theta[:, 0])
     for name, own in zip("AB", contacts, strict=True):
         block[f"force_{name}"] = np.einsum("nab,nb->na", axes, own[:, 1:4])
         block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], block[f"gap_{name}"])

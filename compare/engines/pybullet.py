@@ -16,6 +16,7 @@ import numpy as np
 from compare.engines import adapter
 from compare.engines.adapter import BreakdownError, Floats, Scene, Touch, number, tangents
 from model import Parameters
+from model.arrays import Array
 from model.parameters import Range
 
 
@@ -61,14 +62,13 @@ def newcomer(timestep: float) -> Settings:
 
 def scene(engine: Any, p: Parameters, settings: Settings) -> Scene:
     """The ball in a physics server of its own."""
-    return (_OnJoints if settings.coordinates == "joints" else _Free)(engine, p, settings)
+    return _Server(engine, p, settings)
 
 
-class _Ball(Scene):
-    """Floor, wall, and what is common to both kinds of ball."""
-
+class _Server(Scene):
     def __init__(self, engine: Any, p: Parameters, settings: Settings) -> None:
         self._engine, self._p, self._scale = engine, p, settings.scale
+        self._joints = settings.coordinates == "joints"
         self._here = {"physicsClientId": engine.connect(engine.DIRECT)}
         if self._here["physicsClientId"] < 0:
             raise BreakdownError("PyBullet has no more servers")
@@ -82,50 +82,26 @@ class _Ball(Scene):
             **self._here,
         )
         engine.setGravity(0, 0, -p.g * self._scale, **self._here)
-        self._floor = self._plane([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], p.mu)
+        self._floor = self._plane(np.zeros(3), np.array([0.0, 0.0, 1.0]), p.mu)
         for place, normal in tangents(p, settings.facets):
-            self._plane((place * self._scale).tolist(), normal.tolist(), p.eta)
+            self._plane(place, normal, p.eta)
         sphere = engine.createCollisionShape(engine.GEOM_SPHERE, radius=p.r * self._scale, **self._here)
-        self._body = self._make(sphere)
+        self._body = self._on_joints(sphere) if self._joints else engine.createMultiBody(p.m, sphere, **self._here)
+        free = {"linearDamping": 0, "angularDamping": 0, "jointDamping": 0, "maxJointVelocity": 1e9}
+        for link, mass in enumerate((0, 0, 0, p.m)) if self._joints else [(-1, p.m)]:
+            inertia = [p.j * mass * (p.r * self._scale) ** 2] * 3
+            engine.changeDynamics(self._body, link, localInertiaDiagonal=inertia, **free, **self._here)
+            engine.changeDynamics(self._body, link, lateralFriction=1, restitution=0, **self._here)
 
-    def _plane(self, place: Floats, normal: Floats, friction: float) -> int:
-        shape = self._engine.createCollisionShape(self._engine.GEOM_PLANE, planeNormal=normal, **self._here)
-        body: int = self._engine.createMultiBody(0, shape, basePosition=place, **self._here)
+    def _plane(self, place: Array, normal: Array, friction: float) -> int:
+        shape = self._engine.createCollisionShape(self._engine.GEOM_PLANE, planeNormal=normal.tolist(), **self._here)
+        where = (place * self._scale).tolist()
+        body: int = self._engine.createMultiBody(0, shape, basePosition=where, **self._here)
         self._engine.changeDynamics(body, -1, lateralFriction=friction, restitution=0, **self._here)
         return body
 
-    def _make(self, sphere: int) -> int:
-        raise NotImplementedError
-
-    def _dress(self, body: int, link: int, mass: float) -> None:
-        """Give a link a mass and take away all damping."""
-        inertia = self._p.j * mass * (self._p.r * self._scale) ** 2
-        free = {"linearDamping": 0, "angularDamping": 0, "jointDamping": 0, "maxJointVelocity": 1e9}
-        self._engine.changeDynamics(body, link, localInertiaDiagonal=[inertia] * 3, **free, **self._here)
-        self._engine.changeDynamics(body, link, lateralFriction=1, restitution=0, **self._here)
-
-    def touches(self) -> list[Touch]:
-        """The contact points of the last step that carried something."""
-        return [
-            Touch(
-                int(point[2] != self._floor),
-                (point[9] * np.array(point[7]) + point[10] * np.array(point[11]) + point[12] * np.array(point[13]))
-                / self._scale,
-                point[8] / self._scale,
-            )
-            for point in self._engine.getContactPoints(self._body, **self._here)
-            if point[9] > 0
-        ]
-
-    def close(self) -> None:
-        """Stop the server."""
-        self._engine.disconnect(**self._here)
-
-
-class _OnJoints(_Ball):
-    """The ball on massless joints."""
-
-    def _make(self, sphere: int) -> int:
+    def _on_joints(self, sphere: int) -> int:
+        """A ball on massless joints without motors."""
         engine, count = self._engine, 4
         body: int = engine.createMultiBody(
             baseMass=0,
@@ -142,8 +118,6 @@ class _OnJoints(_Ball):
             linkJointAxis=[[0, 0, 1], [-1, 0, 0], [0, 0, 1], [0, 0, 1]],
             **self._here,
         )
-        for link, mass in enumerate((0, 0, 0, self._p.m)):
-            self._dress(body, link, mass)
         for joint in range(3):
             engine.setJointMotorControl2(body, joint, engine.VELOCITY_CONTROL, force=0, **self._here)
         still = {"targetPosition": _UPRIGHT, "positionGain": 0, "velocityGain": 0, "force": [0, 0, 0]}
@@ -151,48 +125,48 @@ class _OnJoints(_Ball):
         return body
 
     def start(self, place: Floats, velocity: Floats) -> None:
-        _, *gaps = place
-        for joint, gap, rate in zip((1, 2), gaps, velocity[1:3], strict=True):
-            self._engine.resetJointState(self._body, joint, gap * self._scale, rate * self._scale, **self._here)
-        self._turn_back(velocity[0], velocity[3:])
+        engine, body, scale = self._engine, self._body, self._scale
+        if self._joints:
+            for joint, gap, rate in zip((1, 2), place[1:], velocity[1:3], strict=True):
+                engine.resetJointState(body, joint, gap * scale, rate * scale, **self._here)
+            self._turn_back(velocity[0], velocity[3:])
+        else:
+            self._place, linear = ([value * scale for value in part] for part in (place, velocity[:3]))
+            engine.resetBasePositionAndOrientation(body, self._place, _UPRIGHT, **self._here)
+            engine.resetBaseVelocity(body, linear, velocity[3:], **self._here)
 
     def _turn_back(self, rate: float, spin: Floats) -> None:
+        """Set azimuth and orientation back to zero, at these velocities."""
         self._engine.resetJointState(self._body, 0, 0.0, rate, **self._here)
         self._engine.resetJointStateMultiDof(self._body, 3, _UPRIGHT, spin, **self._here)
 
     def advance(self, force: Floats) -> tuple[Floats, Floats]:
         engine, body, scale = self._engine, self._body, self._scale
-        forces = [force[0] * scale * scale, force[1] * scale, force[2] * scale]
-        engine.setJointMotorControlArray(body, (0, 1, 2), engine.TORQUE_CONTROL, forces=forces, **self._here)
-        engine.stepSimulation(**self._here)
-        states = engine.getJointStatesMultiDof(body, (0, 1, 2, 3), **self._here)
-        ((angle,), (rate,), *_), ((h,), (v_h,), *_), ((y,), (v_y,), *_), (_, spin, *_) = states
-        self._turn_back(rate, spin)
-        return (angle, h / scale, y / scale), (rate, v_h / scale, v_y / scale, *spin)
-
-
-class _Free(_Ball):
-    """A free ball."""
-
-    def _make(self, sphere: int) -> int:
-        body: int = self._engine.createMultiBody(self._p.m, sphere, **self._here)
-        self._dress(body, -1, self._p.m)
-        return body
-
-    def start(self, place: Floats, velocity: Floats) -> None:
-        centre, linear = ([value * self._scale for value in part] for part in (place, velocity[:3]))
-        self._engine.resetBasePositionAndOrientation(self._body, centre, _UPRIGHT, **self._here)
-        self._engine.resetBaseVelocity(self._body, linear, velocity[3:], **self._here)
-        self._place = centre
-
-    def advance(self, force: Floats) -> tuple[Floats, Floats]:
-        engine, body, scale = self._engine, self._body, self._scale
+        if self._joints:
+            forces = [force[0] * scale * scale, force[1] * scale, force[2] * scale]
+            engine.setJointMotorControlArray(body, (0, 1, 2), engine.TORQUE_CONTROL, forces=forces, **self._here)
+            engine.stepSimulation(**self._here)
+            states = engine.getJointStatesMultiDof(body, (0, 1, 2, 3), **self._here)
+            ((angle,), (rate,), *_), ((h,), (v_h,), *_), ((y,), (v_y,), *_), (_, spin, *_) = states
+            self._turn_back(rate, spin)
+            return (angle, h / scale, y / scale), (rate, v_h / scale, v_y / scale, *spin)
         pull = [each * scale for each in force]
         engine.applyExternalForce(body, -1, pull, self._place, engine.WORLD_FRAME, **self._here)
         engine.stepSimulation(**self._here)
         self._place, _ = engine.getBasePositionAndOrientation(body, **self._here)
         linear, spin = engine.getBaseVelocity(body, **self._here)
         return [each / scale for each in self._place], [*(each / scale for each in linear), *spin]
+
+    def touches(self) -> list[Touch]:
+        shown = []
+        for point in self._engine.getContactPoints(self._body, **self._here):
+            if point[9] > 0:  # force, direction of the normal; the same of both tangents
+                force = sum(point[k] * np.array(point[way]) for k, way in ((9, 7), (10, 11), (12, 13)))
+                shown.append(Touch(int(point[2] != self._floor), force / self._scale, point[8] / self._scale))
+        return shown
+
+    def close(self) -> None:
+        self._engine.disconnect(**self._here)
 
 
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)

@@ -137,16 +137,13 @@ class _Remote(Scene):
             raise BreakdownError(f"gave no answer for {PATIENCE:g} s")
         line = answers.readline()
         if not line:
-            raise BreakdownError(f"ended ({self._last_words()})")
+            assert self._process.stderr
+            words = self._process.stderr.read().strip().splitlines()
+            raise BreakdownError(f"ended ({words[-1] if words else f'exit code {self._process.wait()}'})")
         answer = json.loads(line)
         if isinstance(answer, dict):
             raise BreakdownError(f"could not go on ({answer['error']})")
         return answer
-
-    def _last_words(self) -> str:
-        assert self._process.stderr
-        words = self._process.stderr.read().strip().splitlines()
-        return words[-1] if words else f"exit code {self._process.wait()}"
 
     def start(self, place: Floats, velocity: Floats) -> None:
         self._ask([*place, *velocity])

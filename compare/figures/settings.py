@@ -1,4 +1,4 @@
-"""Errors: of all engines in the league or of ways of setting one over cost, and along the ladder of settings."""
+"""Error against cost, of the engines in the league or of ways to set MuJoCo; and error along the ladder of settings."""
 
 from __future__ import annotations
 
@@ -35,13 +35,6 @@ def select_ladder(material: Material) -> Entries:
     return material.ladder
 
 
-def select_frontier(material: Material) -> Entries:
-    """The entries that have a cost."""
-    if not material.frontier:
-        raise GapError("error against cost was not measured")
-    return material.frontier
-
-
 def caption_ladder(entries: Entries) -> str:
     """Of the ladder."""
     return (
@@ -51,10 +44,17 @@ def caption_ladder(entries: Entries) -> str:
     )
 
 
+def select_frontier(material: Material) -> Entries:
+    """The entries that have a cost."""
+    if not material.frontier:
+        raise GapError("error against cost was not measured")
+    return material.frontier
+
+
 def caption_frontier(entries: Entries) -> str:
-    """Of error over cost."""
+    """Of error against cost."""
     return (
-        f"Relative error of ω_c over the processor time that a simulated second takes, in {_OF_STATES} and in a "
+        f"Relative error of ω_c against processor time divided by simulated time, in {_OF_STATES} and in a "
         "transient. Marks of one kind: one method at several time steps, joined. What is below 1e-16 is drawn there."
     )
 
@@ -83,15 +83,13 @@ def draw_frontier(entries: Entries) -> Figure:
 
 def draw_league(entries: Sequence[Entry]) -> Figure:
     """A panel for each error of omega_c in the league, a line for each engine."""
-    looks = {entry.name: style.mark_of(entry.name) for entry in entries}
-    return _error_over_cost(entries, looks, leave_out=(CREEP, ROLLING_ENDS, WALL, CASES))
+    return _error_over_cost(entries, {entry.name: style.mark_of(entry.name) for entry in entries})
 
 
-def _error_over_cost(
-    entries: Sequence[Entry], looks: Mapping[str, Mapping[str, Any]], leave_out: Sequence[str] = ()
-) -> Figure:
+def _error_over_cost(entries: Sequence[Entry], looks: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Marks of one name at several time steps are joined, with the looks of that name."""
-    shown = [name for name in dict.fromkeys(n for e in entries for n in e.scores) if name not in (*leave_out, COST)]
+    other = (CREEP, ROLLING_ENDS, WALL, CASES, COST)  # no errors of omega_c
+    shown = [name for name in dict.fromkeys(n for e in entries for n in e.scores) if name not in other]
     lines = -(-len(shown) // COLUMNS)
     figure = style.figure(11, 0.9 + 3.0 * lines)
     panels = figure.subplots(lines, COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
@@ -104,12 +102,12 @@ def _error_over_cost(
         axes.set(xscale="log", yscale="log")
         axes.set_title(discipline, fontsize=10)
         axes.grid(alpha=0.3)
-    for axes in panels[len(shown) :]:
-        axes.set_visible(False)
-    for axes in panels[::COLUMNS]:
-        axes.set_ylabel("relative error")
-    for axes in panels[max(0, len(shown) - COLUMNS) : len(shown)]:
-        axes.set_xlabel("processor time per simulated time")
-        axes.tick_params(labelbottom=True)
+    for k, axes in enumerate(panels):
+        axes.set_visible(k < len(shown))
+        if k % COLUMNS == 0:
+            axes.set_ylabel("relative error")
+        if k >= len(shown) - COLUMNS:
+            axes.set_xlabel("processor time divided by simulated time")
+            axes.tick_params(labelbottom=True)
     style.legend(figure, loc="outside lower center", ncols=4)
     return figure

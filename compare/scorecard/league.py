@@ -1,4 +1,4 @@
-"""The league: every engine that is installed on the same tasks, over the time step, against theory.
+"""The league: every engine that is installed on the same tasks at several time steps, against theory.
 
 Each discipline is a set of runs and what they are off by. Stationary states start at rest and are judged once that
 start is forgotten, as in `trials`; the approach to SS and the motions through landings are held against the
@@ -7,37 +7,30 @@ event-driven simulation, thresholds and cases against closed-form theory.
 
 from __future__ import annotations
 
+import functools
 import json
 import math
+import os
 import statistics
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from rich.table import Table
 
 import analytic
+from compare import pages
+from compare.pages import Rows
 from compare.runs.campaign import Campaign
 from compare.runs.engines import ENGINES, NEWCOMER, Engine, Settings, newcomer
-from compare.runs.tasks import Task
+from compare.runs.tasks import Task, carry_out
 from compare.scorecard import trials
-from compare.scorecard.contenders import Contestant, seconds
-from compare.scorecard.trials import (
-    APPROACH,
-    AT_REST,
-    HITTING,
-    LANDING,
-    ROLLING,
-    ROUGH,
-    SLIPPING,
-    STATES,
-    WINDOW,
-    Held,
-    Motion,
-    Stationary,
-)
+from compare.scorecard.trials import APPROACH, HITTING, LANDING, ROLLING, ROUGH, SLIPPING, STATES, Asked, Stationary
 from compare.statistics import plain
-from model import Case, Parameters, Trajectory
+from mjsim import ContactSettings
+from model import Case, Trajectory
 from model.files import write_text
 
 STEPS = (4e-3, 2e-3, 1e-3)
@@ -51,9 +44,33 @@ REPEATS = 3
 """Cost is the median of as many timings."""
 CREEP, ROLLING_ENDS, WALL, CASES, COST = "creep (m/s)", "ω₀₁", "ω₀₂", "cases (of 9)", "cost"
 OPEN = "open"
+CAPTION = (
+    "Relative errors of ω_c: in stationary states (case and ω₀ in rad/s) from rest, once the start is forgotten; as "
+    "root mean square in motions. ω₀₁: relative error of the flow at which rolling ends; ω₀₂: how near to the flow at "
+    "which the wall begins to carry the ball the engine is right on both sides. Cost: processor time divided by "
+    "simulated time."
+)
+"""What the columns are."""
 Runs = Sequence[Trajectory]
-Asked = tuple[Parameters, Sequence[float], float, float]
-"""A run: its parameters, start, duration and interval of the samples in s."""
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """An engine with settings."""
+
+    name: str
+    engine: Engine
+    step: float | None
+    """s; None for one that chooses its own."""
+    settings: Settings
+
+    def task(self, asked: Asked) -> Task:
+        """A run; it samples no more often than it steps."""
+        p, x0, lasts, interval = asked
+        every = max(interval, self.step or 0.0)
+        return Task(
+            engine=self.engine.name, parameters=p, x0=x0, t_end=lasts, settings=self.settings, sample_interval=every
+        )
 
 
 @dataclass(frozen=True)
@@ -80,26 +97,30 @@ class Entry:
     """By discipline, why."""
 
 
+def as_it_comes(step: float) -> ContactSettings:
+    """MuJoCo's own settings for a free ball in flat facets, as newcomers to the other engines have them."""
+    return replace(newcomer(step), coordinates="free", wall="prism", cone="pyramidal")
+
+
 def contestants(chosen: Sequence[str] | None = None, steps: Sequence[float] = STEPS) -> list[Contestant]:
     """The engines chosen by name, or all, whether installed or not, with each time step that they don't choose."""
-    those = [engine for engine in ENGINES.values() if chosen is None or engine.name in chosen]
+
+    def settings(engine: Engine, step: float | None) -> Settings:
+        if engine is NEWCOMER and step:
+            return as_it_comes(step)
+        return engine.configure({"timestep": step} if step else {}, SLIPPING.p)
+
     return [
-        Contestant(engine.name, engine, step, _settings(engine, step))
-        for engine in those
+        Contestant(engine.name, engine, step, settings(engine, step))
+        for engine in ENGINES.values()
+        if chosen is None or engine.name in chosen
         for step in (steps if "timestep" in engine.options else [None])
     ]
 
 
-def _settings(engine: Engine, step: float | None) -> Settings:
-    """Those of a person's run, but MuJoCo as it comes has a free ball in flat facets, as the others' newcomers have."""
-    if engine is NEWCOMER and step:
-        return replace(newcomer(step), coordinates="free", wall="prism", cone="pyramidal")
-    return engine.configure({"timestep": step} if step else {}, SLIPPING.p)
-
-
 def measure(campaign: Campaign, those: Sequence[Contestant], quick: bool = False) -> list[Entry]:
     """The entries of all contestants that are installed; runs that are there already aren't repeated."""
-    asked = [discipline for discipline in DISCIPLINES if discipline.quick or not quick]
+    asked = [discipline for discipline in disciplines() if discipline.quick or not quick]
     return scored(campaign, [each for each in those if not each.engine.missing], asked, cost)
 
 
@@ -109,8 +130,8 @@ def scored(
     asked: Sequence[Discipline],
     cost: Callable[[Task], float] | None = None,
 ) -> list[Entry]:
-    """What contestants reach in some disciplines, and what a run takes by `cost`, if given."""
-    rows = [[[each.task(*run) for run in discipline.runs] for discipline in asked] for each in those]
+    """What contestants reach in some disciplines, and what a run takes by `cost`, if given, measured once."""
+    rows = [[[each.task(run) for run in discipline.runs] for discipline in asked] for each in those]
     failed = {f.task.key: f.reason for f in campaign.complete(task for row in rows for tasks in row for task in tasks)}
     entries = []
     for number, (each, row) in enumerate(zip(those, rows, strict=True)):
@@ -118,21 +139,35 @@ def scored(
         for discipline, tasks in zip(asked, row, strict=True):
             reasons = [failed[task.key] for task in tasks if task.key in failed]
             entry.failures.update({discipline.name: reasons[0]} if reasons else {})
-            runs = [] if reasons else [campaign.load(task.key) for task in tasks]
-            entry.scores[discipline.name] = discipline.score(runs) if runs else math.nan
+            entry.scores[discipline.name] = math.nan if reasons else discipline.score(campaign.run(tasks))
         if cost:
             campaign.report(f"cost of {each.name}", number, len(those), 0)
-            entry.scores[COST] = _kept(campaign, each.task(*APPROACHING.runs[0]), cost)
+            task = each.task(APPROACH.run)
+            kept = campaign.directory / f"{task.key}.cost.json"
+            if not kept.exists():
+                write_text(kept, json.dumps(cost(task)))
+            entry.scores[COST] = float(json.loads(kept.read_text("utf-8")))
         entries.append(entry)
     return entries
 
 
-def _kept(campaign: Campaign, task: Task, cost: Callable[[Task], float]) -> float:
-    """What a run costs, measured once and kept beside it."""
-    path = campaign.directory / f"{task.key}.cost.json"
-    if not path.exists():
-        write_text(path, json.dumps(cost(task)))
-    return float(json.loads(path.read_text("utf-8")))
+def cost(task: Task) -> float:
+    """Processor time divided by simulated time of one run by itself, without what it takes to begin.
+
+    The time of this process and of those that it started and that ended.
+    """
+
+    def clock() -> float:
+        ended = os.times()
+        return time.process_time() + ended.children_user + ended.children_system
+
+    def seconds(task: Task) -> float:
+        begin = clock()
+        carry_out([task])
+        return clock() - begin
+
+    half = replace(task, t_end=task.t_end / 2)
+    return statistics.median(seconds(task) - seconds(half) for _ in range(REPEATS)) / half.t_end
 
 
 def to_mapping(those: Sequence[Contestant], entries: Sequence[Entry]) -> dict[str, Any]:
@@ -156,40 +191,61 @@ def from_mapping(data: dict[str, Any]) -> list[Entry]:
     ]
 
 
-def cost(task: Task) -> float:
-    """Processor time over simulated time of one run by itself, without what it takes to begin."""
-    half = replace(task, t_end=task.t_end / 2)
-    return statistics.median(seconds(task) - seconds(half) for _ in range(REPEATS)) / half.t_end
+def rows(entries: Sequence[Entry]) -> Rows:
+    """A table with a head, and a row for each entry; only disciplines that some entry has."""
+    forms = {CASES: "{:.0f}".format, COST: "{:.2g}".format, OPEN: "{:.0%}".format, WALL: "≤ {:g}".format}
+
+    def cell(entry: Entry, name: str) -> str:
+        score = entry.scores.get(name)
+        if name in entry.failures or score is None:
+            return "failed" if name in entry.failures else ""
+        return "not seen" if math.isnan(score) else forms.get(name, number)(score)
+
+    asked = list(dict.fromkeys(name for entry in entries for name in entry.scores))
+    table = [["engine", "step", *asked]]
+    for entry in entries:
+        step = "its own" if entry.step is None else f"{1e3 * entry.step:g} ms"
+        table.append([entry.name, step, *(cell(entry, name) for name in asked)])
+    return table
 
 
-def _held(run: Trajectory, state: Stationary) -> Held:
-    """How far the end of a run from rest is from the state that it settles in."""
-    return trials.held(run, state, (1 - WINDOW) * state.settles)
+def number(value: float) -> str:
+    """An error: round-off is shown as such, a run without one as diverged."""
+    return "diverged" if math.isnan(value) else "< 1e-14" if value < 1e-14 else f"{value:.1e}"
+
+
+def tables(entries: Sequence[Entry]) -> Iterator[Table]:
+    """The league for the terminal: for each time step a column an engine, those that choose their own in all."""
+    steps: list[float | None] = [step for step in dict.fromkeys(entry.step for entry in entries) if step]
+    for step in steps or [None]:
+        own = [entry for entry in entries if entry.step in (step, None)]
+        title = "League" if step is None else f"League, step {1e3 * step:g} ms"
+        _, _, *lines = zip(*rows(own), strict=True)
+        yield pages.table(
+            title, [["", *(entry.name.replace("-", "- ") for entry in own)], *lines], no_wrap=True, padding=0
+        )
+
+
+def settings_table(data: dict[str, Any]) -> Rows:
+    """What each contestant was set to, of `to_mapping`: a name, versions, and settings or why it is missing."""
+    table = [["engine", "versions", "settings"]]
+    for each in data["contestants"]:
+        versions = ", ".join(f"{name} {version}" for name, version in each["versions"].items())
+        given = ", ".join(f"{name} {value}" for name, value in each.get("settings", {}).items() if name != "timestep")
+        table.append([each["name"], versions, each["missing"] or given])
+    return table
 
 
 def _stationary(state: Stationary) -> Discipline:
     """Relative error of omega_c in a state that is settled in from rest."""
-    runs, quick = ((state.p, AT_REST, state.settles, state.settles / 1000),), state in (ROLLING, SLIPPING)
-    return Discipline(state.name, runs, lambda runs: abs(_held(runs[0], state).omega_c), quick)
-
-
-def _motion(of: Motion) -> Discipline:
-    """Rms error of omega_c over a motion."""
-    runs = ((of.p, of.x0, of.lasts, of.lasts / 100),)
-    return Discipline(of.name, runs, lambda runs: of.errors(runs[0].time, runs[0].x)[0], quick=True)
-
-
-def _end_of_rolling() -> Discipline:
-    """Relative error of omega_01, where slip measured above it would begin by the same extrapolation as theory's."""
-    states = trials.beyond_rolling()
-
-    def score(runs: Runs) -> float:
-        extrapolated = trials.onset([float(run.slip_z[-100:].mean()) for run in runs])
-        return abs(extrapolated - trials.onset([float(state.solution.state.slip_z) for state in states]))
-
     return Discipline(
-        ROLLING_ENDS, tuple((s.p, AT_REST, math.ceil(s.forgets), s.forgets / 1000) for s in states), score
+        state.name, (state.run,), lambda runs: abs(state.held(runs[0]).omega_c), state in (ROLLING, SLIPPING)
     )
+
+
+def _motion(of: trials.Transient) -> Discipline:
+    """Rms error of omega_c over a motion."""
+    return Discipline(of.name, (of.run,), lambda runs: of.errors(runs[0].time, runs[0].x)[0], quick=True)
 
 
 def _wall_holds() -> Discipline:
@@ -197,9 +253,9 @@ def _wall_holds() -> Discipline:
     omega_02 = analytic.thresholds(ROUGH).omega_02
     runs: list[Asked] = []
     for margin in MARGINS:
+        riding = Stationary(ROUGH.replace(omega_0=omega_02 * (1 + margin)), Case.NR).solution.state
         for sign in (1, -1):
             p = ROUGH.replace(omega_0=omega_02 * (1 + sign * margin))
-            riding = Stationary(ROUGH.replace(omega_0=omega_02 * (1 + margin)), Case.NR).solution.state
             runs.append((p, riding._replace(y=p.R, omega_c=p.omega_0), RIDES, RIDES / 100))
 
     def score(runs: Runs) -> float:
@@ -210,41 +266,37 @@ def _wall_holds() -> Discipline:
     return Discipline(WALL, tuple(runs), score)
 
 
-def _cases() -> Discipline:
-    """How many of the nine cases a run is in where the event-driven simulation is."""
-    runs: list[Asked] = []
-    for case, (p, x0) in trials.SCENARIOS.items():
-        begin, end = trials.phase(case)
-        runs.append((p, x0, end, (end - begin) / 200))
-
-    def score(runs: Runs) -> float:
-        shares = [trials.share(run, case) for run, case in zip(runs, trials.SCENARIOS, strict=True)]
-        return float(sum(share >= trials.AGREES for share in shares))
-
-    return Discipline(CASES, tuple(runs), score, quick=True)
+def _reproduced(runs: Runs) -> float:
+    """In how many of the nine cases a run is where the event-driven simulation is in it."""
+    return float(sum(trials.share(run, case) >= trials.AGREES for run, case in zip(runs, Case, strict=True)))
 
 
 def _open(runs: Runs) -> float:
     """Largest share of samples in which a contact that should carry a force carries none."""
     *ended, passing = runs
-    shares = [_held(run, state).open for run, state in zip(ended, STATES, strict=True)]
+    shares = [state.held(run).open for run, state in zip(ended, STATES, strict=True)]
     # In the first sample the ball has yet to sink into a soft contact.
     carries = np.stack([passing.force_A[1:, 1], passing.force_B[1:, 0]]) > 0
     return max(*shares, 1 - float(carries.mean(axis=1).min()))
 
 
-APPROACHING = _motion(APPROACH)
-ERRORS = (*map(_stationary, STATES), APPROACHING)
-"""Of ways of setting MuJoCo, and, beside them, how often contact is lost."""
+ERRORS = (*map(_stationary, STATES), _motion(APPROACH))
+"""Those of ways to set MuJoCo."""
 CONTACT = Discipline(OPEN, tuple(run for each in ERRORS for run in each.runs), _open)
-DISCIPLINES = (
-    *ERRORS[:3],
-    replace(ERRORS[0], name=CREEP, score=lambda runs: _held(runs[0], ROLLING).creep),
-    APPROACHING,
-    _motion(LANDING),
-    _motion(HITTING),
-    _end_of_rolling(),
-    _wall_holds(),
-    _cases(),
-)
-"""In the order of the table."""
+"""How often contact is lost in the runs of `ERRORS`."""
+
+
+@functools.cache
+def disciplines() -> tuple[Discipline, ...]:
+    """Those of the league, in the order of its table."""
+    onset, cases = tuple(state.run for state in trials.beyond_rolling()), tuple(map(trials.scenario, Case))
+    return (
+        *ERRORS[:3],
+        replace(ERRORS[0], name=CREEP, score=lambda runs: ROLLING.held(runs[0]).creep),
+        ERRORS[-1],
+        _motion(LANDING),
+        _motion(HITTING),
+        Discipline(ROLLING_ENDS, onset, lambda runs: abs(trials.onset(runs))),
+        _wall_holds(),
+        Discipline(CASES, cases, _reproduced, quick=True),
+    )

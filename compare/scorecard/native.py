@@ -20,19 +20,15 @@ from model import InputError, Parameters, StorageError
 from model.parameters import NOT_NEGATIVE, POSITIVE, check_choice, check_number
 
 _NUMBERS = ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations")
-
-
-def _constants(kind: Any, prefix: str, *names: str) -> dict[str, int]:
-    return {name: int(getattr(kind, prefix + name.upper())) for name in names}
-
-
 CHOICES = {
-    "integrator": _constants(mujoco.mjtIntegrator, "mjINT_", "Euler", "RK4", "implicit", "implicitfast", "discrete"),
-    "cone": _constants(mujoco.mjtCone, "mjCONE_", "pyramidal", "elliptic"),
-    "solver": _constants(mujoco.mjtSolver, "mjSOL_", "PGS", "CG", "Newton"),
+    option: {name: int(getattr(kind, f"{prefix}_{name.upper()}")) for name in names.split()}
+    for option, kind, prefix, names in (
+        ("integrator", mujoco.mjtIntegrator, "mjINT", "Euler RK4 implicit implicitfast discrete"),
+        ("cone", mujoco.mjtCone, "mjCONE", "pyramidal elliptic"),
+        ("solver", mujoco.mjtSolver, "mjSOL", "PGS CG Newton"),
+    )
 }
 """Options of the engine that are chosen by name, and its numbers for the names."""
-_NOTE = "{}: there is no {} that the ball can touch; the contact with its {} stands for both"
 _DOWN = 0.7
 """Least share of down in the way from the ball to its floor."""
 _FAR = 1024.0
@@ -40,7 +36,7 @@ _FAR = 1024.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Touch:
+class Pair:
     """What MuJoCo knows of one contact; the defaults are its own."""
 
     solref: tuple[float, float] = (0.02, 1.0)
@@ -76,8 +72,8 @@ class Native:
     iterations: int = 100
     tolerance: float = 1e-8
     noslip_iterations: int = 0
-    A: Touch = Touch()
-    B: Touch = Touch()
+    A: Pair = Pair()
+    B: Pair = Pair()
     note: str = ""
     """What the file that it was read from lacks, and what stands for it."""
 
@@ -89,18 +85,12 @@ class Native:
         for name, known in CHOICES.items():
             check_choice(name, getattr(self, name), list(known))
 
-    def with_contacts(self, **changes: Any) -> Native:
-        """A copy with the given fields of both contacts changed."""
-        return dataclasses.replace(
-            self, A=dataclasses.replace(self.A, **changes), B=dataclasses.replace(self.B, **changes)
-        )
-
     def loop(self, **changes: Any) -> ContactSettings:
         """Settings of the study's loop round the engine, with all its corrections off."""
         return ContactSettings.at(self.timestep, memory=False, servo=0.0, order=1, cone=self.cone, **changes)
 
-    def build(self, p: Parameters, loop: ContactSettings) -> Any:
-        """The scene compiled to an `mujoco.MjModel` with these settings; `InputError` if MuJoCo refuses them."""
+    def build(self, p: Parameters, loop: ContactSettings) -> tuple[Any, str]:
+        """As `mjsim.scene.build`, with these settings in the place of those of the loop."""
         spec = scene.spec(p, loop)
         option = spec.option
         for name in _NUMBERS:
@@ -108,42 +98,41 @@ class Native:
         for name, known in CHOICES.items():
             setattr(option, name, known[getattr(self, name)])
         for pair in spec.pairs:
-            touch = self.A if pair.name == "A" else self.B
-            for field in dataclasses.fields(Touch):
-                setattr(pair, field.name, getattr(touch, field.name))
+            own = self.A if pair.name == "A" else self.B
+            for field in dataclasses.fields(Pair):
+                setattr(pair, field.name, getattr(own, field.name))
         try:
-            return spec.compile()
+            return spec.compile(), str(spec.to_xml())
         except ValueError as error:
             raise InputError(f"MuJoCo refuses these settings: {' '.join(str(error).split())}") from error
 
-    def theory(self, touch: Touch, load: float) -> ContactSettings:
+    def theory(self, pair: Pair, load: float) -> ContactSettings:
         """Settings with one impedance that a contact amounts to under the normal force m `load` (m s-2).
 
         The impedance is that at the depth of rest; time constants follow from b = 2/(dmax tc) and
         k = d/(dmax tc dr)^2, and are those that the engine puts in the place of ones shorter than two steps.
         """
-        depth = 0.0
+        highest, depth = pair.solimp[1], 0.0
+
+        def rates(solref: tuple[float, float], d: float) -> tuple[float, float]:
+            """Damping b (s-1) and stiffness k (s-2) of a row, as MuJoCo's chapter on computation gives them."""
+            first, second = solref
+            if first <= 0 or second <= 0:
+                return -second / highest, -first * d / highest**2
+            first = max(first, 2 * self.timestep)
+            return 2 / (highest * first), d / (highest * first * second) ** 2
+
+        impratio = min(max(self.impratio, 0.1), 1e7)
+        bare = ContactSettings(timestep=1e-12, impratio=impratio, memory=False, servo=0.0, order=1)
         for _ in range(50):
-            formal = self._formal(touch, touch.impedance(depth))
+            d = pair.impedance(depth)
+            b, k = rates(pair.solref, d)
+            b_f, _ = rates(pair.solreffriction if any(pair.solreffriction) else pair.solref, d)
+            tc = 2 / (d * b)
+            solref = tc, 1 / (tc * math.sqrt(d * k))
+            formal = dataclasses.replace(bare, solimp=d, solref=solref, solreffriction=2 / (d * b_f))
             depth = formal.margin(load)
         return formal
-
-    def _formal(self, touch: Touch, d: float) -> ContactSettings:
-        b, k = self._rates(touch.solref, touch.solimp[1], d)
-        friction = touch.solreffriction if any(touch.solreffriction) else touch.solref
-        b_f, _ = self._rates(friction, touch.solimp[1], d)
-        tc = 2 / (d * b)
-        impratio = min(max(self.impratio, 0.1), 1e7)
-        bare = ContactSettings(timestep=1e-12, solimp=d, impratio=impratio, memory=False, servo=0.0, order=1)
-        return dataclasses.replace(bare, solref=(tc, 1 / (tc * math.sqrt(d * k))), solreffriction=2 / (d * b_f))
-
-    def _rates(self, solref: tuple[float, float], highest: float, d: float) -> tuple[float, float]:
-        """Damping b (s-1) and stiffness k (s-2) of a row, as the chapter on computation gives them."""
-        first, second = solref
-        if first <= 0 or second <= 0:
-            return -second / highest, -first * d / highest**2
-        first = max(first, 2 * self.timestep)
-        return 2 / (highest * first), d / (highest * first * second) ** 2
 
 
 def read(path: Path) -> Native:
@@ -158,7 +147,7 @@ def read(path: Path) -> Native:
     StorageError
         If the file can't be read.
     InputError
-        If it is no MJCF, or lacks a ball or anything for it to touch.
+        If it is no MJCF, or lacks a ball or anything for it to pair.
     """
     if not path.is_file():
         raise StorageError(f"cannot read {path}: there is no such file")
@@ -166,22 +155,6 @@ def read(path: Path) -> Native:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise InputError(f"{path} is not valid MJCF: {' '.join(str(error).split())}") from error
-    ball = _ball(model, path)
-    floors, walls = _touches(model, ball)
-    if not floors + walls:
-        raise InputError(
-            f"{path}: the ball has no contacts: it needs a <pair> with something, or a geom whose contype and "
-            "conaffinity meet its own, and contacts switched on"
-        )
-    note = "" if floors and walls else _NOTE.format(path, *(("floor", "wall") if walls else ("wall", "floor")))
-    same: dict[str, Any] = {name: getattr(model.opt, name) for name in _NUMBERS}
-    for name, known in CHOICES.items():
-        same[name] = next(key for key, value in known.items() if value == getattr(model.opt, name))
-    return Native(**same, A=(floors or walls)[0], B=(walls or floors)[0], note=note)
-
-
-def _ball(model: Any, path: Path) -> int:
-    """Number of the ball's geom."""
     moves = model.body_weldid[model.geom_bodyid] > 0
     spheres = np.flatnonzero(moves & (model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE)).tolist()
     named = [geom for geom in spheres if model.geom(geom).name == "ball"]
@@ -189,10 +162,22 @@ def _ball(model: Any, path: Path) -> int:
         raise InputError(f"{path}: there is no ball: it needs a geom of type sphere in a body with a joint")
     if len(spheres) > 1 and not named:
         raise InputError(f"{path}: there are {len(spheres)} spheres that move; name the one to be graded 'ball'")
-    return int((named or spheres)[0])
+    floors, walls = _contacts(model, (named or spheres)[0])
+    if not floors + walls:
+        raise InputError(
+            f"{path}: the ball has no contacts: it needs a <pair> with something, or a geom whose contype and "
+            "conaffinity meet its own, and contacts switched on"
+        )
+    missing, other = ("floor", "wall") if walls else ("wall", "floor")
+    note = f"{path}: there is no {missing} that the ball can touch; the contact with its {other} stands for both"
+    note = "" if floors and walls else note
+    same: dict[str, Any] = {name: getattr(model.opt, name) for name in _NUMBERS}
+    for name, known in CHOICES.items():
+        same[name] = next(key for key, value in known.items() if value == getattr(model.opt, name))
+    return Native(**same, A=(floors or walls)[0], B=(walls or floors)[0], note=note)
 
 
-def _touches(model: Any, ball: int) -> tuple[list[Touch], list[Touch]]:
+def _contacts(model: Any, ball: int) -> tuple[list[Pair], list[Pair]]:
     """The contacts that the engine makes of the ball with what is below it and with what is beside it.
 
     The ball is given a margin that reaches everything, so that the engine itself says what it can touch and how the
@@ -204,11 +189,11 @@ def _touches(model: Any, ball: int) -> tuple[list[Touch], list[Touch]]:
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE  # which knows of the margins in the file alone
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
-    touches: tuple[list[Touch], list[Touch]] = [], []
+    pairs: tuple[list[Pair], list[Pair]] = [], []
     for contact in data.contact:
         if ball in contact.geom:
             given = {name: tuple(getattr(contact, name).tolist()) for name in ("solref", "solreffriction", "solimp")}
             down = -contact.frame[2] if contact.geom[0] == ball else contact.frame[2]
             # The margin is taken apart to the digits that it had in the sum.
-            touches[int(down < _DOWN)].append(Touch(**given, margin=round(contact.includemargin - _FAR, 12)))
-    return touches
+            pairs[int(down < _DOWN)].append(Pair(**given, margin=round(contact.includemargin - _FAR, 12)))
+    return pairs

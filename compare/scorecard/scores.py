@@ -9,129 +9,86 @@ import json
 import statistics
 import time
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 from compare.runs.campaign import BATCH, Campaign
 from compare.runs.engines import EVENT, MOREAU, NEWCOMER, newcomer
 from compare.runs.tasks import Task
 from compare.scorecard import league
-from compare.scorecard.contenders import Contestant
-from compare.scorecard.league import CONTACT, ERRORS, Entry
+from compare.scorecard.league import CONTACT, ERRORS, Contestant, Entry
 from compare.statistics import plain
 from mjsim import ContactSettings, Run
 from model.files import reading_json, write_text
 
 FILE = "scores.json"
 STEP = 1e-3
-"""Time step of the ladder and the variants, s."""
+"""Time step of the ladder, s."""
 STEPS = (4e-3, 2e-3, 1e-3)
 """Time steps of error against cost that figures show, s."""
-BASES: dict[str, Callable[[float], ContactSettings]] = {"ours": ContactSettings.at, "MuJoCo's defaults": newcomer}
-"""Settings for a time step in s, beside which others are named."""
+Ways = Mapping[str, ContactSettings]
+"""Ways to set MuJoCo, named after ours or MuJoCo's defaults and what differs from them."""
 
 
-def name(settings: ContactSettings) -> str:
-    """The base from which settings differ least, and in what they differ."""
-    changes = {base: _changes(at(settings.timestep), settings) for base, at in BASES.items()}
-    base = min(changes, key=lambda each: len(changes[each]))
-    return ", ".join([base, *changes[base]])
-
-
-def _changes(base: ContactSettings, settings: ContactSettings) -> list[str]:
-    values = {f.name: getattr(settings, f.name) for f in fields(settings)}
-    return [f"{each} {_text(value)}" for each, value in values.items() if value != getattr(base, each)]
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, bool):
-        return "on" if value else "off"
-    if isinstance(value, tuple):
-        return " ".join(_text(part) for part in value)
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def rungs(step: float) -> list[ContactSettings]:
+def rungs(step: float) -> Ways:
     """From what a newcomer writes to ours, each with one thing more than the one before."""
-    return [
-        replace(newcomer(step), cone="pyramidal", coordinates="free", wall="prism"),
-        replace(newcomer(step), cone="pyramidal", coordinates="free"),
-        replace(newcomer(step), coordinates="free"),
-        newcomer(step),
-        ContactSettings.at(step, memory=False, servo=0.0, order=1),
-        ContactSettings.at(step, memory=False, order=1),
-        ContactSettings.at(step, order=1),
-        ContactSettings.at(step),
-    ]
+    theirs = "MuJoCo's defaults"
+    return {
+        f"{theirs}, coordinates free, wall prism, cone pyramidal": league.as_it_comes(step),
+        f"{theirs}, coordinates free, cone pyramidal": replace(league.as_it_comes(step), wall=newcomer(step).wall),
+        f"{theirs}, coordinates free": replace(newcomer(step), coordinates="free"),
+        theirs: newcomer(step),
+        "ours, memory off, servo 0, order 1": ContactSettings.at(step, memory=False, servo=0.0, order=1),
+        "ours, memory off, order 1": ContactSettings.at(step, memory=False, order=1),
+        "ours, order 1": ContactSettings.at(step, order=1),
+        "ours": ContactSettings.at(step),
+    }
 
 
-def rivals(step: float) -> list[ContactSettings]:
+def rivals(step: float) -> Ways:
     """Settings whose error is compared with their cost."""
-    return [
-        ContactSettings.at(step),
-        ContactSettings.at(step, order=1),
-        ContactSettings.at(step, order=1, memory=False, servo=0.0),
-        newcomer(step),
-        ContactSettings.at(step, coordinates="free", memory=False, order=1),
-    ]
+    named = rungs(step)
+    chosen = ("ours", "ours, order 1", "ours, memory off, servo 0, order 1", "MuJoCo's defaults")
+    free = ContactSettings.at(step, coordinates="free", memory=False, order=1)
+    return {name: named[name] for name in chosen} | {"ours, memory off, order 1, coordinates free": free}
 
 
-def others(step: float) -> list[ContactSettings]:
-    """Other ways to set MuJoCo; a firmer impedance keeps the damping b_f h = 1 of the friction rows."""
-    firm = {"solimp": 0.1, "solreffriction": 2 * step / 0.1}
-    return [
-        replace(newcomer(step), cone="pyramidal"),
-        ContactSettings.at(step, **firm, cone="pyramidal", memory=False, order=1),
-        ContactSettings.at(step, integrator="implicit"),
-        ContactSettings.at(step, integrator="implicitfast"),
-        ContactSettings.at(step, **firm, integrator="discrete"),
-        ContactSettings.at(step, integrator="discrete"),
-        ContactSettings.at(step, memory=False, noslip_iterations=10),
-        ContactSettings.at(step, memory=False),
-        ContactSettings.at(step),
-    ]
-
-
-def reached(campaign: Campaign, ways: Sequence[ContactSettings]) -> list[Entry]:
+def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
     """Errors of ways to set MuJoCo, and how often contact is lost."""
-    return league.scored(campaign, [_way(each) for each in ways], [*ERRORS, CONTACT])
+    return league.scored(campaign, _contestants(ways), [*ERRORS, CONTACT])
 
 
 def frontier(campaign: Campaign, steps: Sequence[float]) -> list[Entry]:
-    """Entries, with their cost, of MuJoCo under several settings and of the two simulators of theory, over the step."""
-    ways = [_way(each) for alike in zip(*map(rivals, steps), strict=True) for each in alike]
+    """Entries, with their cost, of MuJoCo under several settings and of theory's two simulators, at several steps."""
+    ways = [each for alike in zip(*(_contestants(rivals(step)) for step in steps), strict=True) for each in alike]
     theory = [each for name in (MOREAU.name, EVENT.name) for each in league.contestants([name], steps)]
     return league.scored(campaign, [*ways, *theory], ERRORS, _cost)
 
 
-def _way(settings: ContactSettings) -> Contestant:
-    """MuJoCo set in some way, without a warning where contacts hover: what poor settings do is the question here."""
-    return Contestant(name(settings), NEWCOMER, settings.timestep, settings)
+def _contestants(ways: Ways) -> list[Contestant]:
+    """They run without a warning where contacts hover: what poor settings do is the question here."""
+    return [Contestant(name, NEWCOMER, each.timestep, each) for name, each in ways.items()]
 
 
 def _cost(task: Task) -> float:
-    """Processor time over simulated time of a run, without what it takes to begin: its share of a full batch.
+    """Processor time divided by simulated time of a run, without what it takes to begin: its share of a full batch.
 
     What has no batches, as free balls, runs by itself.
     """
     settings = task.settings
     if not isinstance(settings, ContactSettings) or settings.coordinates != "polar":
         return league.cost(task)
-    return statistics.median(_share_of_batch(task, settings) for _ in range(league.REPEATS)) / task.t_end
-
-
-def _share_of_batch(task: Task, settings: ContactSettings) -> float:
-    """Processor time in s."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of contacts that hover
-        given = [task.parameters] * BATCH, [task.x0] * BATCH, task.t_end, [task.fluid] * BATCH, settings
-        run = Run(*given, sample_interval=task.sample_interval)
-    begin = time.process_time()
-    for _ in run:
-        pass
-    return (time.process_time() - begin) / BATCH
+    given, spent = ([task.parameters] * BATCH, [task.x0] * BATCH, task.t_end, [task.fluid] * BATCH, settings), []
+    for _ in range(league.REPEATS):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of contacts that hover
+            run = Run(*given, sample_interval=task.sample_interval)
+        begin = time.process_time()
+        for _ in run:
+            pass
+        spent.append(time.process_time() - begin)
+    return statistics.median(spent) / BATCH / task.t_end
 
 
 def write(campaign: Campaign, directory: Path) -> None:

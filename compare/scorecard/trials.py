@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 import analytic
 from analytic import StationarySolution
@@ -21,12 +20,30 @@ from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ
 
+Asked = tuple[Parameters, Sequence[float], float, float]
+"""A run: its parameters, start, duration and interval of the samples in s."""
 EPS = float(np.finfo(float).eps)
 SMOOTH, ROUGH = Parameters.named("reference"), Parameters.named("high-wall-friction")
 WINDOW = 0.1
 """Last part of a settled run, which is averaged."""
 AT_REST = State()
 """Start against the wall, on the floor."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """How far a settled run is from a state; nan if it diverged."""
+
+    name: str
+    """Of the state."""
+    omega_c: float
+    """Relative error of omega_c."""
+    slip: float
+    """Largest error of a component of slip, times r, m s-1."""
+    open: float
+    """Largest share of samples in which a contact that should carry a force carries none."""
+    creep: float
+    """Largest mean slip speed at a contact that should roll, m s-1; 0 if none should."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +76,29 @@ class Stationary:
         """How long a run lasts, s, in whose last part, a `WINDOW` of it, the start is forgotten."""
         return math.ceil(self.forgets / (1 - WINDOW))
 
+    @property
+    def run(self) -> Asked:
+        """From rest until it is settled."""
+        return self.p, AT_REST, self.settles, self.settles / 1000
+
+    def held(self, run: Trajectory, since: float | None = None) -> Held:
+        """How far the samples of a run since a time in s are from the state; by default the last `WINDOW` of `run`."""
+        if not run.complete:
+            return Held(self.name, *[math.nan] * 4)
+        since = (1 - WINDOW) * self.settles if since is None else since
+        last, x = slice(int(np.searchsorted(run.time, since)), None), self.solution.x
+        contacts = (
+            (self.case.A, run.slip_speed_A[last], run.force_A[last, 1]),
+            (self.case.B, run.slip_speed_B[last], run.force_B[last, 0]),
+        )
+        return Held(
+            name=self.name,
+            omega_c=float(run.omega_c[last].mean() / self.solution.state.omega_c) - 1,
+            slip=float(np.abs(run.x[last, SLIP_XYZ].mean(axis=0) - x[SLIP_XYZ]).max()) * self.p.r,
+            open=max(float(np.mean(normal <= 0)) for contact, _, normal in contacts if contact is not Contact.N),
+            creep=max([float(speed.mean()) for contact, speed, _ in contacts if contact is Contact.R], default=0.0),
+        )
+
 
 ROLLING = Stationary(SMOOTH.replace(omega_0=12.0), Case.RR)
 SLIPPING = Stationary(SMOOTH.replace(omega_0=25.0), Case.SS)
@@ -68,41 +108,7 @@ STATES = (ROLLING, BARELY, SLIPPING, RIDING)
 
 
 @dataclass(frozen=True)
-class Held:
-    """How far a settled run is from a state; nan if it diverged."""
-
-    name: str
-    """Of the state."""
-    omega_c: float
-    """Relative error of omega_c."""
-    slip: float
-    """Largest error of a component of slip, times r, m s-1."""
-    open: float
-    """Largest share of samples in which a contact that should carry a force carries none."""
-    creep: float
-    """Largest mean slip speed at a contact that should roll, m s-1; 0 if none should."""
-
-
-def held(run: Trajectory, state: Stationary, since: float) -> Held:
-    """Compare the samples of a run from a time in s with a state."""
-    if not run.complete:
-        return Held(state.name, *[math.nan] * 4)
-    last, x = slice(int(np.searchsorted(run.time, since)), None), state.solution.x
-    contacts = (
-        (state.case.A, run.slip_speed_A[last], run.force_A[last, 1]),
-        (state.case.B, run.slip_speed_B[last], run.force_B[last, 0]),
-    )
-    return Held(
-        name=state.name,
-        omega_c=float(run.omega_c[last].mean() / state.solution.state.omega_c) - 1,
-        slip=float(np.abs(run.x[last, SLIP_XYZ].mean(axis=0) - x[SLIP_XYZ]).max()) * state.p.r,
-        open=max(float(np.mean(normal <= 0)) for contact, _, normal in contacts if contact is not Contact.N),
-        creep=max([float(speed.mean()) for contact, speed, _ in contacts if contact is Contact.R], default=0.0),
-    )
-
-
-@dataclass(frozen=True)
-class Motion:
+class Transient:
     """A motion from a start, s, of which theory knows the course."""
 
     name: str
@@ -111,6 +117,11 @@ class Motion:
     lasts: float
     course: str = ""
     """What happens, in words."""
+
+    @property
+    def run(self) -> Asked:
+        """All of it."""
+        return self.p, self.x0, self.lasts, self.lasts / 100
 
     @cached_property
     def exact(self) -> Trajectory:
@@ -128,15 +139,15 @@ class Motion:
 
 KICKED = State(omega_c=14.35, slip_x=-1.0, slip_y=2.0, slip_z=7.0)
 """From here the ball slips at both points all the time."""
-APPROACH = Motion("approach to " + SLIPPING.name, SLIPPING.p, KICKED, 2.0)
-LANDING = Motion(
+APPROACH = Transient("approach to " + SLIPPING.name, SLIPPING.p, KICKED, 2.0)
+LANDING = Transient(
     "lands on the floor",
     SMOOTH,
     State(y=0.02, v_y=-0.2, omega_c=12.0, slip_x=30.0, slip_y=-10.0, slip_z=20.0),
     0.7,
     "slides down the wall, lands, slips at both points, sticks",
 )
-HITTING = Motion(
+HITTING = Transient(
     "hits the wall",
     SMOOTH,
     State(omega_c=10.0, slip_x=1.0, slip_y=2.0, slip_z=3.0, h=0.002, v_h=-0.3),
@@ -155,16 +166,20 @@ def beyond_rolling() -> tuple[Stationary, ...]:
     return tuple(Stationary(SMOOTH.replace(omega_0=factor * omega_01), Case.SS) for factor in ONSET)
 
 
-def onset(slips: Sequence[float]) -> float:
+def onset(runs: Sequence[Trajectory]) -> float:
     """Relative error of omega_01, from settled slip_z in the states at `ONSET` extrapolated to zero along a parabola.
 
-    It is nan if slip doesn't begin near omega_01.
+    The same is done with theory's slip, and the difference taken. It is nan if slip doesn't begin near omega_01.
     """
-    states = beyond_rolling()
-    if not all(abs(slip / s.solution.state.slip_z - 1) < 0.5 for slip, s in zip(slips, states, strict=True)):
+    exact = [float(state.solution.state.slip_z) for state in beyond_rolling()]
+    if not all(run.complete for run in runs):
+        return math.nan
+    slips = [float(run.slip_z[-round(WINDOW * len(run.time)) :].mean()) for run in runs]
+    if not all(abs(slip / of - 1) < 0.5 for slip, of in zip(slips, exact, strict=True)):
         return math.nan
     # omega_0 as a function of slip, at no slip.
-    return float(np.polynomial.Polynomial.fit(slips, ONSET, 2)(0.0)) - 1
+    seen, true = (float(np.polynomial.Polynomial.fit(each, ONSET, 2)(0.0)) for each in (slips, exact))
+    return seen - true
 
 
 AGREES = 0.9
@@ -197,17 +212,21 @@ def phase(case: Case) -> tuple[float, float]:
     return next((first, last) for each, first, last in stretches if each is case)
 
 
+def scenario(case: Case) -> Asked:
+    """The run of a scenario, as long as the event-driven simulation is in its case."""
+    begin, end = phase(case)
+    return *SCENARIOS[case], end, (end - begin) / 200
+
+
 def share(run: Trajectory, case: Case) -> float:
     """Share of the samples of a run of a scenario that are in its case, where the event-driven simulation is in it."""
     begin, end = phase(case)
     # The first steps press the ball into a soft contact, and the end may come early: a tenth is left out each.
     margin = 0.1 * (end - begin)
     judged = (run.time >= begin + margin) & (run.time < end - margin)
-    return float(_in_case(run, case)[judged].mean()) if run.complete and judged.any() else 0.0
-
-
-def _in_case(run: Trajectory, case: Case) -> npt.NDArray[np.bool_]:
-    """Which samples are in a case, by what moves and what carries; a contact that chatters carries its mean."""
+    if not (run.complete and judged.any()):
+        return 0.0
+    # In the case by what moves and what carries; a contact that chatters carries its mean.
     p, right = run.header.parameters, np.ones(len(run.time), dtype=bool)
     for contact, normal, speed in (
         (case.A, run.force_A[:, 1], run.slip_speed_A),
@@ -217,4 +236,4 @@ def _in_case(run: Trajectory, case: Case) -> npt.NDArray[np.bool_]:
         closed = mean > CARRIES * p.m * p.g
         slips = speed > SLIDES * math.sqrt(p.g * p.R)
         right &= ~closed if contact is Contact.N else closed & (slips == (contact is Contact.S))
-    return right
+    return float(right[judged].mean())

@@ -27,8 +27,7 @@ from rich.console import Console
 import analytic
 import mjsim
 from compare.runs.engines import newcomer
-from compare.scorecard import card, native
-from compare.scorecard.grade import grade
+from compare.scorecard import grade, native
 from mjsim import ContactSettings
 from model import Case, Parameters
 
@@ -69,12 +68,12 @@ print(f"floor: solref {mine.A.solref}, solimp {mine.A.solimp}")
 # in which the ball is for at least nine tenths of the time in which it should be.
 
 # %%
-(graded,) = grade(mine, others=())
+(graded,) = grade.grade(mine, others=())
 console = Console(width=88, no_color=True, force_jupyter=False)
-table = card.table([graded])
+table = grade.table([graded])
 table.caption = None
 console.print(table)
-print(card.headline(graded))
+print(grade.headline(graded))
 
 # %% [markdown]
 # And what to do about it, the most harmful first:
@@ -168,9 +167,9 @@ REPAIRED = MINE.replace("<option ", '<option cone="elliptic" impratio="3000" ').
 </mujoco>""",
 )
 Path("repaired.xml").write_text(REPAIRED)
-(better,) = grade(native.read(Path("repaired.xml")), others=())
+(better,) = grade.grade(native.read(Path("repaired.xml")), others=())
 for name, column in (("mine", graded), ("repaired", better)):
-    print(f"{name:>9}: {card.headline(column).removeprefix('yours: ')}")
+    print(f"{name:>9}: {grade.headline(column).removeprefix('yours: ')}")
     for held in column.stationary:
         print(
             f"{held.name:>20}: omega_c {held.omega_c:+.1e}, creep {held.creep:.0e} m/s"

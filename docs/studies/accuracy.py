@@ -14,9 +14,7 @@ from analytic import rolling_forces
 from compare.pages import Rows
 from compare.runs.campaign import Campaign
 from compare.runs.engines import MUJOCO
-from compare.scorecard import trials
-from compare.scorecard.contenders import Contestant
-from compare.scorecard.standings import number
+from compare.scorecard.league import Contestant, number
 from compare.scorecard.trials import APPROACH, AT_REST, HITTING, LANDING, SMOOTH, STATES, WINDOW, Stationary
 from mjsim import ContactSettings
 from model import Case, Contact, Events, State, Trajectory
@@ -43,14 +41,14 @@ def reached(campaign: Campaign, states: Sequence[Stationary] = REACHED, steps: S
     """Errors of stationary states from rest and from near them, the worse of the two."""
     lasts = max(state.settles for state in states)
     tasks = {
-        (state, h): [_at(h).task(state.p, x0, lasts, lasts / 1000) for x0 in (AT_REST, _near(state))]
+        (state, h): [_at(h).task((state.p, x0, lasts, lasts / 1000)) for x0 in (AT_REST, _near(state))]
         for state in states
         for h in steps
     }
     campaign.complete(task for pair in tasks.values() for task in pair)
     rows = [["state", "η", "h", "ω_c", "slip", "creep (m/s)", "open"]]
     for (state, h), pair in tasks.items():
-        held = [trials.held(run, state, (1 - WINDOW) * lasts) for run in campaign.run(pair)]
+        held = [state.held(run, (1 - WINDOW) * lasts) for run in campaign.run(pair)]
         orbital = float(abs(state.solution.state.omega_c)) * state.p.R
         errors = max(abs(each.omega_c) for each in held), max(each.slip for each in held) / orbital
         creep = number(max(each.creep for each in held)) if Contact.R in (state.case.A, state.case.B) else "–"
@@ -66,8 +64,7 @@ def _near(state: Stationary) -> State:
 
 def transient(campaign: Campaign, steps: Sequence[float] = FINE) -> Rows:
     """Rms errors of the transient with the step, the order from one step to the next, and the extrapolation."""
-    p, x0, lasts = APPROACH.p, APPROACH.x0, APPROACH.lasts
-    runs = campaign.run([_at(step).task(p, x0, lasts, lasts / 100) for step in steps])
+    runs = campaign.run([_at(step).task(APPROACH.run) for step in steps])
     errors = np.array([APPROACH.errors(run.time, run.x) for run in runs])
     ratios = np.array(steps[:-1]) / steps[1:]
     orders = np.log(errors[:-1] / errors[1:]) / np.log(ratios)[:, None]
@@ -88,7 +85,7 @@ def event_times(campaign: Campaign, steps: Sequence[float] = (1e-3, 5e-4, 2.5e-4
     rows = [["motion", "h", *(name for kind in KINDS for name in (f"contacts {kind}", "order"))]]
     for motion in (LANDING, HITTING):
         exact, before = _moments(motion.exact.events), dict.fromkeys(KINDS, (math.nan, math.nan))
-        runs = campaign.run([_at(step).task(motion.p, motion.x0, motion.lasts, step) for step in steps])
+        runs = campaign.run([_at(step).task((motion.p, motion.x0, motion.lasts, step)) for step in steps])
         for step, run in zip(steps, runs, strict=True):
             cells, seen = [], _moments(run.events)
             for kind in KINDS:
@@ -139,7 +136,7 @@ def force_split(campaign: Campaign, omegas: Sequence[float] = (6.0, 10.0, 13.0))
         off = State(omega_c=0.88 * omega_0)
         lasts = Stationary(p, Case.RR).settles
         starts = (plain, off), (ours, off), (ours, AT_REST)
-        runs = campaign.run([_at(s.timestep, s).task(p, x0, lasts, lasts / 1000) for s, x0 in starts])
+        runs = campaign.run([_at(s.timestep, s).task((p, x0, lasts, lasts / 1000)) for s, x0 in starts])
         forces = [run.force_B[run.time >= (1 - WINDOW) * lasts, 1].mean() for run in runs]
         rows.append([f"{omega_0:g}", f"{least:.4f} … {greatest:.4f}", *(f"{force:.4f}" for force in forces)])
     return rows

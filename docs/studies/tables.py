@@ -10,6 +10,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,11 @@ from compare import pages
 from compare.pages import Rows
 from compare.runs import progress
 from compare.runs.campaign import Campaign
-from compare.scorecard import league, scores, standings
+from compare.runs.engines import newcomer
+from compare.scorecard import league, scores
 from compare.scorecard.league import Entry
 from docs.studies import accuracy, confirmation
+from mjsim import ContactSettings
 from model import InputError
 from model.files import write_text
 from model.parameters import check_choice, check_names
@@ -40,8 +43,27 @@ def write(page: Path, name: str, rows: Rows) -> None:
 
 def _of_settings(entries: Sequence[Entry]) -> Rows:
     """Entries of one time step, which isn't named."""
-    (_, _, *head), *body = standings.rows(entries)
+    (_, _, *head), *body = league.rows(entries)
     return [["settings", *head], *([name, *cells] for name, _, *cells in body)]
+
+
+def variants(step: float) -> scores.Ways:
+    """Other ways to set MuJoCo; a firmer impedance keeps the damping b_f h = 1 of the friction rows."""
+    firm = {"solimp": 0.1, "solreffriction": 2 * step / 0.1}
+    firmly = f"ours, solreffriction {firm['solreffriction']:g}, solimp 0.1"
+    return {
+        "MuJoCo's defaults, cone pyramidal": replace(newcomer(step), cone="pyramidal"),
+        f"{firmly}, memory off, order 1, cone pyramidal": ContactSettings.at(
+            step, **firm, cone="pyramidal", memory=False, order=1
+        ),
+        "ours, integrator implicit": ContactSettings.at(step, integrator="implicit"),
+        "ours, integrator implicitfast": ContactSettings.at(step, integrator="implicitfast"),
+        f"{firmly}, integrator discrete": ContactSettings.at(step, **firm, integrator="discrete"),
+        "ours, integrator discrete": ContactSettings.at(step, integrator="discrete"),
+        "ours, memory off, noslip_iterations 10": ContactSettings.at(step, memory=False, noslip_iterations=10),
+        "ours, memory off": ContactSettings.at(step, memory=False),
+        "ours": ContactSettings.at(step),
+    }
 
 
 TABLES: dict[str, Callable[[Campaign], Rows]] = {
@@ -51,8 +73,8 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "events": accuracy.event_times,
     "split": accuracy.force_split,
     "ablation": lambda campaign: _of_settings(scores.reached(campaign, scores.rungs(scores.STEP))),
-    "frontier": lambda campaign: standings.rows(scores.frontier(campaign, STEPS)),
-    "variants": lambda campaign: _of_settings(scores.reached(campaign, scores.others(scores.STEP))),
+    "frontier": lambda campaign: league.rows(scores.frontier(campaign, STEPS)),
+    "variants": lambda campaign: _of_settings(scores.reached(campaign, variants(scores.STEP))),
 }
 """The tables by name."""
 
@@ -65,8 +87,8 @@ def _league(campaign: Campaign) -> dict[str, Any]:
 
 
 LEAGUE: dict[str, Callable[[Campaign], Rows]] = {
-    "league": lambda campaign: standings.rows(league.from_mapping(_league(campaign))),
-    "league-settings": lambda campaign: standings.settings(_league(campaign)),
+    "league": lambda campaign: league.rows(league.from_mapping(_league(campaign))),
+    "league-settings": lambda campaign: league.settings_table(_league(campaign)),
 }
 PAGES = {"mujoco-settings.md": ("settings", TABLES), "engines.md": ("league", LEAGUE)}
 """Directory of the runs, and tables of each page."""

@@ -31,9 +31,9 @@ def rows() -> list[list[str]]:
     """What is measured of campaigns, as rows of the table of `tests.benchmarks`."""
     two_over_one, machine, dask_over_processes = _ratios()
     return [
-        ["campaign: two processes over one", "", "", f"{two_over_one:.2f}"],
+        ["campaign: two processes against one", "", "", f"{two_over_one:.2f}"],
         ["the same of bare arithmetic: the machine's limit", "", "", f"{machine:.2f}"],
-        ["campaign: two Dask workers over two processes", "", "", f"{dask_over_processes:.2f}"],
+        ["campaign: two Dask workers against two processes", "", "", f"{dask_over_processes:.2f}"],
         ["campaign: bookkeeping of a task", "", f"{1e3 * _bookkeeping():.1f} ms", ""],
         [f"campaign: resuming {FINISHED} finished tasks", "", f"{_resuming():.1f} s", ""],
     ]
@@ -46,8 +46,8 @@ def _tasks(count: int, t_end: float) -> list[Task]:
 
 
 def _ratios() -> tuple[float, float, float]:
-    """Throughputs, as medians of ratios of times next to each other: two processes over one, of campaigns and of bare
-    arithmetic; then two Dask workers over two processes, apart, since a scheduler takes its share of the time."""
+    """Throughput of two processes divided by that of one, of campaigns and of bare arithmetic; of two Dask workers
+    divided by that of two processes, apart, since a scheduler takes its share. Medians of neighbouring timings."""
     tasks = _tasks(4 * BATCH, 2.0)  # a few seconds, against which the last batch to end counts little
     kinds = processes(1), processes(2)
     times = [[*(_timed(kind, tasks) for kind in kinds), *map(_computing, kinds)] for _ in range(REPEATS)]

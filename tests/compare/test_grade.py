@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -12,9 +13,10 @@ import numpy as np
 import pytest
 
 from compare.commands import cli
-from compare.scorecard import card, contenders, grade, native, trials
+from compare.runs.engines import ENGINES
+from compare.scorecard import grade, native, trials
 from compare.scorecard.grade import Column
-from compare.scorecard.native import Native, Touch
+from compare.scorecard.native import Native, Pair
 from compare.scorecard.trials import EPS, ROLLING, SLIPPING
 from mjsim import ContactSettings, scene
 from mjsim.scene import SCENE
@@ -22,6 +24,7 @@ from model import Case, InputError, Parameters
 
 ELLIPTIC = Native(cone="elliptic", impratio=100.0)
 BALL = '<body name="ball"><freejoint/><geom name="ball" type="sphere" size="0.01"/></body>'
+WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 1"/>'
 FLOOR = '<geom name="floor" type="plane" size="1 1 1"/>'
 
 
@@ -29,13 +32,25 @@ def mjcf(world: str, rest: str = "") -> str:
     return f"<mujoco>{rest}<worldbody>{world}</worldbody></mujoco>"
 
 
+@pytest.fixture
+def read(tmp_path: Path) -> Callable[[str], Native]:
+    """Settings read from a file with this text."""
+
+    def read(text: str) -> Native:
+        (tmp_path / "scene.xml").write_text(text)
+        return native.read(tmp_path / "scene.xml")
+
+    return read
+
+
 @pytest.fixture(scope="module")
 def columns() -> list[Column]:
-    return grade.grade(ELLIPTIC, [contenders.OURS, contenders.PLAIN])
+    return grade.grade(ELLIPTIC, [grade.OURS, grade.PLAIN])
 
 
 def test_the_settings_of_the_study_pass(columns: list[Column]) -> None:
     ours = columns[1]
+    assert not {"yours", grade.PLAIN.name} & ENGINES.keys()  # they are engines only as long as they are graded
     assert ours.reproduced == [case.name for case in Case]
     for held in ours.stationary:
         # Of the start a share of eps is left; each step rounds, and rounding dies out with the slowest time constant.
@@ -74,17 +89,17 @@ def test_creep_and_hovering_are_as_predicted(columns: list[Column]) -> None:
 
 
 def test_card_as_table_and_page(columns: list[Column]) -> None:
-    page = card.html(columns, "cone <elliptic>")
+    page = grade.html(columns, "cone <elliptic>")
     assert "cone &lt;elliptic&gt;" in page
-    assert page.count("<td") >= len(card.lines(columns)) * len(columns)
-    assert card.table(columns).row_count >= len(card.lines(columns))
-    assert card.headline(columns[1]).startswith("dualball: 9 of 9 cases reproduced")
+    assert page.count("<td") >= len(grade.lines(columns)) * len(columns)
+    assert grade.table(columns).row_count >= len(grade.lines(columns))
+    assert grade.headline(columns[1]).startswith("dualball: 9 of 9 cases reproduced")
 
 
 def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, columns, capsys) -> None:
     asked = []
 
-    def measured(yours: Native, engine: object, progress: object) -> list[Column]:
+    def measured(yours: Native, others: object, show: object) -> list[Column]:
         asked.append(yours)
         return columns
 
@@ -104,19 +119,10 @@ def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, columns, capsy
 
 
 def test_settings_come_through_to_the_engine() -> None:
-    given = Native(
-        timestep=0.0015,
-        integrator="implicitfast",
-        cone="elliptic",
-        solver="CG",
-        impratio=7.0,
-        iterations=33,
-        tolerance=1e-5,
-        noslip_iterations=2,
-        A=Touch(solref=(0.005, 0.8), margin=1e-4),
-        B=Touch(solimp=(0.2, 0.3, 0.01, 0.4, 3)),
-    )
-    model = given.build(Parameters.named("reference"), given.loop())
+    options = {"integrator": "implicitfast", "cone": "elliptic", "solver": "CG", "impratio": 7.0, "iterations": 33}
+    options |= {"timestep": 0.0015, "tolerance": 1e-5, "noslip_iterations": 2}
+    given = Native(**options, A=Pair(solref=(0.005, 0.8), margin=1e-4), B=Pair(solimp=(0.2, 0.3, 0.01, 0.4, 3)))
+    model, _ = given.build(Parameters.named("reference"), given.loop())
     assert model.opt.timestep == given.timestep
     assert model.pair("A").solref.tolist() == [0.005, 0.8]
     assert model.pair("A").margin[0] == 1e-4
@@ -124,39 +130,34 @@ def test_settings_come_through_to_the_engine() -> None:
     assert (model.opt.impratio, model.opt.iterations, model.opt.noslip_iterations) == (7.0, 33, 2)
 
 
-def test_a_scene_of_our_own_is_read_back(tmp_path: Path) -> None:
+def test_a_scene_of_our_own_is_read_back(read: Callable[[str], Native]) -> None:
     settings = ContactSettings.at(5e-4)
-    path = tmp_path / "scene.xml"
-    path.write_text(scene.build(Parameters.named("reference"), settings)[1])
-    of_scene = native.read(path)
+    of_scene = read(scene.build(Parameters.named("reference"), settings)[1])
     assert (of_scene.timestep, of_scene.cone, of_scene.impratio) == (5e-4, "elliptic", settings.impratio)
-    for touch in (of_scene.A, of_scene.B):
-        assert touch.solref == settings.spring
-        assert touch.solreffriction[0] == settings.solreffriction
-        theory = of_scene.theory(touch, 9.81)
+    for pair in (of_scene.A, of_scene.B):
+        assert pair.solref == settings.spring
+        assert pair.solreffriction[0] == settings.solreffriction
+        theory = of_scene.theory(pair, 9.81)
         for name in ("b_f", "k", "softness"):
             assert getattr(theory, name) == pytest.approx(getattr(settings, name), rel=1e-12)
 
 
-def test_geoms_are_mixed_as_the_engine_does(tmp_path: Path) -> None:
+def test_geoms_are_mixed_as_the_engine_does(read: Callable[[str], Native]) -> None:
     """Against the contact that MuJoCo itself makes."""
-    world = (
+    text = mjcf(
         '<geom name="floor" type="plane" size="1 1 1" solref="0.01 0.9" solmix="3" margin="0.001"/>'
         '<geom name="wall" type="box" size="0.1 1 1" pos="0.1095 0 0" solimp="0.5 0.6 0.01" priority="1"/>'
         '<body pos="0 0 0.0095"><freejoint/><geom type="sphere" size="0.01" solref="0.03 1.1"/></body>'
     )
-    path = tmp_path / "scene.xml"
-    path.write_text(mjcf(world))
-    of_scene = native.read(path)
-    model = mujoco.MjModel.from_xml_path(str(path))
+    of_scene, model = read(text), mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert data.ncon == 2
     for contact in data.contact:
-        touch = of_scene.A if model.geom("floor").id in contact.geom else of_scene.B
-        assert touch.solref == pytest.approx(tuple(contact.solref))
-        assert touch.solimp == pytest.approx(tuple(contact.solimp))
-        assert touch.margin == pytest.approx(contact.includemargin)
+        pair = of_scene.A if model.geom("floor").id in contact.geom else of_scene.B
+        assert pair.solref == pytest.approx(tuple(contact.solref))
+        assert pair.solimp == pytest.approx(tuple(contact.solimp))
+        assert pair.margin == pytest.approx(contact.includemargin)
 
 
 @pytest.mark.parametrize("depth", [0.0, 2e-4, 6e-4, 2e-3])
@@ -166,7 +167,7 @@ def test_impedance_is_the_engines(depth: float) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     if data.nefc:
-        assert Touch().impedance(depth) == pytest.approx(data.efc_KBIP[0, 2], rel=1e-6)
+        assert Pair().impedance(depth) == pytest.approx(data.efc_KBIP[0, 2], rel=1e-6)
     else:
         assert depth == 0
 
@@ -188,32 +189,23 @@ def test_impedance_is_the_engines(depth: float) -> None:
         (mjcf(FLOOR + BALL, '<option cone="round"/>'), "is not valid MJCF"),
     ],
 )
-def test_files_that_cannot_be_graded(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "scene.xml"
-    path.write_text(text)
+def test_files_that_cannot_be_graded(read: Callable[[str], Native], text: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as refused:
-        native.read(path)
+        read(text)
     assert "\n" not in str(refused.value)
 
 
-WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 1"/>'
-
-
 @pytest.mark.parametrize("height", [-0.004, 0.0, 0.0099, 0.01, 0.0101, 1.0])
-def test_a_floor_is_one_wherever_the_ball_begins(tmp_path: Path, height: float) -> None:
-    path = tmp_path / "scene.xml"
-    path.write_text(mjcf(FLOOR + BALL.replace('name="ball">', f'name="ball" pos="0 0 {height}">', 1)))
-    assert "no wall" in native.read(path).note
+def test_a_floor_is_one_wherever_the_ball_begins(read: Callable[[str], Native], height: float) -> None:
+    assert "no wall" in read(mjcf(FLOOR + BALL.replace('name="ball">', f'name="ball" pos="0 0 {height}">', 1))).note
 
 
 @pytest.mark.parametrize(
     ("world", "lacks"),
     [(FLOOR + BALL, "no wall .* its floor"), (WALL + BALL, "no floor .* its wall"), (FLOOR + WALL + BALL, "^$")],
 )
-def test_what_stands_for_what_is_missing(tmp_path: Path, world: str, lacks: str) -> None:
-    path = tmp_path / "scene.xml"
-    path.write_text(mjcf(world))
-    of_scene = native.read(path)
+def test_what_stands_for_what_is_missing(read: Callable[[str], Native], world: str, lacks: str) -> None:
+    of_scene = read(mjcf(world))
     assert re.search(lacks, of_scene.note)
     assert "\n" not in of_scene.note
     assert (of_scene.A == of_scene.B) is bool(of_scene.note)

@@ -1,4 +1,4 @@
-"""Wrong engines: MuJoCo with one thing put wrong behind the back of those who measure."""
+"""Wrong engines: MuJoCo with one hidden fault."""
 
 from __future__ import annotations
 
