@@ -66,14 +66,14 @@ class TrajectoryWriter(WholeFile):
 
     def __init__(self, path: str | Path, header: Header) -> None:
         super().__init__(path)
-        _begin(self.file, SCHEMA, SCHEMA_VERSION)
+        scales = _begin(self.file, SCHEMA, SCHEMA_VERSION)
         self.file.attrs.update(header.attributes())
         self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
         for of, time in ((Trajectory, "time"), (Events, "event_time")):
             for _, name, meta in _columns(of):
                 sizes = {"shape": (0, *meta["shape"]), "maxshape": (None, *meta["shape"])}
                 layout = {"chunks": (_CHUNK, *meta["shape"]), "compression": "gzip", "shuffle": True}
-                _create(self.file, name, meta, (time, "axis"), **sizes, **layout)
+                _create(self.file, name, meta, (time, "axis"), scales, **sizes, **layout)
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
         """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush it."""
@@ -102,23 +102,25 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
     headers = [run.header.attributes() | {"mjcf": run.header.mjcf} for run in runs.values()]
     with WholeFile(path) as whole:
         file = whole.file
-        _begin(file, BATCH, BATCH_VERSION)
+        scales = _begin(file, BATCH, BATCH_VERSION)
         file.attrs["versions"] = json.dumps(dict(current_versions()))
-        file.create_dataset("run", data=list(runs), dtype=_TEXT).make_scale("run")
+        scales["run"] = file.create_dataset("run", data=list(runs), dtype=_TEXT)
+        scales["run"].make_scale("run")
         for name in headers[0]:
-            file.create_dataset(name, data=[header[name] for header in headers], dtype=_TEXT)
-            file[name].dims[0].attach_scale(file["run"])
+            texts = file.create_dataset(name, data=[header[name] for header in headers], dtype=_TEXT)
+            texts.dims[0].attach_scale(scales["run"])
         for dimension, of in (("sample", Trajectory), ("event", Events)):
             tables: list[Any] = [run.events if of is Events else run for run in runs.values()]
             counts = [len(table.time) for table in tables]
-            file.create_dataset(f"{dimension}s", data=counts).dims[0].attach_scale(file["run"])
-            file.create_dataset(dimension, data=np.arange(max(counts))).make_scale(dimension)
+            file.create_dataset(f"{dimension}s", data=counts).dims[0].attach_scale(scales["run"])
+            scales[dimension] = file.create_dataset(dimension, data=np.arange(max(counts)))
+            scales[dimension].make_scale(dimension)
             for column, name, meta in _columns(of):
                 empty = -1 if meta["dtype"] is np.int8 else np.nan
                 values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
                 for row, count, table in zip(values, counts, tables, strict=True):
                     row[:count] = getattr(table, column)
-                _create(file, name, meta, ("run", dimension, "axis"), data=values)
+                _create(file, name, meta, ("run", dimension, "axis"), scales, data=values)
         whole.finish()
 
 
@@ -194,22 +196,32 @@ def _columns(of: type[Trajectory] | type[Events]) -> list[tuple[str, str, Mappin
     return [(name, event_name(name) if of is Events else name, meta) for name, meta in columns(of).items()]
 
 
-def _begin(file: h5py.File, schema: str, version: int) -> None:
+def _begin(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset]:
+    """What all files have; the scales of dimensions by name, so far that of the axes."""
     file.attrs.update(schema=schema, schema_version=version)
     axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
     axis.attrs.update(AXIS_ATTRIBUTES)
     axis.make_scale("axis")
+    return {"axis": axis}
 
 
-def _create(file: h5py.File, name: str, meta: Mapping[str, Any], dimensions: Sequence[str], **layout: Any) -> None:
-    """A column whose dimensions are of these names, as far as it has so many; it may be the scale of one itself."""
+def _create(
+    file: h5py.File,
+    name: str,
+    meta: Mapping[str, Any],
+    dimensions: Sequence[str],
+    scales: dict[str, h5py.Dataset],
+    **layout: Any,
+) -> None:
+    """A column whose dimensions are the first of these names; without a scale for one, it is the scale itself."""
     column = file.create_dataset(name, dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout)
     column.attrs.update(attributes(meta))
     for dimension, scale in zip(column.dims, dimensions, strict=False):
-        if scale == name:
-            column.make_scale(name)
+        if scale in scales:
+            dimension.attach_scale(scales[scale])
         else:
-            dimension.attach_scale(file[scale])
+            scales[scale] = column
+            column.make_scale(scale)
 
 
 def _read(file: h5py.File, part: slice) -> Trajectory:

@@ -214,9 +214,10 @@ def test_a_run_is_read_in_parts(tmp_path: Path, size: int) -> None:
 
 
 def test_a_run_without_samples_is_one_part(tmp_path: Path) -> None:
-    storage.save(make(0), tmp_path / "run.h5")
+    trajectory = make(0)
+    storage.save(trajectory, tmp_path / "run.h5")
     (part,) = storage.parts(tmp_path / "run.h5", 10)
-    assert_same(part, make(0))
+    assert_same(part, trajectory)
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyError, OSError, TypeError, OverflowError, MemoryError])
@@ -281,9 +282,10 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path: Path) -> None:
 
 
 def test_a_file_of_one_run_is_one_without_a_name(tmp_path: Path) -> None:
-    storage.save(make(), tmp_path / "run.h5")
+    trajectory = make()
+    storage.save(trajectory, tmp_path / "run.h5")
     assert storage.contents(tmp_path / "run.h5")[1] == []
-    assert_same(storage.load_runs(tmp_path / "run.h5")[""], make())
+    assert_same(storage.load_runs(tmp_path / "run.h5")[""], trajectory)
 
 
 @pytest.mark.parametrize(
