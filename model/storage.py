@@ -43,7 +43,6 @@ BATCH, BATCH_VERSION = "dualball-batch", 1
 _CHUNK = 1024
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
-_TEXTS = tuple(field.name for field in dataclasses.fields(Header))
 
 
 def save(trajectory: Trajectory, path: str | Path) -> None:
@@ -97,18 +96,16 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
     """Write runs by name into one file; raises `StorageError` if that can't be done, leaving nothing behind.
 
     Columns have shape (run, sample, ...) and (run, event, ...); behind the samples and events that a run has they are
-    filled with nan, and cases with -1. What a file of one run says in attributes is a text for each run.
+    filled with nan, and cases with -1. What a file of one run says in attributes is JSON in `header` (run).
     """
-    headers = [run.header.attributes() | {"mjcf": run.header.mjcf} for run in runs.values()]
     with WholeFile(path) as whole:
         file = whole.file
         scales = _begin(file, BATCH, BATCH_VERSION)
         file.attrs["versions"] = json.dumps(dict(current_versions()))
         scales["run"] = file.create_dataset("run", data=list(runs), dtype=_TEXT)
         scales["run"].make_scale("run")
-        for name in headers[0]:
-            texts = file.create_dataset(name, data=[header[name] for header in headers], dtype=_TEXT)
-            texts.dims[0].attach_scale(scales["run"])
+        headers = [json.dumps(run.header.attributes() | {"mjcf": run.header.mjcf}) for run in runs.values()]
+        file.create_dataset("header", data=headers, dtype=_TEXT).dims[0].attach_scale(scales["run"])
         for dimension, of in (("sample", Trajectory), ("event", Events)):
             tables: list[Any] = [run.events if of is Events else run for run in runs.values()]
             counts = [len(table.time) for table in tables]
@@ -178,13 +175,13 @@ def load_runs(path: str | Path) -> dict[str, Trajectory]:
         if not is_batch(file):
             return {"": _read(file, slice(None))}
         _check_schema(file, BATCH, BATCH_VERSION)
-        texts = {name: _texts(file, name) for name in _TEXTS}
+        headers = [_json({"header": text}, "header") for text in _texts(file, "header")]
         samples, events = _table(file, Trajectory, 2), _table(file, Events, 2)
         counts = zip(dataset(file, "samples")[...].tolist(), dataset(file, "events")[...].tolist(), strict=True)
         runs = {}
         for k, (name, (n, m)) in enumerate(zip(_texts(file, "run"), counts, strict=True)):
             runs[name] = _trajectory(
-                {key: values[k] for key, values in texts.items()},
+                headers[k],
                 {column: values[k, :n].copy() for column, values in samples.items()},
                 {column: values[k, :m].copy() for column, values in events.items()},
             )
@@ -249,7 +246,7 @@ def _trajectory(
     texts: Mapping[str, Any], samples: Mapping[str, npt.NDArray[Any]], events: Mapping[str, npt.NDArray[Any]]
 ) -> Trajectory:
     """A run from the texts of its header and its columns."""
-    values: dict[str, Any] = {name: _text(texts, name) for name in _TEXTS}
+    values: dict[str, Any] = {field.name: _text(texts, field.name) for field in dataclasses.fields(Header)}
     values |= {name: _json(texts, name) for name in ("parameters", "flow", "settings", "versions")}
     values["parameters"] = Parameters.from_mapping(values["parameters"])
     values["flow"] = Flow.from_mapping(values["flow"])

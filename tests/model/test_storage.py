@@ -292,8 +292,9 @@ def test_a_file_of_one_run_is_one_without_a_name(tmp_path: Path) -> None:
     ("change", "says"),
     [
         (lambda f: f.attrs.__setitem__("schema_version", 2), "newer dualball: its schema version is 2"),
-        (lambda f: f.__delitem__("engine"), "no dataset 'engine'"),
-        (lambda f: replace(f, "flow", ["{"] * 3), "attribute 'flow' is not JSON"),
+        (lambda f: f.__delitem__("header"), "no dataset 'header'"),
+        (lambda f: replace(f, "header", ["{"] * 3), "attribute 'header' is not JSON"),
+        (lambda f: replace(f, "header", ["{}"] * 3), "attribute 'engine' is missing"),
         (lambda f: replace(f, "y", np.zeros((3, 49))), "differ in length"),
         (lambda f: replace(f, "samples", [50, 0]), "does not hold what it should"),
         (lambda f: f["case"].__setitem__((0, 0), 9), "case that does not exist"),
