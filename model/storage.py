@@ -43,7 +43,6 @@ BATCH, BATCH_VERSION = "dualball-batch", 1
 _CHUNK = 1024
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
-_TEXTS = tuple(field.name for field in dataclasses.fields(Header))
 
 
 def save(trajectory: Trajectory, path: str | Path) -> None:
@@ -66,14 +65,14 @@ class TrajectoryWriter(WholeFile):
 
     def __init__(self, path: str | Path, header: Header) -> None:
         super().__init__(path)
-        _begin(self.file, SCHEMA, SCHEMA_VERSION)
+        scales = _begin(self.file, SCHEMA, SCHEMA_VERSION)
         self.file.attrs.update(header.attributes())
         self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
         for of, time in ((Trajectory, "time"), (Events, "event_time")):
             for _, name, meta in _columns(of):
                 sizes = {"shape": (0, *meta["shape"]), "maxshape": (None, *meta["shape"])}
                 layout = {"chunks": (_CHUNK, *meta["shape"]), "compression": "gzip", "shuffle": True}
-                _create(self.file, name, meta, (time, "axis"), **sizes, **layout)
+                _create(self.file, name, meta, (time, "axis"), scales, **sizes, **layout)
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
         """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush it."""
@@ -97,28 +96,28 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
     """Write runs by name into one file; raises `StorageError` if that can't be done, leaving nothing behind.
 
     Columns have shape (run, sample, ...) and (run, event, ...); behind the samples and events that a run has they are
-    filled with nan, and cases with -1. What a file of one run says in attributes is a text for each run.
+    filled with nan, and cases with -1. What a file of one run says in attributes is JSON in `header` (run).
     """
-    headers = [run.header.attributes() | {"mjcf": run.header.mjcf} for run in runs.values()]
     with WholeFile(path) as whole:
         file = whole.file
-        _begin(file, BATCH, BATCH_VERSION)
+        scales = _begin(file, BATCH, BATCH_VERSION)
         file.attrs["versions"] = json.dumps(dict(current_versions()))
-        file.create_dataset("run", data=list(runs), dtype=_TEXT).make_scale("run")
-        for name in headers[0]:
-            file.create_dataset(name, data=[header[name] for header in headers], dtype=_TEXT)
-            file[name].dims[0].attach_scale(file["run"])
+        scales["run"] = file.create_dataset("run", data=list(runs), dtype=_TEXT)
+        scales["run"].make_scale("run")
+        headers = [json.dumps(run.header.attributes() | {"mjcf": run.header.mjcf}) for run in runs.values()]
+        file.create_dataset("header", data=headers, dtype=_TEXT).dims[0].attach_scale(scales["run"])
         for dimension, of in (("sample", Trajectory), ("event", Events)):
             tables: list[Any] = [run.events if of is Events else run for run in runs.values()]
             counts = [len(table.time) for table in tables]
-            file.create_dataset(f"{dimension}s", data=counts).dims[0].attach_scale(file["run"])
-            file.create_dataset(dimension, data=np.arange(max(counts))).make_scale(dimension)
+            file.create_dataset(f"{dimension}s", data=counts).dims[0].attach_scale(scales["run"])
+            scales[dimension] = file.create_dataset(dimension, data=np.arange(max(counts)))
+            scales[dimension].make_scale(dimension)
             for column, name, meta in _columns(of):
                 empty = -1 if meta["dtype"] is np.int8 else np.nan
                 values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
                 for row, count, table in zip(values, counts, tables, strict=True):
                     row[:count] = getattr(table, column)
-                _create(file, name, meta, ("run", dimension, "axis"), data=values)
+                _create(file, name, meta, ("run", dimension, "axis"), scales, data=values)
         whole.finish()
 
 
@@ -176,13 +175,13 @@ def load_runs(path: str | Path) -> dict[str, Trajectory]:
         if not is_batch(file):
             return {"": _read(file, slice(None))}
         _check_schema(file, BATCH, BATCH_VERSION)
-        texts = {name: _texts(file, name) for name in _TEXTS}
+        headers = [_json({"header": text}, "header") for text in _texts(file, "header")]
         samples, events = _table(file, Trajectory, 2), _table(file, Events, 2)
         counts = zip(dataset(file, "samples")[...].tolist(), dataset(file, "events")[...].tolist(), strict=True)
         runs = {}
         for k, (name, (n, m)) in enumerate(zip(_texts(file, "run"), counts, strict=True)):
             runs[name] = _trajectory(
-                {key: values[k] for key, values in texts.items()},
+                headers[k],
                 {column: values[k, :n].copy() for column, values in samples.items()},
                 {column: values[k, :m].copy() for column, values in events.items()},
             )
@@ -194,22 +193,32 @@ def _columns(of: type[Trajectory] | type[Events]) -> list[tuple[str, str, Mappin
     return [(name, event_name(name) if of is Events else name, meta) for name, meta in columns(of).items()]
 
 
-def _begin(file: h5py.File, schema: str, version: int) -> None:
+def _begin(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset]:
+    """What all files have; the scales of dimensions by name, so far that of the axes."""
     file.attrs.update(schema=schema, schema_version=version)
     axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
     axis.attrs.update(AXIS_ATTRIBUTES)
     axis.make_scale("axis")
+    return {"axis": axis}
 
 
-def _create(file: h5py.File, name: str, meta: Mapping[str, Any], dimensions: Sequence[str], **layout: Any) -> None:
-    """A column whose dimensions are of these names, as far as it has so many; it may be the scale of one itself."""
+def _create(
+    file: h5py.File,
+    name: str,
+    meta: Mapping[str, Any],
+    dimensions: Sequence[str],
+    scales: dict[str, h5py.Dataset],
+    **layout: Any,
+) -> None:
+    """A column whose dimensions are the first of these names; without a scale for one, it is the scale itself."""
     column = file.create_dataset(name, dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout)
     column.attrs.update(attributes(meta))
     for dimension, scale in zip(column.dims, dimensions, strict=False):
-        if scale == name:
-            column.make_scale(name)
+        if scale in scales:
+            dimension.attach_scale(scales[scale])
         else:
-            dimension.attach_scale(file[scale])
+            scales[scale] = column
+            column.make_scale(scale)
 
 
 def _read(file: h5py.File, part: slice) -> Trajectory:
@@ -237,7 +246,7 @@ def _trajectory(
     texts: Mapping[str, Any], samples: Mapping[str, npt.NDArray[Any]], events: Mapping[str, npt.NDArray[Any]]
 ) -> Trajectory:
     """A run from the texts of its header and its columns."""
-    values: dict[str, Any] = {name: _text(texts, name) for name in _TEXTS}
+    values: dict[str, Any] = {field.name: _text(texts, field.name) for field in dataclasses.fields(Header)}
     values |= {name: _json(texts, name) for name in ("parameters", "flow", "settings", "versions")}
     values["parameters"] = Parameters.from_mapping(values["parameters"])
     values["flow"] = Flow.from_mapping(values["flow"])

@@ -16,8 +16,8 @@ import os
 import re
 import sys
 import threading
-from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections import Counter, deque
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -37,10 +37,10 @@ BATCH = 64
 HELD = 2**18
 """Most samples of a batch, some 60 MB; a run that has more is written as it comes."""
 READ = 2**19
-"""Samples of runs read last that are held in memory: most are looked at several times, soon after."""
+"""Samples of new runs, and of those read last, that are held in memory, some 100 MB: most are looked at soon after."""
 FAILURES = "failures.json"
-Outcome = tuple[str, Path | None]
-"""Why a run is not whole, empty if it is; and the file that holds what there is of it."""
+Outcome = tuple[str, Path | None, Trajectory | None]
+"""Why a run is not whole, empty if it is; the file that holds what there is of it; the run, if it fits in memory."""
 _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 """Label, ID, and whether it broke down; files of earlier versions have no label."""
 
@@ -120,6 +120,7 @@ class Campaign:
         self._files: dict[str, Path] = dict(_stored(self.directory))
         self._failed: dict[str, Failure] = {}
         self._read: dict[Path, dict[str, Trajectory]] = {}
+        self._samples = 0
 
     def __enter__(self) -> Self:
         return self
@@ -133,7 +134,7 @@ class Campaign:
     def under(self, label: str, doing: str) -> Campaign:
         """A part of the campaign with a label and runs of its own; parts may be carried out by several threads."""
         part = copy.copy(self)
-        part.label, part.doing, part._read = label, doing, {}
+        part.label, part.doing, part._read, part._samples = label, doing, {}, 0
         part._files = {key: file for key, file in self._files.items() if file.name.rpartition("-")[0] == label}
         part._files |= {key: file for key, file in self._files.items() if file.stem == label}
         return part
@@ -151,13 +152,21 @@ class Campaign:
     def load(self, key: str) -> Trajectory:
         """The run of a task that was carried out, by its key; raises `StorageError` if it can't be read."""
         file = self._files[key]
-        if file not in self._read:
-            self._read[file] = storage.load_runs(file)
-            held = [sum(len(run.time) for run in runs.values()) for runs in self._read.values()]
-            while len(held) > 1 and sum(held) > READ:
-                del self._read[next(iter(self._read))], held[0]
-        runs = self._read[file]
-        return runs[key] if key in runs else runs[""]
+        if key not in self._read.get(file, ()):
+            self._forget(file)
+            runs = storage.load_runs(file)
+            self._hold(file, runs if key in runs else {key: runs[""]})
+        return self._read[file][key]
+
+    def _hold(self, file: Path, runs: Mapping[str, Trajectory]) -> None:
+        """Keep runs of a file in memory, and forget those of earlier files while there are more than `READ` samples."""
+        self._read.setdefault(file, {}).update(runs)
+        self._samples += sum(len(run.time) for run in runs.values())
+        while self._samples > READ and len(self._read) > 1:
+            self._forget(next(iter(self._read)))
+
+    def _forget(self, file: Path) -> None:
+        self._samples -= sum(len(run.time) for run in self._read.pop(file, {}).values())
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
@@ -183,9 +192,13 @@ class Campaign:
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
         for batch, outcomes in self._carry_out(_batches(todo, self.batch, self._executor.workers.count)):
-            self._files |= {task.key: file for task, (_, file) in zip(batch, outcomes, strict=True) if file}
-            failed = [Failure(task, reason) for task, (reason, _) in zip(batch, outcomes, strict=True) if reason]
-            failures, done = failures + failed, done + len(batch) - len(failed)
+            for task, (reason, file, run) in zip(batch, outcomes, strict=True):
+                failures += [Failure(task, reason)] if reason else []
+                done += not reason
+                if file:
+                    self._files[task.key] = file
+                if file and run:
+                    self._hold(file, {task.key: run})
             self.report(self.doing, done, len(unique), len(failures))
         if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
             self._failed |= new
@@ -202,17 +215,18 @@ class Campaign:
             storage.save_batch({key: self.load(key) for key in sorted(keys)}, self.directory / f"{label}.h5")
         for file in gone:
             file.unlink(missing_ok=True)
-            self._read.pop(file, None)
+            self._forget(file)
         self._files = {key: file for key, file in self._files.items() if file not in gone}
 
     def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[tuple[Task, ...], Sequence[Outcome]]]:
         """Yield each batch that ends, with what became of its tasks.
 
         A worker that dies takes all batches under way with it. Their tasks are tried again at the end, one at a time;
-        one that then loses its worker, too, has failed.
+        one that then loses its worker twice has failed.
         """
         pending: dict[Future[list[Outcome]], tuple[Task, ...]] = {}
         again: deque[Task] = deque()
+        died: Counter[str] = Counter()
         while True:
             # No more than a few batches wait at the executor, so that memory stays flat however long the list.
             while len(pending) < 2 * self._executor.workers.count and (batch := next(fresh, ())):
@@ -231,9 +245,10 @@ class Campaign:
                     yield batch, future.result()
                 elif not isinstance(error, self._executor.workers.lost):
                     raise error
-                elif alone:
-                    yield batch, [("its worker died (killed, or out of memory)", None)]
-                else:
+                elif alone and died[batch[0].key]:
+                    yield batch, [("its worker died (killed, or out of memory)", None, None)]
+                else:  # a task alone may have died by one of another part of the campaign
+                    died.update(task.key for task in batch if alone)
                     again.extend(batch)
 
 
@@ -251,14 +266,14 @@ def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) 
     try:
         if len(tasks) == 1 and (tasks[0].long or tasks[0].samples > HELD):
             failure = store(tasks[0], paths[0], limit)
-            return [(failure, failed_path(paths[0]) if failure else paths[0])]
+            return [(failure, failed_path(paths[0]) if failure else paths[0], None)]
         runs = carry_out(tasks, Deadline(limit * len(tasks)))
     except StorageError:  # a full disk is for the user to mend
         raise
     except (InputError, OutOfTimeError, MemoryError) as error:
         if len(tasks) > 1:
             return [outcome for task in tasks for outcome in run_batch([task], directory, label, limit)]
-        return [(str(error) or "out of memory", None)]
+        return [(str(error) or "out of memory", None, None)]
     whole = {task.key: run for task, run in zip(tasks, runs, strict=True) if run.complete}
     together = directory / f"{label}-{hashlib.sha256(' '.join(whole).encode()).hexdigest()[:24]}.h5"
     if whole:
@@ -267,7 +282,7 @@ def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) 
     for run, file in zip(runs, files, strict=True):
         if not run.complete:
             storage.save(run, file)
-    return [(run.header.failure, file) for run, file in zip(runs, files, strict=True)]
+    return [(run.header.failure, file, run) for run, file in zip(runs, files, strict=True)]
 
 
 def _stored(directory: Path) -> Iterator[tuple[str, Path]]:

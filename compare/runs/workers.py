@@ -15,7 +15,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any, TypeVar
@@ -73,12 +73,32 @@ class _Pool(ProcessPoolExecutor):
         self._end, self.leash = context.Pipe(duplex=False)  # ours must stay open until all workers have started
         super().__init__(count, mp_context=context, initializer=_follow, initargs=(self._end,))
 
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        return super().submit(_work, fn, *args, **kwargs)
+
+
+_between = threading.Lock()
+"""Held by a worker between its tasks, while it may be sending a result: half of one would keep the parent waiting."""
+
+
+def _work(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
+    """In a worker: do a task, in the midst of which the worker may end."""
+    if _between.locked():
+        _between.release()
+    try:
+        return fn(*args, **kwargs)
+    finally:
+        _between.acquire()
+
 
 def _follow(end: Connection) -> None:
     """In a worker: leave Ctrl-C to the parent, and end with it, or when it says so."""
 
     def wait() -> None:
         end.poll(None)
+        parent = parent_process()
+        if parent and parent.is_alive():
+            _between.acquire()
         os._exit(1)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -88,19 +88,21 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path: Path) -> None:
 
 
 def test_no_more_is_held_than_there_is_memory_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file is read once, as long as there is room for its runs, of 201 samples each."""
+    """New runs, of 201 samples each, aren't read, nor is any file twice, as long as there is room."""
     loaded: list[Path] = []
     read = storage.load_runs
     monkeypatch.setattr(storage, "load_runs", lambda path: [loaded.append(path), read(path)][1])
-    with Campaign(tmp_path, workers=0, batch=2) as campaign:
-        campaign.run(tasks(4))
-        campaign.run(tasks(4))
-        assert len(loaded) == 2
-        monkeypatch.setattr("compare.runs.campaign.READ", 500)
-        with Campaign(tmp_path, workers=0) as small:
-            small.run(tasks(4))
-            small.run(tasks(4))
-    assert len(loaded) == 2 + 4
+    for room, times in ((2**19, (0, 0, 2)), (500, (2, 4, 8))):
+        with Campaign(tmp_path / str(room), workers=0, batch=2) as campaign:
+            monkeypatch.setattr("compare.runs.campaign.READ", room)
+            for count in times[:2]:
+                campaign.run(tasks(4))
+                assert len(loaded) == count
+        with Campaign(tmp_path / str(room), workers=0) as again:
+            again.run(tasks(4))
+            again.run(tasks(4))
+            assert len(loaded) == times[2]
+        loaded.clear()
 
 
 def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path: Path) -> None:

@@ -132,7 +132,7 @@ def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path: Path, design: l
     """Fast contacts would chatter where mu eta is large; on the other set they are the defaults."""
     given = ["--mu", "0.5", "--timestep", "0.002", "--time", "0.05", "--workers", "0", "-o", str(tmp_path)]
     assert cli.main(["sweep", *design, *given]) == 0
-    headers = [storage.load(path).header for path in tmp_path.glob("*.h5")]
+    headers = [run.header for path in tmp_path.glob("*.h5") for run in storage.load_runs(path).values()]
     for header in headers:
         suited = ContactSettings.at(0.002).suited(header.parameters)
         assert tuple(header.settings["solref"]) == suited.solref

@@ -214,9 +214,10 @@ def test_a_run_is_read_in_parts(tmp_path: Path, size: int) -> None:
 
 
 def test_a_run_without_samples_is_one_part(tmp_path: Path) -> None:
-    storage.save(make(0), tmp_path / "run.h5")
+    trajectory = make(0)
+    storage.save(trajectory, tmp_path / "run.h5")
     (part,) = storage.parts(tmp_path / "run.h5", 10)
-    assert_same(part, make(0))
+    assert_same(part, trajectory)
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyError, OSError, TypeError, OverflowError, MemoryError])
@@ -281,17 +282,19 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path: Path) -> None:
 
 
 def test_a_file_of_one_run_is_one_without_a_name(tmp_path: Path) -> None:
-    storage.save(make(), tmp_path / "run.h5")
+    trajectory = make()
+    storage.save(trajectory, tmp_path / "run.h5")
     assert storage.contents(tmp_path / "run.h5")[1] == []
-    assert_same(storage.load_runs(tmp_path / "run.h5")[""], make())
+    assert_same(storage.load_runs(tmp_path / "run.h5")[""], trajectory)
 
 
 @pytest.mark.parametrize(
     ("change", "says"),
     [
         (lambda f: f.attrs.__setitem__("schema_version", 2), "newer dualball: its schema version is 2"),
-        (lambda f: f.__delitem__("engine"), "no dataset 'engine'"),
-        (lambda f: replace(f, "flow", ["{"] * 3), "attribute 'flow' is not JSON"),
+        (lambda f: f.__delitem__("header"), "no dataset 'header'"),
+        (lambda f: replace(f, "header", ["{"] * 3), "attribute 'header' is not JSON"),
+        (lambda f: replace(f, "header", ["{}"] * 3), "attribute 'engine' is missing"),
         (lambda f: replace(f, "y", np.zeros((3, 49))), "differ in length"),
         (lambda f: replace(f, "samples", [50, 0]), "does not hold what it should"),
         (lambda f: f["case"].__setitem__((0, 0), 9), "case that does not exist"),
