@@ -99,7 +99,7 @@ def test_only_what_a_claim_needs_is_measured(tmp_path: Path, counted: list[str])
 def test_verdicts_are_announced_as_they_come(
     tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In order, each while other protocols measure."""
+    """Each as soon as its protocols have measured, while others measure."""
     seen: list[str] = []
     first = threading.Event()
 
@@ -115,7 +115,8 @@ def test_verdicts_are_announced_as_they_come(
     monkeypatch.setattr(validation, "PROTOCOLS", protocols)
     monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, claim("of-waiting", "waiting")))
     assert run(tmp_path, announce=announce)["of-waiting"] == "not run"
-    assert seen == ["of-round", "of-broken", "of-after", "of-waiting"]
+    assert set(seen[:3]) == {"of-round", "of-broken", "of-after"}
+    assert seen[3:] == ["of-waiting"]
 
 
 def test_a_set_that_never_settles_is_named(tmp_path: Path, counted: list[str]) -> None:
