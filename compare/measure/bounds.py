@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from compare.measure.field import DOUBT, LIMIT, floor, slip_unit
+from compare.measure.fits import straight_line, zero_and_slope
 from compare.measure.growth import SMOOTH, Push, direction
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.levels import Level
@@ -25,7 +26,7 @@ from compare.measure.quantities import quantity
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of
 from compare.measure.settling import Settled, begin, family, settle
 from compare.runs.tasks import Task
-from compare.statistics import COVERAGE, Measured, settled_case, straight_line
+from compare.statistics import COVERAGE, settled_case
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -178,25 +179,6 @@ def _result(lab: Lab, line: Line, points: Array, tasks: Sequence[Task]) -> Itera
         natural = (line.p.g / line.p.R) ** (line.power / 2)
         yield if_sure(row, max(abs(zero.value), natural), f"{growth} has too uncertain a zero")
     yield measurement(lab, "bounds", line.set, push.p, f"gamma_slope{square}", slope, tasks, **push.conditions)
-
-
-def zero_and_slope(q: Array, gamma: Array, noise: Array) -> tuple[Measured, Measured]:
-    """Zero of a curve through points (n,), and its slope there; uncertain by a third of what the last degree changes.
-
-    nan without a single zero between the points.
-    """
-
-    def at_zero(values: Array, degree: int) -> Array:
-        fit = np.polynomial.Polynomial.fit(q, values, degree)
-        zeros = [root.real for root in fit.roots() if abs(root.imag) < 1e-9 and q.min() < root.real < q.max()]
-        return np.array([zeros[0], fit.deriv()(zeros[0])] if len(zeros) == 1 else [math.nan, math.nan])
-
-    degree = len(q) - 1
-    best = at_zero(gamma, degree)
-    shifted = [at_zero(gamma + shift, degree) - best for shift in np.diag(noise)]
-    spread = np.linalg.norm([(best - at_zero(gamma, degree - 1)) / 3, *shifted], axis=0)
-    zero, slope = (Measured(*pair) for pair in zip(best.tolist(), spread.tolist(), strict=True))
-    return zero, slope
 
 
 def _lines(name: str, p: Parameters) -> Iterator[Line]:

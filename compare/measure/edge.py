@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compare.measure.brackets import Bracket, Care, Search, narrow
-from compare.measure.extrapolation import vanishing
+from compare.measure.fits import vanishing
 from compare.measure.lab import Lab, coarse_step
 from compare.measure.levels import Level
 from compare.measure.questions import lasting

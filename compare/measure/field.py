@@ -14,6 +14,7 @@ from itertools import product
 
 import numpy as np
 
+from compare.measure.fits import value_and_slope
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.laws import PRESSES
 from compare.measure.levels import Level
@@ -68,19 +69,6 @@ def floor(p: Parameters) -> float:
     What lags behind by a time `LAG` is off by half its square, in units of `time_unit`, once the first order is gone.
     """
     return (LAG * coarse_step(p) / REFINED / time_unit(p)) ** 2 / 2
-
-
-def slope_weights(samples: Array, degree: int) -> Array:
-    """Weights (n,) of values at samples (n,) in the slope at 0 of the polynomial through them, by least squares."""
-    return np.asarray(np.linalg.pinv(np.vander(samples, degree + 1, increasing=True))[1])
-
-
-def polynomial(time: Array, values: Array, degree: int, at: float) -> tuple[Array, Array]:
-    """Values (n,) and rates (n,) at a time of the polynomials through values (samples, n), by least squares."""
-    unit = float(np.ptp(time)) / 2
-    powers = np.vander((time - at) / unit, degree + 1, increasing=True)
-    fit = np.linalg.lstsq(powers, values, rcond=None)[0]
-    return fit[0], fit[1] / unit
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -174,10 +162,10 @@ def _sight(run: Trajectory, centre: int, refined: int, degree: int) -> Array | N
     if np.ptp(run.case[centre - near : centre + near + 1]) or turns_or_hovers(Case(int(run.case[centre])), run, window):
         return None
     time, at = run.time[window], float(run.time[centre])
-    x, rates = polynomial(time, run.x[window], degree, at)
+    x, rates = value_and_slope(time, run.x[window], degree, at)
     # The forces of a sample act from then on for a step: they belong to the middle of it.
     later = (time[1] - time[0]) / 2
-    force, _ = polynomial(time + later, np.concatenate([run.force_A, run.force_B], axis=1)[window], degree, at)
+    force, _ = value_and_slope(time + later, np.concatenate([run.force_A, run.force_B], axis=1)[window], degree, at)
     return np.concatenate([x, rates, force])
 
 

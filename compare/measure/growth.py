@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from compare.measure import field
-from compare.measure.field import DOUBT, LIMIT, polynomial, random_state, slope_weights
+from compare.measure.field import DOUBT, LIMIT, random_state
+from compare.measure.fits import slope_error, value_and_slope
 from compare.measure.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.measure.levels import Level
 from compare.measure.quantities import quantity
@@ -55,8 +56,8 @@ contact that slips already depends on the size."""
 DEGREES = (4, 3)
 """Of the polynomials through a record; the lower one shows what the degree changes."""
 AT_END = float(
-    np.linalg.norm(slope_weights(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]))
-    / np.linalg.norm(slope_weights(np.arange(-field.HALF, field.HALF + 1.0), field.DEGREES[0]))
+    slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0])
+    / slope_error(np.arange(-field.HALF, field.HALF + 1.0), field.DEGREES[0])
 )
 """How many times as uncertain as in the middle of a window of `compare.measure.field` a rate is before a record."""
 COARSE = quantity("gamma").resolves / COVERAGE
@@ -118,7 +119,7 @@ class Push:
         if not np.isin(run.case[SKIPPED * times :], list(alike)).all():
             return np.full(2, np.nan)
         time, slip = run.time[SKIPPED * times :], run.x[SKIPPED * times :, SLIP_XYZ] @ self.n
-        return np.array([polynomial(time, slip[:, None], degree, 0.0)[1][0] for degree in DEGREES])
+        return np.array([value_and_slope(time, slip, degree)[1] for degree in DEGREES])
 
     @property
     def conditions(self) -> dict[str, Condition]:

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.measure.extrapolation import vanishing
-from compare.measure.field import DOUBT, LIMIT, polynomial
+from compare.measure.field import DOUBT, LIMIT
+from compare.measure.fits import value_and_slope, vanishing
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
@@ -116,7 +116,7 @@ def _force(run: Trajectory) -> Measured | None:
     time, force = run.time[SKIPPED:][:pressed], force[:pressed]
     # The force of a sample acts from then on for a step: it belongs to the middle of it.
     begin = -(time[1] - time[0]) / 2
-    value, lower = (float(polynomial(time, force, degree, begin)[0][0]) / (p.m * p.g) for degree in (3, 2))
+    value, lower = (float(value_and_slope(time, force, degree, begin)[0][0]) / (p.m * p.g) for degree in (3, 2))
     return Measured(value, abs(value - lower))
 
 

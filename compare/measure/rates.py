@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 import model
+from compare.measure.fits import exponents, matched, propagator
 from compare.measure.lab import Lab, coarse_step, state_units, time_unit
 from compare.measure.levels import Level
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
@@ -27,7 +28,7 @@ from compare.measure.settled import SPIN
 from compare.measure.settling import SOLVED, family, high
 from compare.runs.engines import STUDY_SLIP
 from compare.runs.tasks import Task
-from compare.statistics import Measured, exponents, matched, propagator
+from compare.statistics import Measured
 from model import Case, Contact, Parameters, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS

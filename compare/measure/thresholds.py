@@ -23,13 +23,13 @@ import numpy as np
 
 from compare.measure import onset
 from compare.measure.brackets import Bracket
-from compare.measure.extrapolation import POINTS, initial_slope, turning, vanishing
+from compare.measure.fits import POINTS, initial_slope, straight_line, turning, vanishing
 from compare.measure.lab import Lab, time_unit
 from compare.measure.questions import slip
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, sure_enough
 from compare.measure.settling import Settled, begin, settle_groups
 from compare.runs.tasks import Task
-from compare.statistics import COVERAGE, Measured, straight_line
+from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters
 from model.arrays import Array
 

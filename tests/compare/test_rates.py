@@ -14,9 +14,9 @@ from compare.claims import stability
 from compare.claims.claim import Outcome
 from compare.claims.judge import judge
 from compare.measure import rates
+from compare.measure.fits import exponents, matched, propagator
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.record import Records
-from compare.statistics import exponents, matched, propagator
 from model import Case, Parameters
 from model.arrays import Array
 from model.kinematics import VARIABLES

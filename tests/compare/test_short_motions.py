@@ -14,7 +14,7 @@ from analytic import bifurcation, slip_bounds, slip_stability
 from compare.claims import cases, equations, formal, slipping
 from compare.claims.claim import Claim, Outcome, Verdict
 from compare.claims.judge import judge
-from compare.measure import bounds, field, growth, lift, motions
+from compare.measure import bounds, field, fits, growth, lift, motions
 from compare.measure.lab import Lab
 from compare.measure.levels import Level
 from compare.measure.record import Records
@@ -44,7 +44,7 @@ def outcomes(claims: tuple[Claim, ...], records: Records) -> dict[str, Verdict]:
 def test_a_polynomial_gives_back_value_and_rate() -> None:
     time = np.linspace(2.0, 2.3, 17)
     values = np.stack([3 * time**3 - time, np.full(17, 5.0)], axis=-1)
-    value, rate = field.polynomial(time, values, 3, 2.1)
+    value, rate = fits.value_and_slope(time, values, 3, 2.1)
     np.testing.assert_allclose(value, [3 * 2.1**3 - 2.1, 5.0], rtol=1e-12)
     np.testing.assert_allclose(rate, [9 * 2.1**2 - 1, 0.0], rtol=1e-10, atol=1e-10)
 
@@ -112,10 +112,10 @@ def test_growth_passes_through_zero_where_it_should(lab: Lab, monkeypatch: pytes
 @pytest.mark.parametrize("power", [1.3, 1.687, 2.0])
 def test_a_bent_line_has_its_zero_and_slope(power: float) -> None:
     q = np.array([0.0, 1.1, 1.5, 2.0])
-    zero, slope = bounds.zero_and_slope(q, q**power - 1.7, np.full(len(q), 1e-6))
+    zero, slope = fits.zero_and_slope(q, q**power - 1.7, np.full(len(q), 1e-6))
     assert abs(zero.value - 1.7 ** (1 / power)) < 3 * zero.uncertainty < 0.03
     assert abs(slope.value - power * zero.value ** (power - 1)) < 3 * slope.uncertainty < 0.06
-    assert np.isnan([m.value for m in bounds.zero_and_slope(q, q + 1, np.full(len(q), 1e-6))]).all()
+    assert np.isnan([m.value for m in fits.zero_and_slope(q, q + 1, np.full(len(q), 1e-6))]).all()
 
 
 def test_the_ball_leaves_the_floor_where_it_should(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
