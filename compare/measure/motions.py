@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from compare.measure.field import constrained
 from compare.measure.lab import Lab, coarse_step, state_units, time_unit
-from compare.measure.levels import Level
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.statistics import Measured
 from model import Case, Contact, Parameters, State, Trajectory
@@ -42,8 +41,6 @@ REFINED = 16
 """Steps in one of `coarse_step`, each sampled; the second run of a landing has twice as many."""
 LASTS = 6.0
 """Duration of a motion in units of sqrt(R/g)."""
-PIECES = {Level.QUICK: 6, Level.DEFAULT: 20, Level.FULL: 32}
-"""Pieces of a motion."""
 LENGTH = 40
 """Samples in a piece."""
 APART = 10
@@ -90,7 +87,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield Missing(protocol, name, f"a motion {run}")
             continue
         p = task.parameters
-        for first in pieces(run, PIECES[lab.level]):
+        for first in pieces(run, lab.effort("motions.pieces")):
             last = first + LENGTH
             case = Case(int(run.case[last]))
             seen.add((name, case))

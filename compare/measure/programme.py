@@ -86,7 +86,6 @@ PROTOCOLS = (
     Protocol("steepest", growth.steepest, waits=False),
     Protocol("lift", lift.measure, waits=False),
     Protocol("bounds", bounds.measure, ("thresholds",)),
-    Protocol("watched", bounds.watched, ("thresholds",)),
     Protocol("motions", motions.measure, waits=False),
     Protocol("impacts", motions.impacts, waits=False),
     Protocol("recurrent", hopping.hopping, reference=HOPS),
