@@ -14,30 +14,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-import model
 from compare.measure.fits import exponents, matched, propagator
 from compare.measure.lab import Lab, coarse_step, state_units, time_unit
-from compare.measure.levels import Level
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.measure.settled import SPIN
 from compare.measure.settling import SOLVED, family, high
+from compare.measure.trials import Start
 from compare.runs.engines import STUDY_SLIP
 from compare.runs.tasks import Task
 from compare.statistics import Measured
-from model import Case, Contact, Parameters, Trajectory
+from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.drag import QUADRATIC, STOKES
 from model.kinematics import VARIABLES, slip_speeds
 
 PROTOCOL = "rates"
-REFINE = {Level.QUICK: (8, 16), Level.DEFAULT: (16, 32), Level.FULL: (32, 64)}
-"""The two time steps are these parts of `coarse_step`."""
 RECORD = (64, 256)
 """Length of a record in coarse steps, which is about 3 sqrt(R/g), and its samples."""
 BRIEF = {Case.RS: (2, 16)}
@@ -58,8 +55,7 @@ FAR = 0.4
 LEAST = {Case.SR: 48}
 """Samples that a record must have, else 8: a floor that is about to carry nothing follows its load less exactly."""
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
-"""Most states of a case and set at the quick level, spread over the flows; beyond it, `MORE` times as many."""
-MORE = {Level.QUICK: 1, Level.DEFAULT: 2, Level.FULL: 5}
+"""Most states of a case and set at the quick level, spread over the flows; more at the others."""
 STOPPED = 4.0
 """Coarse steps in which friction may stop the slip of a state at the soonest: in less, its decay is not resolved."""
 HOVERS = 10.0
@@ -72,13 +68,11 @@ Exponents = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class Pushed:
     """A settled state, from which the ball is pushed."""
 
-    set: str
-    p: Parameters
+    start: Start
     case: Case
-    x: Array = field(repr=False)
 
     @property
     def active(self) -> list[int]:
@@ -88,36 +82,41 @@ class State:
     @property
     def units(self) -> Array:
         """Natural sizes of the active variables."""
-        return state_units(self.p)[self.active]
+        return state_units(self.start.p)[self.active]
 
     @property
     def sizes(self) -> tuple[float, ...]:
         """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
-        size = PUSH.get(self.case, SMALL if self.p.drag == STOKES else SLIGHT)
+        size = PUSH.get(self.case, SMALL if self.start.p.drag == STOKES else SLIGHT)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
 
-    def tasks(self, lab: Lab) -> list[list[Task]]:
+    def tasks(self, lab: Lab) -> list[Task]:
         """Runs for each of the `sizes`: every active variable is pushed, up and down."""
-        step, (coarse, fine) = coarse_step(self.p), REFINE[lab.level]
+        p, step = self.start.p, coarse_step(self.start.p)
+        coarse, fine = lab.effort("rates.refined")
         lasts, samples = BRIEF.get(self.case, RECORD)
-        pushes = []
-        for size, refine in zip(self.sizes, (coarse, fine, fine), strict=False):
-            starts = self.x + np.kron(np.diag(size * self.units), [[1], [-1]]) @ np.eye(8)[self.active]
-            pushes.append([lab.task(self.p, x, lasts * step, step / refine, samples=samples) for x in starts])
-        return pushes
+        tasks = []
+        for size, refined in zip(self.sizes, (coarse, fine, fine), strict=False):
+            for k, unit in zip(self.active, size * self.units, strict=True):
+                for push in (unit, -unit):
+                    x = self.start.x0.copy()
+                    x[k] += push
+                    tasks.append(lab.task(p, x, lasts * step, step / refined, samples=samples))
+        return tasks
 
     def missing(self, why: str) -> Missing:
         """That its rates were not measured."""
-        return Missing(PROTOCOL, self.set, f"{self.case.name} at omega_0 = {self.p.omega_0:.4g} rad/s: {why}")
+        at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
+        return Missing(PROTOCOL, self.start.set, f"{at}: {why}")
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
-    states = [state for name, p in sets.items() for state in chosen(records, name, p, MORE[lab.level])]
-    tasks = [[task for push in state.tasks(lab) for task in push] for state in states]
+    states = [state for name, p in sets.items() for state in chosen(records, name, p, lab.effort("rates.more"))]
+    tasks = [state.tasks(lab) for state in states]
     lab.complete([task for own in tasks for task in own])
     for state, own in zip(states, tasks, strict=True):
-        runs, step = lab.attempt(own), coarse_step(state.p) / REFINE[lab.level][1]
+        runs, step = lab.attempt(own), coarse_step(state.start.p) / lab.effort("rates.refined")[1]
         if isinstance(runs, str):
             yield state.missing(f"a run {runs}")
             continue
@@ -129,22 +128,23 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield from _measurements(lab, state, *spectrum(state, answers, step), step, own[-count:])
     for name in sets:
         for case in STATES:
-            if case not in {state.case for state in states if state.set == name}:
+            if case not in {state.case for state in states if state.start.set == name}:
                 at = f"the ball settles in {case.name} at no flow that was tried"
                 yield Missing(PROTOCOL, name, f"{at}, or slips too slowly or too fast there")
 
 
-def chosen(records: Records, name: str, p: Parameters, more: int) -> list[State]:
+def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed]:
     """The states of a set that are pushed: at most so many of a case, and spinning on the spot next to the wall."""
     unit = time_unit(p)
-    still = model.State(slip_y=SPIN / unit * p.R / p.r).stacked()
-    kept = [State(name, p.replace(omega_0=0.0), Case.RS, still)]
+    still = State(slip_y=SPIN / unit * p.R / p.r).stacked()
+    kept = [Pushed(Start(name, p.replace(omega_0=0.0), "spinning", still), Case.RS)]
     states = [state for state in settled(records, name) if _suits(state)]
     if p.drag == QUADRATIC:  # it settles no ball that goes round with the fluid; but one that begins so goes on so
         slow = 0.5 / unit
-        states.append(State(name, p.replace(omega_0=slow), Case.RR, model.State(omega_c=slow).stacked()))
+        going = Start(name, p.replace(omega_0=slow), "with the fluid", State(omega_c=slow).stacked())
+        states.append(Pushed(going, Case.RR))
     for case, most in STATES.items():
-        alike = sorted((s for s in states if s.case is case), key=lambda s: s.p.omega_0)
+        alike = sorted((s for s in states if s.case is case), key=lambda s: s.start.p.omega_0)
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
         places = {int((k + 0.5) * len(alike) / (more * most)) for k in range(more * most)} if alike else set()
@@ -152,39 +152,39 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> list[State]
     return kept
 
 
-def settled(records: Records, name: str) -> Iterator[State]:
+def settled(records: Records, name: str) -> Iterator[Pushed]:
     """The settled states of a set; one on the wall alone high up, and also where it only just touches the floor."""
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
         values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
     for (p, case), value in values.items():
         if case in (Case.RR, Case.SS, Case.NR, Case.NS):
-            on_floor = model.State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
+            on_floor = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
             x = on_floor._replace(y=high(p)) if case.A is Contact.N else on_floor
-            yield State(name, p, case, x.stacked())
+            yield Pushed(Start(name, p, "settled", x.stacked()), case)
             if case is Case.NR:
-                yield State(name, p, Case.SR, on_floor.stacked())
+                yield Pushed(Start(name, p, "settled", on_floor.stacked()), Case.SR)
 
 
-def _suits(state: State) -> bool:
+def _suits(state: Pushed) -> bool:
     """Whether what slips does so neither too slowly nor too fast.
 
     Too slowly: a push turns it round, or friction stops it within a few steps. Too fast: it hovers under its load.
     """
-    p = state.p
-    loads = p.g, p.R * model.State.of(state.x).omega_c ** 2
+    p = state.start.p
+    loads = p.g, p.R * State.of(state.start.x0).omega_c ** 2
     turned = math.sqrt(p.g * p.R) * max(SLOWEST, 2 * PUSH.get(state.case, 0.0))
     return all(
         max(turned, STOPPED * coarse_step(p) * friction * load) < speed
         and friction * speed < HOVERS * STUDY_SLIP * load / p.g
         for contact, speed, friction, load in zip(
-            (state.case.A, state.case.B), slip_speeds(state.x, p), (p.mu, p.eta), loads, strict=True
+            (state.case.A, state.case.B), slip_speeds(state.start.x0, p), (p.mu, p.eta), loads, strict=True
         )
         if contact is Contact.S
     )
 
 
-def answer(state: State, size: float, runs: Sequence[Trajectory]) -> Array:
+def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
     """D (n, d, d): how the active variables, over `units`, follow pushes of one size; runs in the order of the tasks.
 
     Only as long as the ball stays in the case and near the state; the first sample, at which forces build up, is not
@@ -193,7 +193,7 @@ def answer(state: State, size: float, runs: Sequence[Trajectory]) -> Array:
     ups, downs = runs[::2], runs[1::2]
     if state.case is Case.SR:
         seen = [max(pair, key=lambda run: stays(run, state.case)) for pair in zip(ups, downs, strict=True)]
-        columns = [(1 if run in ups else -1) * (run.x - state.x) for run in seen]
+        columns = [(1 if run in ups else -1) * (run.x - state.start.x0) for run in seen]
     else:
         # Where the wall carries nothing, as beside a ball that only spins, no contact with it shows.
         seen = list(runs[:2] if state.case is Case.RS else runs)
@@ -209,8 +209,8 @@ def stays(run: Trajectory, case: Case) -> int:
     return int(np.argmax(np.append(run.case[1:] != case, True))) + 1
 
 
-def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
-    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `State.sizes`.
+def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
+    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `Pushed.sizes`.
 
     The engine's order in the time step is taken to be 2. The uncertainty is that correction, which is larger than what
     is left if the order is 1; by how much the first half of the record differs; the next term in the size of the push,
@@ -218,7 +218,7 @@ def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Expon
     and the accuracy of the engine's solver.
     """
     lasts, samples = BRIEF.get(state.case, RECORD)
-    interval = lasts * coarse_step(state.p) / samples
+    interval = lasts * coarse_step(state.start.p) / samples
     # All records are as long as the shortest: extrapolated is one and the same thing.
     length = min(map(len, answers))
 
@@ -248,11 +248,12 @@ def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Expon
 
 
 def _measurements(
-    lab: Lab, state: State, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
+    lab: Lab, state: Pushed, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
 ) -> Iterator[Measurement | Missing]:
     """One of each pair of conjugates, in the order of their decay, slowest first; and how many there are in all."""
-    at: dict[str, Condition] = {"case": state.case.name, **state_of(state.x)}
-    yield measurement(lab, PROTOCOL, state.set, state.p, "modes", len(exponents), tasks, **at)
+    start = state.start
+    at: dict[str, Condition] = {"case": state.case.name, **state_of(start.x0)}
+    yield measurement(lab, PROTOCOL, start.set, start.p, "modes", len(exponents), tasks, **at)
     rows = []
     order = [k for k in np.argsort(-exponents.real) if exponents[k].imag >= 0]
     fast = [k for k in order if abs(exponents[k]) * step > RESOLVED]
@@ -265,10 +266,10 @@ def _measurements(
         for (quantity, value), (name, other) in zip(parts.items(), reversed(parts.items()), strict=True):
             sure, which = Measured(value, float(uncertainty[k])), {"mode": mode, name: other}
             # They come from one propagator: where one is too vague for a check, the others aren't to be trusted either.
-            if not sure_enough(quantity, sure, natural_size(value, other, state.p)):
+            if not sure_enough(quantity, sure, natural_size(value, other, start.p)):
                 yield state.missing(f"one of its exponents, {value:.3g} 1/s, is uncertain by {sure.uncertainty:.1g}")
                 return
-            rows.append(measurement(lab, PROTOCOL, state.set, state.p, quantity, sure, tasks, **at, **which))
+            rows.append(measurement(lab, PROTOCOL, start.set, start.p, quantity, sure, tasks, **at, **which))
     yield from rows
 
 

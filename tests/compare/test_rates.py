@@ -17,6 +17,7 @@ from compare.measure import rates
 from compare.measure.fits import exponents, matched, propagator
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.record import Records
+from compare.measure.trials import Start
 from model import Case, Parameters
 from model.arrays import Array
 from model.kinematics import VARIABLES
@@ -68,15 +69,14 @@ def test_a_long_lag_makes_slow_exponents_sharper() -> None:
     assert error(128) < error(1)
 
 
-def state(case: Case, omega_0: float = 20.0) -> rates.State:
-    p = P.replace(omega_0=omega_0)
-    return rates.State("mine", p, case, np.zeros(8))
+def state(case: Case, omega_0: float = 20.0) -> rates.Pushed:
+    return rates.Pushed(Start("mine", P.replace(omega_0=omega_0), "settled", np.zeros(8)), case)
 
 
 def test_what_depends_on_the_size_of_the_push_and_on_the_step_is_extrapolated() -> None:
     leaning = state(Case.SR)
     lasts, samples = rates.RECORD
-    interval, step = lasts * coarse_step(leaning.p) / samples, coarse_step(leaning.p) / 16
+    interval, step = lasts * coarse_step(leaning.start.p) / samples, coarse_step(leaning.start.p) / 16
     J, other = mixed(-1.0, -5.0), mixed(2.0, 1.0)
     bent = 0.05
 
