@@ -2,7 +2,7 @@
 
 A ball that goes round at a held omega_c is given more and more flow; or the flow takes it along at its own omega_0,
 rolling at both points or hanging on the wall alone, as its settled states do. Two flows show about where gamma passes
-through zero, and two more are taken around it. gamma is drawn over omega_0, or its square where the orbit goes with it.
+through zero, and two more are taken around it. The line is one over omega_0, or over its square where the orbit goes with it.
 Where another law of drag than Stokes' bends the line, a cubic is laid through the four.
 """
 
@@ -55,7 +55,7 @@ class Crossing:
 
     @property
     def power(self) -> int:
-        """Of omega_0, over which gamma is drawn: the orbit is held, or goes with the flow."""
+        """Power of omega_0 in which gamma is a line: 1 where the orbit is held, 2 where it goes with the flow."""
         return 1 if self.pushes[0].start.name == "held" else 2
 
     @property

@@ -1,9 +1,9 @@
 """Decay rates and frequencies: settled states are pushed a little, and the motion itself shows its whole spectrum.
 
-Every active variable of a case is pushed by itself, up and down. Half the difference of the two runs, over the size of
-the push, is a column of D(t), which a linear motion turns into P D(t) some time later: the logarithms of the
+Every active variable of a case is pushed by itself, up and down. Half the difference of the two runs, divided by the
+size of the push, is a column of D(t), which a linear motion turns into P D(t) some time later: the logarithms of the
 eigenvalues of P are the exponents, all of them, and no direction is singled out. Two sizes of the push are extrapolated
-to none, two time steps to none.
+to zero, and so are two time steps.
 
 Two states are special. A ball that spins in a fluid at rest (RS) feels the wall only while it goes round, with a
 friction of the order of omega_c^2: it takes a large push. And where floor and ball only just touch (SR), every push
@@ -40,16 +40,16 @@ RECORD = (64, 256)
 BRIEF = {Case.RS: (2, 16)}
 """The same where a large push soon changes the state itself."""
 PUSH = {Case.RS: 0.3, Case.SR: 0.1}
-"""Size of a push, in the `units`, in the two cases in which it is extrapolated to none from this and half of it."""
+"""Size of a push, in the `units`, in the two cases in which it is extrapolated to zero from this and half of it."""
 SMALL = 2e-4
 """Size of a push in all other cases; the run with the coarser step has half of it, and shows that it doesn't matter."""
 SLIGHT = 2e-6
-"""The same where the law of drag isn't Stokes': the drag of a lag that the push makes is then in proportion to it only
-as far as its Reynolds number is nothing beside 1."""
+"""The same where the law of drag isn't Stokes': the drag of the lag that a push makes is in proportion to it only
+as far as its Reynolds number is far below 1."""
 SLOWEST = 0.04
-"""Least slip speed of a state over sqrt(g R): a push is to be small beside it."""
+"""Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
 ORDER = {Case.RS: 2, Case.SR: 1}
-"""What is left of a push's size: its square, where up and down are subtracted."""
+"""Order of the remaining error in the size of a push: second, where up and down are subtracted."""
 FAR = 0.4
 """A record ends once a variable is so far from its settled value, in the `units`."""
 LEAST = {Case.SR: 48}
@@ -134,17 +134,39 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed]:
-    """The states of a set that are pushed: at most so many of a case, and spinning on the spot next to the wall."""
+    """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
+
+    One on the wall alone is pushed high up, and also where it only just touches the floor. What slips must do so neither
+    so slowly that a push turns it round, or friction stops it within a few steps, nor so fast that it hovers.
+    """
     unit = time_unit(p)
-    still = State(slip_y=SPIN / unit * p.R / p.r).stacked()
-    kept = [Pushed(Start(name, p.replace(omega_0=0.0), "spinning", still), Case.RS)]
-    states = [state for state in settled(records, name) if _suits(state)]
+    spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
+    kept = [Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)]
+    values: dict[tuple[Parameters, Case], dict[str, float]] = {}
+    for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
+        values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
+    states = []
+    for (q, case), value in values.items():
+        x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
+        states.append((q, case, x._replace(y=high(q)) if case.A is Contact.N else x))
+        if case is Case.NR:
+            states.append((q, Case.SR, x))
     if p.drag == QUADRATIC:  # it settles no ball that goes round with the fluid; but one that begins so goes on so
-        slow = 0.5 / unit
-        going = Start(name, p.replace(omega_0=slow), "with the fluid", State(omega_c=slow).stacked())
-        states.append(Pushed(going, Case.RR))
+        states.append((p.replace(omega_0=0.5 / unit), Case.RR, State(omega_c=0.5 / unit)))
     for case, most in STATES.items():
-        alike = sorted((s for s in states if s.case is case), key=lambda s: s.start.p.omega_0)
+        alike = []
+        for q, _, x in sorted((s for s in states if s[1] is case), key=lambda s: s[0].omega_0):
+            turned = math.sqrt(q.g * q.R) * max(SLOWEST, 2 * PUSH.get(case, 0.0))
+            contacts = zip(
+                case.name, slip_speeds(x.stacked(), q), (q.mu, q.eta), (q.g, q.R * x.omega_c**2), strict=True
+            )
+            if all(
+                max(turned, STOPPED * coarse_step(q) * friction * load) < speed
+                and friction * speed < HOVERS * STUDY_SLIP * load / q.g
+                for contact, speed, friction, load in contacts
+                if contact == "S"
+            ):
+                alike.append(Pushed(Start(name, q, "settled", x.stacked()), case))
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
         places = {int((k + 0.5) * len(alike) / (more * most)) for k in range(more * most)} if alike else set()
@@ -152,40 +174,8 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed
     return kept
 
 
-def settled(records: Records, name: str) -> Iterator[Pushed]:
-    """The settled states of a set; one on the wall alone high up, and also where it only just touches the floor."""
-    values: dict[tuple[Parameters, Case], dict[str, float]] = {}
-    for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
-        values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
-    for (p, case), value in values.items():
-        if case in (Case.RR, Case.SS, Case.NR, Case.NS):
-            on_floor = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
-            x = on_floor._replace(y=high(p)) if case.A is Contact.N else on_floor
-            yield Pushed(Start(name, p, "settled", x.stacked()), case)
-            if case is Case.NR:
-                yield Pushed(Start(name, p, "settled", on_floor.stacked()), Case.SR)
-
-
-def _suits(state: Pushed) -> bool:
-    """Whether what slips does so neither too slowly nor too fast.
-
-    Too slowly: a push turns it round, or friction stops it within a few steps. Too fast: it hovers under its load.
-    """
-    p = state.start.p
-    loads = p.g, p.R * State.of(state.start.x0).omega_c ** 2
-    turned = math.sqrt(p.g * p.R) * max(SLOWEST, 2 * PUSH.get(state.case, 0.0))
-    return all(
-        max(turned, STOPPED * coarse_step(p) * friction * load) < speed
-        and friction * speed < HOVERS * STUDY_SLIP * load / p.g
-        for contact, speed, friction, load in zip(
-            (state.case.A, state.case.B), slip_speeds(state.start.x0, p), (p.mu, p.eta), loads, strict=True
-        )
-        if contact is Contact.S
-    )
-
-
 def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
-    """D (n, d, d): how the active variables, over `units`, follow pushes of one size; runs in the order of the tasks.
+    """D (n, d, d): how the active variables, in `units`, follow pushes of one size; runs in the order of the tasks.
 
     Only as long as the ball stays in the case and near the state; the first sample, at which forces build up, is not
     among them.
@@ -212,23 +202,23 @@ def stays(run: Trajectory, case: Case) -> int:
 def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
     """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `Pushed.sizes`.
 
-    The engine's order in the time step is taken to be 2. The uncertainty is that correction, which is larger than what
-    is left if the order is 1; by how much the first half of the record differs; the next term in the size of the push,
-    in which it is once more as small, or the first term over the whole; the error of a step for the fastest exponent;
-    and the accuracy of the engine's solver.
+    They are extrapolated to a vanishing push, and to a vanishing step by second order. The uncertainty is, in quadrature:
+    that correction, which exceeds the remainder even of first order; the difference from the first half of the record;
+    the next order in the size of the push; the error of a step for the fastest exponent; the accuracy of the solver.
     """
     lasts, samples = BRIEF.get(state.case, RECORD)
     interval = lasts * coarse_step(state.start.p) / samples
-    # All records are as long as the shortest: extrapolated is one and the same thing.
+    # All records are cut to the length of the shortest, so that all are extrapolated from the same motion.
     length = min(map(len, answers))
+
+    gain = 1 / (2 ** ORDER.get(state.case, 2) - 1)
 
     def exponents_of(large: Array, small: Array, share: float = 1.0) -> Exponents:
         last = max(4, round(share * length))
-        gain = 1 / (2 ** ORDER[state.case] - 1) if large is not small else 0.0
 
         def at(lag: int) -> Array:
-            P = propagator(small[:last], lag)
-            return P + gain * (P - propagator(large[:last], lag)) if gain else P
+            P, P_large = (propagator(record[:last], lag) for record in (small, large))
+            return P + gain * (P - P_large)
 
         return exponents(at, interval, last // 3)
 
