@@ -142,14 +142,14 @@ def _arrow(axes: Axes, inner: Case, outer: Case, line: str, shift: float = 0.0) 
 
 
 CAPTIONS = {
-    "fig-2": "The nine kinematic cases: rolling (R), slipping (S) or no contact (N), first at the floor (A), second at the "
-    "wall (B). Dot: rolls; arrows: slips. Numbers: variables of position that are needed, plus independent "
+    "fig-2": "The nine kinematic cases: rolling (R), slipping (S) or no contact (N), first at the floor (A), second at "
+    "the wall (B). Dot: rolls; arrows: slips. Numbers: variables of position that are needed, plus independent "
     "velocities, make the dimension of the state space. Off the wall (right column) the distance h from it counts.",
-    "fig-3": "Where the cases are. Left: y = v_y = 0 at one ω_c, in the space of the three slips: RR is a point, SR and "
-    "RS are lines, SS is all the rest. Right: y = v_y = ω̃_z = 0, with ω_c upwards: SR and RS are planes that meet in the "
-    "line RR.",
-    "fig-6": "Transitions to cases of more freedom, which are drawn higher up; dim: dimension of the state space. Solid: "
-    "slip begins at the floor (A); dashed: at the wall (B); dotted: the ball leaves the floor.",
+    "fig-3": "Where the cases are. Left: y = v_y = 0 at one ω_c, in the space of the three slips: RR is a point, SR "
+    "and RS are lines, SS is all the rest. Right: y = v_y = ω̃_z = 0, with ω_c upwards: SR and RS are planes that "
+    "meet in the line RR.",
+    "fig-6": "Transitions to cases of more freedom, which are drawn higher up; dim: dimension of the state space. "
+    "Solid: slip begins at the floor (A); dashed: at the wall (B); dotted: the ball leaves the floor.",
 }
 
 

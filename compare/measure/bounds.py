@@ -2,8 +2,8 @@
 
 A ball that goes round at a held omega_c is given more and more flow; or the flow takes it along at its own omega_0,
 rolling at both points or hanging on the wall alone, as its settled states do. Two flows show about where gamma passes
-through zero, and two more are taken around it. The line is one over omega_0, or over its square where the orbit goes with it.
-Where another law of drag than Stokes' bends the line, a cubic is laid through the four.
+through zero, and two more are taken around it. gamma is a line in omega_0, or in its square where the orbit goes with
+it. Where another law of drag than Stokes' bends the line, a cubic is laid through the four.
 """
 
 from __future__ import annotations

@@ -136,8 +136,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed]:
     """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
 
-    One on the wall alone is pushed high up, and also where it only just touches the floor. What slips must do so neither
-    so slowly that a push turns it round, or friction stops it within a few steps, nor so fast that it hovers.
+    One on the wall alone is pushed high up, and where it only just touches the floor. What slips must do so neither
+    so slowly that a push turns it, or friction stops it within a few steps, nor so fast that it hovers.
     """
     unit = time_unit(p)
     spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
@@ -202,7 +202,7 @@ def stays(run: Trajectory, case: Case) -> int:
 def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
     """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `Pushed.sizes`.
 
-    They are extrapolated to a vanishing push, and to a vanishing step by second order. The uncertainty is, in quadrature:
+    They are extrapolated to a vanishing push, and to a vanishing step by second order. The uncertainty is made up of
     that correction, which exceeds the remainder even of first order; the difference from the first half of the record;
     the next order in the size of the push; the error of a step for the fastest exponent; the accuracy of the solver.
     """
@@ -218,7 +218,7 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
 
         def at(lag: int) -> Array:
             P, P_large = (propagator(record[:last], lag) for record in (small, large))
-            return P + gain * (P - P_large)
+            return np.asarray(P + gain * (P - P_large))
 
         return exponents(at, interval, last // 3)
 
