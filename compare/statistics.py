@@ -48,11 +48,13 @@ def window_mean(time: npt.ArrayLike, values: npt.ArrayLike) -> Measured:
         )
     if not np.all(np.isfinite(v)):
         raise InputError("a window mean needs finite samples")
-    mean = float(v.mean())
-    independent = len(v) / correlation_length(v)
-    scatter = float(v.std(ddof=1)) / math.sqrt(independent)
+    scatter = float(v.std(ddof=1)) / math.sqrt(len(v) / correlation_length(v))
+    first, second, third = (float(part.mean()) for part in np.array_split(v, 3))
+    ratio = abs(third - second) / abs(second - first) if second != first else 0.0
+    # Thirds that come together by less than a twentieth say only that nothing has settled.
+    approach = abs(third - first) / 2 + abs(third - second) * ratio / (1 - min(ratio, 0.95))
     rounding = float(np.finfo(float).eps * np.abs(v).max())
-    return Measured(mean, math.sqrt(scatter**2 + _approach(v) ** 2 + rounding**2))
+    return Measured(float(v.mean()), math.sqrt(scatter**2 + approach**2 + rounding**2))
 
 
 def correlation_length(values: Array) -> float:
@@ -66,14 +68,6 @@ def correlation_length(values: Array) -> float:
     pairs = rho[: len(rho) // 2 * 2].reshape(-1, 2).sum(axis=1)
     last = int(np.argmax(pairs <= 0)) if np.any(pairs <= 0) else len(pairs)
     return float(min(max(1.0, 2 * pairs[:last].sum() - 1), len(v)))
-
-
-def _approach(v: Array) -> float:
-    """How far the mean still is from the limit of an exponential approach, judged by the means of three thirds."""
-    first, second, third = (float(part.mean()) for part in np.array_split(v, 3))
-    slower = abs(third - second) / abs(second - first) if second != first else 0.0
-    # Thirds that come together by less than a twentieth say only that nothing has settled.
-    return abs(third - first) / 2 + abs(third - second) * slower / (1 - min(slower, 0.95))
 
 
 def tail(run: Trajectory, share: float = 0.1) -> slice:

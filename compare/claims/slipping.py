@@ -28,6 +28,10 @@ def _held(m: Measurement) -> float:
     return float(m.conditions["omega_c"])
 
 
+def _side(m: Measurement, name: str) -> int:
+    return round(float(m.conditions[name]))
+
+
 def _arrow(m: Measurement) -> tuple[Case, Case]:
     """The case out of which, and into which, a ball slips or lifts off."""
     return Case[str(m.conditions["inner"])], Case[str(m.conditions["outer"])]
@@ -154,9 +158,7 @@ CLAIMS = (
         "eq-66",
         "(66)",
         "A ball that lags behind the fluid begins to slip at the wall where (66) says.",
-        _bound(
-            _RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, _held(m), round(float(m.conditions["n_y"])))
-        ),
+        _bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, _held(m), _side(m, "n_y"))),
         text=Text.CORRECTED,
         reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
     ),
@@ -170,9 +172,7 @@ CLAIMS = (
         "eq-73",
         "(73)",
         "A ball that lags behind the fluid begins to slip at the floor where (73) says.",
-        _bound(
-            _RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, _held(m), round(float(m.conditions["n_x"])))
-        ),
+        _bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, _held(m), _side(m, "n_x"))),
     ),
     Claim(
         "eq-74",
