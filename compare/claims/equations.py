@@ -6,7 +6,7 @@ import analytic
 from compare.claims.claim import Bearing, Claim, Text, given
 from compare.claims.judge import theory
 from compare.claims.stationary import force
-from compare.measure.record import Measurement, state
+from compare.measure.record import state
 from model import Case
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -29,25 +29,25 @@ _FORCES = ("Ax", "Ay", "Az", "Bx", "By", "Bz", "Ax-By", "Ay+By", "Bx+By")
 
 
 def _rate(case: Case, name: str) -> Bearing:
-    def rate(m: Measurement) -> float:
-        return float(theory(analytic.vector_field, case, state(m), m.parameters)[VARIABLES.index(name)])
-
-    def size(m: Measurement) -> float:
-        p = m.parameters
-        return p.g / {"v_y": 1.0, "v_h": 1.0, "omega_c": p.R}.get(name, p.r)
-
-    return Bearing("field", f"rate_{name}", rate, when=given(case=case.name), size=size, by="analytic.vector_field")
+    return Bearing(
+        "field",
+        f"rate_{name}",
+        lambda m: float(theory(analytic.vector_field, case, state(m), m.parameters)[VARIABLES.index(name)]),
+        when=given(case=case.name),
+        size=lambda m: m.parameters.g / {"v_y": 1.0, "v_h": 1.0, "omega_c": m.parameters.R}.get(name, m.parameters.r),
+        by="analytic.vector_field",
+    )
 
 
 def _force(case: Case, name: str) -> Bearing:
-    def predict(m: Measurement) -> float:
-        return force(name, *theory(analytic.contact_forces, case, state(m), m.parameters))
-
-    def weight(m: Measurement) -> float:
-        return m.parameters.m * m.parameters.g
-
-    when, by = given(case=case.name), "analytic.contact_forces"
-    return Bearing("field", f"moving_force_{name}", predict, when=when, size=weight, by=by)
+    return Bearing(
+        "field",
+        f"moving_force_{name}",
+        lambda m: force(name, *theory(analytic.contact_forces, case, state(m), m.parameters)),
+        when=given(case=case.name),
+        size=lambda m: m.parameters.m * m.parameters.g,
+        by="analytic.contact_forces",
+    )
 
 
 CLAIMS = tuple(

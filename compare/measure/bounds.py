@@ -124,21 +124,20 @@ def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, l
     it is uncertain by what the step and the degree of the polynomials change, and nan if the case was another.
     """
 
-    def tasks_of(push: Push) -> list[Task]:
-        large, small = MEDIUM if push.inner is Case.NR else push.sizes
-        return [*push.pair(lab, large), push.pair(lab, small)[1]]
-
-    tasks = [[tasks_of(push) for push in pushes] for pushes in rows]
-    runs = lab.groups([three for own in tasks for three in own])
-    for pushes, own in zip(rows, tasks, strict=True):
-        points = []
+    tasks = []
+    for push in (push for pushes in rows for push in pushes):
+        large_size, small_size = MEDIUM if push.inner is Case.NR else push.sizes
+        tasks.append([*push.pair(lab, large_size), push.pair(lab, small_size)[1]])
+    runs, todo = lab.groups(tasks), iter(tasks)
+    for pushes in rows:
+        points, own = [], [task for _ in pushes for task in next(todo)]
         for push in pushes:
             coarse, large, small = (push.rates(run) for run in next(runs))
             best, change = without_size(np.array([large, small])), (large - coarse)[0]
             p = push.start.p
             noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p) * slip_unit(p))
             points.append((p.omega_0, best[0] + change * LIMIT, noise))
-        yield np.reshape(points, (-1, 3)).T, [task for three in own for task in three]
+        yield np.reshape(points, (-1, 3)).T, own
 
 
 def _result(lab: Lab, line: Crossing, points: Array, tasks: Sequence[Task]) -> Iterator[Measurement | Missing]:

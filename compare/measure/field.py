@@ -47,7 +47,15 @@ STATE, RATES, FORCES = slice(0, 8), slice(8, 16), slice(16, 22)
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Rates of change and contact forces, each with the state they belong to."""
-    starts = [start for name, p in sets.items() for start in _starts(name, p, lab.effort("field.starts"))]
+    starts = []
+    for name, p in sets.items():
+        rng = np.random.default_rng([SEED, *name.encode()])
+        for case, _ in product(Case, range(lab.effort("field.starts"))):
+            x = random_state(case, p, rng)
+            # Two contacts that both roll hold the ball against no more than a slight lag.
+            rolls = case is Case.RR
+            omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
+            starts.append(Start(name, p.replace(omega_0=omega_0), case.name, x))
     steps = CENTRES[-1] + HALF + APART
     tasks = [lab.pair(start.p, start.x0, steps, coarse_step(start.p) / REFINED) for start in starts]
     runs = list(lab.groups(tasks))
@@ -68,17 +76,6 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for name, case in product(sets, Case):
         if not kept[name, case]:
             yield Missing(PROTOCOL, name, f"no random start moved smoothly in case {case.name} for {2 * HALF} steps")
-
-
-def _starts(name: str, p: Parameters, count: int) -> Iterator[Start]:
-    """So many starts a case, with a flow, at random in natural units: lengths in R, times in sqrt(R/g)."""
-    rng = np.random.default_rng([SEED, *name.encode()])
-    unit = time_unit(p)
-    for case, _ in product(Case, range(count)):
-        x = random_state(case, p, rng)
-        # Two contacts that both roll hold the ball against no more than a slight lag.
-        omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if case is Case.RR else rng.uniform(0.3, 2.5) / unit
-        yield Start(name, p.replace(omega_0=omega_0), case.name, x)
 
 
 def random_state(case: Case, p: Parameters, rng: np.random.Generator) -> Array:
