@@ -18,13 +18,11 @@ import numpy as np
 from compare.measure.fits import straight_line, zero_and_slope
 from compare.measure.growth import SMOOTH, Push, without_size
 from compare.measure.lab import Lab, time_unit
-from compare.measure.quantities import quantity
-from compare.measure.record import Measurement, Missing, Records, if_sure
+from compare.measure.record import Measurement, Missing, Records, if_sure, sure_enough
 from compare.measure.settling import begin, settle_groups
 from compare.measure.short import DOUBT, LIMIT, lag_error, slip_unit
 from compare.measure.trials import Start
 from compare.runs.tasks import Task
-from compare.statistics import COVERAGE
 from model import Case, Parameters, State
 from model.arrays import Array
 from model.drag import STOKES
@@ -36,11 +34,9 @@ AROUND_BENT = (0.8, 1.1)
 """The same on a line that the law of drag bends: apart from the first two, too."""
 MEDIUM = (1.0, 0.5)
 """Sizes of slip of a ball that hangs on a smooth wall, and so goes round fast, in units as those of `Push.sizes`."""
-COARSE = quantity("gamma_slope").resolves / COVERAGE
-"""Largest relative uncertainty of a slope that counts: all that a check may have."""
 BEYOND = 2.1
 """Largest zero that counts, divided by the largest value at which slip stayed in its case: the line ends there."""
-FAR = 100.0
+LARGEST = 100.0
 """Largest zero that is followed, divided by the largest of the first flows."""
 HANGING = (1.05, 1.6, 1.3)
 """Flows at which a ball hangs on the wall, divided by the measured one at which it ceases to."""
@@ -71,7 +67,7 @@ class Crossing:
         q = flows**self.power
         slope = np.diff(gammas)[0] / np.diff(q)[0]
         zero = float(q[0] - gammas[0] / slope) if slope else math.inf
-        if not 0 < zero < (FAR * max(flows)) ** self.power:  # or nan
+        if not 0 < zero < (LARGEST * max(flows)) ** self.power:  # or nan
             return ()
         least = flows[0] if self.power == 1 else 0.0
         around = AROUND_BENT if self.bent else AROUND
@@ -153,7 +149,7 @@ def _result(lab: Lab, line: Crossing, points: Array, tasks: Sequence[Task]) -> I
     push, square = line.pushes[0], "_square" if line.power == 2 else ""
     p, name = push.start.p, push.start.set
     growth = f"growth of slip from {push.inner.name} to {push.outer.name}, {push.start.name},"
-    if not slope.uncertainty <= COARSE * abs(slope.value):
+    if not sure_enough("gamma_slope", slope, abs(slope.value)):
         yield Missing(PROTOCOL, name, f"{growth} changes too little with the flow, or is too uncertain")
         return
     if abs(zero.value) <= BEYOND * np.abs(q).max():

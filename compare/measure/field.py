@@ -16,11 +16,10 @@ import numpy as np
 
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.laws import PRESSES
-from compare.measure.quantities import quantity
-from compare.measure.record import Measurement, Missing, Records, measurement, state_of
+from compare.measure.record import Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.measure.short import DOUBT, LIMIT, REFINED, lag_error, polynomials
 from compare.measure.trials import Start
-from compare.statistics import COVERAGE, Measured
+from compare.statistics import Measured
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -32,9 +31,6 @@ CENTRES, HALF = (16, 40, 64), 8
 """Centres of the windows and half their width, in steps of the coarser run."""
 APART = 4
 """Steps before and after a window in which the case doesn't change, either: friction then builds up or dies out."""
-COARSE = quantity("rate_v_y").resolves / COVERAGE
-"""Largest relative uncertainty of a state that counts, all that a check may have: under a fast slip that hardly presses
-contact comes and goes."""
 DEGREES = (5, 3)
 """Degrees of the polynomials; the lower one shows what the degree changes."""
 TURN = 0.5
@@ -151,7 +147,7 @@ def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
     """Quantities with uncertainties, from what the extrapolation and the degree of the polynomials change.
 
     The largest relative change of the rates, or of the forces, stands for all of them: that of one may vanish by
-    chance. Empty where it is more than `COARSE`.
+    chance. Empty where it is more than a check may have.
     """
     moving = [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
@@ -162,7 +158,8 @@ def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
         for rows in ((window[:, RATES] / scales)[:, moving], [[w / weight for w in each.values()] for each in forces])
     )
     rate_change, force_change = max(rate_change, lag_error(p) * (1 + p.j) / p.j), max(force_change, lag_error(p))
-    if max(rate_change, force_change) > COARSE:
+    # Where the ball slips fast and hardly presses, contact comes and goes.
+    if not sure_enough("rate_v_y", Measured(0.0, max(rate_change, force_change)), 1.0):
         return {}
     rates = {f"rate_{VARIABLES[k]}": Measured(window[0, RATES][k], rate_change * scales[k]) for k in moving}
     return rates | {f"moving_force_{name}": Measured(w, force_change * weight) for name, w in forces[0].items()}

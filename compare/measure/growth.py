@@ -21,12 +21,11 @@ from compare.measure import field
 from compare.measure.field import random_state
 from compare.measure.fits import slope_error
 from compare.measure.lab import Lab, coarse_step, dragged_speed, time_unit
-from compare.measure.quantities import quantity
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
 from compare.measure.short import DOUBT, LIMIT, REFINED, lag_error, polynomials, slip_unit
 from compare.measure.trials import Start
 from compare.runs.tasks import Task
-from compare.statistics import COVERAGE, Measured
+from compare.statistics import Measured
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ
@@ -55,9 +54,6 @@ AT_START = slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]) / slope_erro
     np.arange(-field.HALF, field.HALF + 1.0), field.DEGREES[0]
 )
 """Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a `field` window."""
-COARSE = quantity("gamma").resolves / COVERAGE
-"""Largest uncertainty that counts, in units of `slip_unit`, all that a check may have: where a contact is hardly
-loaded, slip turns too fast."""
 SMOOTH = "without friction at both contacts there is nothing that rolls"
 SINKING = 0.5
 """Speed at which a ball sinks divided by `dragged_speed`; the fluid also pulls along the wall at `dragged_speed`."""
@@ -165,8 +161,9 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
     p = push.start.p
     # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
     least = lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * slip_unit(p)
-    uncertainty = math.hypot(step, value - lower, size, least)
-    return Measured(float(value), uncertainty) if uncertainty <= COARSE * slip_unit(p) else None
+    gamma = Measured(float(value), math.hypot(step, value - lower, size, least))
+    # Where a contact is hardly loaded, slip turns too fast.
+    return gamma if sure_enough("gamma", gamma, slip_unit(p)) else None
 
 
 def without_size(rates: Array) -> Array:

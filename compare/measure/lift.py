@@ -18,7 +18,7 @@ from compare.measure.fits import vanishing
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
-from compare.measure.short import DOUBT, LIMIT, polynomials
+from compare.measure.short import DOUBT, LIMIT, REFINED, polynomials
 from compare.measure.trials import Start
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
@@ -36,11 +36,9 @@ ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 """omega_c sqrt(R/g) at which the ball is looked at first."""
 NEAR = (0.05, 0.08, 0.12, 0.17)
 """How much slower the others are than the orbit that the first ones show, relative."""
-REFINED = 32
-"""Steps in one of `coarse_step`; of the shorter ones twice as many. With still shorter ones contacts answer
-no faster."""
 STEPS, SKIPPED, FEWEST = 16, 4, 5
-"""Steps of a run, those at its start in which contact forces build up, and the least number that must be left."""
+"""Steps of a run with either time step, those at its start in which contact forces build up, and the fewest that must be
+left."""
 DEGREES = (3, 2)
 """Degrees of the polynomials; the lower one shows what the degree changes."""
 
@@ -63,8 +61,8 @@ class Arrow:
         return Start(self.set, p.replace(omega_0=omega_c), self.inner.name, x0)
 
     def task(self, lab: Lab, omega_c: float, times: int = 1) -> Task:
-        """The run from there, with the step `times` as short."""
-        start, step = self.start(omega_c), coarse_step(self.p) / REFINED / times
+        """The run from there, with steps half as long as those of `short`, divided by `times`."""
+        start, step = self.start(omega_c), coarse_step(self.p) / (2 * REFINED * times)
         return lab.task(start.p, start.x0, STEPS * step, step, samples=STEPS)
 
     def row(

@@ -41,7 +41,7 @@ BRIEF = {Case.RS: (2, 16)}
 """The same where a large push soon changes the state itself."""
 PUSH = {Case.RS: 0.3, Case.SR: 0.1}
 """Size of a push, in the `units`, in the two cases in which it is extrapolated to zero from this and half of it."""
-SMALL = 2e-4
+USUAL = 2e-4
 """Size of a push in all other cases; the run with the coarser step has half of it, and shows that it doesn't matter."""
 SLIGHT = 2e-6
 """The same where the law of drag isn't Stokes': the drag of the lag that a push makes is in proportion to it only
@@ -50,7 +50,7 @@ SLOWEST = 0.04
 """Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
 ORDER = {Case.RS: 2, Case.SR: 1}
 """Order of the remaining error in the size of a push: second, where up and down are subtracted."""
-FAR = 0.4
+STRAYS = 0.4
 """A record ends once a variable is so far from its settled value, in the `units`."""
 LEAST = {Case.SR: 48}
 """Samples that a record must have, else 8: a floor that is about to carry nothing follows its load less exactly."""
@@ -87,7 +87,7 @@ class Pushed:
     @property
     def sizes(self) -> tuple[float, ...]:
         """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
-        size = PUSH.get(self.case, SMALL if self.start.p.drag == STOKES else SLIGHT)
+        size = PUSH.get(self.case, USUAL if self.start.p.drag == STOKES else SLIGHT)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
 
     def tasks(self, lab: Lab) -> list[Task]:
@@ -190,7 +190,7 @@ def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
         columns = [(up.x - down.x) / 2 for up, down in zip(ups, downs, strict=True)]
     D = np.stack(columns, axis=-1)[:, state.active] / (size * state.units[:, None])
     ends = [stays(run, state.case) for run in seen]
-    ends.append(int(np.argmax(np.append(size * np.abs(D).max(axis=(1, 2)) > FAR * (1 + 1e-9), True))))
+    ends.append(int(np.argmax(np.append(size * np.abs(D).max(axis=(1, 2)) > STRAYS * (1 + 1e-9), True))))
     return np.asarray(D[1 : min(ends)])
 
 
