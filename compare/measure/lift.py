@@ -37,7 +37,7 @@ ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 NEAR = (0.05, 0.08, 0.12, 0.17)
 """How much slower the others are than the orbit that the first ones show, relative."""
 STEPS, SKIPPED, FEWEST = 16, 4, 5
-"""Steps of a run of either time step, those at its start in which contact forces build up, and the fewest to be left."""
+"""Steps of a run, those at its start in which contact forces build up, and the fewest that must be left."""
 DEGREES = (3, 2)
 """Degrees of the polynomials; the lower one shows what the degree changes."""
 
