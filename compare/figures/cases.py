@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -29,7 +30,7 @@ _REACH = 0.42
 """Radius round a case of Fig. 6 that its arrows leave free."""
 
 
-def _draw_2() -> Figure:
+def _draw_2(_: object) -> Figure:
     """Rows: the contact with the floor; columns: with the wall; nearer ones roll."""
     figure = style.figure(6.4, 6.2)
     for row, panels in zip(_COLUMNS, figure.subplots(3, 3), strict=True):
@@ -68,8 +69,8 @@ def _contact(axes: Axes, contact: Contact, at: tuple[float, float], along: tuple
         axes.add_patch(FancyArrowPatch(*ends, arrowstyle="<|-|>", mutation_scale=9, color="#B3261E", lw=1.6, zorder=4))
 
 
-def _draw_3() -> Figure:
-    """Left: y = v_y = 0 at one omega_c, in the space of the three slips. Right: y = v_y = slip_z = 0."""
+def _draw_3(_: object) -> Figure:
+    """Left: y = v_y = 0 at one omega_c, over the three slips. Right: y = v_y = slip_z = 0."""
     figure = style.figure(9.0, 4.3)
     left: Any = figure.add_subplot(1, 2, 1, projection="3d")
     right: Any = figure.add_subplot(1, 2, 2, projection="3d")
@@ -104,7 +105,7 @@ def _axes(axes: Any, names: tuple[str, str, str]) -> None:
     axes.view_init(22, -58)
 
 
-def _draw_6() -> Figure:
+def _draw_6(_: object) -> Figure:
     """Solid: slip begins at A; dashed: at B; dotted: the ball leaves the floor. Higher up: more freedom."""
     figure = style.figure(6.4, 4.7)
     axes = figure.add_subplot()
@@ -141,32 +142,36 @@ def _arrow(axes: Axes, inner: Case, outer: Case, line: str, shift: float = 0.0) 
     axes.add_patch(tip)
 
 
-CAPTIONS = {
-    "fig-2": "The nine kinematic cases: rolling (R), slipping (S) or no contact (N), first at the floor (A), second at "
-    "the wall (B). Dot: rolls; arrows: slips. Numbers: variables of position that are needed, plus independent "
+def _explaining(title: str, draw: Callable[[object], Figure], text: str) -> Drawing:
+    """A figure of the model itself, which depends on no parameter and no result."""
+    return Drawing(title, _nothing, draw, partial(_text, text), background=True)
+
+
+def _nothing(_: object) -> None:
+    """What is selected of results."""
+
+
+def _text(text: str, _: object) -> str:
+    return text
+
+
+FIGURE_2 = _explaining(
+    "Fig. 2: the nine cases",
+    _draw_2,
+    "The nine kinematic cases: rolling (R), slipping (S) or no contact (N), first at the floor (A), second at the "
+    "wall (B). Dot: rolls; arrows: slips. Numbers: variables of position that are needed, plus independent "
     "velocities, make the dimension of the state space. Off the wall (right column) the distance h from it counts.",
-    "fig-3": "Where the cases are. Left: y = v_y = 0 at one ω_c, in the space of the three slips: RR is a point, SR "
-    "and RS are lines, SS is all the rest. Right: y = v_y = ω̃_z = 0, with ω_c upwards: SR and RS are planes that "
-    "meet in the line RR.",
-    "fig-6": "Transitions to cases of more freedom, which are drawn higher up; dim: dimension of the state space. "
-    "Solid: slip begins at the floor (A); dashed: at the wall (B); dotted: the ball leaves the floor.",
-}
-
-
-def _select(_: object, figure: str) -> str:
-    """A figure of the model itself depends on no parameter and no result: its name is all there is."""
-    return figure
-
-
-def _draw(figure: str) -> Figure:
-    return {"fig-2": _draw_2, "fig-3": _draw_3, "fig-6": _draw_6}[figure]()
-
-
-FIGURE_2, FIGURE_3, FIGURE_6 = (
-    Drawing(title, partial(_select, figure=name), _draw, CAPTIONS.__getitem__, background=True)
-    for name, title in (
-        ("fig-2", "Fig. 2: the nine cases"),
-        ("fig-3", "Fig. 3: sections of the state space"),
-        ("fig-6", "Fig. 6: transitions to more freedom"),
-    )
+)
+FIGURE_3 = _explaining(
+    "Fig. 3: sections of the state space",
+    _draw_3,
+    "Where the cases are. Left: y = v_y = 0 at one ω_c, over the three components of slip: RR is a point, SR and "
+    "RS are lines, SS is all the rest. Right: y = v_y = ω̃_z = 0 over ω_c: SR and RS are planes that meet in the "
+    "line RR.",
+)
+FIGURE_6 = _explaining(
+    "Fig. 6: transitions to more freedom",
+    _draw_6,
+    "Transitions to cases of more freedom, which are drawn higher up; dim: dimension of the state space. Solid: "
+    "slip begins at the floor (A); dashed: at the wall (B); dotted: the ball leaves the floor.",
 )
