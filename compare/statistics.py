@@ -1,9 +1,9 @@
-"""Numbers with uncertainties from sampled runs: window means, lines, exponents; and numbers as JSON holds them."""
+"""Numbers with uncertainties from sampled runs: window means and peaks; and numbers as JSON holds them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,11 +48,13 @@ def window_mean(time: npt.ArrayLike, values: npt.ArrayLike) -> Measured:
         )
     if not np.all(np.isfinite(v)):
         raise InputError("a window mean needs finite samples")
-    mean = float(v.mean())
-    independent = len(v) / correlation_length(v)
-    scatter = float(v.std(ddof=1)) / math.sqrt(independent)
+    scatter = float(v.std(ddof=1)) / math.sqrt(len(v) / correlation_length(v))
+    first, second, third = (float(part.mean()) for part in np.array_split(v, 3))
+    ratio = abs(third - second) / abs(second - first) if second != first else 0.0
+    # Thirds that come together by less than a twentieth say only that nothing has settled.
+    approach = abs(third - first) / 2 + abs(third - second) * ratio / (1 - min(ratio, 0.95))
     rounding = float(np.finfo(float).eps * np.abs(v).max())
-    return Measured(mean, math.sqrt(scatter**2 + _approach(v) ** 2 + rounding**2))
+    return Measured(float(v.mean()), math.sqrt(scatter**2 + approach**2 + rounding**2))
 
 
 def correlation_length(values: Array) -> float:
@@ -66,14 +68,6 @@ def correlation_length(values: Array) -> float:
     pairs = rho[: len(rho) // 2 * 2].reshape(-1, 2).sum(axis=1)
     last = int(np.argmax(pairs <= 0)) if np.any(pairs <= 0) else len(pairs)
     return float(min(max(1.0, 2 * pairs[:last].sum() - 1), len(v)))
-
-
-def _approach(v: Array) -> float:
-    """How far the mean still is from the limit of an exponential approach, judged by the means of three thirds."""
-    first, second, third = (float(part.mean()) for part in np.array_split(v, 3))
-    slower = abs(third - second) / abs(second - first) if second != first else 0.0
-    # Thirds that come together by less than a twentieth say only that nothing has settled.
-    return abs(third - first) / 2 + abs(third - second) * slower / (1 - min(slower, 0.95))
 
 
 def tail(run: Trajectory, share: float = 0.1) -> slice:
@@ -90,66 +84,6 @@ def settled_mean(run: Trajectory, values: Array) -> Measured:
 def settled_case(run: Trajectory) -> Case:
     """The case of most samples in the last part of a run."""
     return Case(int(np.bincount(run.case[tail(run)]).argmax()))
-
-
-def straight_line(x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike) -> tuple[Measured, Measured]:
-    """Zero and slope of the line through points x, y (n,) whose y have the standard uncertainties `noise`.
-
-    The uncertainties are those of the points carried over, and the scatter about the line where that is larger.
-    """
-    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    weight = np.maximum(np.broadcast_to(noise, y.shape), np.finfo(float).eps * np.abs(y).max()) ** -2.0
-    # About the weighted mean, height and slope are independent of each other, and one point may outweigh all others.
-    x0, y0 = np.average(x, weights=weight), np.average(y, weights=weight)
-    spread = np.sum(weight * (x - x0) ** 2)
-    slope = np.sum(weight * (x - x0) * (y - y0)) / spread
-    scatter = max(1.0, np.sum(weight * (y - y0 - slope * (x - x0)) ** 2) / max(1, len(x) - 2))
-    height, rise = np.sqrt(scatter / weight.sum()), np.sqrt(scatter / spread)
-    zero = x0 - y0 / slope
-    return (
-        Measured(float(zero), math.hypot(height / slope, (zero - x0) / slope * rise)),
-        Measured(float(slope), float(rise)),
-    )
-
-
-def propagator(record: Array, lag: int) -> Array:
-    """P (d, d) with record[k + lag] = P record[k] in least squares, of a record (n, d, d) of a linear motion.
-
-    The columns of record[k] are d independent motions at sample k; rows should be scaled to be of like size.
-    """
-    now, later = record[:-lag], record[lag:]
-    gram = np.einsum("nij,nkj->ik", now, now)
-    return np.asarray(np.linalg.solve(gram, np.einsum("nij,nkj->ik", now, later)).T)
-
-
-def exponents(at: Callable[[int], Array], interval: float, longest: int) -> npt.NDArray[np.complex128]:
-    """All exponents (d,) in s-1 of a linear motion whose propagator over k sample intervals is at(k), (d, d).
-
-    Each is followed to lags that are longer by a factor of two, up to its own time constant or `longest`: a longer lag
-    shows what is slow more sharply, and what is fast has gone by then.
-    """
-    lag, rates = 1, _logarithms(at(1)) / interval
-    while 2 * lag <= longest:
-        lag *= 2
-        slow = np.abs(rates) * lag * interval < 1
-        if not slow.any():
-            break
-        rates = np.where(slow, matched(_logarithms(at(lag)) / (lag * interval), rates), rates)
-    return rates
-
-
-def matched(values: npt.NDArray[np.complex128], to: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
-    """Values (d,) in the order in which they are, one to one, nearest to others (d,)."""
-    from scipy.optimize import linear_sum_assignment  # here, because it takes half a second to load
-
-    order = linear_sum_assignment(np.abs(to[:, None] - values[None, :]))[1]
-    return np.asarray(values[order])
-
-
-def _logarithms(matrix: Array) -> npt.NDArray[np.complex128]:
-    """Logarithms of the eigenvalues of a matrix; of one that is 0, a decay to round-off."""
-    values = np.linalg.eigvals(matrix).astype(complex)
-    return np.asarray(np.log(np.where(values == 0, np.finfo(float).eps, values)))
 
 
 def peaks(values: Array) -> tuple[npt.NDArray[np.intp], Array]:

@@ -11,11 +11,7 @@ from compare.claims.judge import simulated
 from compare.measure.laws import FLUIDS
 from compare.measure.motions import NAMES
 from compare.measure.record import Measurement, state
-from model import Parameters, State
-
-
-def _none(m: Measurement) -> float:
-    return 0.0
+from model import State
 
 
 def _friction(m: Measurement) -> float:
@@ -28,9 +24,10 @@ def _sinking(m: Measurement) -> float:
     return -stokes.sinking_speed(**{name: float(m.conditions[name]) for name in FLUIDS[m.set]})
 
 
-def _end(m: Measurement, name: str) -> float:
+def _end(m: Measurement) -> float:
     """A column of theory's motion where the measured one ends."""
-    return float(getattr(simulated(m.parameters, state(m), float(m.conditions["time"])), name)[-1])
+    motion = simulated(m.parameters, state(m), float(m.conditions["time"]))
+    return float(getattr(motion, m.quantity.removeprefix("after_"))[-1])
 
 
 def _decides(m: Measurement) -> bool:
@@ -44,20 +41,10 @@ def _decides(m: Measurement) -> bool:
     return not rolls or float(margin(x.omega_c, p)) < 0 or float(slip_margin(x.omega_c, p)) >= 0
 
 
-def _speed(name: str, p: Parameters) -> float:
-    """The natural size of a velocity, or of a rate of rotation."""
-    falling = math.sqrt(p.g * p.R)
-    return falling if name in ("v_y", "v_h") else falling / (p.R if name == "omega_c" else p.r)
-
-
-def _landed(name: str) -> Bearing:
-    return Bearing(
-        "impacts",
-        f"after_{name}",
-        lambda m: _end(m, name),
-        size=lambda m: _speed(name, m.parameters),
-        by="analytic.simulate",
-    )
+def _speed(m: Measurement) -> float:
+    """The natural size of a velocity, or of a rate of rotation, after a landing."""
+    p, name = m.parameters, m.quantity.removeprefix("after_")
+    return math.sqrt(p.g * p.R) / {"v_y": 1.0, "v_h": 1.0, "omega_c": p.R}.get(name, p.r)
 
 
 CLAIMS = (
@@ -67,8 +54,8 @@ CLAIMS = (
         "A contact that rolls doesn't slip; contacts press and never pull; friction stays within mu or eta times "
         "the normal force, has that size where the contact slips, and opposes the slip.",
         (
-            Bearing("laws", "law", _none, size=one, by="(12), (13)"),
-            Bearing("laws", "law_in_motion", _none, size=one, by="Table 3, (14)-(17)"),
+            Bearing("laws", "law", lambda m: 0.0, size=one, by="(12), (13)"),
+            Bearing("laws", "law_in_motion", lambda m: 0.0, size=one, by="Table 3, (14)-(17)"),
             Bearing("laws", "friction_ratio", _friction, by="(14), (15)"),
         ),
     ),
@@ -85,13 +72,13 @@ CLAIMS = (
         "Fig. 2, Table 3",
         "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
         "equations of motion say.",
-        (Bearing("motions", "case", lambda m: _end(m, "case"), when=_decides, by="analytic.simulate"),),
+        (Bearing("motions", "case", _end, when=_decides, by="analytic.simulate"),),
     ),
     Claim(
         "impacts",
         "extension",
         "A ball that lands does not rebound, and friction takes its share of the impulse.",
-        tuple(_landed(name) for name in NAMES),
+        tuple(Bearing("impacts", f"after_{name}", _end, size=_speed, by="analytic.simulate") for name in NAMES),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
     ),
 )

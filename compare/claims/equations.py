@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import analytic
 from compare.claims.claim import Bearing, Claim, Text, given
-from compare.claims.judge import remembered
+from compare.claims.judge import theory
 from compare.claims.stationary import force
-from compare.measure.record import Measurement, state
-from model import Case, Parameters
-from model.arrays import Array
+from compare.measure.record import state
+from model import Case
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
 
@@ -29,29 +28,13 @@ _FORCES = ("Ax", "Ay", "Az", "Bx", "By", "Bz", "Ax-By", "Ay+By", "Bx+By")
 """Where both contacts roll only A_z, B_z and the sums are determined, and measured."""
 
 
-@remembered
-def _rates(case: Case, x: tuple[float, ...], p: Parameters) -> Array:
-    return analytic.vector_field(case, x, p)
-
-
-@remembered
-def _forces(case: Case, x: tuple[float, ...], p: Parameters) -> tuple[Array, Array]:
-    return analytic.contact_forces(case, x, p)
-
-
 def _rate(case: Case, name: str) -> Bearing:
-    k = VARIABLES.index(name)
-
-    def size(m: Measurement) -> float:
-        p = m.parameters
-        return p.g / {"v_y": 1.0, "v_h": 1.0, "omega_c": p.R}.get(name, p.r)
-
     return Bearing(
         "field",
         f"rate_{name}",
-        lambda m: float(_rates(case, state(m), m.parameters)[k]),
+        lambda m: float(theory(analytic.vector_field, case, state(m), m.parameters)[VARIABLES.index(name)]),
         when=given(case=case.name),
-        size=size,
+        size=lambda m: m.parameters.g / {"v_y": 1.0, "v_h": 1.0, "omega_c": m.parameters.R}.get(name, m.parameters.r),
         by="analytic.vector_field",
     )
 
@@ -60,7 +43,7 @@ def _force(case: Case, name: str) -> Bearing:
     return Bearing(
         "field",
         f"moving_force_{name}",
-        lambda m: force(name, *_forces(case, state(m), m.parameters)),
+        lambda m: force(name, *theory(analytic.contact_forces, case, state(m), m.parameters)),
         when=given(case=case.name),
         size=lambda m: m.parameters.m * m.parameters.g,
         by="analytic.contact_forces",

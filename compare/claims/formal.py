@@ -15,7 +15,6 @@ from compare.measure.check import Check
 from compare.measure.record import Measurement
 from compare.statistics import COVERAGE
 from model import Case, Parameters, State
-from model.arrays import Array
 from model.kinematics import TURNING
 
 FORMAL = Parameters.named("reference").replace(eta=0.43)
@@ -35,9 +34,16 @@ def _figure_12() -> Iterator[Check]:
     s = np.linspace(-8.0, 8.0, 65)
     states, fluid = branch_stability.states(s, p)
     ends = State.of(branch_stability.states(np.array([-40.0, 40.0]), p)[0])
-    rates = max(_residual(x, p.replace(omega_0=float(w))) for x, w in zip(states, fluid, strict=True))
+    rates = [dynamics.rates(Case.SS, x, p, w)[TURNING] for x, w in zip(states.tolist(), fluid.tolist(), strict=True)]
     pushed = slipping_branch.branch(s, p).A_y
-    exchange = brentq(lambda w: _second_rate(p.replace(omega_0=w)), 0.8 * t.omega_03, 1.2 * t.omega_03, rtol=1e-14)
+
+    def determinant(omega_0: float) -> float:
+        """Of SR: its sign is that of the eigenvalue that isn't the decay of omega_c."""
+        q = p.replace(omega_0=omega_0)
+        (state,) = analytic.stationary_solutions(q, (Case.SR,))
+        return float(np.linalg.det(jacobian.jacobian(Case.SR, state.x, q)))
+
+    exchange = brentq(determinant, 0.8 * t.omega_03, 1.2 * t.omega_03, rtol=1e-14)
     along = branch_stability.states(np.linspace(-8.0, 8.0, POINTS), p)[1]
     k = int(np.argmax(along))
     # The maximum lies between the neighbours of the largest value, which is lower by no more than they are.
@@ -46,7 +52,7 @@ def _figure_12() -> Iterator[Check]:
     yield _check("omega_02", "NF2: ω_c where w̃_z vanishes", float(ends.omega_c[1]), t.omega_02)
     yield _check("omega_03", "NT1: ω₀ where SR turns stable", float(exchange), t.omega_03)
     yield _check("omega_04", "F: ω₀ where the branch turns", float(along[k]), released["omega_04"], spacing)
-    yield _check("law", "greatest rate on the branch over g/r", rates, 0.0)
+    yield _check("law", "greatest rate on the branch divided by g/r", np.abs(rates).max() * p.r / p.g, 0.0)
     yield _check("law", "points with A_y ≥ 0", float(np.sum(pushed >= 0)), 0.0)
 
 
@@ -84,17 +90,6 @@ def _check(quantity: str, what: str, value: float, predicted: float, uncertainty
         conditions={"by": what},
     )
     return Check(measurement=algebra, predicted=predicted, tolerance=COVERAGE * own, scale=abs(predicted) or 1.0)
-
-
-def _residual(x: Array, p: Parameters) -> float:
-    """Largest rate of slip in SS, in units of g/r, with (12) released."""
-    return float(np.abs(dynamics.rates(Case.SS, x.tolist(), p, p.omega_0)[TURNING]).max() * p.r / p.g)
-
-
-def _second_rate(p: Parameters) -> float:
-    """The determinant of SR, whose sign is that of the eigenvalue that isn't the decay of omega_c."""
-    (state,) = analytic.stationary_solutions(p, (Case.SR,))
-    return float(np.linalg.det(jacobian.jacobian(Case.SR, state.x, p)))
 
 
 CLAIMS = (

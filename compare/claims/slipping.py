@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,13 +12,11 @@ from analytic import slip_bounds, slip_stability
 from analytic.slip_bounds import HeldBound, SlipBound
 from compare.claims.claim import Bearing, Claim, Outcome, Text, When, every, given, one
 from compare.measure.check import Relation
-from compare.measure.field import slip_unit
 from compare.measure.record import Measurement, state
+from compare.measure.short import slip_unit
 from model import Case
 from model.arrays import Array
 
-Arrow = tuple[Case, Case]
-"""From a case to one of more freedom."""
 _NR_NS, _RR_RS, _RR_SR, _RR_SS = (Case.NR, Case.NS), (Case.RR, Case.RS), (Case.RR, Case.SR), (Case.RR, Case.SS)
 
 
@@ -33,17 +32,18 @@ def _side(m: Measurement, name: str) -> int:
     return round(float(m.conditions[name]))
 
 
-def _arrow(m: Measurement) -> Arrow:
+def _arrow(m: Measurement) -> tuple[Case, Case]:
+    """The case out of which, and into which, a ball slips or lifts off."""
     return Case[str(m.conditions["inner"])], Case[str(m.conditions["outer"])]
 
 
-def _along(arrow: Arrow, *by: str) -> When:
-    """Chooses slips along an arrow that were measured in one of some ways."""
+def _along(arrow: tuple[Case, Case], *by: str) -> When:
+    """True for slips along an arrow that were measured in one of some ways."""
     return lambda m: _arrow(m) == arrow and m.conditions.get("by", "") in by
 
 
-def _unit(m: Measurement) -> float:
-    return slip_unit(m.parameters)
+def _growth(predict: Callable[[Measurement], float], when: When, by: str = "slip_stability.gamma") -> Bearing:
+    return Bearing("growth", "gamma", predict, when=when, size=lambda m: slip_unit(m.parameters), by=by)
 
 
 def _gamma(m: Measurement) -> float:
@@ -61,34 +61,20 @@ def _greatest_as_printed(m: Measurement) -> float:
     return float(slip_stability.gamma(*_RR_SS, _x(m), n, m.parameters).max())
 
 
-def _growth(arrow: Arrow) -> Claim:
-    """Of a slip along an arrow, random or dragged; not in the direction that bears on the extrema alone."""
-    predictions = {"slip_stability.gamma": _gamma} | ({"slip_bounds.gamma_nr": _gamma_nr} if arrow == _NR_NS else {})
-    inner, outer = (case.name for case in arrow)
-    return Claim(
-        f"slip-{inner}-{outer}",
-        "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
-        f"Out of any state of {inner} a slip along any direction of {outer} grows at the rate γ.",
-        tuple(
-            Bearing("growth", "gamma", predict, when=_along(arrow, "", "dragged"), size=_unit, by=by)
-            for by, predict in predictions.items()
-        ),
-    )
-
-
 def _bound(
-    arrow: Arrow, by: str, bound: Callable[[Measurement], SlipBound | HeldBound], side: int = 0, from_rest: bool = False
+    arrow: tuple[Case, Case],
+    by: str,
+    bound: Callable[[Measurement], SlipBound | HeldBound],
+    side: int = 0,
+    from_rest: bool = False,
 ) -> tuple[Bearing, Bearing]:
     """Zero and slope of gamma.
 
     `side` is the sign of n_z where that makes another bound; `from_rest`: the zero is 0 or nearly so.
     """
-
-    def natural(m: Measurement) -> float:
-        return m.parameters.g / m.parameters.R
-
     when = every(_along(arrow, by), given(n_z=side)) if side else _along(arrow, by)
-    power, size = "_square" if by == "stationary" else "", natural if from_rest else None
+    power = "_square" if by == "stationary" else ""
+    size = (lambda m: m.parameters.g / m.parameters.R) if from_rest else None
     return (
         Bearing("bounds", f"gamma_zero{power}", lambda m: bound(m).zero, when=when, size=size, by="slip_bounds"),
         Bearing("bounds", f"gamma_slope{power}", lambda m: bound(m).slope, when=when, by="slip_bounds"),
@@ -96,47 +82,58 @@ def _bound(
 
 
 def _neutral(quantity: str, case: Case, by: str) -> Bearing:
-    def predict(m: Measurement) -> float:
-        return slip_stability.neutral_flow(case, m.parameters)
-
-    return Bearing("thresholds", quantity, predict, when=given(by=by), by="slip_stability.neutral_flow")
-
-
-def _watched(inner: Case, end: str, beyond: Case) -> Bearing:
-    """What becomes of slight slips on either side of the flow at which rolling ends; `beyond` it they come to that."""
-
-    def predict(m: Measurement) -> float:
-        stable = slip_stability.stability(inner, m.parameters) is slip_stability.SlipStability.STABLE
-        return float(inner if stable else beyond)
-
-    return Bearing("watched", "case", predict, when=given(end=end), by="slip_stability.stability")
+    return Bearing(
+        "thresholds",
+        quantity,
+        lambda m: slip_stability.neutral_flow(case, m.parameters),
+        when=given(by=by),
+        by="slip_stability.neutral_flow",
+    )
 
 
-def _lifts(m: Measurement) -> float:
-    return float(slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0)
-
-
-def _lift_onset(m: Measurement) -> float:
-    return slip_stability.lift_onset(*_arrow(m), _x(m), m.parameters)
+def _on_the_wall(m: Measurement) -> float:
+    """NR where it is stable with respect to slipping, else NS."""
+    stable = slip_stability.stability(Case.NR, m.parameters) is slip_stability.SlipStability.STABLE
+    return float(Case.NR if stable else Case.NS)
 
 
 def _lifting(inner: Case, outer: Case) -> Claim:
     never = f"Out of {inner.name} the ball never lifts off the floor, whatever its orbit."
     once = f"Out of {inner.name} the ball lifts off the floor once the wall alone, in {outer.name}, would drive it up."
+
+    def lifts(m: Measurement) -> float:
+        return float(slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0)
+
+    def onset(m: Measurement) -> float:
+        return slip_stability.lift_onset(*_arrow(m), _x(m), m.parameters)
+
     when = given(inner=inner.name)
     return Claim(
         f"lift-{inner.name}-{outer.name}",
         "Fig. 6, dotted",
         never if inner is Case.RS else once,
         (
-            Bearing("lift", "lifts", _lifts, when=when, by="slip_stability.lift_acceleration"),
-            Bearing("lift", "lift_onset", _lift_onset, when=when, by="slip_stability.lift_onset"),
+            Bearing("lift", "lifts", lifts, when=when, by="slip_stability.lift_acceleration"),
+            Bearing("lift", "lift_onset", onset, when=when, by="slip_stability.lift_onset"),
         ),
     )
 
 
 CLAIMS = (
-    *(_growth(arrow) for arrow in slip_stability.SLIP_ARROWS),
+    *(
+        # Slips at random or dragged; not in the direction that bears on the extrema alone.
+        Claim(
+            f"slip-{arrow[0].name}-{arrow[1].name}",
+            "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
+            f"Out of any state of {arrow[0].name} a slip along any direction of {arrow[1].name} grows at the rate γ.",
+            tuple(
+                _growth(predict, _along(arrow, "", "dragged"), by)
+                for by, predict in (("slip_stability.gamma", _gamma), ("slip_bounds.gamma_nr", _gamma_nr))
+                if predict is _gamma or arrow == _NR_NS
+            ),
+        )
+        for arrow in slip_stability.SLIP_ARROWS
+    ),
     Claim(
         "eq-58",
         "(58)",
@@ -183,17 +180,14 @@ CLAIMS = (
         "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, it lifts (η > j).",
         (
             *_bound(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
-            _watched(Case.RR, "omega_03", Case.NR),
+            _neutral("omega_03", Case.RR, "loss of the floor"),
         ),
     ),
     Claim(
         "eq-82",
         "(82)",
         "Slip at both points at once, with directions (0, 0), grows above ω₀₁ and dies out below.",
-        (
-            *_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
-            _watched(Case.RR, "omega_01", Case.SS),
-        ),
+        _bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
     ),
     Claim(
         "eq-83",
@@ -205,7 +199,10 @@ CLAIMS = (
         "fig-4-5",
         "Figs. 4 and 5",
         "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below it remains slipping for good.",
-        (_watched(Case.NR, "omega_02", Case.NS),),
+        (
+            *_bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
+            Bearing("settled", "case", _on_the_wall, when=given(start="on the wall"), by="slip_stability.stability"),
+        ),
     ),
     Claim(
         "eq-69",
@@ -227,7 +224,7 @@ CLAIMS = (
         "Rolling is stable with respect to slipping up to a flow at which it is neutral, and unstable beyond (on the "
         "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
         (
-            Bearing("growth", "gamma", _gamma, when=_along(_RR_RS, "rest"), size=_unit, by="slip_stability.gamma"),
+            _growth(_gamma, _along(_RR_RS, "rest")),
             _neutral("omega_01", Case.RR, "onset of slip"),
             _neutral("omega_02", Case.NR, "onset of sliding on the wall"),
             _neutral("omega_03", Case.RR, "loss of the floor"),
@@ -238,14 +235,9 @@ CLAIMS = (
         "after (80)",
         "(α, β) = (0, 0) and (π, π) are the global extrema of γ.",
         (
-            Bearing(
-                "growth",
-                "gamma",
-                _greatest_as_printed,
-                when=_along(_RR_SS, "sideways"),
-                size=_unit,
+            replace(
+                _growth(_greatest_as_printed, _along(_RR_SS, "sideways"), "slip_stability.gamma at (0, 0), (π, π)"),
                 relation=Relation.AT_MOST,
-                by="slip_stability.gamma at (0, 0), (π, π)",
             ),
         ),
         expected=Outcome.REFUTED,

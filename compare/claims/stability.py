@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 import analytic
-from analytic import StationarySolution
 from compare.claims.claim import Bearing, Claim, Text, every, given
-from compare.claims.judge import remembered
+from compare.claims.judge import theory
 from compare.measure.check import Relation
 from compare.measure.rates import natural_size
 from compare.measure.record import Measurement
-from model import Case, Parameters
-
-
-@remembered
-def _states(p: Parameters) -> tuple[StationarySolution, ...]:
-    return tuple(s for s in analytic.stationary_solutions(p) if s.exists)
+from model import Case
 
 
 def _spectrum(m: Measurement) -> tuple[complex, ...]:
@@ -23,7 +17,8 @@ def _spectrum(m: Measurement) -> tuple[complex, ...]:
     In NS y is cyclic, (48): it adds a zero to the eigenvalues of the reduced field. SR may be unstable.
     """
     p, case = m.parameters, Case[str(m.conditions["case"])]
-    those = [s for s in _states(p) if s.case is case and (s.stable or case is Case.SR)]
+    found = theory(analytic.stationary_solutions, p)
+    those = [s for s in found if s.exists and s.case is case and (s.stable or case is Case.SR)]
     if len(those) != 1:
         raise LookupError(f"{case.name} has {len(those)} stationary states at omega_0 = {p.omega_0:g} rad/s")
     return (*([0.0] if case is Case.NS else []), *(complex(value) for value in those[0].eigenvalues))
@@ -34,26 +29,12 @@ def _other(m: Measurement) -> float:
     return float(m.conditions["frequency" if m.quantity == "decay_rate" else "decay_rate"])
 
 
-def _nearest(m: Measurement, values: tuple[complex, ...]) -> complex:
-    """Of the values, those with Im >= 0, the one that is nearest to the measured eigenvalue."""
-    measured = complex(-m.value, _other(m)) if m.quantity == "decay_rate" else complex(-_other(m), m.value)
-    return min((complex(v.real, abs(v.imag)) for v in values), key=lambda value: abs(value - measured))
-
-
-def _decay_rate(m: Measurement) -> float:
-    return -_nearest(m, _spectrum(m)).real
-
-
-def _frequency(m: Measurement) -> float:
-    return _nearest(m, _spectrum(m)).imag
-
-
-def _count(m: Measurement) -> float:
-    return float(len(_spectrum(m)))
-
-
-def _leaning_rate(m: Measurement) -> float:
-    return -_nearest(m, tuple(analytic.leaning_modes(m.parameters)[0])).real
+def _nearest(m: Measurement, values: tuple[complex, ...]) -> float:
+    """Decay rate or frequency of the value, of those with Im >= 0, that is nearest to the measured eigenvalue."""
+    decays = m.quantity == "decay_rate"
+    measured = complex(-m.value, _other(m)) if decays else complex(-_other(m), m.value)
+    nearest = min((complex(v.real, abs(v.imag)) for v in values), key=lambda value: abs(value - measured))
+    return -nearest.real if decays else nearest.imag
 
 
 def _size(m: Measurement) -> float:
@@ -64,9 +45,9 @@ def _bearings(case: Case) -> tuple[Bearing, ...]:
     """The whole spectrum of the state of a case."""
     when, by = given(case=case.name), "analytic.stationary_solutions: eigenvalues of the exact Jacobian"
     return (
-        Bearing("rates", "decay_rate", _decay_rate, when=when, size=_size, by=by),
-        Bearing("rates", "frequency", _frequency, when=when, size=_size, by=by),
-        Bearing("rates", "modes", _count, when=when, by=by),
+        Bearing("rates", "decay_rate", lambda m: _nearest(m, _spectrum(m)), when=when, size=_size, by=by),
+        Bearing("rates", "frequency", lambda m: _nearest(m, _spectrum(m)), when=when, size=_size, by=by),
+        Bearing("rates", "modes", lambda m: float(len(_spectrum(m))), when=when, by=by),
     )
 
 
@@ -74,7 +55,7 @@ def _slowest(grows: bool) -> Bearing:
     """The slowest decay of SR is one above omega_03 and none below."""
 
     def there(m: Measurement) -> bool:
-        return bool(m.parameters.omega_0 < analytic.thresholds(m.parameters).omega_03) is grows
+        return bool(m.parameters.omega_0 < theory(analytic.thresholds, m.parameters).omega_03) is grows
 
     when = every(given(case="SR", mode=1), there)
     relation, by = Relation.AT_MOST if grows else Relation.AT_LEAST, "analytic.thresholds: omega_03"
@@ -105,7 +86,12 @@ CLAIMS = (
             _slowest(grows=False),
             _slowest(grows=True),
             Bearing(
-                "rates", "decay_rate", _leaning_rate, when=given(case="SR"), size=_size, by="analytic.leaning_modes"
+                "rates",
+                "decay_rate",
+                lambda m: _nearest(m, tuple(theory(analytic.leaning_modes, m.parameters)[0])),
+                when=given(case="SR"),
+                size=_size,
+                by="analytic.leaning_modes",
             ),
         ),
         text=Text.CORRECTED,

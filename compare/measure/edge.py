@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from compare.measure.brackets import Bracket, Care, Search, narrow
-from compare.measure.extrapolation import vanishing
+from compare.measure.fits import vanishing
 from compare.measure.lab import Lab, coarse_step
 from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, if_sure, measurement, sure_enough

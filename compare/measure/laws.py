@@ -14,25 +14,21 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from compare.measure.lab import Lab, coarse_step, time_unit
-from compare.measure.levels import Level
 from compare.measure.record import Measurement, Missing, Records, if_sure, measurement
-from compare.runs.tasks import Task
 from compare.statistics import Measured
 from model import Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import slip_velocities
 
 PROTOCOL = "laws"
-REFINE = {Level.QUICK: (4, 8), Level.DEFAULT: (8, 16), Level.FULL: (16, 32)}
-"""The two time steps are these parts of `coarse_step`."""
 LASTS = 768
 """Length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples."""
 FASTEST = 3.0
 """The flow rises from rest to this, or falls from it, omega_0 sqrt(R/g)."""
 SLIPS = 0.02
-"""Slip speed over sqrt(g R) above which friction must be that of slipping, whatever case is detected."""
+"""Slip speed divided by sqrt(g R) above which friction must be that of slipping, whatever case is detected."""
 PRESSES = 0.05
-"""Normal force over the weight above which it is looked at: a contact that carries less may hover."""
+"""Normal force divided by the weight above which friction is looked at: a contact that carries less may hover."""
 FEWEST = 20
 """Samples of a law that a set must have."""
 ROUNDING = 100 * float(np.finfo(float).eps)
@@ -46,10 +42,27 @@ FLUIDS: Mapping[str, Mapping[str, float]] = {
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """How far the laws are off, the ratio of friction to normal force, and the speed at which balls sink in a fluid."""
-    tasks = [_tasks(lab, p, refine) for p in sets.values() for refine in REFINE[lab.level]]
-    falls = [_falls(lab, _ball(name), refine) for name in FLUIDS for refine in REFINE[lab.level]]
+    refined = lab.effort("laws.refined")
+    balls = {name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2) for name, fluid in FLUIDS.items()}
+    tasks = []
+    for p in sets.values():
+        step, fast = coarse_step(p), FASTEST / time_unit(p)
+        t_end = LASTS * step
+        # From rest in a flow that rises; high on the wall in one that falls; and along the floor towards the wall.
+        up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
+        down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
+        half = Flow.steady(fast / 2)
+        starts = (up, State()), (down, State(y=2 * p.R, omega_c=fast)), (half, State(omega_c=fast / 3, h=p.R / 2))
+        for parts in refined:
+            tasks.append([lab.task(p, x, t_end, step / parts, flow=flow, samples=LASTS) for flow, x in starts])
+    falls = []
+    for p in balls.values():
+        # In the middle of still fluid, off floor and wall, from rest and sinking already.
+        step, middle = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
+        falling = middle, middle._replace(v_y=-math.sqrt(p.g * p.R))
+        falls += [[lab.task(p, x, 64 * step, step / parts, samples=64) for x in falling] for parts in refined]
     runs = lab.groups([*tasks, *falls])
-    for name, p, fine_tasks in zip(sets, sets.values(), tasks[1::2], strict=True):
+    for (name, p), fine_tasks in zip(sets.items(), tasks[1::2], strict=True):
         coarse, fine = deviations(next(runs)), deviations(next(runs))
         for key, value in fine.items():
             quantity, law, contact = key
@@ -61,56 +74,43 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             sure = Measured(value, math.hypot(np.nanmax(changes), ROUNDING))
             row = measurement(lab, PROTOCOL, name, p, quantity, sure, fine_tasks, law=law, contact=contact)
             yield if_sure(row, 1.0, f"the step changes what is seen at {contact}: {law}")
-    for name, fine_tasks in zip(FLUIDS, falls[1::2], strict=True):
-        speed, p = _sinking(next(runs), next(runs)), _ball(name)
-        yield measurement(lab, PROTOCOL, name, p, "v_y", speed, fine_tasks, case="NN", by=name, **FLUIDS[name])
+    for (name, p), fine_tasks in zip(balls.items(), falls[1::2], strict=True):
+        (before, _), (speed, lasts) = _sinking_speed(*next(runs)), _sinking_speed(*next(runs))
+        # What is left of a fall that has only just begun is a difference of speeds, each of them rounded in every step.
+        sinking = Measured(speed, math.hypot(speed - before, ROUNDING * abs(speed) / (p.c * lasts)))
+        yield measurement(lab, PROTOCOL, name, p, "v_y", sinking, fine_tasks, case="NN", by=name, **FLUIDS[name])
 
 
-def _tasks(lab: Lab, p: Parameters, refine: int) -> list[Task]:
-    """From rest in a flow that rises; high on the wall in one that falls; and along the floor towards the wall."""
-    unit, step = time_unit(p), coarse_step(p)
-    t_end, fast = LASTS * step, FASTEST / unit
-    up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
-    down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
-    half = Flow.steady(fast / 2)
-    starts = (up, State()), (down, State(y=2 * p.R, omega_c=fast)), (half, State(omega_c=fast / 3, h=p.R / 2))
-    return [lab.task(p, x, t_end, step / refine, flow=flow, samples=LASTS) for flow, x in starts]
-
-
-Deviations = dict[tuple[str, str, str], float]
-
-
-def deviations(runs: Sequence[Trajectory]) -> Deviations:
+def deviations(runs: Sequence[Trajectory]) -> dict[tuple[str, str, str], float]:
     """How far runs of one set are from every law, dimensionless: by quantity, law and contact.
 
     nan where too few samples show it.
     """
-    worst: Deviations = {}
+
+    def typical(values: Array) -> float:
+        return float(np.median(values)) if len(values) >= FEWEST else math.nan
+
+    worst: dict[tuple[str, str, str], float] = {}
     for contact in "AB":
         rows = [_rows(run, contact) for run in runs]
         normal, friction, limit, against, speed, gap, letter = (np.concatenate(row) for row in zip(*rows, strict=True))
         slides = (speed > SLIPS) & (normal > PRESSES)
-        closed = letter != "N"
         worst["law", "(12): the contact presses", contact] = float(np.max(-normal, initial=0.0))
         worst["law", "(13): friction is within its limit", contact] = float(np.max(friction - limit, initial=0.0))
         for law, values in (
             ("where it rolls it doesn't slip", speed[letter == "R"]),
-            ("where it is closed there is no gap", np.abs(gap[closed])),
+            ("where it is closed there is no gap", np.abs(gap[letter != "N"])),
             (f"({14 if contact == 'A' else 15}): friction opposes the slip", against[slides]),
         ):
-            worst["law_in_motion", law, contact] = _typical(values)
-        worst["friction_ratio", "friction over normal force", contact] = _typical(friction[slides] / normal[slides])
+            worst["law_in_motion", law, contact] = typical(values)
+        worst["friction_ratio", "friction over normal force", contact] = typical(friction[slides] / normal[slides])
     return worst
 
 
-def _typical(values: Array) -> float:
-    return float(np.median(values)) if len(values) >= FEWEST else math.nan
-
-
 def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
-    """Normal force, friction, its limit, and its excess over full friction against the slip, all over the weight.
+    """Normal force, friction, its limit, and its difference from full friction against the slip, divided by the weight.
 
-    Then slip speed over sqrt(g R), gap over R and the contact's letter, each (n,).
+    Then slip speed divided by sqrt(g R), gap divided by R and the contact's letter, each (n,).
     """
     p, k = run.header.parameters, "AB".index(contact)
     across, along = ((1, [0, 2]), (0, [1, 2]))[k]
@@ -120,35 +120,16 @@ def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
     direction = slip / np.maximum(speed, np.finfo(float).tiny)[:, None]
     against = np.hypot(*(tangent + friction[:, None] * direction).T)
     letters = np.array([case.name[k] for case in run.cases])
-    over_weight = (each / (p.m * p.g) for each in (normal, friction, limit, against))
-    return *over_weight, speed / math.sqrt(p.g * p.R), (run.gap_A, run.gap_B)[k] / p.R, letters
+    forces = (each / (p.m * p.g) for each in (normal, friction, limit, against))
+    return *forces, speed / math.sqrt(p.g * p.R), (run.gap_A, run.gap_B)[k] / p.R, letters
 
 
-def _ball(name: str) -> Parameters:
-    return Parameters.from_fluid(**FLUIDS[name], R=5 * FLUIDS[name]["r"], mu=0.2, eta=0.2)
-
-
-def _falls(lab: Lab, p: Parameters, refine: int) -> list[Task]:
-    """A ball in the middle of still fluid, off floor and wall, from rest and sinking already."""
-    step, middle = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
-    starts = middle, middle._replace(v_y=-math.sqrt(p.g * p.R))
-    return [lab.task(p, x, 64 * step, step / refine, samples=64) for x in starts]
-
-
-def _sinking(coarse: Sequence[Trajectory], fine: Sequence[Trajectory]) -> Measured:
-    """The speed at which a ball sinks steadily, where its acceleration vanishes, from two falls on either time step."""
-    before, value = terminal_speed(*coarse), terminal_speed(*fine)
-    # What is left of a fall that has only just begun is a difference of speeds, each of them rounded in every step.
-    rounding = ROUNDING * abs(value) / (fine[0].header.parameters.c * float(fine[0].time[-1]))
-    return Measured(value, math.hypot(value - before, rounding))
-
-
-def terminal_speed(slow: Trajectory, fast: Trajectory) -> float:
-    """v_y in m/s at which gravity and drag balance, of two falls that differ in speed: their difference dies out alone.
+def _sinking_speed(slow: Trajectory, fast: Trajectory) -> tuple[float, float]:
+    """v_y in m/s at which gravity and drag balance, of two falls that differ in speed, and their duration in s.
 
     With a drag proportional to speed, v' = (v_end - v)/T: the fall from rest gains (1 - q) v_end while the difference
     of the two shrinks to q of what it was.
     """
     gap = fast.v_y - slow.v_y
     lost = (gap[0] - gap[-1]) / gap[0]
-    return float(slow.v_y[0] + (slow.v_y[-1] - slow.v_y[0]) / lost)
+    return float(slow.v_y[0] + (slow.v_y[-1] - slow.v_y[0]) / lost), float(fast.time[-1])

@@ -1,9 +1,9 @@
 """The dotted arrows of Fig. 6: at which orbit does a ball on the floor leave it, by the engine's own contact?
 
 States of every case with a floor differ only in the speed of the orbit, from slow, where the floor presses, to fast. A
-few of them show roughly where it stops pressing; slower ones, at which the contact doesn't come and go, give its force,
-which is extrapolated to zero over omega_c^2. Whether the wall's contact rolls or slips once the ball has left, the
-engine says.
+few of them show roughly where it stops pressing; slower ones, at which contact doesn't come and go, give its force,
+which is extrapolated to zero as a function of omega_c^2. Whether the wall's contact rolls or slips once the ball has
+left, the engine says.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.measure.extrapolation import vanishing
-from compare.measure.field import DOUBT, LIMIT, polynomial
+from compare.measure.fits import vanishing
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.quantities import quantity
 from compare.measure.record import Measurement, Missing, Records, measurement, state_of
+from compare.measure.short import DOUBT, LIMIT, REFINED, polynomials
+from compare.measure.trials import Start
 from compare.runs.tasks import Task
 from compare.statistics import COVERAGE, Measured
 from model import Case, Parameters, Trajectory
-from model.arrays import Array
 
 PROTOCOL = "lift"
 ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
@@ -35,16 +35,15 @@ ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
 ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 """omega_c sqrt(R/g) at which the ball is looked at first."""
 NEAR = (0.05, 0.08, 0.12, 0.17)
-"""How much slower the others are than the orbit to which the first point, relative."""
-REFINED = 32
-"""Steps in one of `coarse_step`; of the shorter ones twice as many. With still shorter ones contacts answer
-no faster."""
+"""How much slower the others are than the orbit that the first ones show, relative."""
 STEPS, SKIPPED, FEWEST = 16, 4, 5
-"""Steps of a run, those at its start in which contact forces build up, and the least number that must be left."""
+"""Steps of a run, those at its start in which contact forces build up, and the fewest that must be left."""
+DEGREES = (3, 2)
+"""Degrees of the polynomials; the lower one shows what the degree changes."""
 
 
 @dataclass(frozen=True)
-class Line:
+class Arrow:
     """States of a case that differ in omega_c, and the case to which the ball leaves the floor."""
 
     set: str
@@ -52,76 +51,74 @@ class Line:
     inner: Case
     outer: Case
 
-    def at(self, omega_c: float) -> tuple[Parameters, Array]:
-        """Parameters, with the fluid going round like the ball, and state (8,)."""
+    def start(self, omega_c: float) -> Start:
+        """The state at an orbit, with the fluid going round like the ball."""
         p = self.p
         unit = p.R / p.r * omega_c if self.inner is Case.SR else math.sqrt(p.g * p.R) / p.r
         slips = np.array(ARROWS[self.inner, self.outer]) * unit
-        return p.replace(omega_0=omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
+        x0 = np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
+        return Start(self.set, p.replace(omega_0=omega_c), self.inner.name, x0)
 
     def task(self, lab: Lab, omega_c: float, times: int = 1) -> Task:
-        """The run from there, with the step `times` as short."""
-        step = coarse_step(self.p) / REFINED / times
-        return lab.task(*self.at(omega_c), STEPS * step, step, samples=STEPS)
-
-    def missing(self, why: str) -> Missing:
-        """That nothing was measured along it."""
-        return Missing(PROTOCOL, self.set, why)
+        """The run from there, with steps half as long as those of `short`, divided by `times`."""
+        start, step = self.start(omega_c), coarse_step(self.p) / (2 * REFINED * times)
+        return lab.task(start.p, start.x0, STEPS * step, step, samples=STEPS)
 
     def row(
         self, lab: Lab, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]
     ) -> Measurement:
         """What was measured along it, with the state at an orbit."""
-        p, x = self.at(omega_c)
-        inner, outer = self.inner.name, self.outer.name
-        return measurement(lab, PROTOCOL, self.set, p, quantity, value, tasks, inner=inner, outer=outer, **state_of(x))
+        start = self.start(omega_c)
+        at = {"inner": self.inner.name, "outer": self.outer.name} | state_of(start.x0)
+        return measurement(lab, PROTOCOL, start.set, start.p, quantity, value, tasks, **at)
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
-    lines = [Line(name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
-    first = [[line.task(lab, Omega / time_unit(line.p)) for Omega in ORBITS] for line in lines]
-    seen = [_direct(line, runs) for line, runs in zip(lines, lab.groups(first), strict=True)]
+    arrows = [Arrow(name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
+    first = [[arrow.task(lab, Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
+    seen = [_direct(arrow, runs) for arrow, runs in zip(arrows, lab.groups(first), strict=True)]
     near = [
-        [line.task(lab, where * (1 - part), times) for part in NEAR for times in (1, 2)] if where else []
-        for line, where in zip(lines, map(_about, seen), strict=True)
+        [arrow.task(lab, where * (1 - part), times) for part in NEAR for times in (1, 2)] if where else []
+        for arrow, where in zip(arrows, map(_about, seen), strict=True)
     ]
-    for line, orbits, begun, tasks, runs in zip(lines, first, seen, near, lab.groups(near), strict=True):
+    for arrow, orbits, begun, tasks, runs in zip(arrows, first, seen, near, lab.groups(near), strict=True):
         lifted = next((run for run in begun if _force(run) is None), None)
         if not begun:
-            yield line.missing(f"the ball doesn't stay in {line.inner.name} at any orbit")
+            yield Missing(PROTOCOL, arrow.set, f"the ball doesn't stay in {arrow.inner.name} at any orbit")
         elif lifted is None:
-            yield line.row(lab, "lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
-        elif (to := Case(int(lifted.case[-1]))) is not line.outer:
-            yield line.missing(f"out of {line.inner.name} the ball leaves the floor for {to.name}")
+            yield arrow.row(lab, "lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
+        elif (to := Case(int(lifted.case[-1]))) is not arrow.outer:
+            yield Missing(PROTOCOL, arrow.set, f"out of {arrow.inner.name} the ball leaves the floor for {to.name}")
         elif (value := _onset(runs)) is None:
-            yield line.missing(f"where the ball leaves {line.inner.name} the floor's contact comes and goes")
+            why = f"where the ball leaves {arrow.inner.name} the floor's contact comes and goes"
+            yield Missing(PROTOCOL, arrow.set, why)
         else:
-            yield line.row(lab, "lift_onset", value.value, value, tasks)
+            yield arrow.row(lab, "lift_onset", value.value, value, tasks)
 
 
-def _direct(line: Line, runs: Sequence[Trajectory]) -> list[Trajectory]:
+def _direct(arrow: Arrow, runs: Sequence[Trajectory]) -> list[Trajectory]:
     """The first runs in a row in which the ball passes into no case but the two ends of the arrow."""
-    strays = [not np.isin(run.case[SKIPPED:], [line.inner, line.outer]).all() for run in runs]
+    strays = [not np.isin(run.case[SKIPPED:], [arrow.inner, arrow.outer]).all() for run in runs]
     begin = [*strays, False].index(False)
     return list(runs[begin : [*strays, True].index(True, begin)])
 
 
 def _force(run: Trajectory) -> Measured | None:
-    """Force of the floor at the beginning over the weight; None where it doesn't press for long enough."""
-    p, force = run.header.parameters, run.force_A[SKIPPED:, 1:2]
+    """Force of the floor at the beginning divided by the weight; None where it doesn't press for long enough."""
+    p, force = run.header.parameters, run.force_A[SKIPPED:, 1]
     pressed = int(np.argmax(np.append(force <= 0, True)))
     if pressed < FEWEST:
         return None
-    time, force = run.time[SKIPPED:][:pressed], force[:pressed]
+    time = run.time[SKIPPED:][:pressed]
     # The force of a sample acts from then on for a step: it belongs to the middle of it.
     begin = -(time[1] - time[0]) / 2
-    value, lower = (float(polynomial(time, force, degree, begin)[0][0]) / (p.m * p.g) for degree in (3, 2))
+    value, lower = (polynomials(time, force[:pressed], DEGREES, begin)[0] / (p.m * p.g)).tolist()
     return Measured(value, abs(value - lower))
 
 
 def _about(runs: Sequence[Trajectory]) -> float | None:
-    """Where the forces of the last two orbits before the ball leaves point to, over omega_c^2; None if nowhere."""
+    """Where the forces at the last two orbits before the ball leaves, as a line over omega_c^2, vanish; or None."""
     pressed = [(run.omega_c[0] ** 2, force.value) for run in runs if (force := _force(run))]
     if len(pressed) < 2 or len(pressed) == len(runs):
         return None
@@ -131,16 +128,13 @@ def _about(runs: Sequence[Trajectory]) -> float | None:
 
 def _onset(runs: Sequence[Trajectory]) -> Measured | None:
     """omega_c where the force vanishes, from runs with both steps at each orbit; None if it does not so smoothly."""
-    squares, forces = [], []
-    for run, coarse, fine in zip(runs[::2], map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
+    squares, forces = np.array([run.omega_c[0] ** 2 for run in runs[::2]]), []
+    for coarse, fine in zip(map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
         if coarse is None or fine is None:
             return None
         change = fine.value - coarse.value
-        squares.append(run.omega_c[0] ** 2)
         forces.append(Measured(fine.value + change * LIMIT, math.hypot(fine.uncertainty, change * DOUBT)))
-    if not forces:
-        return None
-    square = vanishing(np.array(squares), forces)
+    square = vanishing(squares, forces) if forces else Measured(0.0, math.inf)
     if not 0 < COVERAGE * square.uncertainty < 2 * quantity("lift_onset").resolves * square.value:
         return None
     return Measured(math.sqrt(square.value), square.uncertainty / (2 * math.sqrt(square.value)))

@@ -12,15 +12,14 @@ import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-import numpy.typing as npt
 
 from compare.measure.field import constrained
 from compare.measure.lab import Lab, coarse_step, state_units, time_unit
-from compare.measure.levels import Level
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.measure.short import REFINED
+from compare.measure.trials import Start
 from compare.statistics import Measured
 from model import Case, Contact, Parameters, State, Trajectory
-from model.arrays import Array
 from model.kinematics import VARIABLES
 
 STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
@@ -38,19 +37,15 @@ STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
     (1.20, (0.0, 0.0, 0.40, 0.6, 0.1, -0.5, 0.5, 0.0)),
 )
 """omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
-REFINED = 16
-"""Steps in one of `coarse_step`, each sampled; the second run of a landing has twice as many."""
 LASTS = 6.0
 """Duration of a motion in units of sqrt(R/g)."""
-PIECES = {Level.QUICK: 6, Level.DEFAULT: 20, Level.FULL: 32}
-"""Pieces of a motion."""
 LENGTH = 40
 """Samples in a piece."""
 APART = 10
 """Samples between the ends of a piece and any change of case: a slip dies out and a force builds up in three or so, the
 case is taken to have changed after as many more, and a change comes by a few steps earlier or later than it should."""
 NARROW = 1e-4
-"""Least gap of an open contact over R at the ends of a piece: an unloaded contact may hover."""
+"""Least gap of an open contact divided by R at the ends of a piece: an unloaded contact may hover."""
 LATE = 2.0
 """Steps, of which two landings may come one late each. What weight does to a slip in that time is the least slip at the
 ends of a piece: where two contacts roll one may creep so fast, since how they share a load is not determined.
@@ -79,53 +74,36 @@ NAMES = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The case at the end of every piece, with the state at its beginning."""
-    protocol, names, tasks = "motions", [name for name in sets for _ in STARTS], []
-    for p in sets.values():
-        step = coarse_step(p) / REFINED
-        count = round(LASTS * time_unit(p) / step)
-        tasks += [lab.task(*_start(p, *start), count * step, step, samples=count) for start in STARTS]
+    starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
+    tasks = []
+    for start in starts:
+        step = coarse_step(start.p) / REFINED
+        count = round(LASTS * time_unit(start.p) / step)
+        tasks.append(lab.task(start.p, start.x0, count * step, step, samples=count))
     seen = set[tuple[str, Case]]()
-    for name, task, run in zip(names, tasks, lab.each(tasks), strict=True):
+    for start, task, run in zip(starts, tasks, lab.each(tasks), strict=True):
+        name, p = start.set, start.p
         if isinstance(run, str):
-            yield Missing(protocol, name, f"a motion {run}")
+            yield Missing("motions", name, f"a motion {run}")
             continue
-        p = task.parameters
-        for first in pieces(run, PIECES[lab.level]):
+        for first in pieces(run, lab.effort("motions.pieces")):
             last = first + LENGTH
             case = Case(int(run.case[last]))
             seen.add((name, case))
             at = state_of(constrained(Case(int(run.case[first])), run.x[first], p))
             time = float(run.time[last] - run.time[first])
-            yield measurement(lab, protocol, name, p, "case", case, [task], case=case.name, time=time, **at)
+            yield measurement(lab, "motions", name, p, "case", case, [task], case=case.name, time=time, **at)
     for name in sets:
         unseen = [case.name for case in Case if (name, case) not in seen]
         if unseen:
-            yield Missing(protocol, name, f"no piece of a motion ended in {', '.join(unseen)}")
+            yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}")
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
-    """Where pieces begin, about evenly spread: their ends are away from changes of case."""
-    plain = _plain(run)
-    changes = np.flatnonzero(np.diff(run.case)) + 1
-    firsts = np.arange(APART, len(run.time) - LENGTH - APART)
-    for end in (0, LENGTH):
-        near = np.min(np.abs((firsts + end)[:, None] - changes), axis=1, initial=len(run.time))
-        firsts = firsts[(near >= APART) & plain[firsts + end]]
-    if len(firsts) == 0:
-        return []
-    # As many pieces with a change of case in them as without, as far as there are.
-    inside = np.array([np.any((changes > first) & (changes < first + LENGTH)) for first in firsts])
-    chosen: set[int] = set()
-    for some in (firsts[inside], firsts[~inside]):
-        if len(some):
-            chosen |= set(some[np.linspace(0, len(some) - 1, count // 2).round().astype(int)].tolist())
-    return sorted(chosen)
+    """Where pieces begin, about evenly spread: their ends are away from changes of case.
 
-
-def _plain(run: Trajectory) -> npt.NDArray[np.bool_]:
-    """Whether contacts plainly are what they are called, at every sample (n,).
-
-    An open one is open, a slipping one slips by more than a trace, and a rolling one needs less friction than it may.
+    There contacts are plainly what they are called: an open one is open, a slipping one slips by more than a trace, and
+    a rolling one needs less friction than it may.
     """
     p, A, B = run.header.parameters, run.force_A.T, run.force_B.T
     plain = np.full(len(run.time), True)
@@ -137,37 +115,49 @@ def _plain(run: Trajectory) -> npt.NDArray[np.bool_]:
         plain &= (contact != "R") | (friction <= (1 - LEFT) * limit)
         plain &= (contact != "N") | (gap > NARROW * p.R)
         plain &= (contact != "S") | (speed > LATE * p.g * coarse_step(p) / REFINED)
-    return plain
+    changes = np.flatnonzero(np.diff(run.case)) + 1
+    firsts = np.arange(APART, len(run.time) - LENGTH - APART)
+    for end in (0, LENGTH):
+        near = np.min(np.abs((firsts + end)[:, None] - changes), axis=1, initial=len(run.time))
+        firsts = firsts[(near >= APART) & plain[firsts + end]]
+    # As many pieces with a change of case in them as without, as far as there are.
+    inside = np.any((changes > firsts[:, None]) & (changes < firsts[:, None] + LENGTH), axis=1)
+    chosen: set[int] = set()
+    for some in (firsts[inside], firsts[~inside]):
+        if len(some):
+            chosen |= set(some[np.linspace(0, len(some) - 1, count // 2).round().astype(int)].tolist())
+    return sorted(chosen)
 
 
-def _start(p: Parameters, Omega_0: float, state: tuple[float, ...]) -> tuple[Parameters, Array]:
-    """Parameters with the flow, and a state (8,), from natural units."""
+def _start(name: str, p: Parameters, Omega_0: float, state: tuple[float, ...], how: str = "") -> Start:
+    """A start from natural units: a flow, and a state (8)."""
     x = State.of(np.array(state) * state_units(p))
     if x.y == x.v_y == x.slip_x == 0 and x.h > 0:  # it rolls on the floor
         x = x._replace(slip_z=-x.v_h / p.r)
-    return p.replace(omega_0=Omega_0 / time_unit(p)), x.stacked()
+    return Start(name, p.replace(omega_0=Omega_0 / time_unit(p)), how, x.stacked())
 
 
 def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The state shortly after every landing."""
-    landings = [(name, how, *_start(p, FLOW, x)) for name, p in sets.items() for how, x in LANDINGS.items()]
-    pairs = []
-    for _, _, p, x in landings:
-        step = coarse_step(p) / REFINED
-        pairs.append(lab.pair(p, x, round(LANDED * time_unit(p) / step), step))
-    for (name, how, p, x), pair, (coarse, fine) in zip(landings, pairs, lab.groups(pairs), strict=True):
-        contact = [case.A if how.startswith("floor") else case.B for case in coarse.cases]
+    starts = [_start(name, p, FLOW, x, how) for name, p in sets.items() for how, x in LANDINGS.items()]
+    steps = [coarse_step(start.p) / REFINED for start in starts]
+    pairs = [
+        lab.pair(start.p, start.x0, round(LANDED * time_unit(start.p) / step), step)
+        for start, step in zip(starts, steps, strict=True)
+    ]
+    for start, step, pair, (coarse, fine) in zip(starts, steps, pairs, lab.groups(pairs), strict=True):
+        contact = [case.A if start.name.startswith("floor") else case.B for case in coarse.cases]
         at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + AFTER
         if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
-            why = f"{how}: the contact did not close for good within {LANDED:g} sqrt(R/g)"
-            yield Missing("impacts", name, why)
+            why = f"{start.name}: the contact did not close for good within {LANDED:g} sqrt(R/g)"
+            yield Missing("impacts", start.set, why)
             continue
-        units = state_units(p)
-        change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[[VARIABLES.index(n) for n in NAMES]]))
+        p, units = start.p, state_units(start.p)
+        changed = [VARIABLES.index(name) for name in NAMES]
+        change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
         # The contact closes at a step, up to one late: for so long weight and friction act otherwise than they should.
-        late = coarse_step(p) / REFINED / time_unit(p) / 2
-        conditions: dict[str, Condition] = {"start": how, "time": float(coarse.time[at]), **state_of(x)}
-        for quantity in NAMES:
-            k = VARIABLES.index(quantity)
+        late = step / time_unit(p) / 2
+        conditions: dict[str, Condition] = {"start": start.name, "time": float(coarse.time[at]), **state_of(start.x0)}
+        for quantity, k in zip(NAMES, changed, strict=True):
             value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
-            yield measurement(lab, "impacts", name, p, f"after_{quantity}", value, pair, **conditions)
+            yield measurement(lab, "impacts", start.set, p, f"after_{quantity}", value, pair, **conditions)

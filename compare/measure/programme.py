@@ -116,7 +116,6 @@ PROTOCOLS = (
     Protocol("steepest", growth.steepest, waits=False),
     Protocol("lift", lift.measure, waits=False),
     Protocol("bounds", bounds.measure, ("thresholds",)),
-    Protocol("watched", bounds.watched, ("thresholds",)),
     Protocol("motions", motions.measure, quick=ONE, waits=False),
     Protocol("impacts", motions.impacts, quick=TWO, waits=False),
     Protocol("followed", attractors.followed, level=Level.DEFAULT, alone=HOPS),

@@ -1,9 +1,9 @@
 """Decay rates and frequencies: settled states are pushed a little, and the motion itself shows its whole spectrum.
 
-Every active variable of a case is pushed by itself, up and down. Half the difference of the two runs, over the size of
-the push, is a column of D(t), which a linear motion turns into P D(t) some time later: the logarithms of the
+Every active variable of a case is pushed by itself, up and down. Half the difference of the two runs, divided by the
+size of the push, is a column of D(t), which a linear motion turns into P D(t) some time later: the logarithms of the
 eigenvalues of P are the exponents, all of them, and no direction is singled out. Two sizes of the push are extrapolated
-to none, two time steps to none.
+to zero, and so are two time steps.
 
 Two states are special. A ball that spins in a fluid at rest (RS) feels the wall only while it goes round, with a
 friction of the order of omega_c^2: it takes a large push. And where floor and ball only just touch (SR), every push
@@ -14,51 +14,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-import model
+from compare.measure.fits import exponents, matched, propagator
 from compare.measure.lab import Lab, coarse_step, state_units, time_unit
-from compare.measure.levels import Level
 from compare.measure.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.measure.settled import SPIN
 from compare.measure.settling import SOLVED, family, high
+from compare.measure.trials import Start
 from compare.runs.engines import STUDY_SLIP
 from compare.runs.tasks import Task
-from compare.statistics import Measured, exponents, matched, propagator
-from model import Case, Contact, Parameters, Trajectory
+from compare.statistics import Measured
+from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.drag import QUADRATIC, STOKES
 from model.kinematics import VARIABLES, slip_speeds
 
 PROTOCOL = "rates"
-REFINE = {Level.QUICK: (8, 16), Level.DEFAULT: (16, 32), Level.FULL: (32, 64)}
-"""The two time steps are these parts of `coarse_step`."""
 RECORD = (64, 256)
 """Length of a record in coarse steps, which is about 3 sqrt(R/g), and its samples."""
 BRIEF = {Case.RS: (2, 16)}
 """The same where a large push soon changes the state itself."""
 PUSH = {Case.RS: 0.3, Case.SR: 0.1}
-"""Size of a push, in the `units`, in the two cases in which it is extrapolated to none from this and half of it."""
-SMALL = 2e-4
+"""Size of a push, in the `units`, in the two cases in which it is extrapolated to zero from this and half of it."""
+USUAL = 2e-4
 """Size of a push in all other cases; the run with the coarser step has half of it, and shows that it doesn't matter."""
 SLIGHT = 2e-6
-"""The same where the law of drag isn't Stokes': the drag of a lag that the push makes is then in proportion to it only
-as far as its Reynolds number is nothing beside 1."""
+"""The same where the law of drag isn't Stokes': the drag of the lag that a push makes is in proportion to it only
+as far as its Reynolds number is far below 1."""
 SLOWEST = 0.04
-"""Least slip speed of a state over sqrt(g R): a push is to be small beside it."""
+"""Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
 ORDER = {Case.RS: 2, Case.SR: 1}
-"""What is left of a push's size: its square, where up and down are subtracted."""
-FAR = 0.4
+"""Order of the remaining error in the size of a push: second, where up and down are subtracted."""
+STRAYS = 0.4
 """A record ends once a variable is so far from its settled value, in the `units`."""
 LEAST = {Case.SR: 48}
 """Samples that a record must have, else 8: a floor that is about to carry nothing follows its load less exactly."""
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
-"""Most states of a case and set at the quick level, spread over the flows; beyond it, `MORE` times as many."""
-MORE = {Level.QUICK: 1, Level.DEFAULT: 2, Level.FULL: 5}
+"""Most states of a case and set at the quick level, spread over the flows; more at the others."""
 STOPPED = 4.0
 """Coarse steps in which friction may stop the slip of a state at the soonest: in less, its decay is not resolved."""
 HOVERS = 10.0
@@ -71,13 +68,11 @@ Exponents = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class Pushed:
     """A settled state, from which the ball is pushed."""
 
-    set: str
-    p: Parameters
+    start: Start
     case: Case
-    x: Array = field(repr=False)
 
     @property
     def active(self) -> list[int]:
@@ -87,36 +82,41 @@ class State:
     @property
     def units(self) -> Array:
         """Natural sizes of the active variables."""
-        return state_units(self.p)[self.active]
+        return state_units(self.start.p)[self.active]
 
     @property
     def sizes(self) -> tuple[float, ...]:
         """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
-        size = PUSH.get(self.case, SMALL if self.p.drag == STOKES else SLIGHT)
+        size = PUSH.get(self.case, USUAL if self.start.p.drag == STOKES else SLIGHT)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
 
-    def tasks(self, lab: Lab) -> list[list[Task]]:
+    def tasks(self, lab: Lab) -> list[Task]:
         """Runs for each of the `sizes`: every active variable is pushed, up and down."""
-        step, (coarse, fine) = coarse_step(self.p), REFINE[lab.level]
+        p, step = self.start.p, coarse_step(self.start.p)
+        coarse, fine = lab.effort("rates.refined")
         lasts, samples = BRIEF.get(self.case, RECORD)
-        pushes = []
-        for size, refine in zip(self.sizes, (coarse, fine, fine), strict=False):
-            starts = self.x + np.kron(np.diag(size * self.units), [[1], [-1]]) @ np.eye(8)[self.active]
-            pushes.append([lab.task(self.p, x, lasts * step, step / refine, samples=samples) for x in starts])
-        return pushes
+        tasks = []
+        for size, refined in zip(self.sizes, (coarse, fine, fine), strict=False):
+            for k, unit in zip(self.active, size * self.units, strict=True):
+                for push in (unit, -unit):
+                    x = self.start.x0.copy()
+                    x[k] += push
+                    tasks.append(lab.task(p, x, lasts * step, step / refined, samples=samples))
+        return tasks
 
     def missing(self, why: str) -> Missing:
         """That its rates were not measured."""
-        return Missing(PROTOCOL, self.set, f"{self.case.name} at omega_0 = {self.p.omega_0:.4g} rad/s: {why}")
+        at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
+        return Missing(PROTOCOL, self.start.set, f"{at}: {why}")
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
-    states = [state for name, p in sets.items() for state in chosen(records, name, p, MORE[lab.level])]
-    tasks = [[task for push in state.tasks(lab) for task in push] for state in states]
+    states = [state for name, p in sets.items() for state in chosen(records, name, p, lab.effort("rates.more"))]
+    tasks = [state.tasks(lab) for state in states]
     lab.complete([task for own in tasks for task in own])
     for state, own in zip(states, tasks, strict=True):
-        runs, step = lab.attempt(own), coarse_step(state.p) / REFINE[lab.level][1]
+        runs, step = lab.attempt(own), coarse_step(state.start.p) / lab.effort("rates.refined")[1]
         if isinstance(runs, str):
             yield state.missing(f"a run {runs}")
             continue
@@ -128,22 +128,45 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield from _measurements(lab, state, *spectrum(state, answers, step), step, own[-count:])
     for name in sets:
         for case in STATES:
-            if case not in {state.case for state in states if state.set == name}:
+            if case not in {state.case for state in states if state.start.set == name}:
                 at = f"the ball settles in {case.name} at no flow that was tried"
                 yield Missing(PROTOCOL, name, f"{at}, or slips too slowly or too fast there")
 
 
-def chosen(records: Records, name: str, p: Parameters, more: int) -> list[State]:
-    """The states of a set that are pushed: at most so many of a case, and spinning on the spot next to the wall."""
+def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed]:
+    """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
+
+    One on the wall alone is pushed high up, and where it only just touches the floor. What slips must do so neither
+    so slowly that a push turns it, or friction stops it within a few steps, nor so fast that it hovers.
+    """
     unit = time_unit(p)
-    still = model.State(slip_y=SPIN / unit * p.R / p.r).stacked()
-    kept = [State(name, p.replace(omega_0=0.0), Case.RS, still)]
-    states = [state for state in settled(records, name) if _suits(state)]
+    spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
+    kept = [Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)]
+    values: dict[tuple[Parameters, Case], dict[str, float]] = {}
+    for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
+        values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
+    states = []
+    for (q, case), value in values.items():
+        x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
+        states.append((q, case, x._replace(y=high(q)) if case.A is Contact.N else x))
+        if case is Case.NR:
+            states.append((q, Case.SR, x))
     if p.drag == QUADRATIC:  # it settles no ball that goes round with the fluid; but one that begins so goes on so
-        slow = 0.5 / unit
-        states.append(State(name, p.replace(omega_0=slow), Case.RR, model.State(omega_c=slow).stacked()))
+        states.append((p.replace(omega_0=0.5 / unit), Case.RR, State(omega_c=0.5 / unit)))
     for case, most in STATES.items():
-        alike = sorted((s for s in states if s.case is case), key=lambda s: s.p.omega_0)
+        alike = []
+        for q, _, x in sorted((s for s in states if s[1] is case), key=lambda s: s[0].omega_0):
+            turned = math.sqrt(q.g * q.R) * max(SLOWEST, 2 * PUSH.get(case, 0.0))
+            contacts = zip(
+                case.name, slip_speeds(x.stacked(), q), (q.mu, q.eta), (q.g, q.R * x.omega_c**2), strict=True
+            )
+            if all(
+                max(turned, STOPPED * coarse_step(q) * friction * load) < speed
+                and friction * speed < HOVERS * STUDY_SLIP * load / q.g
+                for contact, speed, friction, load in contacts
+                if contact == "S"
+            ):
+                alike.append(Pushed(Start(name, q, "settled", x.stacked()), case))
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
         places = {int((k + 0.5) * len(alike) / (more * most)) for k in range(more * most)} if alike else set()
@@ -151,40 +174,8 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> list[State]
     return kept
 
 
-def settled(records: Records, name: str) -> Iterator[State]:
-    """The settled states of a set; one on the wall alone high up, and also where it only just touches the floor."""
-    values: dict[tuple[Parameters, Case], dict[str, float]] = {}
-    for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
-        values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
-    for (p, case), value in values.items():
-        if case in (Case.RR, Case.SS, Case.NR, Case.NS):
-            on_floor = model.State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
-            x = on_floor._replace(y=high(p)) if case.A is Contact.N else on_floor
-            yield State(name, p, case, x.stacked())
-            if case is Case.NR:
-                yield State(name, p, Case.SR, on_floor.stacked())
-
-
-def _suits(state: State) -> bool:
-    """Whether what slips does so neither too slowly nor too fast.
-
-    Too slowly: a push turns it round, or friction stops it within a few steps. Too fast: it hovers under its load.
-    """
-    p = state.p
-    loads = p.g, p.R * model.State.of(state.x).omega_c ** 2
-    turned = math.sqrt(p.g * p.R) * max(SLOWEST, 2 * PUSH.get(state.case, 0.0))
-    return all(
-        max(turned, STOPPED * coarse_step(p) * friction * load) < speed
-        and friction * speed < HOVERS * STUDY_SLIP * load / p.g
-        for contact, speed, friction, load in zip(
-            (state.case.A, state.case.B), slip_speeds(state.x, p), (p.mu, p.eta), loads, strict=True
-        )
-        if contact is Contact.S
-    )
-
-
-def answer(state: State, size: float, runs: Sequence[Trajectory]) -> Array:
-    """D (n, d, d): how the active variables, over `units`, follow pushes of one size; runs in the order of the tasks.
+def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
+    """D (n, d, d): how the active variables, in `units`, follow pushes of one size; runs in the order of the tasks.
 
     Only as long as the ball stays in the case and near the state; the first sample, at which forces build up, is not
     among them.
@@ -192,14 +183,14 @@ def answer(state: State, size: float, runs: Sequence[Trajectory]) -> Array:
     ups, downs = runs[::2], runs[1::2]
     if state.case is Case.SR:
         seen = [max(pair, key=lambda run: stays(run, state.case)) for pair in zip(ups, downs, strict=True)]
-        columns = [(1 if run in ups else -1) * (run.x - state.x) for run in seen]
+        columns = [(1 if run in ups else -1) * (run.x - state.start.x0) for run in seen]
     else:
         # Where the wall carries nothing, as beside a ball that only spins, no contact with it shows.
         seen = list(runs[:2] if state.case is Case.RS else runs)
         columns = [(up.x - down.x) / 2 for up, down in zip(ups, downs, strict=True)]
     D = np.stack(columns, axis=-1)[:, state.active] / (size * state.units[:, None])
     ends = [stays(run, state.case) for run in seen]
-    ends.append(int(np.argmax(np.append(size * np.abs(D).max(axis=(1, 2)) > FAR * (1 + 1e-9), True))))
+    ends.append(int(np.argmax(np.append(size * np.abs(D).max(axis=(1, 2)) > STRAYS * (1 + 1e-9), True))))
     return np.asarray(D[1 : min(ends)])
 
 
@@ -208,26 +199,26 @@ def stays(run: Trajectory, case: Case) -> int:
     return int(np.argmax(np.append(run.case[1:] != case, True))) + 1
 
 
-def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
-    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `State.sizes`.
+def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
+    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `Pushed.sizes`.
 
-    The engine's order in the time step is taken to be 2. The uncertainty is that correction, which is larger than what
-    is left if the order is 1; by how much the first half of the record differs; the next term in the size of the push,
-    in which it is once more as small, or the first term over the whole; the error of a step for the fastest exponent;
-    and the accuracy of the engine's solver.
+    They are extrapolated to a vanishing push, and to a vanishing step by second order. The uncertainty is made up of
+    that correction, which exceeds the remainder even of first order; the difference from the first half of the record;
+    the next order in the size of the push; the error of a step for the fastest exponent; the accuracy of the solver.
     """
     lasts, samples = BRIEF.get(state.case, RECORD)
-    interval = lasts * coarse_step(state.p) / samples
-    # All records are as long as the shortest: extrapolated is one and the same thing.
+    interval = lasts * coarse_step(state.start.p) / samples
+    # All records are cut to the length of the shortest, so that all are extrapolated from the same motion.
     length = min(map(len, answers))
+
+    gain = 1 / (2 ** ORDER.get(state.case, 2) - 1)
 
     def exponents_of(large: Array, small: Array, share: float = 1.0) -> Exponents:
         last = max(4, round(share * length))
-        gain = 1 / (2 ** ORDER[state.case] - 1) if large is not small else 0.0
 
         def at(lag: int) -> Array:
-            P = propagator(small[:last], lag)
-            return P + gain * (P - propagator(large[:last], lag)) if gain else P
+            P, P_large = (propagator(record[:last], lag) for record in (small, large))
+            return np.asarray(P + gain * (P - P_large))
 
         return exponents(at, interval, last // 3)
 
@@ -247,11 +238,12 @@ def spectrum(state: State, answers: Sequence[Array], step: float) -> tuple[Expon
 
 
 def _measurements(
-    lab: Lab, state: State, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
+    lab: Lab, state: Pushed, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
 ) -> Iterator[Measurement | Missing]:
     """One of each pair of conjugates, in the order of their decay, slowest first; and how many there are in all."""
-    at: dict[str, Condition] = {"case": state.case.name, **state_of(state.x)}
-    yield measurement(lab, PROTOCOL, state.set, state.p, "modes", len(exponents), tasks, **at)
+    start = state.start
+    at: dict[str, Condition] = {"case": state.case.name, **state_of(start.x0)}
+    yield measurement(lab, PROTOCOL, start.set, start.p, "modes", len(exponents), tasks, **at)
     rows = []
     order = [k for k in np.argsort(-exponents.real) if exponents[k].imag >= 0]
     fast = [k for k in order if abs(exponents[k]) * step > RESOLVED]
@@ -264,10 +256,10 @@ def _measurements(
         for (quantity, value), (name, other) in zip(parts.items(), reversed(parts.items()), strict=True):
             sure, which = Measured(value, float(uncertainty[k])), {"mode": mode, name: other}
             # They come from one propagator: where one is too vague for a check, the others aren't to be trusted either.
-            if not sure_enough(quantity, sure, natural_size(value, other, state.p)):
+            if not sure_enough(quantity, sure, natural_size(value, other, start.p)):
                 yield state.missing(f"one of its exponents, {value:.3g} 1/s, is uncertain by {sure.uncertainty:.1g}")
                 return
-            rows.append(measurement(lab, PROTOCOL, state.set, state.p, quantity, sure, tasks, **at, **which))
+            rows.append(measurement(lab, PROTOCOL, start.set, start.p, quantity, sure, tasks, **at, **which))
     yield from rows
 
 

@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from compare.measure.brackets import Answer, Bracket, Care, Search, narrow
-from compare.measure.extrapolation import POINTS, initial_slope, turning, vanishing
+from compare.measure.fits import POINTS, initial_slope, straight_line, turning, vanishing
 from compare.measure.lab import Lab, coarse_step, time_unit
 from compare.measure.laws import PRESSES
 from compare.measure.record import Condition, Measurement, Missing, Records, if_sure, measurement, sure_enough
@@ -38,7 +38,7 @@ from compare.measure.settling import (
     settles,
 )
 from compare.runs.tasks import Task
-from compare.statistics import COVERAGE, Measured, settled_case, straight_line, tail
+from compare.statistics import COVERAGE, Measured, settled_case, tail
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 

@@ -14,7 +14,7 @@ from compare.claims.claim import Outcome, Verdict
 from compare.claims.judge import judge
 from compare.measure import laws
 from compare.measure.lab import Lab
-from compare.measure.record import Measurement, Missing, Records
+from compare.measure.record import Measurement, Records
 from model import Case, Flow, Parameters, Trajectory
 from model.trajectory import SAMPLE, Events, Header
 from tests.measured import measured
@@ -79,45 +79,37 @@ def law(quantity: str, value: float, uncertainty: float, contact: str = "A") -> 
     return measured("laws", quantity, value, uncertainty, P, law="a law", contact=contact)
 
 
-def table_3(*rows: Measurement) -> Verdict:
-    (claim,) = (claim for claim in claims.CLAIMS if claim.id == "table-3")
-    return judge([claim], Records(rows))[0]
+def verdict_of(name: str, records: Records) -> Verdict:
+    return judge([claim for claim in claims.CLAIMS if claim.id == name], records)[0]
 
 
 def test_laws_are_judged() -> None:
     good = (law("law", 0.0, 1e-14), law("friction_ratio", P.mu, 1e-9), law("friction_ratio", P.eta, 1e-9, "B"))
-    assert table_3(*good).outcome is Outcome.CONFIRMED
+    assert verdict_of("table-3", Records(good)).outcome is Outcome.CONFIRMED
     for bad in (
         law("law", 1e-6, 1e-14),
         law("law_in_motion", 1e-3, 1e-5),
         law("friction_ratio", 1.01 * P.mu, 1e-9),
         law("friction_ratio", P.mu, 1e-9, "B"),
     ):
-        assert table_3(*good, bad).outcome is Outcome.REFUTED
-    assert table_3(*good, law("law_in_motion", 0.0, 1e-2)).outcome is Outcome.INCONCLUSIVE
+        assert verdict_of("table-3", Records((*good, bad))).outcome is Outcome.REFUTED
+    assert verdict_of("table-3", Records((*good, law("law_in_motion", 0.0, 1e-2)))).outcome is Outcome.INCONCLUSIVE
 
 
 def test_laws_and_drag_are_measured_with_mujoco(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(laws, "LASTS", 256)
-    rows = list(laws.measure(lab, {"reference": Parameters.named("reference")}, Records()))
-    records = Records.of(rows)
-    for verdict in judge([claim for claim in claims.CLAIMS if claim.protocols == {laws.PROTOCOL}], records):
-        assert verdict.outcome is Outcome.CONFIRMED, verdict.claim.id
-    assert all(isinstance(row, Missing | Measurement) for row in rows)
+    records = Records.of(laws.measure(lab, {"reference": Parameters.named("reference")}, Records()))
+    mine = [claim for claim in claims.CLAIMS if claim.protocols == {laws.PROTOCOL}]
+    assert {verdict.claim.id: verdict.outcome for verdict in judge(mine, records)} == {
+        "table-3": Outcome.CONFIRMED,
+        "eq-10": Outcome.CONFIRMED,
+    }
     right = stokes.sinking_speed
     monkeypatch.setattr(stokes, "sinking_speed", lambda **fluid: 1.0001 * right(**fluid))
-    (drag,) = (verdict for verdict in judge(claims.CLAIMS, records) if verdict.claim.id == "eq-10")
-    assert drag.outcome is Outcome.REFUTED
+    assert verdict_of("eq-10", records).outcome is Outcome.REFUTED
 
 
 def test_a_drag_coefficient_that_disagrees_with_stokes_is_noticed(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     of_fluid = Parameters.from_fluid
-
-    def wrong(**values: float) -> Parameters:
-        p = of_fluid(**values)
-        return p.replace(c=1.01 * p.c)
-
-    monkeypatch.setattr(Parameters, "from_fluid", wrong)
-    records = Records.of(laws.measure(lab, {}, Records()))
-    (drag,) = (verdict for verdict in judge(claims.CLAIMS, records) if verdict.claim.id == "eq-10")
-    assert drag.outcome is Outcome.REFUTED
+    monkeypatch.setattr(Parameters, "from_fluid", lambda **values: (p := of_fluid(**values)).replace(c=1.01 * p.c))
+    assert verdict_of("eq-10", Records.of(laws.measure(lab, {}, Records()))).outcome is Outcome.REFUTED

@@ -16,7 +16,7 @@ from compare.claims.judge import judge
 from compare.measure import thresholds
 from compare.measure.brackets import FINER, LONGER, Bracket, Search, narrow
 from compare.measure.edge import Edge, ends_slipping
-from compare.measure.extrapolation import turning, vanishing
+from compare.measure.fits import turning, vanishing
 from compare.measure.lab import coarse_step, time_unit
 from compare.measure.levels import Level
 from compare.measure.record import Missing, Records
