@@ -22,25 +22,19 @@ def shown(quiet: bool = False) -> Iterator[Show]:
     """A function to report progress to, on standard error."""
     if quiet:
         yield lambda what, done, total, failed: None
-    elif sys.stderr.isatty():
-        with _live() as show:
-            yield show
-    else:
+    elif not sys.stderr.isatty():
         yield _plain()
+    else:
+        counts = BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}")
+        times = TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn()
+        with Progress(TextColumn("{task.description}"), *counts, *times, console=Console(stderr=True)) as bar:
+            line = bar.add_task("", total=None, failed="")
 
+            def show(what: str, done: int, total: int, failed: int) -> None:
+                failures = f"[red]{failed} failed" if failed else ""
+                bar.update(line, description=what, completed=done, total=total, failed=failures)
 
-@contextmanager
-def _live() -> Iterator[Show]:
-    counts = BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}")
-    times = TimeElapsedColumn(), TextColumn("ETA"), TimeRemainingColumn()
-    with Progress(TextColumn("{task.description}"), *counts, *times, console=Console(stderr=True)) as bar:
-        line = bar.add_task("", total=None, failed="")
-
-        def show(what: str, done: int, total: int, failed: int) -> None:
-            failures = f"[red]{failed} failed" if failed else ""
-            bar.update(line, description=what, completed=done, total=total, failed=failures)
-
-        yield show
+            yield show
 
 
 def _plain() -> Show:
