@@ -225,8 +225,13 @@ def remove_leftovers(directory: Path) -> None:
     """Remove the temporary files that writers killed on this machine have left in a directory."""
     for path in directory.glob(f".*{_SUFFIX}"):
         host, process = path.name.removesuffix(_SUFFIX).split(".")[-2:]
-        if host == _host() and process.isdigit() and not _alive(int(process)):
-            path.unlink(missing_ok=True)
+        if host == _host() and process.isdigit():
+            try:
+                os.kill(int(process), 0)
+            except ProcessLookupError:
+                path.unlink(missing_ok=True)
+            except PermissionError:
+                continue  # it lives, and is somebody else's
 
 
 def _temporary(path: Path) -> Path:
@@ -236,13 +241,3 @@ def _temporary(path: Path) -> Path:
 
 def _host() -> str:
     return socket.gethostname().replace(".", "-")
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # it lives, and is somebody else's
-        return True
-    return True

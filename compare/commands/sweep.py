@@ -9,7 +9,6 @@ from pathlib import Path
 
 from compare.commands import options, running
 from compare.runs import campaign, collection, sweep
-from compare.runs.tasks import Task
 from model import Flow
 
 
@@ -43,7 +42,14 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry out the runs that are not done yet and say which failed."""
-    tasks = _tasks(args)
+    p, axes = options.parameters(args), [sweep.Axis.parse(text) for text in args.vary]
+    if args.direction != "held":
+        omegas = sweep.levels(axes, args.direction)
+        flow, lasts = Flow.staircase(omegas, args.hold), args.hold * len(omegas)
+        tasks = [running.task(args, p.replace(omega_0=omegas[0]), flow=flow, t_end=lasts)]
+    else:
+        sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
+        tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
     with running.campaign(args, "sweep", batch=args.batch) as work:
         failures = work.complete(tasks)
     whole = len(tasks) - len(failures)
@@ -56,17 +62,6 @@ def run(args: argparse.Namespace) -> int:
         for failure in failures:
             print(f"failed: {failure.task.key}: {failure.reason}", file=sys.stderr)
     return 1 if failures else 0
-
-
-def _tasks(args: argparse.Namespace) -> list[Task]:
-    """The runs, each with settings that suit its set."""
-    p, axes = options.parameters(args), [sweep.Axis.parse(text) for text in args.vary]
-    if args.direction != "held":
-        omegas = sweep.levels(axes, args.direction)
-        flow, lasts = Flow.staircase(omegas, args.hold), args.hold * len(omegas)
-        return [running.task(args, p.replace(omega_0=omegas[0]), flow=flow, t_end=lasts)]
-    sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
-    return [running.task(args, each) for each in sets]
 
 
 def collect(args: argparse.Namespace) -> int:

@@ -48,7 +48,11 @@ def run(args: argparse.Namespace) -> int:
     """Measure and judge."""
     from compare import validation  # here, because it loads everything there is
 
-    console, chosen = Console(quiet=args.json), _own_set(args)
+    console, chosen = Console(quiet=args.json), None
+    if args.parameters:
+        chosen = {args.parameters.stem: Parameters.load(args.parameters)}
+    elif args.set:
+        chosen = {args.set: Parameters.named(args.set)}
     if args.list:
         Console().print(tables.claims(CLAIMS))
         return 0
@@ -70,12 +74,6 @@ def judge(args: argparse.Namespace) -> int:
     for verdict in verdicts:
         console.print(tables.line(verdict), soft_wrap=True)
     return _finish(verdicts, [v for v in verdicts if v.outcome is not Outcome.NOT_RUN], args, console)
-
-
-def _own_set(args: argparse.Namespace) -> dict[str, Parameters] | None:
-    if args.parameters:
-        return {args.parameters.stem: Parameters.load(args.parameters)}
-    return {args.set: Parameters.named(args.set)} if args.set else None
 
 
 def _finish(

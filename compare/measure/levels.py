@@ -32,8 +32,8 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
     "edge.lines": (3, 4, 6),
     "edge.time": (20.0, 60.0, 60.0),
     # plane: points spread evenly over each plane, and added in each round
-    "plane.spread": (28, 160, 600),
-    "plane.added": ((10, 10), (60, 60, 60), (200,) * 5),
+    "plane.spread": (8, 160, 600),
+    "plane.added": ((4,), (60, 60, 60), (200,) * 5),
     # hysteresis: how long each level of the loop is held in units of 1/c, parts of a gap in which a case changes
     "hysteresis.hold": (40.0, 60.0, 100.0),
     "hysteresis.parts": (2, 4, 8),
