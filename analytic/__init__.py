@@ -2,10 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from analytic.bifurcation import Thresholds, thresholds
-from analytic.dynamics import contact_forces, vector_field
-from analytic.ensemble import Ensemble, simulate_many
-from analytic.flowmeter import (
+from analytic.bifurcation.diagram import Thresholds, thresholds
+from analytic.flowmeter.characteristic import (
     OperatingLimit,
     characteristic_slope,
     mean_slope,
@@ -15,11 +13,13 @@ from analytic.flowmeter import (
     slope_jump,
     unloading_limit,
 )
-from analytic.leaning import leaning_modes
-from analytic.settings import Settings
-from analytic.simulation import simulate
-from analytic.slip_stability import SlipStability
-from analytic.stationary import (
+from analytic.mechanics.dynamics import contact_forces, vector_field
+from analytic.simulation.ensemble import Ensemble, simulate_many
+from analytic.simulation.settings import Settings
+from analytic.simulation.simulator import simulate
+from analytic.slipping.slip_stability import SlipStability
+from analytic.stationary.leaning import leaning_modes
+from analytic.stationary.solutions import (
     Stability,
     StationarySolution,
     slowest_time_constant,
@@ -29,7 +29,7 @@ from analytic.stationary import (
 )
 
 if TYPE_CHECKING:
-    from analytic.fates import attractors
+    from analytic.orbits.fates import attractors
 
 __all__ = [
     "Ensemble",
@@ -63,7 +63,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """`attractors` when it is asked for: the formulas don't wait for its integrators and statistics to load."""
     if name == "attractors":
-        from analytic.fates import attractors
+        from analytic.orbits.fates import attractors
 
         return attractors
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -4,17 +4,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from compare.claims.claim import Claim, Outcome, Verdict
-    from compare.measure.check import Check
-    from compare.measure.levels import Level
+    from compare.claim import Claim, Outcome, Verdict
+    from compare.kit.check import Check
+    from compare.kit.levels import Level
     from compare.validation import validate
 
 __all__ = ["Check", "Claim", "Level", "Outcome", "Verdict", "validate"]
 
-_CLAIM = "compare.claims.claim"
+_CLAIM = "compare.claim"
 _MODULES = dict.fromkeys(("Claim", "Outcome", "Verdict"), _CLAIM) | {
-    "Check": "compare.measure.check",
-    "Level": "compare.measure.lab",
+    "Check": "compare.kit.check",
+    "Level": "compare.kit.lab",
     "validate": "compare.validation",
 }
 

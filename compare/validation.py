@@ -11,22 +11,22 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Claim, Outcome, Verdict
-from compare.claims.judge import forget, judge, select, verdict
-from compare.figures.drawing import Material
-from compare.measure import programme, record
-from compare.measure.lab import Lab
-from compare.measure.levels import Level
-from compare.measure.programme import PROTOCOLS
-from compare.measure.record import Records
+from compare.bench import scores
+from compare.catalogue import CLAIMS
+from compare.claim import Claim, Outcome, Verdict
+from compare.judge import forget, judge, select, verdict
+from compare.kit import programme, record
+from compare.kit.campaign import Campaign
+from compare.kit.drawing import Material
+from compare.kit.engines import MUJOCO, Engine
+from compare.kit.lab import Lab
+from compare.kit.levels import Level
+from compare.kit.programme import PROTOCOLS
+from compare.kit.progress import Show, Whole, nowhere
+from compare.kit.record import Records
+from compare.kit.workers import Spread, Workers, spread
 from compare.report import results
 from compare.report.results import Summary
-from compare.runs.campaign import Campaign
-from compare.runs.engines import MUJOCO, Engine
-from compare.runs.progress import Show, Whole, nowhere
-from compare.runs.workers import Spread, Workers, spread
-from compare.scorecard import scores
 from model import Parameters
 
 Announce = Callable[[Verdict], None]

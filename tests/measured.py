@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import analytic
-from compare.measure.record import Condition, Measurement, Records
+from compare.kit.record import Condition, Measurement, Records
 from model import Parameters
 
 

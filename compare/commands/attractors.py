@@ -13,15 +13,15 @@ import numpy as np
 from rich.table import Table
 
 import analytic
-from analytic import orbit_branch
-from analytic.fates import LASTING, Attractor
-from analytic.orbits import Orbit
-from compare import pages
+from analytic.orbits import orbit_branch
+from analytic.orbits.fates import LASTING, Attractor
+from analytic.orbits.periodic import Orbit
 from compare.commands import options, running
-from compare.runs.engines import EVENT
-from compare.runs.sweep import Axis, grid
-from compare.runs.tasks import carry_out
-from compare.statistics import plain
+from compare.kit import pages
+from compare.kit.engines import EVENT
+from compare.kit.statistics import plain
+from compare.kit.sweep import Axis, grid
+from compare.kit.tasks import carry_out
 from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text

@@ -10,10 +10,10 @@ from typing import Any
 
 from rich.console import Console
 
-from analytic import design
-from analytic.design import Interval, Request
+from analytic.flowmeter import design
+from analytic.flowmeter.design import Interval, Request
 from compare.commands import options
-from compare.statistics import plain
+from compare.kit.statistics import plain
 from model import InputError, Parameters, drag, parameters
 from model.files import check_writable, write_text
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names, check_number, refuse_missing

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.console import Console
 
+from compare.bench import native
+from compare.bench.native import CHOICES, Native
+from compare.bench.trials import SLIPPING
 from compare.commands import options, running
-from compare.runs import engines, progress
-from compare.scorecard import native
-from compare.scorecard.native import CHOICES, Native
-from compare.scorecard.trials import SLIPPING
+from compare.kit import engines, progress
 from mjsim import ContactSettings
 from model import InputError
 from model.files import check_writable, write_text
 
 if TYPE_CHECKING:
-    from compare.scorecard.league import Contestant
+    from compare.bench.league import Contestant
 
 _NUMBERS = {"timestep": float, "impratio": float, "iterations": int, "tolerance": float, "noslip_iterations": int}
 _PAIR: dict[str, tuple[Any, Any, str | None]] = {
@@ -56,7 +56,7 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Grade the settings and show the card."""
-    from compare.scorecard import grade  # here, because nothing else needs it
+    from compare.bench import grade  # here, because nothing else needs it
 
     if args.output:
         check_writable(args.output)
@@ -102,7 +102,7 @@ def _of_mujoco(args: argparse.Namespace) -> tuple[Native, str]:
 
 def _of_another(args: argparse.Namespace) -> tuple[list[Contestant], str]:
     """Another engine in its best settings and as it comes, also in words."""
-    from compare.scorecard.league import Contestant  # here, because nothing else needs it
+    from compare.bench.league import Contestant  # here, because nothing else needs it
 
     engine: engines.Engine = args.engine
     if engine.missing:

@@ -9,9 +9,9 @@ from typing import Any
 
 from rich.console import Console
 
-from compare import pages
 from compare.commands import options, running
-from compare.runs.engines import ENGINES
+from compare.kit import pages
+from compare.kit.engines import ENGINES
 from model import InputError
 from model.files import make_directory, write_text
 from model.parameters import check_names
@@ -34,7 +34,7 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure what isn't there yet, show the table, write JSON and page."""
-    from compare.scorecard import league  # here, because nothing else needs it
+    from compare.bench import league  # here, because nothing else needs it
 
     check_names(args.engine or (), list(ENGINES), "engine")
     those = league.contestants(args.engine, league.QUICK if args.quick else league.STEPS)
@@ -60,9 +60,9 @@ def run(args: argparse.Namespace) -> int:
 
 def html(data: dict[str, Any]) -> str:
     """The league of `league.to_mapping` as one page, which needs nothing but itself."""
-    from compare.figures import settings  # here, because drawing takes a second to load
+    from compare.bench import figures as settings  # here, because drawing takes a second to load
+    from compare.bench import league
     from compare.report.pictures import address, svg
-    from compare.scorecard import league
 
     entries = league.from_mapping(data)
     failures = [

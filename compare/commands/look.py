@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 
 from compare.commands import options, running
+from compare.kit import collection
 from compare.report import results
-from compare.runs import collection
 from compare.view import inspection
 from mjsim import ContactSettings
 from model import Flow, InputError, storage
@@ -70,8 +70,8 @@ def report(args: argparse.Namespace) -> int:
 
 def figures(args: argparse.Namespace) -> int:
     """Draw every figure; one whose results are missing is named."""
+    from compare import gallery as registry
     from compare import validation  # here, because drawing takes a second to load
-    from compare.figures import registry
 
     if args.results and not args.results.is_dir():
         raise InputError(f"cannot read {args.results}: there is no such directory")
@@ -89,7 +89,8 @@ def inspect(args: argparse.Namespace) -> int:
         options.show(collection.describe(args.file), collection.table, args.json)
         return 0
     if args.plot:
-        from compare.figures import drawing, trajectory  # here, because drawing takes a second to load
+        from compare.kit import drawing
+        from compare.view import plot as trajectory  # here, because drawing takes a second to load
 
         drawing.save(trajectory.draw(storage.load(args.file)), args.plot)
     options.show(inspection.describe(args.file), inspection.table, args.json)

@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.console import Console
 
-from compare.pages import readable
+from compare.kit.pages import readable
 from model import Parameters, drag
 
 Parser = argparse.ArgumentParser
@@ -42,7 +42,7 @@ def command(
 
 
 def add_axes(parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any) -> None:
-    """An option, to be given once or more often, for `compare.runs.sweep.Axis`."""
+    """An option, to be given once or more often, for `compare.kit.sweep.Axis`."""
     parser.add_argument(option, action="append", metavar=form, help=meaning, **{"default": [], **more})
 
 

@@ -13,11 +13,13 @@ from rich.console import Console
 from rich.table import Table
 
 import analytic
-from analytic import StationarySolution, drag, fluid_inertia
+from analytic import StationarySolution
+from analytic.bifurcation import fluid_inertia
+from analytic.mechanics import drag
 from compare.commands import options
-from compare.measure.quantities import QUANTITIES
-from compare.pages import readable
-from compare.statistics import plain
+from compare.kit.pages import readable
+from compare.kit.quantities import QUANTITIES
+from compare.kit.statistics import plain
 from model import Case, Parameters
 from model.drag import REYNOLDS, SCHILLER_NAUMANN
 from model.kinematics import UNITS, VARIABLES

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from compare.commands.options import given, number
-from compare.runs import engines, progress
-from compare.runs.campaign import Campaign
-from compare.runs.engines import Settings
-from compare.runs.tasks import Task
-from compare.runs.workers import Workers, dask, processes
+from compare.kit import engines, progress
+from compare.kit.campaign import Campaign
+from compare.kit.engines import Settings
+from compare.kit.tasks import Task
+from compare.kit.workers import Workers, dask, processes
 from model import Flow, InputError, Parameters, State
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import POSITIVE, check_names, check_number, parse_number

@@ -10,11 +10,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.markdown import Markdown
 
-from analytic.ensemble import interval
+from analytic.simulation.ensemble import interval
 from compare.commands import options, running
-from compare.runs import progress, search
-from compare.runs.search import BOX, FATES, Search, Searched
-from compare.runs.sweep import Axis
+from compare.kit import progress
+from compare.kit.sweep import Axis
+from compare.subjects.attractors import search
+from compare.subjects.attractors.search import BOX, FATES, Search, Searched
 from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import POSITIVE, Range, check_number

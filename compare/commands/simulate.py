@@ -8,8 +8,8 @@ import tempfile
 from pathlib import Path
 
 from compare.commands import options, running
-from compare.runs.tasks import failed_path, journal_path, store
-from compare.runs.workers import interrupts
+from compare.kit.tasks import failed_path, journal_path, store
+from compare.kit.workers import interrupts
 from compare.view import inspection
 from model.files import check_writable
 

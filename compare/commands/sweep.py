@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from compare.commands import options, running
-from compare.runs import campaign, collection, sweep
+from compare.kit import campaign, collection, sweep
 from model import Flow
 
 

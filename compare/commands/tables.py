@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from rich.table import Table
 from rich.text import Text
 
-from compare import pages
-from compare.claims.claim import Claim, Outcome, Verdict
+from compare.claim import Claim, Outcome, Verdict
+from compare.kit import pages
 from compare.report import wording
 
 _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}

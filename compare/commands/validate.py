@@ -9,12 +9,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Outcome, Verdict
+from compare.catalogue import CLAIMS
+from compare.claim import Outcome, Verdict
 from compare.commands import options, running, tables
-from compare.measure.levels import Level
+from compare.kit import progress
+from compare.kit.levels import Level
 from compare.report import results
-from compare.runs import progress
 from model import Parameters
 
 

@@ -11,11 +11,12 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
-from analytic import drag, flowmeter
-from analytic.design import THRESHOLDS, Choice, Design
-from analytic.flowmeter import End
-from compare import pages
-from compare.measure.quantities import QUANTITIES
+from analytic.flowmeter import characteristic as flowmeter
+from analytic.flowmeter.characteristic import End
+from analytic.flowmeter.design import THRESHOLDS, Choice, Design
+from analytic.mechanics import drag
+from compare.kit import pages
+from compare.kit.quantities import QUANTITIES
 
 SYMBOLS = {"mu": "μ", "eta": "η", "rho_b": "ρ_b", "rho_f": "ρ_f", "nu_f": "ν_f"}
 SYMBOLS |= {key: QUANTITIES[key].symbol for key in THRESHOLDS}
@@ -125,8 +126,8 @@ def described(made: Design) -> dict[str, Any]:
 
 def page(made: Design) -> str:
     """All of it as a page that needs nothing but itself."""
-    from compare.figures import meter as figures  # here, because drawing takes a second to load
     from compare.report import pictures
+    from compare.subjects.flowmeter.figures import meter as figures  # here, because drawing takes a second to load
 
     r, bounds = made.request, made.request.bounds[made.material]
     response = f", time constant up to {r.response:g} s" if math.isfinite(r.response) else ""

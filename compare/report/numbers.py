@@ -9,9 +9,9 @@ import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compare.measure.check import Check
-from compare.measure.record import Measurement, Records
-from compare.pages import readable
+from compare.kit.check import Check
+from compare.kit.pages import readable
+from compare.kit.record import Measurement, Records
 from compare.report import wording
 
 

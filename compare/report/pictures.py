@@ -14,8 +14,8 @@ import matplotlib
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from compare.figures.drawing import Drawing
-from compare.runs.tasks import sources
+from compare.kit.drawing import Drawing
+from compare.kit.tasks import sources
 from model.files import write_text
 
 _PROGRAM = ("model", "analytic", "compare", "compare.runs", "compare.measure", "compare.scorecard", "compare.figures")

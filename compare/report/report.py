@@ -12,14 +12,14 @@ from typing import Any
 
 from markdown_it import MarkdownIt
 
-from compare import pages
-from compare.claims.claim import Outcome, Verdict
-from compare.figures.drawing import Drawing, GapError, Material
-from compare.figures.registry import FIGURES, figures_of
-from compare.measure.levels import Level
+from compare.claim import Outcome, Verdict
+from compare.gallery import FIGURES, figures_of
+from compare.kit import pages
+from compare.kit.drawing import Drawing, GapError, Material
+from compare.kit.levels import Level
+from compare.kit.workers import Spread
 from compare.report import numbers, pictures, results, wording
 from compare.report.results import Summary
-from compare.runs.workers import Spread
 from model import storage
 from model.errors import StorageError
 from model.files import make_directory, write_text

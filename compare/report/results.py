@@ -12,12 +12,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from compare.claims.claim import Verdict
-from compare.measure import record
-from compare.measure.check import Check
-from compare.measure.levels import Level
-from compare.measure.record import Records
-from compare.statistics import plain
+from compare.claim import Verdict
+from compare.kit import record
+from compare.kit.check import Check
+from compare.kit.levels import Level
+from compare.kit.record import Records
+from compare.kit.statistics import plain
 from model.errors import StorageError
 from model.files import make_directory, write_text
 from model.trajectory import current_commit, current_versions

@@ -6,11 +6,11 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from compare.claims.claim import Outcome, Text, Verdict
-from compare.measure.check import Check
-from compare.measure.quantities import QUANTITIES, quantity
-from compare.measure.record import Condition, Measurement
-from compare.pages import readable
+from compare.claim import Outcome, Text, Verdict
+from compare.kit.check import Check
+from compare.kit.pages import readable
+from compare.kit.quantities import QUANTITIES, quantity
+from compare.kit.record import Condition, Measurement
 from model import Case
 
 SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {

@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.table import Table
 
-from compare import pages
+from compare.kit import pages
 from model import Case, Flow, Parameters, storage
 from model.kinematics import UNITS, VARIABLES
 

@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from PIL import Image, ImageDraw, ImageFont
 
-from compare.figures import style
-from compare.figures.style import BALL, FORCE, INK, SLIP
+from compare.kit import style
+from compare.kit.style import BALL, FORCE, INK, SLIP
 from compare.view import stage
 from model import Case, InputError, StorageError, Trajectory
 from model.files import check_writable

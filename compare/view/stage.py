@@ -23,8 +23,8 @@ from mujoco.rendering.classic import gl_context
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from compare.figures import style
-from compare.figures.style import BALL, FORCE, SLIP
+from compare.kit import style
+from compare.kit.style import BALL, FORCE, SLIP
 from mjsim import ContactSettings, scene
 from model import Case, InputError, Trajectory
 from model.arrays import Array

@@ -26,8 +26,8 @@ from rich.console import Console
 
 import analytic
 import mjsim
-from compare.runs.engines import newcomer
-from compare.scorecard import grade, native
+from compare.bench import grade, native
+from compare.kit.engines import newcomer
 from mjsim import ContactSettings
 from model import Case, Parameters
 

@@ -28,7 +28,7 @@ import numpy as np
 
 import analytic
 import mjsim
-from analytic.bifurcation import threshold_curves
+from analytic.bifurcation.diagram import threshold_curves
 from model import Case, Flow, Parameters
 
 plt.rcParams |= {

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analytic import rolling_forces
-from compare.pages import Rows
-from compare.runs.campaign import Campaign
-from compare.runs.engines import MUJOCO
-from compare.scorecard.league import Contestant, number
-from compare.scorecard.trials import APPROACH, AT_REST, HITTING, LANDING, SMOOTH, STATES, WINDOW, Stationary
+from analytic.mechanics import rolling_forces
+from compare.bench.league import Contestant, number
+from compare.bench.trials import APPROACH, AT_REST, HITTING, LANDING, SMOOTH, STATES, WINDOW, Stationary
+from compare.kit.campaign import Campaign
+from compare.kit.engines import MUJOCO
+from compare.kit.pages import Rows
 from mjsim import ContactSettings
 from model import Case, Contact, Events, State, Trajectory
 

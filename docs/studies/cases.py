@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
-from analytic.slip_stability import LIFT_ARROWS, SLIP_ARROWS
-from compare.figures import style
+from analytic.slipping.slip_stability import LIFT_ARROWS, SLIP_ARROWS
+from compare.kit import style
 from model import Case, Contact
 from model.cases import TRAITS
 

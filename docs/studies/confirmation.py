@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.scorecard import trials
-from compare.scorecard.trials import EPS
+from compare.bench import trials
+from compare.bench.trials import EPS
 from mjsim import ContactSettings, Run, simulate
 from model import Flow, State
 from model.arrays import Array

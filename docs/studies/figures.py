@@ -9,8 +9,8 @@ from pathlib import Path
 
 import matplotlib
 
-from compare.figures import drawing
-from compare.runs.search import Basins, Searched
+from compare.kit import drawing
+from compare.subjects.attractors.search import Basins, Searched
 from docs.studies import cases, hopping
 from model.files import make_directory
 

@@ -10,9 +10,9 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analytic.ensemble import interval
-from compare.figures import style
-from compare.runs.search import FATES, LOGARITHMIC, Basins, Searched
+from analytic.simulation.ensemble import interval
+from compare.kit import style
+from compare.subjects.attractors.search import FATES, LOGARITHMIC, Basins, Searched
 from model.kinematics import UNITS, VARIABLES
 
 _PAIRS = (("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0"))

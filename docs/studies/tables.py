@@ -14,13 +14,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from compare import pages
-from compare.pages import Rows
-from compare.runs import progress
-from compare.runs.campaign import Campaign
-from compare.runs.engines import newcomer
-from compare.scorecard import league, scores
-from compare.scorecard.league import Entry
+from compare.bench import league, scores
+from compare.bench.league import Entry
+from compare.kit import pages, progress
+from compare.kit.campaign import Campaign
+from compare.kit.engines import newcomer
+from compare.kit.pages import Rows
 from docs.studies import accuracy, confirmation
 from mjsim import ContactSettings
 from model import InputError

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from analytic import slipping_branch as sb
 from analytic import stationary_solutions, thresholds
-from analytic.bifurcation import (
+from analytic.bifurcation.diagram import (
     Exists,
     case_map,
     critical_drag,
@@ -17,6 +16,7 @@ from analytic.bifurcation import (
     threshold_curves,
     wall_spin,
 )
+from analytic.stationary import slipping_branch as sb
 from model import Case, InputError, Parameters
 
 P = Parameters.named("reference")

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from analytic import charts, contact_forces, flight, motion, two_point_rolling, vector_field
-from analytic.rigid_body import energy, velocities
+from analytic import contact_forces, vector_field
+from analytic.mechanics import flight
+from analytic.mechanics.rigid_body import energy, velocities
+from analytic.simulation import charts, motion, two_point_rolling
 from model import Case, Contact, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS

@@ -15,10 +15,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from analytic import dynamics, rolling_forces, simulate, solution, thresholds, transitions, two_point_rolling
-from analytic.contact_problem import Closed, solve
-from analytic.motion import Moment
-from analytic.rigid_body import slip_at_A, slip_at_B, smooth_rates, velocities
+from analytic import simulate, solution, thresholds
+from analytic.mechanics import dynamics, rolling_forces
+from analytic.mechanics.contact_problem import Closed, solve
+from analytic.mechanics.rigid_body import slip_at_A, slip_at_B, smooth_rates, velocities
+from analytic.simulation import transitions, two_point_rolling
+from analytic.simulation.motion import Moment
 from model import Case, Contact, SimulationError, State
 from tests.random_motions import UNIT, P, random_start
 

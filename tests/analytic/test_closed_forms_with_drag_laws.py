@@ -1,6 +1,6 @@
 """Stationary solutions, fold, eigenvalues and slip bounds under every law of drag, against brute force.
 
-The law, the branch of SS and the equations of motion are written out here again: nothing of `analytic.drag`,
+The law, the branch of SS and the equations of motion are written out here again: nothing of `analytic.mechanics.drag`,
 `slipping_branch` or `dynamics` is used for what is expected.
 """
 
@@ -19,8 +19,6 @@ from analytic import (
     characteristic_slope,
     leaning_modes,
     mean_slope,
-    slip_bounds,
-    slip_stability,
     slope_jump,
     slowest_time_constant,
     solution,
@@ -28,9 +26,10 @@ from analytic import (
     thresholds,
     vector_field,
 )
-from analytic import slipping_branch as sb
-from analytic.bifurcation import case_map, critical_drag, double_points, number_of_folds, threshold_curves
-from analytic.branch_stability import eigenvalues_at
+from analytic.bifurcation.diagram import case_map, critical_drag, double_points, number_of_folds, threshold_curves
+from analytic.slipping import slip_bounds, slip_stability
+from analytic.stationary import slipping_branch as sb
+from analytic.stationary.branch_stability import eigenvalues_at
 from model import Case, Contact, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS, QUADRATIC, SCHILLER_NAUMANN, STOKES

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analytic import contact_forces
-from analytic.contact_problem import Closed, NotConvergedError, solve, unlocked
-from analytic.rigid_body import (
+from analytic.mechanics.contact_problem import Closed, NotConvergedError, solve, unlocked
+from analytic.mechanics.rigid_body import (
     Velocities,
     contact_work,
     energy,

@@ -9,7 +9,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from analytic import bifurcation, design, operating_range, solution, stable_solutions, thresholds
+from analytic import operating_range, solution, stable_solutions, thresholds
+from analytic.bifurcation import diagram as bifurcation
+from analytic.flowmeter import design
 from model import Case, InputError, Parameters
 
 WATER = partial(Parameters.from_fluid, nu_f=1.004e-6, rho_f=998.2, gravity=9.81)

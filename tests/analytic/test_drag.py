@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analytic import drag, stokes
+from analytic.mechanics import drag, stokes
 from model import Parameters
 from model.drag import LAWS
 from tests.drag_laws import BALL, BY_LAW, resistance

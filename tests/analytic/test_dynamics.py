@@ -15,8 +15,9 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analytic import contact_forces, dynamics, vector_field
-from analytic.rigid_body import Forces
+from analytic import contact_forces, vector_field
+from analytic.mechanics import dynamics
+from analytic.mechanics.rigid_body import Forces
 from model import Case, Contact, InputError, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS

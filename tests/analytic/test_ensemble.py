@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from analytic import Settings, simulate, simulate_many, stationary_solutions
-from analytic.compiling import compiled, forget_stale
+from analytic.simulation.compiling import compiled, forget_stale
 from model import Case, Flow, InputError, Parameters, State
 
 P = Parameters.named("reference")

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analytic import attractors, ensemble, fates, orbits, stable_solutions
-from analytic.fates import Kind, Run
+from analytic import attractors, stable_solutions
+from analytic.orbits import fates
+from analytic.orbits import periodic as orbits
+from analytic.orbits.fates import Kind, Run
+from analytic.simulation import ensemble
 from model import Case, Events, Flow, Header, InputError, Parameters, Trajectory
 from model.arrays import Array
 from model.trajectory import SAMPLE

@@ -17,7 +17,7 @@ from analytic import (
     thresholds,
     unloading_limit,
 )
-from analytic.flowmeter import End
+from analytic.flowmeter.characteristic import End
 from model import Case, InputError, Parameters
 
 P = Parameters.named("reference")

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analytic import fluid_inertia
+from analytic.bifurcation import fluid_inertia
 from model import Parameters
 
 BALL = Parameters.named("steel-in-water")

@@ -12,8 +12,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from analytic import integrator, rolling_forces, simulate, stationary_solutions, vector_field
-from analytic.dynamics import newton_euler
+from analytic import simulate, stationary_solutions, vector_field
+from analytic.mechanics import rolling_forces
+from analytic.mechanics.dynamics import newton_euler
+from analytic.simulation import integrator
 from model import Case, Flow, Parameters, SimulationError
 
 P = Parameters.named("reference")
@@ -157,7 +159,7 @@ def test_costs_at_most_twice_a_bare_integrator(monkeypatch):
         calls.append(None)
         return newton_euler(*args)
 
-    monkeypatch.setattr("analytic.dynamics.newton_euler", counted)
+    monkeypatch.setattr("analytic.mechanics.dynamics.newton_euler", counted)
     simulate(p, x0, 10.0, rtol=rtol, sample_interval=10.0)
     monkeypatch.undo()
     natural = np.array([1.0, p.R / p.r, p.R / p.r, p.R / p.r]) * math.sqrt(p.g / p.R)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from analytic import contact_forces, dynamics, leaning_modes, simulate, solution
+from analytic import contact_forces, leaning_modes, simulate, solution
+from analytic.mechanics import dynamics
 from model import Case, InputError, Parameters, State
 
 P = Parameters.named("high-wall-friction")

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from analytic import branch_stability, orbit_branch, orbits, simulate, thresholds
-from analytic.orbit_branch import Bifurcation
-from analytic.orbits import NoOrbitError, Orbit
+from analytic import simulate, thresholds
+from analytic.orbits import orbit_branch
+from analytic.orbits import periodic as orbits
+from analytic.orbits.orbit_branch import Bifurcation
+from analytic.orbits.periodic import NoOrbitError, Orbit
+from analytic.stationary import branch_stability
 from model import Case, InputError, Parameters, State
 
 HOPPING = Parameters.named("hopping")

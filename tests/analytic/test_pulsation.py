@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from analytic import pulsation, response, simulate, stationary, thresholds
+from analytic import simulate, thresholds
+from analytic.flowmeter import pulsation, response
+from analytic.stationary import solutions as stationary
 from model import Case, Flow, Parameters
 
 REFERENCE = Parameters.named("reference")

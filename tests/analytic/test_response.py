@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import analytic
-from analytic import response
+from analytic.flowmeter import response
 from model import Case, Contact, Flow, InputError, Parameters
 
 P = Parameters.named("reference")

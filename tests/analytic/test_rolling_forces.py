@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analytic import contact_forces, rolling_forces
-from analytic.dynamics import newton_euler, rolling_family
+from analytic import contact_forces
+from analytic.mechanics import rolling_forces
+from analytic.mechanics.dynamics import newton_euler, rolling_family
 from model import Case, InputError, Parameters, State
 
 P = Parameters.named("reference")

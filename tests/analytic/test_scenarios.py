@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analytic import scenarios
+from analytic.simulation import scenarios
 from model import Case, Parameters
 
 ROUGH = Parameters.named("high-wall-friction")

@@ -256,7 +256,10 @@ def test_flow_with_a_sample_that_is_not_finite_is_refused():
 @pytest.mark.parametrize("method", METHODS)
 def test_interruption_keeps_what_there_is(method, monkeypatch):
     """Ctrl-C in the middle of the equations: the samples so far, and a header that says where it stopped."""
-    name = {"event": "analytic.dynamics.newton_euler", "time-stepping": "analytic.stepping.advance"}[method]
+    name = {
+        "event": "analytic.mechanics.dynamics.newton_euler",
+        "time-stepping": "analytic.simulation.stepping.advance",
+    }[method]
     calls = iter(range(10**9))
 
     def stop(*args):

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from analytic import contact_forces, dynamics, slip_bounds, slip_stability, thresholds, vector_field
-from analytic.rigid_body import Forces
-from analytic.slip_bounds import HeldBound, SlipBound
+from analytic import contact_forces, thresholds, vector_field
+from analytic.mechanics import dynamics
+from analytic.mechanics.rigid_body import Forces
+from analytic.slipping import slip_bounds, slip_stability
+from analytic.slipping.slip_bounds import HeldBound, SlipBound
 from model import Case, InputError, Parameters, State
 
 P = Parameters.named("reference")

@@ -11,8 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize
 
-from analytic import contact_forces, dynamics, rolling_forces, stationary_solutions, thresholds, vector_field
-from analytic import slip_stability as slip
+from analytic import contact_forces, stationary_solutions, thresholds, vector_field
+from analytic.mechanics import dynamics, rolling_forces
+from analytic.slipping import slip_stability as slip
 from model import Case, InputError, Parameters, State
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, angular_velocity

@@ -19,9 +19,9 @@ from analytic import (
     thresholds,
     vector_field,
 )
-from analytic import branch_stability as stability
-from analytic.jacobian import jacobian
-from analytic.slipping_branch import branch, fold, points_at
+from analytic.mechanics.jacobian import jacobian
+from analytic.stationary import branch_stability as stability
+from analytic.stationary.slipping_branch import branch, fold, points_at
 from model import Case, InputError, Parameters, State
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, slip_speeds

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from analytic import Settings, simulate, stationary_solutions, thresholds
-from analytic.stepping import TOLERANCE, step
-from analytic.time_stepping import prepared
+from analytic.simulation.stepping import TOLERANCE, step
+from analytic.simulation.time_stepping import prepared
 from model import Case, Flow, InputError, Parameters, SimulationError, State
 
 P = Parameters.named("reference")

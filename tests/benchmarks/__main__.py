@@ -8,7 +8,7 @@ from __future__ import annotations
 from rich.console import Console
 
 from analytic import stable_solutions
-from compare import pages
+from compare.kit import pages
 from tests.benchmarks import campaigns, loop
 
 

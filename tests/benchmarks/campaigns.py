@@ -13,10 +13,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from compare.runs.campaign import Campaign, run_batch
-from compare.runs.engines import MUJOCO
-from compare.runs.tasks import Task, carry_out
-from compare.runs.workers import Workers, dask, processes
+from compare.kit.campaign import Campaign, run_batch
+from compare.kit.engines import MUJOCO
+from compare.kit.tasks import Task, carry_out
+from compare.kit.workers import Workers, dask, processes
 from model import Parameters, State, storage
 
 BATCH = 64

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from compare.figures.registry import FIGURES
-from compare.measure.lab import Lab
-from compare.measure.levels import Level
+from compare.gallery import FIGURES
+from compare.kit.campaign import Campaign
+from compare.kit.engines import MUJOCO
+from compare.kit.lab import Lab
+from compare.kit.levels import Level
 from compare.report import report
-from compare.runs.campaign import Campaign
-from compare.runs.engines import MUJOCO
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import analytic
-from analytic import orbits
+from analytic.orbits import periodic as orbits
 from compare.commands.cli import main
-from compare.measure import attractors
-from compare.measure.trials import finer
-from compare.statistics import hops
+from compare.kit.statistics import hops
+from compare.kit.trials import finer
+from compare.subjects.attractors import measure as attractors
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.arrays import Array
 from model.trajectory import SAMPLE

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare.runs.campaign import FAILURES, Campaign, Failure, run_batch
-from compare.runs.tasks import Task, carry_out
-from compare.runs.workers import dask, spread
+from compare.kit.campaign import FAILURES, Campaign, Failure, run_batch
+from compare.kit.tasks import Task, carry_out
+from compare.kit.workers import dask, spread
 from model import InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 
@@ -94,7 +94,7 @@ def test_no_more_is_held_than_there_is_memory_for(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(storage, "load_runs", lambda path: [loaded.append(path), read(path)][1])
     for room, times in ((2**19, (0, 0, 2)), (500, (2, 4, 8))):
         with Campaign(tmp_path / str(room), workers=0, batch=2) as campaign:
-            monkeypatch.setattr("compare.runs.campaign.READ", room)
+            monkeypatch.setattr("compare.kit.campaign.READ", room)
             for count in times[:2]:
                 campaign.run(tasks(4))
                 assert len(loaded) == count
@@ -219,7 +219,7 @@ PROGRAM = """
 import sys
 sys.path.insert(0, {here!r})
 import test_campaign
-from compare.runs.campaign import Campaign
+from compare.kit.campaign import Campaign
 if __name__ == "__main__":
     with Campaign({directory!r}, workers=2, batch=1) as campaign:
         campaign.complete(test_campaign.tasks())
@@ -269,7 +269,7 @@ def deadly(tasks, *where):
 def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
     tmp_path: Path, undisturbed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("compare.runs.campaign.run_batch", deadly)
+    monkeypatch.setattr("compare.kit.campaign.run_batch", deadly)
     with Campaign(tmp_path, workers=2, batch=3) as campaign:
         failures = campaign.complete(tasks())
     assert failures == [Failure(tasks()[2], "its worker died (killed, or out of memory)")]
@@ -361,7 +361,7 @@ def test_a_killed_dask_worker_does_not_stop_the_campaign(tmp_path: Path, undistu
 
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("compare.runs.workers.PATIENCE", 0.5)
+    monkeypatch.setattr("compare.kit.workers.PATIENCE", 0.5)
     with pytest.raises(InputError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1"):
         dask("tcp://127.0.0.1:1")
 
@@ -394,7 +394,7 @@ def test_bad_starts(x0: object, says: str) -> None:
 LONG_PROGRAM = """
 import sys
 from compare.runs import tasks
-from compare.runs.campaign import Campaign
+from compare.kit.campaign import Campaign
 from mjsim.journal import Journal
 from model import Parameters
 tasks.LONG = 1000
@@ -435,7 +435,7 @@ def test_workers_end_with_a_killed_campaign(tmp_path: Path) -> None:
     program = tmp_path / "campaign.py"
     program.write_text("""
 import time
-from compare.runs.workers import processes
+from compare.kit.workers import processes
 if __name__ == "__main__":
     work = processes(1).start().submit(time.sleep, 600)
     while not work.running():
@@ -478,8 +478,8 @@ def test_interrupted_by_the_keyboard(tmp_path: Path) -> None:
 def test_ten_million_steps_stay_small(tmp_path: Path) -> None:
     program = f"""
 import resource
-from compare.runs.campaign import Campaign
-from compare.runs.tasks import Task
+from compare.kit.campaign import Campaign
+from compare.kit.tasks import Task
 from model import Parameters
 task = Task(
     engine="mujoco", parameters=Parameters.named("reference"), x0=(0.0,) * 8, t_end=1e4, sample_interval=1e-2

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 
-from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Text
-from compare.measure.levels import Level
-from compare.measure.programme import PROTOCOLS, needed
-from compare.measure.sets import COUNT, sets
+from compare.catalogue import CLAIMS
+from compare.claim import Text
+from compare.kit.levels import Level
+from compare.kit.programme import PROTOCOLS, needed
+from compare.kit.sets import COUNT, sets
 
 SHOWN = {"newcomer"}
 """Measured for a figure only: nothing is claimed of MuJoCo's defaults."""

@@ -13,7 +13,7 @@ import pytest
 import xarray
 
 from compare.commands import cli
-from compare.runs.sweep import FIELDS
+from compare.kit.sweep import FIELDS
 from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
 from model.trajectory import columns
@@ -48,7 +48,7 @@ def test_predict_waits_for_no_heavy_package() -> None:
     """Formulas need numpy only; the engines, scipy and the figures would take most of a second to load."""
     code = "import sys; from compare.commands import cli; cli.main(['predict']); print(*sys.modules, file=sys.stderr)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stderr.split()
-    assert "analytic.stationary" in loaded
+    assert "analytic.stationary.solutions" in loaded
     assert not {"h5py", "matplotlib", "mujoco", "numba", "scipy"} & set(loaded)
 
 

@@ -11,9 +11,9 @@ import pytest
 import xarray
 
 from compare.commands import cli
-from compare.runs import collection
-from compare.runs.campaign import Campaign
-from compare.runs.tasks import Task
+from compare.kit import collection
+from compare.kit.campaign import Campaign
+from compare.kit.tasks import Task
 from model import Parameters, StorageError, storage
 from model.files import dataset, reading
 

@@ -11,17 +11,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import analytic
+from compare.bench import grade, league
+from compare.bench.league import CASES, COST, Contestant, Entry
+from compare.bench.trials import HITTING, LANDING, ROLLING, STATES
 from compare.commands import cli
-from compare.measure import settled
-from compare.measure.lab import Lab
-from compare.measure.levels import Level
-from compare.measure.record import Records
-from compare.runs.campaign import Campaign
-from compare.runs.engines import ENGINES, NEWCOMER
-from compare.runs.tasks import Task, carry_out, store
-from compare.scorecard import grade, league
-from compare.scorecard.league import CASES, COST, Contestant, Entry
-from compare.scorecard.trials import HITTING, LANDING, ROLLING, STATES
+from compare.kit.campaign import Campaign
+from compare.kit.engines import ENGINES, NEWCOMER
+from compare.kit.lab import Lab
+from compare.kit.levels import Level
+from compare.kit.record import Records
+from compare.kit.tasks import Task, carry_out, store
+from compare.subjects.stationary import measure as settled
 from model import InputError, Parameters, State
 from model.drag import LAWS
 from model.kinematics import Motion as World

@@ -14,15 +14,22 @@ import pytest
 
 import analytic
 import mjsim
-from analytic import orbit_branch, thresholds
-from compare.claims.catalogue import CLAIMS
-from compare.figures import bifurcation_diagrams, deviations, drawing, registry, slipping, style, unloading, unsteady
-from compare.figures.drawing import Diagram, GapError, Material, Motion
-from compare.figures.registry import FIGURES, figures_of
-from compare.measure.check import Check
-from compare.measure.record import Measurement, Records
-from compare.runs.engines import ENGINES
-from compare.scorecard.league import COST, Entry
+from analytic import thresholds
+from analytic.orbits import orbit_branch
+from compare import gallery as registry
+from compare.bench.league import COST, Entry
+from compare.catalogue import CLAIMS
+from compare.gallery import FIGURES, figures_of
+from compare.kit import drawing, style
+from compare.kit.check import Check
+from compare.kit.drawing import Diagram, GapError, Material, Motion
+from compare.kit.engines import ENGINES
+from compare.kit.record import Measurement, Records
+from compare.subjects.flowmeter.figures import unloading
+from compare.subjects.slipping import figures as slipping
+from compare.subjects.stationary import figures as deviations
+from compare.subjects.thresholds.figures import bifurcation_diagrams
+from compare.subjects.unsteady import figures as unsteady
 from model import Case, InputError, Parameters, StorageError
 
 DEPENDS = dict.fromkeys(FIGURES, "μηjκ") | {"fig-7": "μjκ", "fig-8": "jκ"}

@@ -15,14 +15,13 @@ import pytest
 
 import analytic
 from compare.commands import cli
-from compare.engines import loop
-from compare.engines.adapter import Floats, Library, Touch
-from compare.measure import record
-from compare.measure.levels import Level
-from compare.measure.record import Measurement, Missing, Records
+from compare.kit import collection, record
+from compare.kit.adapters import loop
+from compare.kit.adapters.adapter import Floats, Library, Touch
+from compare.kit.engines import ENGINES
+from compare.kit.levels import Level
+from compare.kit.record import Measurement, Missing, Records
 from compare.report import results
-from compare.runs import collection
-from compare.runs.engines import ENGINES
 from compare.view import inspection
 from model import Flow, InputError, Parameters, State, StorageError, Trajectory, storage
 from model.files import seal

@@ -12,12 +12,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from compare.bench import grade, native, trials
+from compare.bench.grade import Column
+from compare.bench.native import Native, Pair
+from compare.bench.trials import EPS, ROLLING, SLIPPING
 from compare.commands import cli
-from compare.runs.engines import ENGINES
-from compare.scorecard import grade, native, trials
-from compare.scorecard.grade import Column
-from compare.scorecard.native import Native, Pair
-from compare.scorecard.trials import EPS, ROLLING, SLIPPING
+from compare.kit.engines import ENGINES
 from mjsim import ContactSettings, scene
 from mjsim.scene import SCENE
 from model import Case, InputError, Parameters

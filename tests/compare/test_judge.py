@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from compare.claims.claim import Bearing, Claim, Outcome, Text
-from compare.claims.judge import judge, remembered, select
-from compare.measure.check import Relation
-from compare.measure.quantities import quantity
-from compare.measure.record import Measurement, Missing, Records
-from compare.statistics import COVERAGE, Measured
+from compare.claim import Bearing, Claim, Outcome, Text
+from compare.judge import judge, remembered, select
+from compare.kit.check import Relation
+from compare.kit.quantities import quantity
+from compare.kit.record import Measurement, Missing, Records
+from compare.kit.statistics import COVERAGE, Measured
 from model import InputError, Parameters
 
 P = Parameters.named("reference")

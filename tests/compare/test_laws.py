@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analytic import stokes
-from compare.claims import cases as claims
-from compare.claims.claim import Outcome, Verdict
-from compare.claims.judge import judge
-from compare.measure import laws
-from compare.measure.lab import Lab
-from compare.measure.record import Measurement, Records
+from analytic.mechanics import stokes
+from compare.claim import Outcome, Verdict
+from compare.judge import judge
+from compare.kit.lab import Lab
+from compare.kit.record import Measurement, Records
+from compare.subjects.motion import cases as claims
+from compare.subjects.motion.measure import laws
 from model import Case, Flow, Parameters, Trajectory
 from model.trajectory import SAMPLE, Events, Header
 from tests.measured import measured

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 
 import analytic
-from compare.claims import bifurcations
-from compare.claims.claim import Outcome
-from compare.claims.judge import judge
-from compare.measure import thresholds
-from compare.measure.brackets import FINER, LONGER, Bracket, Search, narrow
-from compare.measure.edge import Edge, ends_slipping
-from compare.measure.fits import turning, vanishing
-from compare.measure.lab import coarse_step, time_unit
-from compare.measure.levels import Level
-from compare.measure.record import Missing, Records
-from compare.measure.sets import sets
-from compare.measure.settling import begin, lasting, settles
-from compare.measure.thresholds import ASKED, BESIDE, TURNS
-from compare.statistics import Measured
+from compare.claim import Outcome
+from compare.judge import judge
+from compare.kit.brackets import FINER, LONGER, Bracket, Search, narrow
+from compare.kit.fits import turning, vanishing
+from compare.kit.lab import coarse_step, time_unit
+from compare.kit.levels import Level
+from compare.kit.record import Missing, Records
+from compare.kit.sets import sets
+from compare.kit.settling import begin, lasting, settles
+from compare.kit.statistics import Measured
+from compare.subjects.thresholds import claims as bifurcations
+from compare.subjects.thresholds.measure import thresholds
+from compare.subjects.thresholds.measure.edge import Edge, ends_slipping
+from compare.subjects.thresholds.measure.thresholds import ASKED, BESIDE, TURNS
 from model import Case, Parameters
 from tests.measured import measured
 

@@ -10,13 +10,14 @@ import pytest
 
 import analytic
 import mjsim
-from compare.claims import unsteady as claims
-from compare.claims.claim import Outcome
-from compare.claims.judge import judge
-from compare.measure import pulsation, unsteady
-from compare.measure.levels import Level
-from compare.measure.record import Records
-from compare.measure.sets import sets
+from compare.claim import Outcome
+from compare.judge import judge
+from compare.kit.levels import Level
+from compare.kit.record import Records
+from compare.kit.sets import sets
+from compare.subjects.unsteady import claims
+from compare.subjects.unsteady.measure import jumps as unsteady
+from compare.subjects.unsteady.measure import pulsation
 from model import Case, Flow, Parameters
 from tests.measured import thresholds
 from tests.mutants.exchange import believed
@@ -26,7 +27,8 @@ NAME, QUICK = "rough-wall", sets(Level.QUICK)
 UNSTEADY = [
     wrong
     for wrong in THEORIES
-    if wrong.module in ("analytic.response", "analytic.pulsation") or wrong.what.startswith("a ramp")
+    if wrong.module in ("analytic.flowmeter.response", "analytic.flowmeter.pulsation")
+    or wrong.what.startswith("a ramp")
 ]
 
 
@@ -71,10 +73,11 @@ def test_a_mean_may_depend_on_more_than_the_state(lab) -> None:
     """Where theory itself has two answers (docs/theory.md, 11) the protocol sees that its own is none, blind."""
     p, f, a = sets(Level.DEFAULT)["design-5"].replace(omega_0=11.7694), 4.0, 199.89
     early, late = (
-        analytic.pulsation.mean_error(p, a, f, leave_rolling=rule) for rule in ("slip-stability", "infeasible")
+        analytic.flowmeter.pulsation.mean_error(p, a, f, leave_rolling=rule)
+        for rule in ("slip-stability", "infeasible")
     )
     assert late - early > 0.015 * abs(early)
-    begin = analytic.pulsation.swing(p, a, f, 0.0)[0] - p.omega_0
+    begin = analytic.flowmeter.pulsation.swing(p, a, f, 0.0)[0] - p.omega_0
     driven = pulsation.Pulsation("design-5", p, f, a, reach=1.0, begin=float(begin) / a)
     (row,) = pulsation.mean_errors(replace(lab, level=Level.DEFAULT), [(driven, a)])
     assert "more than the state" in row.reason

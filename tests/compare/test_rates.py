@@ -12,14 +12,14 @@ import pytest
 from scipy.linalg import block_diag, expm
 
 import analytic
-from compare.claims import stability
-from compare.claims.claim import Outcome
-from compare.claims.judge import judge
-from compare.measure import rates
-from compare.measure.fits import exponents, matched, propagator
-from compare.measure.lab import Lab, coarse_step, time_unit
-from compare.measure.record import Records
-from compare.measure.trials import Start
+from compare.claim import Outcome
+from compare.judge import judge
+from compare.kit.fits import exponents, matched, propagator
+from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.record import Records
+from compare.kit.trials import Start
+from compare.subjects.stability import claims as stability
+from compare.subjects.stability import measure as rates
 from model import Case, Parameters
 from model.arrays import Array
 from model.kinematics import VARIABLES

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray
 
-from compare.measure import record
-from compare.measure.record import Measurement, Missing, Records
+from compare.kit import record
+from compare.kit.record import Measurement, Missing, Records
 from model import InputError, Parameters, StorageError
 from model.files import seal
 

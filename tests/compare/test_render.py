@@ -13,7 +13,7 @@ from PIL import Image
 import analytic
 import mjsim
 from compare.commands import cli
-from compare.figures import style
+from compare.kit import style
 from compare.view import render, stage
 from model import Case, InputError, Parameters, Trajectory, storage
 from model.kinematics import angular_velocity

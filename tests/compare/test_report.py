@@ -24,18 +24,18 @@ from xml.etree import ElementTree
 import pytest
 from matplotlib.figure import Figure
 
-from compare.claims.claim import Bearing, Claim, Outcome, Text, Verdict
+from compare.claim import Bearing, Claim, Outcome, Text, Verdict
 from compare.commands import tables
-from compare.figures.drawing import Drawing, GapError, Material
-from compare.figures.registry import FIGURES
-from compare.measure import record
-from compare.measure.check import Check
-from compare.measure.levels import Level
-from compare.measure.record import Measurement, Records
-from compare.pages import readable
+from compare.gallery import FIGURES
+from compare.kit import record
+from compare.kit.check import Check
+from compare.kit.drawing import Drawing, GapError, Material
+from compare.kit.levels import Level
+from compare.kit.pages import readable
+from compare.kit.record import Measurement, Records
+from compare.kit.workers import spread
 from compare.report import numbers, pictures, report, results, wording
 from compare.report.results import Summary
-from compare.runs.workers import spread
 from model import Case, Parameters, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")

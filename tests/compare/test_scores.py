@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import analytic
-from compare.runs.campaign import Campaign
-from compare.runs.engines import newcomer
-from compare.scorecard import league, scores
-from compare.scorecard.league import COST, ERRORS, OPEN
-from compare.scorecard.trials import APPROACH, ROLLING, SLIPPING, STATES
+from compare.bench import league, scores
+from compare.bench.league import COST, ERRORS, OPEN
+from compare.bench.trials import APPROACH, ROLLING, SLIPPING, STATES
+from compare.kit.campaign import Campaign
+from compare.kit.engines import newcomer
 from docs.studies import tables
 from mjsim import ContactSettings
 

@@ -9,14 +9,25 @@ import math
 import numpy as np
 import pytest
 
-from analytic import hopping, stable_solutions
-from analytic.ensemble import interval
+from analytic import stable_solutions
+from analytic.orbits import hopping
+from analytic.simulation.ensemble import interval
 from compare.commands import cli
-from compare.runs import search
-from compare.runs.campaign import Campaign
-from compare.runs.search import BOX, FATES, Basins, Search, Searched, basins, carry_out, parameters, random_starts
-from compare.runs.sweep import Axis
-from compare.runs.workers import processes
+from compare.kit.campaign import Campaign
+from compare.kit.sweep import Axis
+from compare.kit.workers import processes
+from compare.subjects.attractors import search
+from compare.subjects.attractors.search import (
+    BOX,
+    FATES,
+    Basins,
+    Search,
+    Searched,
+    basins,
+    carry_out,
+    parameters,
+    random_starts,
+)
 from docs.studies.figures import SEARCHES
 from model import InputError, Parameters, StorageError, storage
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from compare.measure import characteristic, plane, settled, settling
-from compare.measure.lab import Lab, coarse_step, time_unit
-from compare.measure.levels import EFFORT, Level
-from compare.measure.quantities import quantity
-from compare.measure.record import Measurement, Missing, Records
-from compare.measure.sets import sets
-from compare.runs import engines
+from compare.kit import engines, settling
+from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.levels import EFFORT, Level
+from compare.kit.quantities import quantity
+from compare.kit.record import Measurement, Missing, Records
+from compare.kit.sets import sets
+from compare.subjects.flowmeter.measure import characteristic
+from compare.subjects.stationary import measure as settled
+from compare.subjects.thresholds.measure import plane
 from model import Case, Parameters
 from tests.measured import thresholds
 

@@ -12,18 +12,23 @@ import numpy as np
 import pytest
 
 import analytic
-from analytic import bifurcation, slip_bounds, slip_stability
-from compare.claims import cases, equations, formal, slipping
-from compare.claims.claim import Outcome, Verdict
-from compare.claims.judge import judge
-from compare.measure import bounds, field, growth, lift, motions
-from compare.measure.lab import Lab, coarse_step, time_unit
-from compare.measure.levels import Level
-from compare.measure.record import Missing, Records
-from compare.measure.sets import sets
-from compare.measure.settling import family
-from compare.measure.thresholds import birth
-from compare.statistics import settled_case
+from analytic.bifurcation import diagram as bifurcation
+from analytic.slipping import slip_bounds, slip_stability
+from compare.claim import Outcome, Verdict
+from compare.judge import judge
+from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.levels import Level
+from compare.kit.record import Missing, Records
+from compare.kit.sets import sets
+from compare.kit.settling import family
+from compare.kit.statistics import settled_case
+from compare.subjects.motion import cases
+from compare.subjects.motion import claims as equations
+from compare.subjects.motion.measure import field, motions
+from compare.subjects.slipping import claims as slipping
+from compare.subjects.slipping.measure import bounds, growth, lift
+from compare.subjects.thresholds import formal
+from compare.subjects.thresholds.measure.thresholds import birth
 from model import Case, Parameters, storage
 from model.cases import TRAITS
 from tests.measured import thresholds

@@ -7,10 +7,10 @@ import sys
 import pytest
 
 from compare.commands import cli
-from compare.engines import siconos
-from compare.engines.siconos import Settings
-from compare.runs.engines import ENGINES
-from compare.runs.tasks import Task, carry_out
+from compare.kit.adapters import siconos
+from compare.kit.adapters.siconos import Settings
+from compare.kit.engines import ENGINES
+from compare.kit.tasks import Task, carry_out
 from model import InputError, Parameters
 
 REFERENCE = Parameters.named("reference")

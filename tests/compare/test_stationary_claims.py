@@ -11,12 +11,13 @@ import pytest
 
 import analytic
 from analytic import StationarySolution
-from compare.claims import flowmeter, stationary
-from compare.claims.claim import Outcome
-from compare.claims.judge import judge
-from compare.measure.quantities import quantity
-from compare.measure.record import Records
-from compare.measure.settling import determined, family, scale
+from compare.claim import Outcome
+from compare.judge import judge
+from compare.kit.quantities import quantity
+from compare.kit.record import Records
+from compare.kit.settling import determined, family, scale
+from compare.subjects.flowmeter import claims as flowmeter
+from compare.subjects.stationary import claims as stationary
 from model import Case, Parameters
 from tests.measured import measured
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from compare.measure.fits import value_and_slope, zero_and_slope
-from compare.statistics import correlation_length, window_mean
+from compare.kit.fits import value_and_slope, zero_and_slope
+from compare.kit.statistics import correlation_length, window_mean
 from model import InputError
 
 T = np.linspace(0, 10, 1001)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from compare import pages
-from compare.runs.campaign import Campaign
+from compare.kit import pages
+from compare.kit.campaign import Campaign
 from docs.studies import accuracy, confirmation, tables
 from model import InputError
 

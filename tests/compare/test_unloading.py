@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 import analytic
-from compare.claims import unloading as claims
-from compare.claims.claim import Outcome
-from compare.claims.judge import forget, judge
-from compare.measure import unloading
-from compare.measure.levels import Level
-from compare.measure.record import Records
-from compare.measure.sets import sets
+from compare.claim import Outcome
+from compare.judge import forget, judge
+from compare.kit.levels import Level
+from compare.kit.record import Records
+from compare.kit.sets import sets
+from compare.subjects.flowmeter import unloading as claims
+from compare.subjects.flowmeter.measure import unloading
 from tests.measured import thresholds
 
 NAME = "thick-fluid"
@@ -43,7 +43,7 @@ def test_predictions_are_as_sure_as_they_say(records, monkeypatch):
         ]
 
     usual = predicted()
-    monkeypatch.setattr("compare.claims.unloading.RTOL", 1e-11)
+    monkeypatch.setattr("compare.subjects.flowmeter.unloading.RTOL", 1e-11)
     for one, finer in zip(usual, predicted(), strict=True):
         assert abs(one.value - finer.value) <= one.uncertainty
 

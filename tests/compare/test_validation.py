@@ -10,16 +10,16 @@ from pathlib import Path
 import pytest
 
 from compare import validation
-from compare.claims.claim import Bearing, Claim, Outcome, Verdict
+from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.commands import cli
-from compare.measure import programme
-from compare.measure.lab import Lab
-from compare.measure.levels import Level
-from compare.measure.programme import UNDAMPED, Measure, Protocol
-from compare.measure.record import Measurement, Missing, Records
+from compare.kit import programme
+from compare.kit.campaign import Campaign
+from compare.kit.engines import EVENT, MUJOCO
+from compare.kit.lab import Lab
+from compare.kit.levels import Level
+from compare.kit.programme import UNDAMPED, Measure, Protocol
+from compare.kit.record import Measurement, Missing, Records
 from compare.report import results
-from compare.runs.campaign import Campaign
-from compare.runs.engines import EVENT, MUJOCO
 from model import InputError, Parameters, SimulationError, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")

@@ -9,7 +9,7 @@ import pytest
 
 import analytic
 import mjsim
-from analytic import drag
+from analytic.mechanics import drag
 from mjsim import ContactSettings, limits
 from mjsim.corrections import Ball, resistance
 from model import Case, Flow, InputError

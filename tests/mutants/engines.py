@@ -10,7 +10,7 @@ from typing import Any
 from unittest import mock
 
 import mjsim
-from compare.runs.engines import ENGINES, MUJOCO, Engine
+from compare.kit.engines import ENGINES, MUJOCO, Engine
 from mjsim import ContactSettings, scene
 from model import Parameters
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.measure.levels import Level
+from compare.kit.levels import Level
 from model import Case, Parameters
 
 Function = Callable[..., Any]

@@ -11,16 +11,17 @@ import numpy as np
 import pytest
 
 import analytic
-from analytic import dynamics, stationary
-from compare.claims import stationary as claims
-from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Outcome
-from compare.measure.field import constrained
-from compare.measure.lab import Lab
-from compare.measure.levels import Level
-from compare.measure.record import Records
-from compare.runs.campaign import Campaign
-from compare.runs.engines import ENGINES, MUJOCO
+from analytic.mechanics import dynamics
+from analytic.stationary import solutions as stationary
+from compare.catalogue import CLAIMS
+from compare.claim import Outcome
+from compare.kit.campaign import Campaign
+from compare.kit.engines import ENGINES, MUJOCO
+from compare.kit.lab import Lab
+from compare.kit.levels import Level
+from compare.kit.record import Records
+from compare.subjects.motion.measure.field import constrained
+from compare.subjects.stationary import claims
 from model import Case, Parameters
 from tests.mutants import engines, trial
 from tests.mutants.engines import WRONG_ENGINES
@@ -42,7 +43,9 @@ def test_there_are_many_and_each_replaces_a_function_that_exists_and_gives_it_ba
         assert getattr(module, wrong.function) is right, wrong.what
 
 
-@pytest.mark.parametrize("wrong", [w for w in THEORIES if w.module == "analytic.dynamics"], ids=lambda w: w.what)
+@pytest.mark.parametrize(
+    "wrong", [w for w in THEORIES if w.module == "analytic.mechanics.dynamics"], ids=lambda w: w.what
+)
 def test_wrong_equations_of_motion_are_wrong_and_not_broken(wrong: WrongTheory) -> None:
     """Another number somewhere, and no error: a theory that can't be evaluated would be noticed by anybody."""
 
@@ -78,7 +81,7 @@ def test_faults_in_a_law_of_drag_show_under_that_law_alone(law: str) -> None:
 
 
 def test_a_fault_shows_wherever_the_function_is_known_by_name() -> None:
-    doubled = WrongTheory("", "analytic.stationary", "stable_solutions", lambda right: lambda p: 2 * right(p))
+    doubled = WrongTheory("", "analytic.stationary.solutions", "stable_solutions", lambda right: lambda p: 2 * right(p))
     right = analytic.stable_solutions(P)
     with believed(doubled):
         assert len(analytic.stable_solutions(P)) == len(stationary.stable_solutions(P)) == 2 * len(right)
@@ -88,7 +91,7 @@ def test_a_fault_shows_wherever_the_function_is_known_by_name() -> None:
 def test_a_fault_shows_in_tables_of_functions() -> None:
     x = [0.0, 0.0, 12.0, 1.0, 2.0, 3.0, 0.0, 0.0]
     right = np.array(dynamics.forces(Case.SS, x, P, P.omega_0))
-    with believed(WrongTheory("", "analytic.dynamics", "_ss", scaled(1.5, 1))):
+    with believed(WrongTheory("", "analytic.mechanics.dynamics", "_ss", scaled(1.5, 1))):
         wrong = np.array(dynamics.forces(Case.SS, x, P, P.omega_0))
     assert wrong[1] == 1.5 * right[1]
     assert np.array_equal(np.delete(wrong, 1), np.delete(right, 1))
@@ -106,7 +109,7 @@ def test_a_theory_that_raises_is_given_back_too() -> None:
 def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(
     wrong: engines.Engine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("compare.runs.engines.ENGINES", dict(ENGINES) | {wrong.name: wrong})
+    monkeypatch.setattr("compare.kit.engines.ENGINES", dict(ENGINES) | {wrong.name: wrong})
     start, runs = [0.02, 0.0, 14.0, -1.0, 2.0, 7.0, 0.0, 0.0], {}
     with Campaign(tmp_path, workers=0) as campaign:
         for engine in (MUJOCO, wrong):

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from analytic import bifurcation
-from analytic.orbit_branch import Place
-from compare.measure.levels import Level
+from analytic.bifurcation import diagram as bifurcation
+from analytic.orbits.orbit_branch import Place
+from compare.kit.levels import Level
 from model import Case, Flow, Parameters, State
 from model.drag import STOKES
 from tests.mutants.exchange import (

@@ -23,15 +23,15 @@ from types import CodeType, FrameType
 from typing import TypeVar
 
 import analytic
-from compare import pages, validation
-from compare.claims.catalogue import CLAIMS
-from compare.claims.claim import Claim, Outcome, Text, Verdict
-from compare.claims.judge import forget, judge, verdict
-from compare.measure import levels
-from compare.measure.quantities import QUANTITIES
-from compare.measure.record import Records
+from compare import validation
+from compare.catalogue import CLAIMS
+from compare.claim import Claim, Outcome, Text, Verdict
+from compare.judge import forget, judge, verdict
+from compare.kit import levels, pages
+from compare.kit.quantities import QUANTITIES
+from compare.kit.record import Records
+from compare.kit.workers import spread
 from compare.report import results
-from compare.runs.workers import spread
 from tests.mutants import engines
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import believed

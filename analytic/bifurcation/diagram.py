@@ -1,0 +1,180 @@
+"""Bifurcations over omega_0: the thresholds omega_01 ... omega_04, eta_cr, and what meets there (section 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.stationary import slipping_branch
+from model import InputError, Parameters, State
+from model.arrays import Array, Real
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """The flows omega_0 > 0 at which stationary solutions change, rad s-1, and eta_cr; nan for what doesn't exist."""
+
+    omega_01: float
+    """(84): RR gives way to SS. nan for eta > j, where A_y would have to be negative. 0 for mu = 0."""
+    omega_02: float
+    """(85): the wall begins to carry the weight. nan for eta = 0: a smooth wall never does."""
+    omega_03: float
+    """(86): the gyroscopic moment carries the weight, and RR lifts off the floor if nothing ended it before."""
+    omega_04: float
+    """(88): the fold of SS. nan unless eta_cr < eta < j, mu > 0 and c > 0."""
+    eta_cr: float
+    """(87): c^2 R/(4 g mu^2), but 0 for the quadratic law of drag.
+
+    inf for mu = 0 (no fold at any eta), nan for mu = c = 0.
+    """
+
+
+def thresholds(p: Parameters) -> Thresholds:
+    """Thresholds of a set of parameters; p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only."""
+    Omega = threshold_curves(p, p.mu, p.eta)
+    unit = np.sqrt(p.g / p.R)
+    omega = {name: float(Omega[name] * unit) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
+    return Thresholds(**omega, eta_cr=float(Omega["eta_cr"]))
+
+
+def threshold_curves(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False) -> dict[str, Array]:
+    """The fields of `Thresholds` over arrays mu and eta, with Omega = omega sqrt(R/g); for the lines of Figs. 7, 8.
+
+    `released` drops (12), as Fig. 12 does: omega_01 and omega_04 are then continued beyond eta = j as far as the
+    equations have solutions.
+    """
+    mu, eta = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(mu, eta))
+    fold = slipping_branch.fold(p, mu, eta, released)
+    folds = np.isfinite(fold)
+    Omega_04 = np.full(mu.shape, np.nan)
+    Omega_04[folds] = slipping_branch.branch(fold[folds], p, mu[folds], eta[folds]).Omega_0
+    return curves_without_drag(p.j, mu, eta, released) | {
+        "omega_04": Omega_04,
+        "eta_cr": np.broadcast_to(slipping_branch.eta_critical(mu, p), mu.shape),
+    }
+
+
+def curves_without_drag(j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False) -> dict[str, Array]:
+    """Those of `threshold_curves` in which drag plays no part: omega_01, omega_02 and omega_03."""
+    mu, eta = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(mu, eta))
+    divisor = mu * eta * (1 + j) + j - eta
+    real = (divisor > 0) & ((eta <= j) | released)
+    Omega_01 = np.where(real, np.sqrt(mu * (1 + eta) / np.where(real, divisor, 1.0)), np.nan)
+    return {
+        "omega_01": np.asarray(Omega_01),
+        "omega_02": np.where(eta > 0, 1 / np.sqrt(np.where(eta > 0, eta, 1.0)), np.nan),
+        "omega_03": np.full(mu.shape, 1 / np.sqrt(j)),
+    }
+
+
+def number_of_folds(p: Parameters) -> int:
+    """Folds along the branch of SS, counted: after Proposition 7 one for eta_cr < eta < j, and none for less eta.
+
+    By the changes of sign of `slope`, a search that assumes nothing. `InputError` as `check_branch`.
+    """
+    check_branch(p)
+    values = slipping_branch.slope(np.linspace(-slipping_branch.END, slipping_branch.END, 20_001), p)
+    return int(np.sum(np.sign(values[1:]) != np.sign(values[:-1])))
+
+
+def critical_drag(p: Parameters) -> float:
+    """The drag c in s-1 at which p.eta is eta_cr, (87): for less of it SS has a fold. eta_cr rises like c^2.
+
+    inf for the quadratic law, under which there is always a fold. `InputError` unless 0 < eta < j, mu > 0 and p.c > 0;
+    else p.c plays no part.
+    """
+    check_branch(p)
+    eta_cr = float(slipping_branch.eta_critical(p.mu, p))
+    return p.c * float(np.sqrt(p.eta / eta_cr)) if eta_cr else np.inf
+
+
+def check_branch(p: Parameters) -> None:
+    """`InputError` unless SS has a branch from RR to SR: 0 < eta < j, mu > 0 and c > 0."""
+    if not (0 < p.eta < p.j and p.mu > 0 and p.c > 0):
+        raise InputError(
+            f"eta = {p.eta:g} is out of range: SS has a branch from RR to SR for 0 < eta < j = {p.j:g}, mu > 0, "
+            "c > 0 only"
+        )
+
+
+@dataclass(frozen=True)
+class DoublePoint:
+    """A point of codimension 2 in the plane (eta, omega_0): a black dot of Figs. 7 and 8."""
+
+    eta: float
+    omega_0: float
+    """rad s-1"""
+    meets: tuple[str, ...]
+    """The thresholds that meet there."""
+
+
+def double_points(p: Parameters, equal: bool = False) -> list[DoublePoint]:
+    """Where the curves of Fig. 7 meet, or with `equal` friction mu = eta those of Fig. 8.
+
+    At eta_cr, for equal friction (kappa^2/4)^(1/3), where the fold is born; and at eta = j.
+    """
+    unit = np.sqrt(p.g / p.R)
+    light = slipping_branch.light_drag(p)
+    eta_cr = float(np.cbrt(light**2 / 4) if equal else slipping_branch.eta_critical(p.mu, p))
+    folds = 0 < eta_cr < p.j
+    points = [DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04"))] if folds else []
+    if equal or p.mu > 0:
+        meets = ("omega_01", "omega_02", "omega_03", *("omega_04",) * folds)
+        points.append(DoublePoint(p.j, float(unit / np.sqrt(p.j)), meets))
+    return points
+
+
+class Exists(IntFlag):
+    """Which stationary solutions exist: the labels of the regions of Figs. 7 and 8 (RS exists on omega_0 = 0 only)."""
+
+    RR = 1
+    SS = 2
+    """The part of the branch that begins in RR."""
+    SS_BEYOND_FOLD = 4
+    """The unstable part, between the fold and SR."""
+    SR = 8
+    NR = 16
+    NS = 32
+
+
+def case_map(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+    """Flags `Exists` at every point of a plane of parameters, shape (number of eta, number of omega_0).
+
+    Parameters
+    ----------
+    mu, eta : 1-D, of one length (Fig. 8) or mu a number (Fig. 7)
+    omega_0 : 1-D, rad s-1, of either sign
+
+    RR counts where it is stable with respect to slipping; for mu > 1 it may also jam beyond that, see `rolling_forces`.
+    """
+    Omega = np.abs(np.asarray(omega_0, dtype=float)) / np.sqrt(p.g / p.R)
+    eta = np.asarray(eta, dtype=float)
+    curves = {name: value[:, None] for name, value in threshold_curves(p, mu, eta).items()}
+    mu = np.broadcast_to(np.asarray(mu, dtype=float), eta.shape)[:, None]
+    eta = eta[:, None]
+    one, two, four = (curves[f"omega_0{k}"] for k in (1, 2, 4))
+    two = np.where(np.isnan(two), np.inf, two)
+    end_of_rr = np.where(eta < p.j, one, curves["omega_03"])
+    slips = (eta < p.j) & (mu > 0) & (p.c > 0)
+    folds = np.isfinite(four)
+    carried = two <= Omega
+    flags = [
+        (Exists.RR, end_of_rr >= Omega),
+        (Exists.SS, slips & (one < Omega) & (Omega < np.where(folds, four, two))),
+        (Exists.SS_BEYOND_FOLD, folds & (two < Omega) & (four > Omega)),
+        (Exists.SR, carried),
+        (Exists.NR, carried),
+        (Exists.NS, ~carried & (p.c > 0)),
+    ]
+    plane = np.zeros(np.broadcast_shapes(eta.shape, Omega.shape), dtype=np.uint8)
+    for flag, where in flags:
+        plane |= np.where(where, np.uint8(flag), np.uint8(0))
+    return plane
+
+
+def wall_spin(state: State, p: Parameters) -> Real:
+    """omega_x^0 = slip_x + omega_c R/r of (91), rad s-1: the spin on the wall, ordinate of Figs. 9-12."""
+    return state.slip_x + p.R / p.r * state.omega_c

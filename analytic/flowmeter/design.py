@@ -1,0 +1,292 @@
+"""Design of a flowmeter: how its limits depend on what it is made of, its reading with tolerances, the best choice.
+
+Everything rests on `thresholds`, `operating_range` and the branch of SS, whatever the law of drag. A meter is given as
+a function `make` that takes values by name and returns `Parameters`: `p.replace`, or `Parameters.from_fluid` with
+some arguments filled in.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.bifurcation import diagram as bifurcation
+from analytic.bifurcation import fluid_inertia
+from analytic.bifurcation.diagram import Thresholds
+from analytic.flowmeter import characteristic as flowmeter
+from analytic.flowmeter.characteristic import OperatingLimit
+from analytic.mechanics import roots
+from analytic.stationary import slipping_branch
+from model import InputError, Parameters, drag
+from model.arrays import Array
+
+Make: TypeAlias = Callable[..., Parameters]
+"""Parameters of a meter from values by name."""
+Interval: TypeAlias = tuple[float, float]
+"""Lowest and highest value."""
+
+INEXACT = ("mu", "eta", "r", "R")
+"""What may have a tolerance: friction and size."""
+THRESHOLDS = ("omega_01", "omega_02", "omega_03", "omega_04")
+_LOG_STEP = 1e-3
+"""Of the differences, in the logarithm of a value."""
+_TIE = 1e-3
+"""What the logarithm of the response time counts beside the margin: it decides where the margin doesn't."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """d ln omega_0k / d ln of a value: by how many per cent a threshold changes if the value does by one."""
+
+    value: float
+    """nan where the threshold doesn't exist on both sides, or the value may not be changed to one of them."""
+    error: float
+    """Estimated from differences of two widths."""
+
+
+def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Sensitivity]]:
+    """Sensitivity of each threshold to each of the values `at`.
+
+    By central differences in the logarithm, extrapolated from two widths (Richardson). omega_01 to omega_03 have
+    closed forms (docs/design.md), with which tests compare; the differences serve any law of drag, and the fold.
+    """
+
+    def logarithms(name: str, step: float) -> Array:
+        try:
+            t = bifurcation.thresholds(make(**{**at, name: at[name] * math.exp(step)}))
+        except InputError:  # beyond what the value may be: no derivative there
+            return np.full(len(THRESHOLDS), np.nan)
+        with np.errstate(divide="ignore"):
+            return np.log([getattr(t, key) for key in THRESHOLDS])
+
+    by_name = {}
+    with np.errstate(invalid="ignore"):
+        for name in at:
+            wide, narrow = ((logarithms(name, h) - logarithms(name, -h)) / (2 * h) for h in (_LOG_STEP, _LOG_STEP / 2))
+            by_name[name] = (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
+    return {
+        key: {name: Sensitivity(float(value[k]), float(error[k])) for name, (value, error) in by_name.items()}
+        for k, key in enumerate(THRESHOLDS)
+    }
+
+
+def corners(make: Make, at: Mapping[str, float], tolerances: Mapping[str, float]) -> Iterator[Parameters]:
+    """The meter with every value at one end of its tolerance, which is relative: x (1 - t) or x (1 + t).
+
+    Limits and readings are monotonic in friction and size, but for a ridge of the operating limit at eta = j; so their
+    extremes over all that the tolerances allow are at corners. A test samples between them.
+    """
+    inexact = {name: (at[name] * (1 - t), at[name] * (1 + t)) for name, t in tolerances.items() if t > 0}
+    for values in itertools.product(*inexact.values()):
+        yield make(**{**at, **dict(zip(inexact, values, strict=True))})
+
+
+def threshold_spread(meters: Sequence[Parameters]) -> dict[str, Interval]:
+    """Lowest and highest value of each threshold over some meters, rad s-1; nan if one of them doesn't have it."""
+    each = [dataclasses.asdict(bifurcation.thresholds(p)) for p in meters]
+    return {key: (float(np.min([t[key] for t in each])), float(np.max([t[key] for t in each]))) for key in THRESHOLDS}
+
+
+def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
+    """The lowest and the highest omega_c of all stationary motions that attract, at flows omega_0 >= 0, rad s-1.
+
+    They differ where the reading depends on the past (Fig. 13): the lowest is read while the flow rises slowly from
+    rest, the highest while it falls. Only SS lags behind the flow, up to its fold; whether it swings there, as it may
+    for mu > 1.7, is left out. nan without drag.
+    """
+    flows = np.asarray(omega_0, dtype=float) * (1.0 if p.c else np.nan)
+    if p.mu == 0 or p.eta >= p.j or p.c == 0:
+        return flows, flows
+    t, turn, unit = bifurcation.thresholds(p), slipping_branch.fold(p), np.sqrt(p.g / p.R)
+    end, ends_in_fold = (slipping_branch.END, False) if np.isnan(turn) else (float(turn), True)
+    s = roots.bisected(lambda s: slipping_branch.branch(s, p).Omega_0 * unit - flows, -slipping_branch.END, end)
+    lagging = slipping_branch.branch(s, p).Omega_c * unit
+    slips = (flows > t.omega_01) & ~(flows > (t.omega_04 if ends_in_fold else t.omega_02))
+    return np.where(slips, lagging, flows), np.where(slips & ~(flows > t.omega_02), lagging, flows)
+
+
+def response_time(p: Parameters) -> float:
+    """Time constant (1 + 2j)/c in s with which a rolling ball follows a small change of the flow (docs/theory.md, 9).
+
+    inf for the quadratic law: such drag vanishes faster than the difference that it is to remove.
+    """
+    return math.inf if p.drag == drag.QUADRATIC or p.c == 0 else (1 + 2 * p.j) / p.c
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A meter for flows up to a given one."""
+
+    values: dict[str, float]
+    """What `make` needs to make it."""
+    p: Parameters
+    limit: OperatingLimit
+    """As it is meant to be."""
+    worst: OperatingLimit
+    """At the corner of the tolerances where the operating range is the shortest."""
+    margin: float
+    """The worst limit divided by the fastest flow: covered if >= 1."""
+    response: float
+    """Time constant, s."""
+
+
+def choice(make: Make, values: Mapping[str, float], tolerances: Mapping[str, float], fastest: float) -> Choice:
+    """What is to be said of a meter that shall measure flows up to `fastest`, rad s-1."""
+    p = make(**values)
+    limit = flowmeter.operating_limit(p)
+    others = (flowmeter.operating_limit(q) for q in corners(make, values, tolerances))
+    worst = min((limit, *others), key=lambda each: each.omega_0)
+    return Choice(dict(values), p, limit, worst, worst.omega_0 / fastest, response_time(p))
+
+
+def best(
+    make: Make,
+    bounds: Mapping[str, Interval],
+    tolerances: Mapping[str, float],
+    fastest: float,
+    slowest_response: float = math.inf,
+    seed: int = 0,
+) -> Choice:
+    """The meter within the bounds whose operating range exceeds the fastest flow by the largest factor.
+
+    Among all that answer within `slowest_response`, s, the one with the largest margin at the worst corner of the
+    tolerances; among equals the quickest. Differential evolution (scipy), as the margin has a ridge at eta = j; the
+    seed settles the result.
+
+    Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one can.
+    """
+    from scipy.optimize import Bounds, differential_evolution  # here, because `predict` shall not wait for it
+
+    open_names = [name for name, (low, high) in bounds.items() if low < high]
+    ends = np.array([bounds[name] for name in open_names]).reshape(-1, 2)
+    exact = {name: low for name, (low, _) in bounds.items()}
+
+    def at(unit: npt.ArrayLike) -> Choice:
+        chosen = ends[:, 0] + np.asarray(unit) * (ends[:, 1] - ends[:, 0])
+        return choice(make, {**exact, **dict(zip(open_names, chosen.tolist(), strict=True))}, tolerances, fastest)
+
+    def cost(unit: Array) -> float:
+        c = at(unit)
+        delay = math.log(c.response) if math.isfinite(c.response) else 0.0
+        late = c.response > slowest_response
+        return 100 + delay if late else _TIE * delay - c.margin
+
+    if open_names:
+        each = 4 + 12 // len(ends)  # times the number of values: how many meters compete
+        cube = Bounds(np.zeros(len(ends)), np.ones(len(ends)))
+        result = differential_evolution(cost, cube, rng=seed, popsize=each, tol=1e-5, polish=False)
+        at_bounds = np.where(np.abs(result.x - 0.5) > 0.49, np.round(result.x), result.x)
+        chosen = at(min(at_bounds, result.x, key=cost))
+    else:
+        chosen = at([])
+    if chosen.response > slowest_response:
+        raise InputError(
+            f"response = {slowest_response:g} s excludes everything: within the bounds the quickest ball has a time "
+            f"constant of {chosen.response:.3g} s"
+        )
+    return chosen
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """Requirements on a meter: flows, fluid, materials, tolerances and response."""
+
+    fluid: Mapping[str, Any]
+    """Arguments of `Parameters.from_fluid`: nu_f, rho_f, gravity, and perhaps drag and C_D."""
+    slowest: float
+    """The range of flows to measure: omega_0, rad s-1."""
+    fastest: float
+    bounds: Mapping[str, Mapping[str, Interval]]
+    """For each material the bounds on r, R, rho_b, mu, eta and j."""
+    tolerances: Mapping[str, float]
+    """Relative, of any of `INEXACT`."""
+    response: float = math.inf
+    """Longest time constant, s."""
+
+    @property
+    def make(self) -> Make:
+        """The meter with this fluid."""
+        return partial(Parameters.from_fluid, **self.fluid)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Characteristic curve: lowest and highest reading at each flow, rad s-1, arrays of one shape."""
+
+    omega_0: Array
+    meant: tuple[Array, Array]
+    """Of the meter as it is meant to be."""
+    band: tuple[Array, Array]
+    """Over all corners of the tolerances."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """The best meter for a request, and what to know of it."""
+
+    request: Request
+    material: str
+    choices: dict[str, Choice]
+    """The best meter of each material that can be used."""
+    refused: dict[str, str]
+    """Why the others can't."""
+    thresholds: Thresholds
+    spread: dict[str, Interval]
+    """Of the thresholds over the corners of the tolerances."""
+    sensitivities: dict[str, dict[str, Sensitivity]]
+    curve: Curve
+    with_inertia: float
+    """The worst limit, rad s-1, if the fluid had inertia, which the model leaves out: see `fluid_inertia`."""
+
+    @property
+    def choice(self) -> Choice:
+        """The chosen meter."""
+        return self.choices[self.material]
+
+
+def design(request: Request, seed: int = 0) -> Design:
+    """Choose the material and the meter with the largest margin; raises `InputError` if no material can be used."""
+    choices, refused, wanted = {}, {}, (request.tolerances, request.fastest, request.response, seed)
+    for material, bounds in request.bounds.items():
+        try:
+            for ends in zip(*bounds.values(), strict=True):
+                request.make(**dict(zip(bounds, ends, strict=True)))  # does the lightest ball sink?
+            choices[material] = best(request.make, bounds, *wanted)
+        except InputError as reason:
+            refused[material] = str(reason)
+    if not choices:
+        raise InputError("; ".join(f"{material}: {why}" for material, why in refused.items()))
+    material = max(choices, key=lambda name: choices[name].margin)
+    chosen = choices[material]
+    meters = [chosen.p, *corners(request.make, chosen.values, request.tolerances)]
+    at = {name: x for name, x in {**request.fluid, **chosen.values}.items() if name != "drag"}
+    with_inertia = map(fluid_inertia.thresholds, meters)
+    return Design(
+        request=request,
+        material=material,
+        choices=choices,
+        refused=refused,
+        thresholds=bifurcation.thresholds(chosen.p),
+        spread=threshold_spread(meters),
+        sensitivities=sensitivities(request.make, at),
+        curve=characteristic(meters, 1.5 * max(request.fastest, chosen.limit.omega_0)),
+        with_inertia=min(t["omega_02"] if math.isnan(t["omega_01"]) else t["omega_01"] for t in with_inertia),
+    )
+
+
+def characteristic(meters: Sequence[Parameters], top: float) -> Curve:
+    """The curve of the first meter up to the flow `top`, rad s-1, with a band over all of them."""
+    t = dataclasses.astuple(bifurcation.thresholds(meters[0]))[: len(THRESHOLDS)]
+    sides = np.outer(t, (1 - 1e-6, 1 + 1e-6)).ravel()  # of the jumps
+    flows = np.union1d(np.linspace(0.0, top, 61)[1:], sides[sides < top])
+    each = [readings(p, flows) for p in meters]
+    band = np.min([low for low, _ in each], axis=0), np.max([high for _, high in each], axis=0)
+    return Curve(flows, each[0], band)

@@ -1,0 +1,274 @@
+"""Coulomb's law at floor and wall at once: the contact problem of one instant.
+
+The unknowns are the impulses P of floor and wall and the velocities after them, or as well forces and accelerations. A
+closed contact obeys
+
+    0 <= P_n  perpendicular to  v_n - target >= 0,   P_t in the disk of radius friction * P_n,
+    P_t = -friction * P_n * v_t/|v_t| where v_t is not zero.
+
+No case is named: which contact sticks, slips or opens is part of the answer. At one contact of a sphere normal and
+tangential impulses do not influence each other, so that a contact alone is solved exactly, by a projection. Of two, the
+impulse (n, s, t) of one per mass changes what the other one needs by C (n, s, t) = (s, j k n - k s, j k t) with
+k = 1/(1+j), the same both ways, and Coulomb's law is
+
+    A = project(a - C B, mu),  B = project(b - C A, eta),
+
+where a and b are what A and B need to meet their targets and to rest if the other one gives nothing.
+
+A sweep computes A from B and B from that (projected Gauss-Seidel); what is sought is an impulse at B that a sweep f
+reproduces. Newton's method on the change of a sweep settles most problems in one or two steps. While the ball rolls at
+both points B is undetermined along one direction, and a little damping keeps it from drifting there. Where a contact
+begins to stick, slide or open, Newton's method may end in another solution than sweeps do: then, and where sweeps may
+lead away from a solution (mu eta > 1), plain sweeps are taken. Where these approach slowly or swing, B = f(B) is taken
+for the equilibrium of dB/dt = f(B) - B (pseudo-transient continuation, Kelley & Keyes, SIAM J. Numer. Anal. 35 (1998)
+508). Its linearly implicit Euler steps, (1/span + 1 - f') dB = f(B) - B, are damped sweeps for small spans and those of
+the generalised Newton method for large ones: a success lengthens the span, a setback shortens it and makes it grow more
+carefully from then on. Where that fails, it starts again from zero and from damped sweeps.
+
+A solution exists where mu < 1 or eta < 1 (Acary, Cadoux, Lemarechal & Malick, ZAMM 91 (2011) 155: the ball can move so
+that v_n - target > friction * |v_t| at both contacts). Where both are greater, floor and wall can lock the ball in the
+corner, so that no impulses meet a target > 0; `unlocked` is for those. Where mu > 1, sticking and slipping may both
+obey the law. The solution found is then the one near the first guess: with the impulses of the last step the ball goes
+on rolling until no impulses near the present ones hold it.
+
+All on plain floats: `stepping` compiles it where numba is installed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from analytic.mechanics import rigid_body
+from analytic.mechanics.rigid_body import NOTHING, Forces, Velocities
+from model import Parameters
+
+EAGER, WHOLE = 5, 1e4
+"""Most sweeps with Newton's method from the start, and the span of its steps."""
+PLAIN_SWEEPS = 6
+"""Sweeps before the continuation takes over."""
+ATTEMPT = 100
+"""Sweeps after which the continuation starts again: from zero the first time, then from where it is."""
+DAMPED = 0.5
+"""Share of a sweep that is taken in all attempts but the first, before the continuation."""
+WARY, BOLD = 1.0, 1.3
+"""Factor by which the change may rise from one sweep to the next before it counts as a setback, the two in turns from
+attempt to attempt. Wary where the sweeps swing; bold where impulses that hardly move the ball have to pile up in the
+corner until one of them finds the limit of friction."""
+SPAN, GROWTH, LONGEST_SPAN = 1.0, 8.0, 1e8
+"""Length of the first step of the continuation, in sweeps; by which factor steps grow; and the longest, by when a step
+is one of Newton's."""
+SHORTER, CALMER, LEAST_GROWTH = 20.0, 0.7, 1.1
+"""A setback divides the length by the first; the growth is raised to the power of the second, and stays above the
+third."""
+MAX_SWEEPS = 1000
+
+
+class Closed(NamedTuple):
+    """A contact that takes part in the problem."""
+
+    target: float = 0.0
+    """Least normal velocity (or acceleration) afterwards."""
+    slip: tuple[float, float] | None = None
+    """Unit vector along which the contact slips (x, z at A; y, z at B) if that is known beforehand."""
+
+
+class Friction(NamedTuple):
+    """Friction of one contact; its direction of slip is that of (s, t) if that isn't (0, 0), else to be found."""
+
+    coefficient: float
+    s: float
+    t: float
+
+
+class Impulse(NamedTuple):
+    """Impulse of one contact per mass, m s-1."""
+
+    n: float
+    """Normal."""
+    s: float
+    """Tangential, along the normal of the other contact."""
+    t: float
+    """Tangential, along k."""
+
+
+class NotConvergedError(ArithmeticError):
+    """The sweeps did not settle; the message gives the last change."""
+
+
+def solve(
+    free: Velocities,
+    A: Closed | None,
+    B: Closed | None,
+    p: Parameters,
+    start: Forces = NOTHING,
+    tolerance: float = 4e-15,
+) -> tuple[Velocities, Forces]:
+    """Velocities and impulses that obey Coulomb's law at both contacts.
+
+    Parameters
+    ----------
+    free : velocities (m s-1 and rad s-1) that the ball would have without any impulse
+    A, B : the closed contacts; None for an open one
+    start : first guess of the impulses in N s; only those of B matter
+    tolerance : the largest change in a sweep at which to stop, relative to the velocities of the problem, those that
+        the impulses cause among them; a sweep rounds a dozen times, so that less than some eps may never be reached
+
+    Raises `NotConvergedError` after `MAX_SWEEPS`.
+    """
+    share = p.j / (1 + p.j)  # of the mass, that a tangential impulse feels at the contact point
+    (v_h, v_y, *_), (s_A, t_A), (s_B, t_B) = free, rigid_body.slip_at_A(free, p), rigid_body.slip_at_B(free, p)
+    a = Impulse((A.target if A else 0.0) - v_y, -share * s_A, -share * t_A)
+    b = Impulse((B.target if B else 0.0) - v_h, -share * s_B, -share * t_B)
+    at_A = at_B = Impulse(0.0, 0.0, 0.0)
+    mu, eta = Friction(p.mu, *((A and A.slip) or (0.0, 0.0))), Friction(p.eta, *((B and B.slip) or (0.0, 0.0)))
+    if A and B:
+        scale = max(map(abs, (*free[:3], *(p.r * o for o in free[3:]))))
+        guess = Impulse(*(each / p.m for each in start[3:]))
+        at_A, at_B, change = both(a, b, guess, mu, eta, p.j, tolerance * scale)
+        enough = tolerance * max(scale, *map(abs, (*at_A, *at_B)))
+        if not change <= enough < math.inf:
+            raise NotConvergedError(
+                f"contact problem: still a change of {change:g} m s-1 after {MAX_SWEEPS} sweeps, "
+                f"asked for {enough:g} m s-1"
+            )
+    elif A:
+        at_A = project(a, mu)
+    elif B:
+        at_B = project(b, eta)
+    P = Forces(*(p.m * each for each in (at_A.s, at_A.n, at_A.t, *at_B)))
+    return rigid_body.apply(free, P, p), P
+
+
+def unlocked(error: NotConvergedError, p: Parameters) -> Closed:
+    """The target of a contact when no impulses make both rebound: to stay closed.
+
+    Raises the error again if friction can't have locked the ball.
+    """
+    if p.mu < 1 or p.eta < 1:
+        raise error
+    return Closed()
+
+
+def project(need: Impulse, friction: Friction) -> Impulse:
+    """The impulse that Coulomb's law allows: friction is the point of its disk next to the need, or opposes a known
+    slip."""
+    n, s, t = need
+    if n <= 0:
+        return Impulse(0.0, 0.0, 0.0)
+    limit = friction.coefficient * n
+    if friction.s != 0 or friction.t != 0:
+        return Impulse(n, -limit * friction.s, -limit * friction.t)
+    size = math.sqrt(s * s + t * t)
+    if size == 0:
+        return Impulse(n, 0.0, 0.0)
+    return need if size <= limit else Impulse(n, s * (limit / size), t * (limit / size))
+
+
+def _held(need: Impulse, friction: Friction) -> Impulse:
+    """Share of a need that `project` meets along the disk, and the direction there: none if open, 0, or sticking, 1."""
+    if need.n <= 0:
+        return Impulse(0.0, 0.0, 0.0)
+    if friction.s != 0 or friction.t != 0:
+        return Impulse(0.0, -friction.s, -friction.t)
+    size, limit = math.sqrt(need.s * need.s + need.t * need.t), friction.coefficient * need.n
+    return Impulse(limit / size, need.s / size, need.t / size) if size > limit else Impulse(1.0, 0.0, 0.0)
+
+
+def _project_rate(held: Impulse, friction: Friction, by: Impulse) -> Impulse:
+    """Derivative of `project` in the direction `by`, at a need that is so `_held`."""
+    share, e_s, e_t = held
+    if share == 1 or (e_s == 0 and e_t == 0):
+        return Impulse(share * by.n, share * by.s, share * by.t)
+    along = friction.coefficient * by.n - share * (e_s * by.s + e_t * by.t)
+    return Impulse(by.n, share * by.s + along * e_s, share * by.t + along * e_t)
+
+
+def _less(a: Impulse, other: Impulse, k: float) -> Impulse:
+    """a - C other: what a contact needs when the other one gives that."""
+    return Impulse(a.n - other.s, a.s - (1 - k) * other.n + k * other.s, a.t - (1 - k) * other.t)
+
+
+def _sweep_rate(at_A: Impulse, at_B: Impulse, by: Impulse, A: Friction, B: Friction, k: float) -> Impulse:
+    """How the impulse at B after a sweep changes if that before it changes in the direction `by`."""
+    still = Impulse(0.0, 0.0, 0.0)
+    return _project_rate(at_B, B, _less(still, _project_rate(at_A, A, _less(still, by, k)), k))
+
+
+def _cross(a: Impulse, b: Impulse) -> Impulse:
+    return Impulse(a.s * b.t - a.t * b.s, a.t * b.n - a.n * b.t, a.n * b.s - a.s * b.n)
+
+
+def _dot(a: Impulse, b: Impulse) -> float:
+    return a.n * b.n + a.s * b.s + a.t * b.t
+
+
+def _continued(
+    need_A: Impulse, need_B: Impulse, step: Impulse, span: float, A: Friction, B: Friction, k: float
+) -> Impulse:
+    """An implicit Euler step of length `span` of dB/dt = f(B) - B, where a sweep f takes B on by `step`."""
+    at_A, at_B = _held(need_A, A), _held(need_B, B)
+    x = _sweep_rate(at_A, at_B, Impulse(1.0, 0.0, 0.0), A, B, k)
+    y = _sweep_rate(at_A, at_B, Impulse(0.0, 1.0, 0.0), A, B, k)
+    z = _sweep_rate(at_A, at_B, Impulse(0.0, 0.0, 1.0), A, B, k)
+    d = 1 + 1 / span
+    x, y, z = Impulse(d - x.n, -x.s, -x.t), Impulse(-y.n, d - y.s, -y.t), Impulse(-z.n, -z.s, d - z.t)
+    yz = _cross(y, z)
+    size = _dot(x, yz)
+    return Impulse(_dot(step, yz) / size, _dot(x, _cross(step, z)) / size, _dot(x, _cross(y, step)) / size)
+
+
+def _sense(need: Impulse, given: Impulse) -> int:
+    """0 if a contact that needs an impulse and is given another is open, 1 if it sticks, 2 if it slides."""
+    if given.n == 0:
+        return 0
+    return 1 if given.s == need.s and given.t == need.t else 2
+
+
+def both(
+    a: Impulse, b: Impulse, start: Impulse, A: Friction, B: Friction, j: float, enough: float
+) -> tuple[Impulse, Impulse, float]:
+    """Impulses of A and B that obey Coulomb's law, from a first guess of B; and by how much they still changed.
+
+    That is at most `enough` (m s-1) unless `MAX_SWEEPS` were not enough. Sweeps with Newton's method count from
+    -`EAGER` up to 0, those after it from 0 on.
+    """
+    k, rough, zero, before = 1 / (1 + j), A.coefficient * B.coefficient, Impulse(0.0, 0.0, 0.0), -1
+    at_A, at_B, count = start, start, -EAGER if rough < 1 else 0
+    change, last, span, growth = math.inf, math.inf, SPAN, GROWTH
+    while count < MAX_SWEEPS:
+        attempt, sweeps = count // ATTEMPT, count % ATTEMPT
+        if count >= 0 and sweeps == 0:
+            last, span, growth = math.inf, SPAN, GROWTH
+            at_B = start if attempt == 0 else zero if attempt == 1 else at_B
+        need_A = _less(a, at_B, k)
+        at_A = project(need_A, A)
+        need_B = _less(b, at_A, k)
+        after = project(need_B, B)
+        step = Impulse(after.n - at_B.n, after.s - at_B.s, after.t - at_B.t)
+        change = abs(step.n) + abs(step.s) + abs(step.t)
+        pace = DAMPED if attempt > 0 else 1.0
+        if count < 0:
+            sense = 3 * _sense(need_A, at_A) + _sense(need_B, after)
+            if before != -1 and sense != before:  # a contact begins to stick, slide or open
+                count = 0
+                continue
+            before = sense
+        if change <= enough:
+            return at_A, after, change
+        if count < 0:
+            step = _continued(need_A, need_B, step, WHOLE, A, B, k)
+        elif sweeps >= PLAIN_SWEEPS * (1 + attempt):
+            if change <= last * (BOLD if attempt % 2 else WARY):
+                span = min(span * growth, LONGEST_SPAN)
+            else:  # the rate of a sweep is of the order of mu eta at most: shorter spans damp no better
+                span, growth = max(span / SHORTER, 1 / (10 + rough)), max(growth**CALMER, LEAST_GROWTH)
+            step, pace = _continued(need_A, need_B, step, span, A, B, k), 1.0
+        last = change
+        at_B = Impulse(at_B.n + pace * step.n, at_B.s + pace * step.s, at_B.t + pace * step.t)
+        count += 1
+    return at_A, at_B, change
+
+
+COMPILED = (both, project, _continued, _sense, _cross, _dot, _sweep_rate, _less, _project_rate, _held)
+"""Called by what `stepping` compiles."""

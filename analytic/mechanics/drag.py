@@ -1,0 +1,109 @@
+"""The drag -m c(|w|) w of each law of `model.drag` as a function of the speed |w| relative to the fluid.
+
+With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^0.687, blunt |w|): Stokes' has the first
+term alone, the quadratic one the last. So c never falls as |w| grows, and a drag force belongs to one speed.
+
+All take floats or arrays, and complex ones for derivatives by complex steps. `analytic.simulation.stepping` compiles
+`rate`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from model import Parameters, State
+from model.arrays import Array, Real
+from model.drag import QUADRATIC, REYNOLDS, SCHILLER_NAUMANN, STOKES
+
+EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
+"""Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
+SPEED_STEPS = 8
+"""Steps to the last digit from a speed less than twice too high: 6, and 2 to spare for the corner of `Law`."""
+POWERS = (1.0, 1.0 + EXPONENT, 2.0)
+"""How the force of each term of `Law` grows with the speed."""
+
+
+class Law(NamedTuple):
+    """c(|w|) = max(linear + wake |w|^0.687, blunt |w|) in s-1, with |w| in m s-1."""
+
+    linear: float
+    wake: float
+    blunt: float
+
+
+def law(p: Parameters) -> Law:
+    """The law of a parameter set. Raises KeyError for a law of `model.drag` that has no formula here."""
+    per_speed = 2 * p.r / (p.nu_f or math.inf)
+    laws = {
+        STOKES: Law(p.c, 0.0, 0.0),
+        SCHILLER_NAUMANN: Law(p.c, WAKE * p.c * per_speed**EXPONENT, BLUNT / 24 * p.c * per_speed),
+        QUADRATIC: Law(0.0, 0.0, p.C_D / 24 * p.c * per_speed),
+    }
+    return laws[p.drag]
+
+
+def rate(speed: Real, law: Law) -> Real:
+    """c(|w|) of a law, s-1."""
+    slow, fast = law.linear + law.wake * speed**EXPONENT, law.blunt * speed
+    return slow * (slow >= fast) + fast * (slow < fast)  # max, for all kinds of numbers
+
+
+def coefficient(speed: Real, p: Parameters) -> Real:
+    """c(|w|) at a speed |w| >= 0 (m s-1) relative to the fluid, s-1: the drag on the ball is -m c(|w|) w, N."""
+    return p.c if p.drag == STOKES else rate(speed, law(p))
+
+
+def of_velocity(w_h: Real, w_y: Real, w_k: Real, p: Parameters) -> Real:
+    """c(|w|) of a velocity relative to the fluid, inward, upward and along the orbit, rho (omega_c - omega_0); s-1."""
+    return p.c if p.drag == STOKES else rate(speed(w_h, w_y, w_k), law(p))
+
+
+def speed(w_h: Real, w_y: Real, w_k: Real) -> Real:
+    """|w| of the same components, m s-1."""
+    square = w_h * w_h + w_y * w_y + w_k * w_k
+    return math.sqrt(square) if isinstance(square, float) else np.sqrt(square)
+
+
+def slope(speed: Real, p: Parameters) -> Real:
+    """d(c(|w|) |w|)/d|w|, s-1: how the drag per mass answers a change along w; across w it is `coefficient`."""
+    if p.drag == STOKES:
+        return p.c
+    linear, wake, blunt = law(p)
+    slow, fast = wake * speed**EXPONENT, blunt * speed
+    return (linear + (1 + EXPONENT) * slow) * (linear + slow >= fast) + 2 * fast * (linear + slow < fast)
+
+
+def speed_of(acceleration: npt.ArrayLike, p: Parameters) -> Array:
+    """The speed |w| (m s-1) at which the drag per mass c(|w|) |w| is a given one >= 0 (m s-2); inf where c = 0."""
+    given, terms = np.asarray(acceleration, dtype=float), law(p)
+    alone = [(given / term) ** (1 / power) for term, power in zip(terms, POWERS, strict=True) if term > 0]
+    if not alone:
+        return np.where(given > 0, np.inf, given)
+    speed: Array = np.minimum.reduce(alone)
+    if len(alone) == 1:
+        return speed
+    # One term alone makes the drag of this speed too great, but that of half of it is too small. The drag is convex, so
+    # that Newton's method comes down to the root from there, with twice as many digits each time.
+    for _ in range(SPEED_STEPS):
+        speed = speed - (rate(speed, terms) * speed - given) / slope(speed, p)
+    return speed
+
+
+def reynolds(speed: Real, p: Parameters) -> Real:
+    """Reynolds number 2 r |w|/nu_f; nan if the viscosity isn't known."""
+    return 2 * p.r / p.nu_f * speed if p.nu_f else math.nan * speed
+
+
+def reynolds_of(x: State, p: Parameters) -> float:
+    """Reynolds number of a ball in a state x in the flow p.omega_0; nan if the viscosity isn't known."""
+    return float(reynolds(speed(x.v_h, x.v_y, (p.R - x.h) * (x.omega_c - p.omega_0)), p))
+
+
+def covers(Re: float, law: str) -> bool:
+    """Whether a law is meant for a Reynolds number; no law has anything to say where the ball goes with the fluid."""
+    low, high = REYNOLDS[law]
+    return Re == 0 or low <= Re <= high

@@ -1,0 +1,100 @@
+"""The ball as a rigid body under gravity, drag and contact forces, whatever its case.
+
+All on plain floats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from analytic.mechanics import drag
+from model import Parameters, State
+from model.arrays import Real
+
+
+class Velocities(NamedTuple):
+    """Velocities of the centre (m s-1) and spin (rad s-1) along the paper's axes i, j, k, or their rates."""
+
+    v_h: Real
+    v_y: Real
+    v_k: Real
+    """rho omega_c."""
+    o_x: Real
+    o_y: Real
+    o_z: Real
+
+
+class Forces(NamedTuple):
+    """Forces of floor (A) and wall (B) on the ball along the paper's axes, N; or impulses, N s."""
+
+    A_x: Real = 0.0
+    A_y: Real = 0.0
+    A_z: Real = 0.0
+    B_x: Real = 0.0
+    B_y: Real = 0.0
+    B_z: Real = 0.0
+
+
+NOTHING = Forces()
+
+
+def velocities(x: Sequence[Real], p: Parameters) -> Velocities:
+    """Velocities of a state, (2) and (4)."""
+    _, v_y, omega_c, w_x, w_y, w_z, h, v_h = x
+    v_k = (p.R - h) * omega_c
+    return Velocities(v_h, v_y, v_k, w_x + v_k / p.r, w_y - v_k / p.r, w_z + v_y / p.r)
+
+
+def state(y: Real, h: Real, u: Velocities, p: Parameters) -> State:
+    """The state of a ball with velocities u; inverse of `velocities`."""
+    v_h, v_y, v_k, o_x, o_y, o_z = u
+    return State(y, v_y, v_k / (p.R - h), o_x - v_k / p.r, o_y + v_k / p.r, o_z - v_y / p.r, h, v_h)
+
+
+def slip_at_A(u: Velocities, p: Parameters) -> tuple[Real, Real]:
+    """Velocity of the lowest point along i and k (6)."""
+    v_h, _, v_k, o_x, _, o_z = u
+    return v_h + p.r * o_z, v_k - p.r * o_x
+
+
+def slip_at_B(u: Velocities, p: Parameters) -> tuple[Real, Real]:
+    """Velocity of the outermost point along j and k (6)."""
+    _, v_y, v_k, _, o_y, o_z = u
+    return v_y - p.r * o_z, v_k + p.r * o_y
+
+
+def apply(u: Velocities, P: Forces, p: Parameters) -> Velocities:
+    """Velocities after impulses P; or with accelerations u, accelerations under forces P besides: (20)."""
+    m, jmr = p.m, p.j * p.m * p.r
+    (v_h, v_y, v_k, o_x, o_y, o_z), (A_x, A_y, A_z, B_x, B_y, B_z) = u, P
+    v_h, v_y, v_k = v_h + (A_x + B_x) / m, v_y + (A_y + B_y) / m, v_k + (A_z + B_z) / m
+    return Velocities(v_h, v_y, v_k, o_x - A_z / jmr, o_y + B_z / jmr, o_z + (A_x - B_y) / jmr)
+
+
+def smooth_rates(u: Velocities, h: float, omega_0: float, p: Parameters) -> Velocities:
+    """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact; h is the gap at B."""
+    v_h, v_y, v_k, o_x, _, o_z = u
+    turn, w_k = v_k / (p.R - h), v_k - omega_0 * (p.R - h)
+    c = drag.of_velocity(v_h, v_y, w_k, p)
+    return Velocities(-turn * v_k - c * v_h, -p.g - c * v_y, turn * v_h - c * w_k, -turn * o_z, 0.0, turn * o_x)
+
+
+def contact_work(u: Velocities, P: Forces, p: Parameters) -> Real:
+    """Work of impulses P at contact points that move with the mean velocities u, J."""
+    (v_h, v_y, *_), (A_x, A_y, A_z, B_x, B_y, B_z) = u, P
+    (A_s, A_t), (B_s, B_t) = slip_at_A(u, p), slip_at_B(u, p)
+    return A_x * A_s + A_y * v_y + A_z * A_t + B_x * v_h + B_y * B_s + B_z * B_t
+
+
+def energy(y: Real, u: Velocities, p: Parameters) -> Real:
+    """Kinetic and potential energy, J; 0 at rest on the floor."""
+    v_h, v_y, v_k, o_x, o_y, o_z = u
+    spin = p.j * p.r**2 * (o_x**2 + o_y**2 + o_z**2)
+    return p.m * ((v_h**2 + v_y**2 + v_k**2 + spin) / 2 + p.g * y)
+
+
+def mean(a: Velocities, b: Velocities) -> Velocities:
+    """Half the sum."""
+    o_x, o_y, o_z = (a.o_x + b.o_x) / 2, (a.o_y + b.o_y) / 2, (a.o_z + b.o_z) / 2
+    return Velocities((a.v_h + b.v_h) / 2, (a.v_y + b.v_y) / 2, (a.v_k + b.v_k) / 2, o_x, o_y, o_z)

@@ -1,0 +1,147 @@
+"""Contact forces of two-point rolling (RR): a one-parameter family, and whether any member is admissible.
+
+Rolling at A and B leaves one force free, say B_y: A_x = B_y - j u, A_y = G - B_y, B_x = (1+j) u - B_y, with
+u = m R omega_c^2, G = m g, and A_z = B_z = z given by (23). RR can go on only if some B_y puts both forces into
+their Coulomb cones (12), (13). With s the normal force of one contact, either cone reads
+(d - s)^2 + z^2 <= f^2 s^2, s >= 0, where d = G - j u, f = mu at A and d = (1+j) u, f = eta at B: a convex problem in
+one unknown. Loads are kept in units of G inside; all functions take floats or arrays and broadcast them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.mechanics import drag, roots
+from model import Parameters
+from model.arrays import Array
+
+
+@dataclass(frozen=True)
+class LeastUtilisation:
+    """The member of the family whose larger friction utilisation is the least; arrays of one shape."""
+
+    B_y: Array
+    """Its free component, N; -inf if the least is only approached as the forces grow without bound."""
+    utilisation: Array
+    """max(|friction at A|/(mu A_y), |friction at B|/(eta B_x)); RR can go on where it is <= 1 with finite forces."""
+
+
+def admissible_interval(
+    omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """Least and greatest admissible B_y in N; nan where there is none, -inf where the ball can jam (mu, eta > 1)."""
+    least, greatest = _interval(*_loads(omega_c, p, omega_0), p)
+    exists = (least <= greatest) & (greatest > -np.inf) & (margin(omega_c, p, omega_0) >= 0)
+    return tuple(np.where(exists, p.m * p.g * end, np.nan) for end in (least, greatest))  # type: ignore[return-value]
+
+
+def margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+    """How far RR is from its end, in closed form: >= 0 exactly where both cones can hold, continuous through 0.
+
+    The smallest of three lengths in units of m g: the slack of either cone alone, and the overlap of the two
+    intervals of B_y.
+    """
+    u, z = _loads(omega_c, p, omega_0)
+    least, greatest = _interval(u, z, p)
+    unbounded = np.isneginf(greatest)
+    overlap = np.where(unbounded, -np.inf, np.where(unbounded, 0.0, greatest) - least)
+    slacks = [
+        friction * np.hypot(d, z) - np.where(d >= 0, z, np.hypot(d, z))
+        for d, friction in ((1 - p.j * u, p.mu), ((1 + p.j) * u, p.eta))
+    ]
+    return np.asarray(np.minimum(np.minimum(*slacks), overlap))
+
+
+def slip_margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+    """How far RR is from the onset of a slip that lasts, in units of m g: >= 0 where slip dies out.
+
+    Two slacks: of the wall's friction that must drive the spin (66), and of the floor's cone once the wall carries
+    `last_share` of the weight. Continuous; never beyond the zero of `margin`. docs/theory.md derives it.
+    """
+    u, z = _loads(omega_c, p, omega_0)
+    share = last_share(omega_c, p, omega_0)
+    return np.asarray(np.minimum(p.eta * (1 + p.j) * u - z, p.mu * (1 - share) - np.hypot(p.j * u - share, z)))
+
+
+def last_share(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
+    """B_y in units of m g at which RR gives way: all that the wall's cone has, but not more than turns the spin, j u.
+
+    0 where the cone has nothing left, beyond (66).
+    """
+    u, z = _loads(omega_c, p, omega_0)
+    k = (1 + p.j) * u
+    return np.asarray(np.clip(k - _normal_forces(k, z, p.eta)[0], 0.0, p.j * u))
+
+
+def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> LeastUtilisation:
+    """The member of the family with the least larger utilisation, see `LeastUtilisation`.
+
+    Each utilisation falls and then rises along B_y, so that the least maximum is at the lowest point of one of them
+    or at their only crossing in between. The search runs in q = 1/(1 + A_y/G), which is finite for all A_y >= 0.
+    """
+    u, z = np.broadcast_arrays(*_loads(omega_c, p, omega_0))
+    a, k = 1 - p.j * u, (1 + p.j) * u
+    hyp2 = a**2 + z**2
+    q_A = np.where(a > 0, _ratio(a, a + hyp2), np.where(hyp2 > 0, 0.0, 1.0))
+    q_B = np.where(k + z > 0, _ratio(k, 2 * k + z**2), 0.5)
+
+    def at_A(q: Array, a: Array, z: Array) -> tuple[Array, Array]:
+        return np.hypot((a + 1) * q - 1, z * q), p.mu * (1 - q)
+
+    def at_B(q: Array, k: Array, z: Array) -> tuple[Array, Array]:
+        return np.hypot(2 * q - 1, z * q), p.eta * np.maximum((k - 2) * q + 1, 0.0)
+
+    def lead_of_A(q: Array, a: Array, k: Array, z: Array) -> Array:
+        (load_A, hold_A), (load_B, hold_B) = at_A(q, a, z), at_B(q, k, z)
+        return np.asarray(load_A * hold_B - load_B * hold_A)
+
+    A_binds, B_binds = lead_of_A(q_A, a, k, z) >= 0, lead_of_A(q_B, a, k, z) <= 0
+    crossing = roots.bisected(lambda q: lead_of_A(q, a, k, z), q_A, q_B)
+    q = np.where(A_binds, q_A, np.where(B_binds, q_B, crossing))
+    use_A = np.where(A_binds, _least_alone(a, z, p.mu), _ratio(*at_A(q, a, z)))
+    use_B = np.where(B_binds & ~A_binds, _least_alone(k, z, p.eta), _ratio(*at_B(q, k, z)))
+    with np.errstate(divide="ignore"):
+        B_y = p.m * p.g * (2 - 1 / q)
+    return LeastUtilisation(B_y, np.maximum(use_A, use_B))
+
+
+def _loads(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None) -> tuple[Array, Array]:
+    """Centrifugal load u and common friction |z| of (23), in units of G."""
+    omega_c, fluid = np.asarray(omega_c, dtype=float), np.asarray(p.omega_0 if omega_0 is None else omega_0)
+    u, lag = p.R / p.g * omega_c**2, np.abs(omega_c - fluid)
+    return np.asarray(u), np.asarray(p.j * drag.coefficient(p.R * lag, p) * p.R / p.g * lag / (1 + 2 * p.j))
+
+
+def _interval(u: Array, z: Array, p: Parameters) -> tuple[Array, Array]:
+    """Least and greatest B_y/G that both cones allow; least > greatest if none."""
+    k = (1 + p.j) * u
+    low_A, high_A = _normal_forces(1 - p.j * u, z, p.mu)
+    low_B, high_B = _normal_forces(k, z, p.eta)
+    return np.maximum(1 - high_A, k - high_B), np.minimum(1 - low_A, k - low_B)
+
+
+def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
+    """Roots s of (d - s)^2 + z^2 = friction^2 s^2 that bound the admissible normal forces of one contact.
+
+    Where no s is admissible the discriminant is taken as 0, or both ends are inf: there `margin` is negative.
+    """
+    hyp2 = d**2 + z**2
+    top = d + np.sqrt(np.maximum((friction - 1) * (friction + 1) * z**2 + (friction * d) ** 2, 0.0))
+    low = np.where(hyp2 == 0, 0.0, np.where(top > 0, hyp2 / np.where(top > 0, top, 1.0), np.inf))
+    high = top / (1 - friction**2) if friction < 1 else np.full_like(low, np.inf)
+    return low, high
+
+
+def _least_alone(d: Array, z: Array, friction: float) -> Array:
+    """Least utilisation of one contact if the other asked for nothing."""
+    hyp = np.hypot(d, z)
+    return _ratio(np.where(d > 0, _ratio(z, hyp), np.where(hyp > 0, 1.0, 0.0)), np.asarray(friction))
+
+
+def _ratio(load: Array, hold: Array) -> Array:
+    """load/hold, 0 for 0/0: a contact that is asked for no friction needs none."""
+    safe = np.where(hold == 0, 1.0, hold)
+    return np.where(load == 0, 0.0, np.where(hold == 0, np.inf, load / safe))

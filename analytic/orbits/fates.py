@@ -1,0 +1,274 @@
+"""Attractors: whether motions from one start or many become stationary, periodic, or neither.
+
+A run is followed window by window until it repeats what it did; any simulator may carry it out. A recurrent motion is
+closed to an orbit by theory (`orbits`). One for which no stable orbit is found is chaotic if neighbours of it part
+exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with what it did last.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.orbits import periodic as orbits
+from analytic.orbits.periodic import NoOrbitError, Orbit, extent, scale
+from analytic.simulation.ensemble import interval, random_starts
+from analytic.simulation.motion import natural_units
+from analytic.simulation.simulator import simulate
+from analytic.stationary.solutions import StationarySolution, stable_solutions
+from model import InputError, Parameters, SimulationError, Trajectory
+from model.arrays import Array
+from model.cases import TRAITS
+from model.kinematics import VARIABLES, full_state
+from model.parameters import POSITIVE, check_number
+
+WINDOW, WINDOW_SAMPLES = 100.0, 4000
+"""Length of a window in units of sqrt(R/g), and samples in it."""
+LASTING = 60.0
+"""How long a run is followed, in units of 1/c."""
+STATIONARY_RANGE = 1e-3
+"""Range of the variables over a window, in natural units, below which a motion that still shrinks is stationary."""
+NEAR = 1e-2
+"""Distance in natural units up to which it is that of a stationary solution."""
+ALIKE = 0.05
+"""Distance divided by the range of the motion up to which states, means and extremes are the same."""
+GROWING = 400.0
+"""Duration over which the Lyapunov exponent is taken, in units of sqrt(R/g)."""
+APART = 1e-6
+"""Distance in natural units of the two motions whose growing apart is the Lyapunov exponent."""
+
+Run = Callable[[Parameters, Array, float, float], Trajectory]
+"""A simulator: parameters, start (8,), duration in s, sample interval in s. Raises `SimulationError`."""
+
+
+class Kind(StrEnum):
+    """The kind of attractor that a motion approaches."""
+
+    STATIONARY = "stationary"
+    PERIODIC = "periodic"
+    QUASI_PERIODIC = "quasi-periodic"
+    CHAOTIC = "chaotic"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What one run came to, and what it did last."""
+
+    kind: Kind
+    last: Trajectory
+    """Its last window."""
+    period: float = math.nan
+    """s, as seen in the window; nan unless it is periodic."""
+    solution: StationarySolution | None = None
+    """The stationary solution that it came to, if theory has it."""
+    orbit: Orbit | None = None
+    """The periodic motion, as theory has it."""
+    exponent: float = math.nan
+    """Largest Lyapunov exponent, s-1, where it was taken."""
+    failure: str = ""
+    """Why the run broke down, if it did."""
+
+    def same(self, other: Fate) -> bool:
+        """Whether two runs came to one attractor; all that are undecided count as one."""
+        if self.kind is not other.kind or (self.solution is None) is not (other.solution is None):
+            return False
+        if self.solution and other.solution:
+            return self.solution.case is other.solution.case
+        return self.kind is Kind.UNDECIDED or _alike(self.last, other.last)
+
+
+@dataclass(frozen=True)
+class Attractor:
+    """What some of the starts came to."""
+
+    fate: Fate
+    """Of the first of them."""
+    count: int
+    starts: int
+    """How many starts came to it, and how many there were."""
+
+    @property
+    def share(self) -> float:
+        """Share of the starts."""
+        return self.count / self.starts
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The share's confidence interval, `ensemble.interval`."""
+        return interval(self.count, self.starts)
+
+    @property
+    def run(self) -> Trajectory:
+        """What it does: a period by theory where there is an orbit, else the last window of the first run."""
+        return self.fate.orbit.cycle if self.fate.orbit else self.fate.last
+
+
+def event_driven(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
+    """The event-driven simulation as a `Run`."""
+    return simulate(p, x0, duration, sample_interval=interval, initial_impact=True)
+
+
+def attractors(
+    p: Parameters,
+    starts: int | npt.ArrayLike = 20,
+    *,
+    seed: int = 0,
+    lasting: float | None = None,
+    run: Run = event_driven,
+) -> list[Attractor]:
+    """The attractors that balls approach from many starts, the most frequent first.
+
+    Parameters
+    ----------
+    starts : number of random starts (`ensemble.random_starts`), or states of shape (n, 6 or 8)
+    lasting : how long a run is followed at most, s; `LASTING`/c if None
+    run : the simulator that carries out the runs
+
+    Raises `InputError` if a start is outside of the vessel, a number out of range, or c = 0 without `lasting`.
+    """
+    states = random_starts(p, starts, seed) if isinstance(starts, int) else np.atleast_2d(full_state(starts))
+    if lasting is None and p.c == 0:
+        raise InputError("c = 0 s-1 leaves motions undamped: say how long to follow them (lasting)")
+    duration = LASTING / p.c if lasting is None else check_number("lasting", lasting, "s", POSITIVE)
+    groups: list[list[Fate]] = []
+    for x in states:
+        fate = settle(p, x, duration, run, [group[0] for group in groups])
+        group = next((group for group in groups if group[0].same(fate)), None)
+        if group is None:
+            groups.append(group := [])
+        group.append(fate)
+    groups.sort(key=len, reverse=True)
+    return [Attractor(group[0], len(group), len(states)) for group in groups]
+
+
+def settle(
+    p: Parameters, x0: npt.ArrayLike, lasting: float, run: Run = event_driven, known: Sequence[Fate] = ()
+) -> Fate:
+    """The attractor that the motion from x0 approaches within `lasting` seconds; `known` fates are simply recognised.
+
+    It is followed in windows. Stationary is what hardly moves, and less than before. Where two windows are alike the
+    motion is recurrent: it has one of the known fates, or closes; if it does neither, its largest Lyapunov exponent
+    decides.
+    """
+    solutions, x, unit = stable_solutions(p), full_state(x0), natural_units(p)[0]
+    window, seen, recurrent = WINDOW * unit, list[Trajectory](), False
+    for _ in range(math.ceil(lasting / window)):
+        try:
+            now = run(p, x, window, window / WINDOW_SAMPLES)
+        except SimulationError as error:
+            return Fate(Kind.UNDECIDED, error.trajectory, failure=str(error))
+        if now.header.failure:
+            return Fate(Kind.UNDECIDED, now, failure=now.header.failure)
+        x, seen = now.x[-1], [*seen[-1:], now]
+        if len(seen) < 2:
+            continue
+        before = seen[0]
+        if extent(now) < STATIONARY_RANGE and extent(now) <= extent(before):
+            return Fate(Kind.STATIONARY, now, solution=_nearest(now, solutions))
+        if recurrent := _alike(before, now):
+            same = (fate for fate in known if fate.kind is not Kind.UNDECIDED and _alike(fate.last, now))
+            if fate := next(same, None) or periodic(now):
+                return fate
+    if not recurrent:
+        return Fate(Kind.UNDECIDED, seen[-1])
+    try:
+        exponent, deviation = lyapunov(p, _state(seen[-1]), GROWING * unit, unit, run=run)
+    except (SimulationError, InputError) as reason:
+        return Fate(Kind.UNDECIDED, seen[-1], failure=str(reason))
+    return Fate(Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC, seen[-1], exponent=exponent)
+
+
+def _alike(a: Trajectory, b: Trajectory) -> bool:
+    """Whether means and extremes of two windows agree, relative to the range of the motion."""
+    size = scale(a.header.parameters) * max(extent(a), STATIONARY_RANGE)
+    return all(
+        bool(np.all(np.abs(of(a.x, axis=0) - of(b.x, axis=0)) <= ALIKE * size)) for of in (np.mean, np.min, np.max)
+    )
+
+
+def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> StationarySolution | None:
+    """The stationary solution at which a motion is, of two in one state that of its own case; free variables aside."""
+    x, case = last.x[-1], last.cases[-1]
+    size = scale(last.header.parameters)
+
+    def distance(of: StationarySolution) -> float:
+        bound = [k for k, name in enumerate(VARIABLES) if name not in of.family]
+        return float((np.abs(x - of.x) / size)[bound].max())
+
+    near = [each for each in solutions if distance(each) <= NEAR]
+    return min(near, key=lambda each: (each.case is not case, distance(each)), default=None)
+
+
+def periodic(last: Trajectory) -> Fate | None:
+    """A recurrent motion that closes: with the stable orbit that theory has near it, or after all that one sees.
+
+    None if it doesn't close.
+    """
+    p, seen = last.header.parameters, _periods(last)
+    for period, _ in seen:
+        try:
+            orbit = orbits.refine(p, _state(last), period)
+        except NoOrbitError:
+            continue
+        if orbit.stable and abs(orbit.period / period - 1) < ALIKE:
+            return Fate(Kind.PERIODIC, last, period, orbit=orbit)
+    exact = [period for period, defect in seen if defect < STATIONARY_RANGE * extent(last)]
+    return Fate(Kind.PERIODIC, last, exact[0]) if exact else None
+
+
+def _periods(last: Trajectory) -> list[tuple[float, float]]:
+    """Up to three times after which the motion nearly returns, the shortest first, and by how much it misses.
+
+    As far as half the window shows.
+    """
+    z, n = last.x / scale(last.header.parameters), len(last.x) // 2
+    size, interval = extent(last), float(last.time[1] - last.time[0])
+    away = np.array([np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)])
+    left = int(np.argmax(away > size / 2))
+    dips = np.array([k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]], dtype=int)
+    good = dips[away[dips] <= 2 * away[dips].min(initial=size) + ALIKE * size]
+    return [(float(k * interval), float(away[k])) for k in good[:3]]
+
+
+def _state(last: Trajectory) -> Array:
+    """The highest state of a window, with what its case holds at zero exactly there."""
+    k = int(np.argmax(last.y))
+    held = TRAITS[last.cases[k]].constraints
+    return np.where([name in held for name in VARIABLES], 0.0, last.x[k])
+
+
+def lyapunov(
+    p: Parameters, x: npt.ArrayLike, duration: float, renewed: float, run: Run = event_driven
+) -> tuple[float, float]:
+    """Largest Lyapunov exponent of the motion from x over a duration, and its standard error, s-1.
+
+    A second motion starts beside the first, a distance `APART` away in natural units, and is brought back to that
+    distance every `renewed` seconds, as soon as both are in one case; the mean growth between is the exponent
+    (Benettin's method). The error is that of the mean of ten parts of the duration.
+    """
+    first = full_state(x)
+    case = run(p, first, renewed, renewed).cases[0]
+    active = [VARIABLES.index(name) for name in TRAITS[case].active]
+    push = np.zeros(8)
+    push[active] = np.random.default_rng(0).normal(size=len(active))
+    second = first + push * scale(p) * APART / np.linalg.norm(push)
+    growth, before = [], APART
+    for _ in range(math.ceil(duration / renewed)):
+        runs = [run(p, each, renewed, renewed) for each in (first, second)]
+        first, second = (each.x[-1] for each in runs)
+        apart = second - first
+        distance = float(np.linalg.norm(apart / scale(p)))
+        if distance == 0:
+            return -math.inf, 0.0
+        growth.append(math.log(distance / before))
+        before = distance
+        if runs[0].case[-1] == runs[1].case[-1]:
+            second, before = first + apart * APART / distance, APART
+    parts = np.array([part.mean() for part in np.array_split(np.array(growth), 10)]) / renewed
+    return float(np.mean(growth)) / renewed, float(parts.std(ddof=1) / math.sqrt(len(parts)))

@@ -1,0 +1,247 @@
+"""Branches of periodic motions: an orbit followed in one parameter to where it is born and where it dies.
+
+The branch is followed by its length (in natural units of the state, and the logarithm of the parameter), so that it may
+turn back: a step along the tangent, then Newton's method across it. Where stability or the sequence of cases changes
+between two orbits, the place is located.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from analytic.orbits.periodic import Changes, Loop, NoOrbitError, Orbit, close, closed, extent, jacobian
+from model import Contact, InputError, Parameters, State
+from model.arrays import Array
+from model.parameters import check_names, check_number
+
+FIRST_STEP, LEAST_STEP, LONGEST_STEP = 0.05, 1e-5, 0.5
+"""Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
+GRAZING = 0.01
+"""Longest step in which the number of landings may change: other branches, as of balls that ride the wall, are near."""
+EASY = 5
+"""Steps of Newton's method up to which the next step along the branch is longer."""
+SHARP = 1e-6
+"""How sharply a change of stability is located along the branch; a change of the sequence of cases by `HALVINGS`."""
+HALVINGS = 10
+SMALL = 0.05
+"""Extent divided by the largest of the branch, below which the branch is extrapolated to extent zero."""
+
+
+class Bifurcation(StrEnum):
+    """What happens to a branch of orbits at a place."""
+
+    FOLD = "fold"
+    """It turns back."""
+    DOUBLING = "period doubling"
+    """A multiplier passes -1."""
+    TORUS = "torus"
+    """A pair of multipliers passes the unit circle (Neimark and Sacker)."""
+    GRAZING = "grazing"
+    """The number of landings in a period changes."""
+    PERSISTENCE = "persistence"
+    """The sequence of cases changes without a landing more or less, and the orbit goes on."""
+    HOPF = "Hopf"
+    """It shrinks to a stationary motion within one case."""
+    BIRTH = "nonsmooth birth"
+    """It shrinks to a stationary motion at which cases meet: its extent falls linearly, not like a root."""
+    LOST = "lost"
+    """It isn't followed any further, for a reason that is given."""
+    RANGE = "end of the range"
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place on a branch."""
+
+    kind: Bifurcation
+    value: float
+    """The parameter there, SI."""
+    orbit: Orbit
+    """The orbit there, or nearest to it."""
+    reason: str = ""
+    """Why the branch is lost."""
+
+    def __str__(self) -> str:
+        return f"{self.kind} at {self.value:.6g}" + (f" ({self.reason})" if self.reason else "")
+
+
+@dataclass(frozen=True)
+class OrbitBranch:
+    """Orbits along a branch, from one end to the other."""
+
+    name: str
+    """The parameter that varies."""
+    orbits: tuple[Orbit, ...]
+    places: tuple[Place, ...]
+    """Where something happens, in order; the first and the last are its ends."""
+
+    @property
+    def values(self) -> Array:
+        """The parameter at the orbits, SI, shape (n,)."""
+        return np.array([getattr(orbit.p, self.name) for orbit in self.orbits])
+
+    @property
+    def stable(self) -> npt.NDArray[np.bool_]:
+        """Whether each orbit is stable, shape (n,)."""
+        return np.array([orbit.stable for orbit in self.orbits], dtype=bool)
+
+
+def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) -> OrbitBranch:
+    """Follow an orbit both ways in a parameter until it leaves [low, high], ends, or `most` orbits are known each way.
+
+    Raises `InputError` if there is no such parameter, or the orbit isn't within the range.
+    """
+    check_names([name], [field.name for field in Parameters.quantities()], "parameter")
+    low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
+    if not low <= (value := getattr(start.p, name)) <= high or value == 0:
+        raise InputError(f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, not 0")
+    down, up = ([*_way(start, name, (low, high), sign, most)] for sign in (-1.0, 1.0))
+    every: list[Orbit | Place] = [*down[::-1], start, *up]
+    return OrbitBranch(
+        name,
+        tuple(each for each in every if isinstance(each, Orbit)),
+        tuple(each for each in every if isinstance(each, Place)),
+    )
+
+
+def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: int) -> Iterator[Orbit | Place]:
+    """Orbits and places one way from an orbit, to the end."""
+    here, step, before, reason = start, FIRST_STEP, [start], ""
+    along = np.append(np.zeros(len(start.loop.free)), sign)
+    for _ in range(most):
+        try:
+            matrix = jacobian(here.loop, here.derivative, name)
+        except NoOrbitError as error:
+            yield Place(Bifurcation.LOST, getattr(here.p, name), here, str(error))
+            return
+        tangent = np.linalg.svd(matrix)[2][-1]
+        along = tangent if tangent @ along >= 0 else -tangent
+        there = None
+        while there is None and step > LEAST_STEP:
+            try:
+                there = _beside(here, step * along, name, matrix)
+            except NoOrbitError as error:
+                step, reason = step / 2, str(error)
+        if there is None:
+            yield Place(Bifurcation.LOST, getattr(here.p, name), here, reason)
+            return
+        met = _between(here, there, step * along, name, matrix)
+        yield from (place for place in met if span[0] <= place.value <= span[1])
+        if not span[0] <= getattr(there.p, name) <= span[1]:
+            yield from _edge(here, there, name, span)
+            return
+        yield there
+        step = min(LONGEST_STEP, 1.5 * step if there.steps <= EASY else 0.7 * step)
+        # The same orbit through a section anew: on the floor orbits may shrink away from one.
+        if State.of(there.loop.x).y > 0:
+            here = replace(there, loop=replace(there.loop, extent=extent(there.cycle)))
+        else:
+            here = close(Loop.of(there.p, there.loop.x, there.period))
+            if (here.loop.case, here.loop.fixed) != (there.loop.case, there.loop.fixed):
+                # The section is another: the parameter alone says which way the branch goes on.
+                along = np.append(np.zeros(len(here.loop.free)), along[-1])
+        before.append(here)
+        if here.loop.extent < SMALL * max(each.loop.extent for each in before):
+            # The extent will be zero where a parabola through the last three orbits says.
+            last, (kind, power) = before[-3:], (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2)
+            sizes = np.array([each.loop.extent for each in last]) ** power
+            values = np.array([getattr(each.p, name) for each in last])
+            yield Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), here)
+            return
+    yield Place(Bifurcation.LOST, getattr(here.p, name), here, f"not followed beyond {most} orbits")
+
+
+def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
+    """The orbit of the branch a step further; `NoOrbitError` also where a long step comes to other landings."""
+    orbit = close(here.loop.moved(by, name), name, matrix)
+    if _strays(here, by, orbit.changes):
+        raise NoOrbitError("the nearest orbit is one of another branch")
+    return orbit
+
+
+def _edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) -> Iterator[Orbit | Place]:
+    """The orbit where the branch leaves a range, between the last within it and the first outside."""
+    inside, outside = getattr(here.p, name), getattr(there.p, name)
+    value = min(max(outside, span[0]), span[1])
+    share = (value - inside) / (outside - inside)
+    x, period = (a + share * (b - a) for a, b in ((here.loop.x, there.loop.x), (here.period, there.period)))
+    try:
+        orbit = close(replace(here.loop, p=here.p.replace(**{name: value}), x=x, period=period))
+    except NoOrbitError as error:
+        yield Place(Bifurcation.LOST, inside, here, str(error))
+    else:
+        yield from (orbit, Place(Bifurcation.RANGE, value, orbit))
+
+
+def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:
+    """What happens between an orbit and the next, a step away."""
+    for kind, sign in _TESTS.items():
+        outside = [np.sum(np.abs(each.multipliers) > 1) for each in (here, there)]
+        if outside[0] == outside[1] or (sign(here.multipliers) > 0) == (sign(there.multipliers) > 0):
+            continue
+
+        def test(share: float, sign: Callable[[Any], float] = sign) -> float:
+            return sign(_beside(here, share * step, name, matrix).multipliers)
+
+        try:
+            orbit = _beside(here, brentq(test, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix)
+        except (NoOrbitError, ValueError):  # where the sequence of cases changes, too, the test may jump
+            orbit = there
+        yield Place(kind, getattr(orbit.p, name), orbit)
+    if _sequence(here.changes) != _sequence(there.changes):
+        yield _change(here, there, step, name, matrix)
+
+
+def _change(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Place:
+    """Where the sequence of cases changes, by halving as far as orbits are found."""
+    low, high, loop, before = 0.0, 1.0, there.loop, _sequence(here.changes)
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        try:
+            found, back, _ = closed(here.loop.moved(middle * step, name), name, matrix)
+        except NoOrbitError:
+            break
+        if _strays(here, middle * step, back.changes):
+            break
+        loop = found
+        low, high = (middle, high) if _sequence(back.changes) == before else (low, middle)
+    try:
+        nearest = close(loop)
+    except NoOrbitError:  # disturbances there land where others don't
+        nearest = there
+    kind = Bifurcation.PERSISTENCE if _landings(here.changes) == _landings(there.changes) else Bifurcation.GRAZING
+    return Place(kind, getattr(loop.p, name), nearest)
+
+
+def _sequence(changes: Changes) -> Changes:
+    """The changes of case of a period, from wherever it is the least in order."""
+    turns = [changes[k:] + changes[:k] for k in range(len(changes))]
+    return min(turns, default=())
+
+
+def _strays(here: Orbit, by: Array, changes: Changes) -> bool:
+    """Whether a long step came to other landings than those of the orbit it began at."""
+    return bool(np.linalg.norm(by) > GRAZING) and _landings(changes) != _landings(here.changes)
+
+
+def _landings(changes: Changes) -> int:
+    return sum(before.A is Contact.N is not after.A for before, after in changes)
+
+
+def _reals(multipliers: npt.NDArray[np.complex128]) -> Array:
+    return np.real(multipliers[np.isreal(multipliers)])
+
+
+_TESTS: dict[Bifurcation, Callable[[npt.NDArray[np.complex128]], float]] = {
+    Bifurcation.FOLD: lambda m: -float(np.prod(1 - _reals(m))),
+    Bifurcation.DOUBLING: lambda m: -float(np.prod(1 + _reals(m))),
+    Bifurcation.TORUS: lambda m: float(np.abs(m[np.imag(m) != 0]).max(initial=0.0)) - 1,
+}
+"""What is positive of multipliers of which an odd number is real and beyond 1 or -1, or a pair outside the circle."""

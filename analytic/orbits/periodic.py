@@ -1,0 +1,286 @@
+"""Periodic motions: orbits that close, by Newton's method on the return map, and how disturbances of them grow.
+
+The return map leads from a plane through a point of the orbit, across the motion there, back to it: through every event
+and impact in between, by the event-driven simulation. The point lies within one case, and its coordinates are the
+active variables of that case (Table 4) in natural units, so that the map is smooth as long as the sequence of events
+stays the same; the azimuth plays no part. Derivatives are central differences of the simulation, at a tolerance at
+which they keep six digits. Floquet multipliers are the eigenvalues of the derivative of the return map: the factors by
+which disturbances of the orbit change in a period.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.integrate import solve_ivp
+
+from analytic.mechanics import dynamics
+from analytic.simulation.motion import natural_units
+from analytic.simulation.simulator import simulate
+from model import Case, InputError, Parameters, SimulationError, State, Trajectory
+from model.arrays import Array
+from model.cases import TRAITS
+from model.kinematics import VARIABLES
+
+RETURN_RTOL = 1e-12
+"""Relative tolerance of the simulation under the return map."""
+SHIFT = 3e-5
+"""Half width of the differences divided by the extent of the orbit: truncation and RETURN_RTOL leave less than 1e-6."""
+CLOSED = 1e-10
+"""Defect in natural units at which an orbit is closed."""
+ITERATIONS = 8
+"""Steps of Newton's method after which an orbit is given up."""
+FAST = 10.0
+"""Factor by which a step must reduce the defect for the derivatives of a neighbour to be used once more."""
+ORBIT_SAMPLES = 4000
+"""Samples of a period from which means and extremes are taken: a parabola's top is then good to 1e-6 of its height."""
+
+Changes = tuple[tuple[Case, Case], ...]
+"""Changes of case in order, (before, after)."""
+
+
+class NoOrbitError(ArithmeticError):
+    """No closed orbit was found where it was looked for."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A state within a case and the section through it: the plane on which one of its active variables has its value.
+
+    The other active variables, in natural units, are the d - 1 coordinates of the section.
+    """
+
+    p: Parameters
+    case: Case
+    x: Array
+    """State, shape (8,)."""
+    period: float
+    """About the time until the motion comes back to the section, s."""
+    fixed: int
+    """Index of the variable that has one value on the section."""
+    extent: float
+    """Of the motion in natural units: the largest range of a variable over a period."""
+
+    @classmethod
+    def of(cls, p: Parameters, x: npt.ArrayLike, period: float) -> Loop:
+        """A good section of a motion that passes a state (6 or 8 entries) and has about this period, s.
+
+        Of a ball that hops the top of its highest hop, v_y = 0. On the floor, within the middle half of the longest
+        stretch in one case other than RR, where the case's fastest variable is fastest, in natural units.
+        """
+        run = _simulated(p, x, 2 * period, ORBIT_SAMPLES)
+        size, y = extent(run), run.y
+        tops = 1 + np.flatnonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:]))
+        if len(tops):
+            top = int(tops[np.argmax(y[tops])])
+            state = State.of(run.x[top])._replace(v_y=0.0)
+            return cls(p, run.cases[top], state.stacked(), period, VARIABLES.index("v_y"), size)
+        stretches = [each for each in run.phases() if each[0] is not Case.RR]
+        if not stretches:
+            raise NoOrbitError(f"the ball rolls at both points all the time (period {period:g} s)")
+        case, start, end = max(stretches, key=lambda each: each[2] - each[1])
+        inner = np.abs(run.time - (start + end) / 2) <= (end - start) / 4
+        rates = np.abs([dynamics.rates(case, z, p, p.omega_0) for z in run.x[inner].tolist()]) / scale(p)
+        active = _active(case)
+        at, fixed = np.unravel_index(np.argmax(rates[:, active]), (len(rates), len(active)))
+        return cls(p, case, run.x[inner][at], period, active[int(fixed)], size)
+
+    @property
+    def free(self) -> list[int]:
+        """Indices of the coordinates among the state variables."""
+        return [k for k in _active(self.case) if k != self.fixed]
+
+    def coordinates(self, x: Array) -> Array:
+        """Coordinates (..., d - 1) of states (..., 8), or of differences of states."""
+        return np.asarray(x[..., self.free] / scale(self.p)[self.free])
+
+    def moved(self, by: Array, varied: str | None = None) -> Loop:
+        """Moved by coordinates (d - 1,) and, if a parameter is `varied`, by its logarithm, (d,).
+
+        Raises `NoOrbitError` where that leads out of the range of the parameter.
+        """
+        p, x = self.p, self.x.copy()
+        x[self.free] += by[: len(self.free)] * scale(p)[self.free]
+        if self.case is Case.RN:
+            x = State.of(x)._replace(slip_z=-State.of(x).v_h / p.r).stacked()
+        if varied:
+            try:
+                p = p.replace(**{varied: getattr(p, varied) * math.exp(by[-1])})
+            except InputError as error:
+                raise NoOrbitError(str(error)) from error
+        return replace(self, p=p, x=x)
+
+    def back(self) -> Return:
+        """The motion up to its return to the section; `NoOrbitError` if it doesn't come back.
+
+        It is simulated for the period, and then followed to the section nearby, forwards or backwards, by the
+        equations of the case.
+        """
+
+        def rates(t: float, z: Array) -> list[float]:
+            return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))
+
+        run, tolerance = _simulated(self.p, self.x, self.period, 1), RETURN_RTOL * scale(self.p)
+        if run.cases[-1] is not self.case:
+            raise NoOrbitError(f"after {self.period:g} s the ball is in {run.cases[-1].name}, not in {self.case.name}")
+        x, late = run.x[-1], 0.0
+        for _ in range(ITERATIONS):
+            short = (self.x - x)[self.fixed] / rates(0.0, x)[self.fixed]
+            if abs(short) < 1e-15 * self.period:
+                break
+            late += short
+            if not abs(late) < self.period / 4:
+                raise NoOrbitError(f"after {self.period:g} s the ball is far from where it was")
+            x = np.asarray(solve_ivp(rates, (0.0, short), x, "DOP853", rtol=RETURN_RTOL, atol=tolerance).y[:, -1])
+        changes = tuple((Case(a), Case(b)) for a, b in zip(run.events.from_case, run.events.to_case, strict=True))
+        turn = run.theta[-1] - run.theta[0] + late * (State.of(x).omega_c + run.omega_c[-1]) / 2
+        return Return(x, float(self.period + late), changes, float(turn))
+
+    def derivative(self) -> Array:
+        """Derivative (d - 1, d - 1) of the return map."""
+        return np.stack([self.slope(unit) for unit in np.eye(len(self.free))], axis=-1)
+
+    def slope(self, along: Array, varied: str | None = None) -> Array:
+        """Derivative (d - 1,) of the return map in a direction as in `moved`."""
+        shift = SHIFT * self.extent
+        high, low = (self.moved(sign * shift * along, varied).back().x for sign in (1, -1))
+        return self.coordinates(high - low) / (2 * shift)
+
+
+class Return(NamedTuple):
+    """Where and when the motion of a loop returns to the section."""
+
+    x: Array
+    period: float
+    changes: Changes
+    turn: float
+    """Gain of azimuth, rad."""
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A periodic motion, closed to `CLOSED`."""
+
+    loop: Loop
+    """A state on it, and its period."""
+    changes: Changes
+    """The changes of case in a period."""
+    turn: float
+    """Gain of azimuth in a period, rad."""
+    steps: int
+    """Steps that Newton's method took."""
+    derivative: Array
+    """Derivative (d - 1, d - 1) of the return map."""
+
+    @property
+    def period(self) -> float:
+        """Period, s."""
+        return self.loop.period
+
+    @property
+    def p(self) -> Parameters:
+        """Its parameters."""
+        return self.loop.p
+
+    @cached_property
+    def multipliers(self) -> npt.NDArray[np.complex128]:
+        """Floquet multipliers (d - 1,), largest modulus first, d the dimension of the case of `loop`."""
+        values = np.linalg.eigvals(self.derivative).astype(complex)
+        return np.asarray(values[np.argsort(-np.abs(values), kind="stable")])
+
+    @property
+    def stable(self) -> bool:
+        """Whether every small disturbance dies out."""
+        return bool(np.all(np.abs(self.multipliers) < 1))
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """The cases of a period, in order from that of `loop`."""
+        return tuple(before for before, _ in self.changes) or (self.loop.case,)
+
+    @cached_property
+    def cycle(self) -> Trajectory:
+        """One period, `ORBIT_SAMPLES` equal parts of it."""
+        return _simulated(self.p, self.loop.x, self.period, ORBIT_SAMPLES)
+
+    @property
+    def mean(self) -> Array:
+        """Means of the state variables, shape (8,); that of omega_c from the gain of azimuth."""
+        mean: Array = np.asarray(np.trapezoid(self.cycle.x, self.cycle.time, axis=0)) / self.period
+        mean[VARIABLES.index("omega_c")] = self.turn / self.period
+        return mean
+
+
+def refine(p: Parameters, x: npt.ArrayLike, period: float) -> Orbit:
+    """The closed orbit near a state x (6 or 8 entries) with about this period, s, by Newton's method.
+
+    The guess may be off by some percent of the orbit.
+
+    Raises `NoOrbitError` if Newton's method does not converge to `CLOSED` within `ITERATIONS` steps, or the ball
+    doesn't come back from beside the orbit, so that the return map has no derivative.
+    """
+    return close(Loop.of(p, x, period))
+
+
+def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> Orbit:
+    """`refine` from a loop that is nearly closed; a parameter that is `varied` is one more unknown.
+
+    There is then one unknown more than equations: the place on a branch. Newton's step is the shortest one (Moore and
+    Penrose), across the branch. The `jacobian` of a neighbour, if given, does until the defect falls slowly.
+    """
+    loop, back, steps = closed(loop, varied, neighbour)
+    return Orbit(loop, back.changes, back.turn, steps, loop.derivative())
+
+
+def closed(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> tuple[Loop, Return, int]:
+    """The loop of `close`, its return, and the steps that Newton's method took."""
+    before = math.inf
+    for step in range(ITERATIONS + 1):
+        back = loop.back()
+        loop = replace(loop, period=back.period)
+        defect = loop.coordinates(back.x - loop.x)
+        size = float(np.abs(defect).max())
+        if size <= CLOSED:
+            return loop, back, step
+        if size > before / FAST:
+            neighbour = None
+        before = size
+        matrix = jacobian(loop, loop.derivative(), varied) if neighbour is None else neighbour
+        loop = loop.moved(np.asarray(-np.linalg.lstsq(matrix, defect)[0], dtype=float), varied)
+    raise NoOrbitError(
+        f"after {ITERATIONS} steps an orbit of period {loop.period:g} s is open by {size:.1e} in natural units"
+    )
+
+
+def jacobian(loop: Loop, derivative: Array, varied: str | None = None) -> Array:
+    """Derivative (d - 1, d - 1) of the defect of a loop; with one more column if a parameter is varied."""
+    by_state = derivative - np.eye(len(derivative))
+    return np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)]) if varied else by_state
+
+
+def extent(run: Trajectory) -> float:
+    """Largest range of a state variable in a run, in natural units."""
+    return float((np.ptp(run.x, axis=0) / scale(run.header.parameters)).max())
+
+
+def scale(p: Parameters) -> Array:
+    """Natural size of each state variable, shape (8,)."""
+    time, speed, spin, _ = natural_units(p)
+    return np.array([p.R, speed, 1 / time, spin, spin, spin, p.R, speed])
+
+
+def _simulated(p: Parameters, x: npt.ArrayLike, duration: float, samples: int) -> Trajectory:
+    """The motion from a state; `NoOrbitError` if it breaks down or can't begin."""
+    try:
+        return simulate(p, x, duration, sample_interval=duration / samples, rtol=RETURN_RTOL)
+    except (SimulationError, InputError) as error:
+        raise NoOrbitError(f"no motion for {duration:g} s: {error}") from error
+
+
+def _active(case: Case) -> list[int]:
+    return [VARIABLES.index(name) for name in TRAITS[case].active]

@@ -1,0 +1,127 @@
+"""Many runs at once, by time stepping: states at a few times, for many parameter sets and starts."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.simulation.settings import Settings
+from analytic.simulation.simulator import sample_times, start_state
+from model import Flow, InputError, Parameters, State
+from model.arrays import Array
+from model.kinematics import TURNING, VARIABLES
+from model.parameters import POSITIVE, Range, check_number
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """States of many runs at the same times, and their landings in between."""
+
+    time: Array
+    """Shape (samples,), s; the first is the start."""
+    x: Array
+    """States in the order of `model.State`, shape (runs, samples, 8)."""
+    case: npt.NDArray[np.int8]
+    """Codes of the cases, shape (runs, samples)."""
+    landings: npt.NDArray[np.int64]
+    """Landings on floor or wall since the sample before, faster than sqrt(g R)/1000, shape (runs, samples)."""
+    end: Array
+    """When each run ended, shape (runs,), s: it was quiet, failed, or reached the last time."""
+    failure: tuple[str, ...]
+    """Why a run failed, empty if it didn't; what it has from there on is nan."""
+
+
+def simulate_many(
+    parameters: Parameters | Sequence[Parameters],
+    x0s: npt.ArrayLike,
+    t_end: float,
+    flow: Flow | Sequence[Flow] | None = None,
+    settings: Settings | None = None,
+    *,
+    sample_interval: float | None = None,
+    quiet: float | None = None,
+    threads: int | None = None,
+) -> Ensemble:
+    """Time stepping (`time_stepping`) of many runs, on all cores if numba is installed.
+
+    Parameters
+    ----------
+    parameters, flow : one for all, or one for each run; without flow each has its own omega_0
+    x0s : starts, shape (runs, 6 or 8), or one for all
+    t_end, sample_interval : s; a thousandth of t_end if None
+    settings : timestep and restitution count; one step for all where it is given
+    quiet : end a run in which nothing has landed for that long, s; its last state stands for the rest
+    threads : number of threads, that of the cores if None
+
+    Raises `InputError` if numbers of runs differ, or as `simulate` for the first run that can't start.
+    """
+    from analytic.simulation import (
+        stepping,
+        time_stepping,  # here, because numba takes a while to load
+    )
+
+    settings = settings or Settings(method="time-stepping")
+    sets = [parameters] if isinstance(parameters, Parameters) else list(parameters)
+    starts = np.atleast_2d(np.asarray(x0s, dtype=float))
+    flows = [flow] if flow is None or isinstance(flow, Flow) else list(flow)
+    count = max(len(sets), len(starts), len(flows))
+    if {len(sets), len(starts), len(flows)} - {1, count}:
+        raise InputError(
+            f"every run needs parameters, a start and a flow: there are {len(sets)} parameter sets, {len(starts)} "
+            f"starts and {len(flows)} flows; each must be one, or as many as the others"
+        )
+    sets, flows = sets * (count // len(sets)), flows * (count // len(flows))
+    states = [
+        start_state(x, p, settings) for x, p in zip(np.resize(starts, (count, starts.shape[1])), sets, strict=True)
+    ]
+    times = sample_times(t_end, sample_interval)
+    still = np.inf if quiet is None else check_number("quiet", quiet, "s", POSITIVE)
+    workers = int(check_number("threads", threads or os.cpu_count() or 1, "threads", Range(1, whole=True)))
+
+    shape = (count, len(times))
+    x, case, landings = np.full((*shape, 8), np.nan), np.full(shape, -1, np.int8), np.zeros(shape, np.int64)
+    x[:, 0], end, failure = states, np.zeros(count), [""] * count
+
+    def carry_out(k: int) -> None:
+        fluid = flows[k] or Flow.steady(sets[k].omega_0)
+        ball, stretches, omega_0, given = time_stepping.prepared(states[k], 0.0, sets[k], fluid, settings, times)
+        end[k] = stepping.follow(ball, *stretches, still, omega_0, given, x[k], case[k], landings[k])
+        if end[k] < 0:
+            end[k] *= -1
+            failure[k] = f"stopped at t = {end[k]:g} s: the velocities don't settle; a shorter step may help"
+
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(carry_out, range(count)))
+    return Ensemble(times, x, case, landings, end, tuple(failure))
+
+
+def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
+    """States (count, 8): at the wall, half of them on the floor, half up to R above it with speeds up to sqrt(g R).
+
+    omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all evenly spread.
+    """
+    check_number("starts", count, "runs", Range(1, whole=True))
+    rng = np.random.default_rng(seed)
+    size = 2 * abs(p.omega_0) * np.array([1.0, *[p.R / p.r] * 3])
+    x = np.zeros((count, len(VARIABLES)))
+    x[:, TURNING] = rng.uniform(-size, size, (count, 4))
+    flying = rng.random(count) < 0.5
+    y = np.where(flying, rng.uniform(0, p.R, count), 0.0)
+    v_y = np.where(flying, rng.uniform(-1, 1, count) * math.sqrt(p.g * p.R), 0.0)
+    return State.of(x)._replace(y=y, v_y=v_y).stacked()
+
+
+def interval(hits: int, of: int) -> tuple[float, float]:
+    """Confidence interval of 95 % of a share (Clopper-Pearson); all of [0, 1] if nothing was tried."""
+    from scipy.stats import binomtest  # slow to import
+
+    if of == 0:
+        return 0.0, 1.0
+    low, high = binomtest(hits, of).proportion_ci(0.95)
+    return float(low), float(high)

@@ -1,0 +1,189 @@
+"""Event-driven simulation: each case by its own equations, from one change of case to the next.
+
+Within a case `integrator` follows the coordinates of `charts` up to the guard that turns negative first (with Stokes'
+drag RR is known in closed form), and `transitions` says how to go on.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.mechanics import dynamics, rolling_forces
+from analytic.mechanics.rigid_body import NOTHING, Forces
+from analytic.simulation import charts, transitions, two_point_rolling
+from analytic.simulation.integrator import StalledError, Stretch
+from analytic.simulation.motion import Fluid, Moment, Path, natural_units
+from analytic.simulation.records import REPORT_EVERY, Event, Recorder
+from analytic.simulation.settings import Settings
+from analytic.simulation.transitions import Shortest
+from model import Case, Contact, Flow, Parameters, State
+from model.arrays import Array
+from model.drag import STOKES
+
+_LEAST_JUMP = 1e-12
+"""Part of the flow by which it may differ before and after a knot without a jump."""
+MAX_EVENTS_AT_ONCE = 100
+"""Changes of case without any progress in time after which a run is given up."""
+
+
+def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
+    """Simulate from state x0 and record; the contract of `simulation.simulate`.
+
+    Raises `StalledError`, `NotConvergedError` if the integrator, the contact problem or the sequence of cases gets
+    stuck.
+    """
+    t_end = float(recorder.times[-1])
+    knots = [0.0, *(t for t in flow.start.tolist() if 0 < t < t_end), t_end]
+    simulator = _Simulator(p, settings, recorder)
+    at, case = Moment(0.0, theta_0, x0), None
+    for start, end in pairwise(knots):
+        fluid = Fluid.of(flow, start)
+        step = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
+        if case is None or step > _LEAST_JUMP * np.abs(flow.value).max():
+            before, (case, at, impulse) = case, simulator.settle(at, fluid)
+            if (before is not None and before is not case) or impulse is not NOTHING:
+                recorder.events.append(Event(start, case if before is None else before, case, impulse))
+        case, at = simulator.advance(case, at, end, fluid)
+
+
+class _Simulator:
+    def __init__(self, p: Parameters, settings: Settings, recorder: Recorder) -> None:
+        self.p, self.settings, self.recorder = p, settings, recorder
+        self.absolute = settings.rtol / 1e3
+        """Absolute tolerance in natural units."""
+        time, *_ = natural_units(p)
+        # A hop that lasts T rises by g T^2/8, well above the tolerance of lengths where it is integrated.
+        integrated = math.sqrt(8 * self.absolute) * time
+        self.shortest = Shortest(settings.rtol * time if p.drag == STOKES else integrated, integrated)
+        self.still = 10 * settings.rtol * math.sqrt(p.g * p.R) / p.r
+        """Slip in rad s-1 that counts as zero where the other contact has just stuck."""
+
+    def advance(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[Case, Moment]:
+        """Go on through all events before `until`."""
+        at_once = 0
+        while at.time < until:
+            start = at.time
+            known = case is Case.RR and self.p.drag == STOKES
+            guard, at = self._roll(at, until, fluid) if known else self._follow(case, at, until, fluid)
+            if guard:
+                before = case
+                case, at, impulse = self._react(guard, case, at, fluid)
+                self.recorder.events.append(Event(at.time, before, case, impulse))
+            at_once = at_once + 1 if at.time - start <= 1e-14 * until else 0
+            if at_once > MAX_EVENTS_AT_ONCE:
+                raise StalledError(f"no way on from case {case.name} at state {at.x}")
+        return case, at
+
+    def settle(self, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
+        """Collide if the ball moves into something it touches, then find the case."""
+        x, omega_0, impulse = at.x, fluid(at.time), NOTHING
+        if (x.y == 0 and x.v_y < 0) or (x.h == 0 and x.v_h < 0):
+            at, impulse = transitions.collide(at, self.p, omega_0, self.settings.restitution, self.shortest)
+        return *transitions.choose(at, self.p, omega_0, self.settings.leave_rolling), impulse
+
+    def _react(self, guard: str, case: Case, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
+        """What follows when a guard has fired."""
+        x = at.x
+        match guard:
+            case "A slips":
+                f = self._forces_at(case, at, fluid)
+                return Case.of(Contact.S, case.B), at._replace(alpha=math.atan2(f.A_z, -f.A_x)), NOTHING
+            case "B slips":
+                f = self._forces_at(case, at, fluid)
+                return Case.of(case.A, Contact.S), at._replace(beta=math.atan2(-f.B_z, f.B_y)), NOTHING
+            case "A lifts":
+                return Case.of(Contact.N, case.B), at._replace(alpha=math.nan), NOTHING
+            case "B opens":
+                return Case.of(case.A, Contact.N), at._replace(beta=math.nan), NOTHING
+            case "RR ends":
+                return *transitions.leave(at, self.p, fluid(at.time)), NOTHING
+            case "A sticks":
+                x = x._replace(slip_x=0.0, slip_z=-(x.v_h + x.v_y) / self.p.r)
+                if case.B is Contact.S and abs(x.slip_y) <= self.still:
+                    x = x._replace(slip_y=0.0)
+            case "B sticks":
+                x = x._replace(slip_y=0.0, slip_z=0.0)
+                if case.A is Contact.S and abs(x.slip_x) <= self.still:
+                    x = x._replace(slip_x=0.0)
+            case "A lands":
+                x = x._replace(y=0.0)
+            case "B lands":
+                x = x._replace(h=0.0)
+        return self.settle(at._replace(x=x), fluid)
+
+    def _forces_at(self, case: Case, at: Moment, fluid: Fluid) -> Forces:
+        path = Path(*(np.array([value]) for value in at))
+        return Forces(*path_forces(case, path, self.p, np.array([fluid(at.time)]))[0].tolist())
+
+    def _roll(self, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
+        """RR with Stokes' drag up to its end or `until`."""
+        p = self.p
+        end = two_point_rolling.end(at, until, p, fluid, self.settings.leave_rolling)
+        stop = until if end is None else end
+        times = self.recorder.times
+        first = int(np.searchsorted(times, at.time, side="right")) if self.recorder.taken else 0
+        times = times[first : int(np.searchsorted(times, stop, side="right"))]
+        path = two_point_rolling.path(np.append(times, stop), at, p, fluid)
+        self._record(Case.RR, path, np.append(np.full(len(times), True), False), fluid)
+        return None if end is None else "RR ends", _moment(path, -1)
+
+    def _follow(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
+        """One case up to the first guard or `until`; samples are recorded even if it is interrupted."""
+        if case is Case.RR:
+            motion = two_point_rolling.chart(at, self.p, fluid, self.settings.leave_rolling)
+        else:
+            motion = charts.chart(case, at, self.p, fluid, self.settings.rtol)
+        lands, until = motion.landing <= until, min(until, motion.landing)
+        times, states = [at.time], [motion.start]
+        sampled, guard = [self.recorder.taken == 0], None
+        tolerances = self.settings.rtol, self.absolute
+        stretch = Stretch(motion, at.time, until, self.recorder.times, *tolerances, fluid.steady)
+        x, hop = at.x, math.inf
+        if (x.y == 0 < x.v_y and motion.landing == math.inf) or x.h == 0 < x.v_h:  # it is just rebounding
+            dx = dynamics.newton_euler(case, x, self._forces_at(case, at, fluid), self.p, fluid(at.time))
+            hops = ((x.y, x.v_y, dx.v_y), (x.h, x.v_h, dx.v_h))
+            hop = min((2 * v / -a for gap, v, a in hops if gap == 0 < v and a < 0), default=math.inf)
+        try:
+            for count, step in enumerate(stretch.steps(hop / 20 if hop < until - at.time else None), 1):
+                times += [*step.sample_times, step.time]
+                states += [*step.samples, step.z]
+                sampled += [True] * len(step.samples) + [False]
+                guard = step.guard
+                if count % REPORT_EVERY == 0:
+                    self.recorder.reached(step.time)
+        finally:
+            path = motion.path(np.array(times), np.array(states).T)
+            self._record(case, path, np.array(sampled), fluid)
+        return guard or ("A lands" if lands else None), _moment(path, -1)
+
+    def _record(self, case: Case, path: Path, wanted: npt.NDArray[np.bool_], fluid: Fluid) -> None:
+        if not np.any(wanted):
+            self.recorder.reached(float(path.time[-1]))
+            return
+        path = Path(*(column[wanted] for column in path))
+        omega_0 = np.array([fluid(t) for t in path.time.tolist()])
+        forces = path_forces(case, path, self.p, omega_0)
+        self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
+
+
+def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:
+    """Contact forces along a path, shape (n, 6), N; in RR those of least friction utilisation."""
+    x = State.of(path.x)
+    if case is Case.RR:
+        B_y = rolling_forces.least_utilisation(x.omega_c, p, omega_0).B_y
+        jammed = rolling_forces.admissible_interval(x.omega_c, p, omega_0)[1]
+        f = dynamics.rolling_family(x.omega_c, p, omega_0, np.where(np.isfinite(B_y), B_y, jammed))
+    else:
+        slip_A = (np.sin(path.alpha), np.cos(path.alpha)) if case.A is Contact.S else None
+        slip_B = (np.sin(path.beta), np.cos(path.beta)) if case.B is Contact.S else None
+        f = dynamics.forces(case, x, p, omega_0, slip_A, slip_B)
+    return np.stack(np.broadcast_arrays(*f, path.time)[:6], axis=-1)
+
+
+def _moment(path: Path, k: int) -> Moment:
+    at = Moment(*(column[k].tolist() for column in path))
+    return at._replace(x=State(*at.x))

@@ -1,0 +1,370 @@
+"""Moreau-Jean steps and the loops over them, compiled where numba is installed: plain floats in named tuples."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.mechanics import contact_problem, drag, rigid_body
+from analytic.mechanics.contact_problem import Friction, Impulse, both, project
+from analytic.mechanics.rigid_body import Forces, Velocities, mean
+from analytic.simulation.compiling import callable_when_compiled, compiled
+from model.arrays import Array
+
+TOLERANCE, BARELY = 1e-14, 1e-11
+"""Change of an impulse per mass in a sweep at which it stops, relative to sqrt(g R) or the fastest velocity; and what
+does where friction only just holds a rolling ball: two solutions meet there, good to the root of it at best."""
+MAX_ITERATIONS = 100
+ROUGH = 1e-4
+"""How well an iteration solves the contacts, relative to the last change of velocities."""
+LOCATING = 10
+"""Most solutions of a stretch to locate its landing: the parabola triples the digits with each."""
+LANDINGS = 20
+"""Most landings that are located within a step; of any more, the step's end is taken for the place."""
+SLIDES = 4.0
+"""A contact slides on through a step if it takes more than this many times the load of the step to stop it."""
+ZERO_SLIP = 1e-9
+"""Sliding speed relative to sqrt(g R) up to which a contact is called rolling: above what iterations leave."""
+LANDED = 1e-3
+"""Speed relative to sqrt(g R) from which a landing counts: less is settling, or round-off."""
+ROLLS, SLIPS, OPEN = 0, 1, 2
+"""State of a contact; three times that of A plus that of B is the code of the case, see `model.Case`."""
+
+
+callable_when_compiled(drag.rate, mean, rigid_body.state, *contact_problem.COMPILED)
+
+
+class Constants(NamedTuple):
+    """Parameters and settings of a step."""
+
+    law: drag.Law
+    m: float
+    r: float
+    R: float
+    j: float
+    mu: float
+    eta: float
+    g: float
+    e: float
+    """Coefficient of restitution."""
+
+
+class FlowArrays(NamedTuple):
+    """Arrays of a `model.Flow`."""
+
+    start: Array
+    value: Array
+    slope: Array
+    waves: Array
+
+
+class At(NamedTuple):
+    """Where the ball is, and its velocities along the axes there."""
+
+    theta: float
+    y: float
+    h: float
+    u: Velocities
+
+
+class Ball(NamedTuple):
+    """The ball at the end of a step."""
+
+    at: At
+    P: Forces
+    """Impulses of the step, N s."""
+    impact: Forces
+    """Those among them of landings, N s."""
+    case: int
+    """What the solution says of the contacts, see `model.cases.Case`."""
+    work: float
+    """Work of drag and contacts since the start, J."""
+    landings: int
+    """Landings since the start faster than `LANDED`."""
+    residual: float
+    """0, or by how much the velocities of a step that did not converge still changed, m s-1."""
+
+
+class Solved(NamedTuple):
+    """Velocities after a step or an impact, and what brought them about."""
+
+    new: Velocities
+    P: Forces
+    work: float
+    """Work of drag and contacts, J."""
+    spin: float
+    """How fast the axes turned about j, rad s-1."""
+    residual: float
+
+
+@compiled
+def solve(
+    at: At, dt: float, omega_0: float, in_A: bool, in_B: bool, to_A: float, to_B: float, start: Forces, p: Constants
+) -> Solved:
+    """Velocities after dt, 0 for an impact, with closed contacts A, B whose normal velocities aim at to_A, to_B.
+
+    Smooth forces, at the mean of both velocities, and contacts are iterated together; `start` guesses the impulses.
+    """
+    v_h, v_y, v_k, o_x, o_y, o_z = old = at.u
+    m, r, j = p.m, p.r, p.j
+    fastest = max(abs(v_h), abs(v_y), abs(v_k), r * max(abs(o_x), abs(o_y), abs(o_z)))
+    rest = j / (1 + j)  # share of m that a tangential impulse feels at the contact point
+    # Old and new slip are added, since friction opposes their mean where a contact slides on. Where slip may stop
+    # within the step, friction opposes the final slip, so that it cannot reverse.
+    slip_A, slip_B = (v_h + r * o_z, v_k - r * o_x), (v_y - r * o_z, v_k + r * o_y)
+    load = SLIDES * (max(p.g * dt - v_y, 0.0) + max(v_k * v_k / (p.R - at.h) * dt - v_h, 0.0))
+    if dt == 0 or rest * _size(slip_A[0], slip_A[1]) <= p.mu * load:
+        slip_A = (0.0, 0.0)
+    if dt == 0 or rest * _size(slip_B[0], slip_B[1]) <= p.eta * load:
+        slip_B = (0.0, 0.0)
+    on_A, on_B = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0)
+    for tolerance in (TOLERANCE, BARELY):
+        enough = tolerance * max(math.sqrt(p.g * p.R), fastest)
+        still = (4 + 8 / j) * enough  # what such changes of two impulses, in two iterations, add up to
+        A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
+        if in_A:
+            A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
+        if in_B:
+            B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m)
+        new, last, change = old, 0.0, p.g * dt
+        for _ in range(MAX_ITERATIONS):
+            u = mean(old, new)
+            x_i = at.h - p.R + dt / 2 * u.v_h
+            x_k, spin = (0.0, -u.v_k / x_i) if in_B else (dt / 2 * u.v_k, 0.0)
+            # (20) with (9), no contact
+            w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
+            c = drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law) if p.law.blunt > 0 else p.law.linear
+            f_h = v_h - dt * (spin * u.v_k + c * w_h)
+            f_y = v_y - dt * (p.g + c * u.v_y)
+            f_k = v_k + dt * (spin * u.v_h - c * w_k)
+            f_x = o_x - dt * spin * u.o_z  # f_z takes the new o_x, which saves two iterations of seven
+            f_z = o_z + dt * spin * (o_x + f_x - A.t / (j * r)) / 2
+            a = Impulse(to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1]))
+            b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * o_y + slip_B[1]))
+            residual, aim = 0.0, max(enough, ROUGH * change)
+            if in_A and in_B:
+                A, B, residual = both(a, b, B, on_A, on_B, j, aim)
+            elif in_A:
+                A = project(a, on_A)
+            elif in_B:
+                B = project(b, on_B)
+            n_h, n_y, n_k = f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t
+            after = Velocities(n_h, n_y, n_k, f_x - A.t / (j * r), o_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r))
+            change = abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)  # a sum, since max overlooks nan
+            change += r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
+            new = after
+            # Changes shrink at a steady rate: what is left is this one times the rate.
+            settled = dt == 0 or change <= still or (change < last / 4 and change * change <= last * still / 50)
+            if (settled and residual <= enough) or not residual <= aim:
+                break
+            last = change
+        converged = settled and residual <= enough
+        if converged:
+            break
+    u = mean(old, new)
+    power = u.v_h * (u.v_h - omega_0 * x_k) + u.v_y * u.v_y + u.v_k * (u.v_k + omega_0 * x_i)
+    at_A = A.s * (u.v_h + r * u.o_z) + A.n * u.v_y + A.t * (u.v_k - r * u.o_x)
+    at_B = B.n * u.v_h + B.s * (u.v_y - r * u.o_z) + B.t * (u.v_k + r * u.o_y)
+    work = m * (at_A + at_B - dt * c * power)
+    # A loaded contact has met its target, and round-off must not open it again.
+    new = Velocities(to_B if B.n > 0 else new.v_h, to_A if A.n > 0 else new.v_y, new.v_k, new.o_x, new.o_y, new.o_z)
+    P = Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)
+    return Solved(new, P, work, spin, 0.0 if converged else _worse(change, residual))
+
+
+@compiled
+def _size(x: float, y: float) -> float:
+    return math.sqrt(x * x + y * y)  # several times as fast as math.hypot
+
+
+@compiled
+def _sum(a: Forces, b: Forces) -> Forces:
+    return Forces(a.A_x + b.A_x, a.A_y + b.A_y, a.A_z + b.A_z, a.B_x + b.B_x, a.B_y + b.B_y, a.B_z + b.B_z)
+
+
+@compiled
+def _moved(at: At, dt: float, s: Solved, in_A: bool, in_B: bool, R: float) -> At:
+    """Where the ball comes within dt; a closed contact that carries load stays, or is now, closed."""
+    u, new = mean(at.u, s.new), s.new
+    y = 0.0 if in_A and s.P.A_y > 0 else at.y + dt * u.v_y
+    if in_B:
+        return At(at.theta + dt * s.spin, y, 0.0 if s.P.B_x > 0 else at.h + dt * u.v_h, new)
+    x_i, x_k = at.h - R + dt * u.v_h, dt * u.v_k
+    rho = _size(x_i, x_k)
+    cos, sin = -x_i / rho, x_k / rho
+    v_h, v_k = new.v_h * cos - new.v_k * sin, new.v_k * cos + new.v_h * sin
+    o_x, o_z = new.o_x * cos - new.o_z * sin, new.o_z * cos + new.o_x * sin
+    turned = Velocities(v_h, new.v_y, v_k, o_x, new.o_y, o_z)
+    return At(at.theta + math.atan2(x_k, -x_i), y, R - rho, turned)
+
+
+@compiled
+def _crossing(gap: float, rate: float, end: float, dt: float) -> float:
+    """When a gap that is `end` after dt passes zero, by the parabola through that and the start."""
+    bend = 2 * (end - gap - rate * dt) / (dt * dt)
+    root = math.sqrt(max(0.0, rate * rate - 2 * bend * gap))
+    time = 2 * gap / (root - rate) if rate < 0 else (rate + root) / -bend
+    return min(max(time, 0.0), dt)
+
+
+@compiled
+def _stretch(
+    at: At, dt: float, omega_0: float, in_A: bool, in_B: bool, start: Forces, p: Constants
+) -> tuple[At, Solved, float]:
+    """The ball after dt, or at its first landing on floor or wall; and the time of that."""
+    time = dt
+    s = solve(at, dt, omega_0, in_A, in_B, 0.0, 0.0, start, p)
+    after = _moved(at, dt, s, in_A, in_B, p.R)
+    to_floor = _crossing(at.y, at.u.v_y, after.y, dt) if not in_A and after.y < 0 else math.inf
+    to_wall = _crossing(at.h, at.u.v_h, after.h, dt) if not in_B and after.h < 0 else math.inf
+    floor, better = to_floor <= to_wall, min(to_floor, to_wall)
+    if better == math.inf or s.residual != 0:
+        return after, s, dt
+    for _ in range(LOCATING):
+        time = better
+        s = solve(at, time, omega_0, in_A, in_B, 0.0, 0.0, start, p)
+        after = _moved(at, time, s, in_A, in_B, p.R)
+        if time == 0:
+            break
+        better = _crossing(at.y, at.u.v_y, after.y, time) if floor else _crossing(at.h, at.u.v_h, after.h, time)
+        if abs(better - time) <= 1e-12 * dt:
+            break
+    return At(after.theta, 0.0 if floor else after.y, after.h if floor else 0.0, after.u), s, time
+
+
+@compiled
+def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
+    """The ball a step of dt later, with omega_0 from the middle of the step."""
+    nothing = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    at, P, impact, case, work, landings, residual = ball.at, nothing, nothing, ball.case, ball.work, ball.landings, 0.0
+    q, b = ball.P, ball.impact  # first guess: the impulses of the last step but those of landings
+    start = Forces(q.A_x - b.A_x, q.A_y - b.A_y, q.A_z - b.A_z, q.B_x - b.B_x, q.B_y - b.B_y, q.B_z - b.B_z)
+    left, count = dt, 0
+    while left > 0 and residual == 0:
+        in_A, in_B = at.y <= 0 and at.u.v_y <= 0, at.h <= 0 and at.u.v_h <= 0
+        speed = max(-at.u.v_y if in_A else 0.0, -at.u.v_h if in_B else 0.0)
+        if speed > 0:
+            hit = _collided(at, in_A, in_B, dt, p)
+            at, P, impact = At(at.theta, at.y, at.h, hit.new), _sum(P, hit.P), _sum(impact, hit.P)
+            work, residual = work + hit.work, _worse(hit.residual, residual)
+            landings += speed > LANDED * math.sqrt(p.g * p.R)
+            in_A, in_B = in_A and at.u.v_y <= 0, in_B and at.u.v_h <= 0
+        if count < LANDINGS:
+            at, s, time = _stretch(at, left, omega_0, in_A, in_B, start, p)
+        else:
+            after = _moved(at, left, solve(at, left, omega_0, in_A, in_B, 0.0, 0.0, start, p), in_A, in_B, p.R)
+            in_A, in_B, time = in_A or after.y < 0, in_B or after.h < 0, left
+            s = solve(at, left, omega_0, in_A, in_B, 0.0, 0.0, start, p)
+            after = _moved(at, left, s, in_A, in_B, p.R)
+            at = At(after.theta, max(after.y, 0.0), max(after.h, 0.0), after.u)
+        P, work, residual = _sum(P, s.P), work + s.work, _worse(s.residual, residual)
+        case, left, count = _case(in_A, in_B, s, p), left - time, count + 1
+    return Ball(at, P, impact, case, work, landings, residual)
+
+
+@compiled
+def _worse(new: float, residual: float) -> float:
+    """The larger one, or nan."""
+    return new if new > residual or math.isnan(new) else residual
+
+
+@compiled
+def _collided(at: At, in_A: bool, in_B: bool, dt: float, p: Constants) -> Solved:
+    """An impact by Newton's restitution; a rebound that would last less than a hundredth of a step is none."""
+    start, least = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p.g * dt / 200
+    to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > least else 0.0
+    to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > least else 0.0
+    s = solve(at, 0.0, 0.0, in_A, in_B, to_A, to_B, start, p)
+    if s.residual != 0 and p.mu >= 1 and p.eta >= 1:  # friction may lock the ball in the corner: it can't rebound
+        s = solve(at, 0.0, 0.0, in_A, in_B, 0.0, 0.0, start, p)
+    return s
+
+
+@compiled
+def _case(in_A: bool, in_B: bool, s: Solved, p: Constants) -> int:
+    """What the solution says of the contacts: open if it leaves with a velocity, rolling if nothing slides."""
+    (v_h, v_y, v_k, o_x, o_y, o_z), still, A, B = s.new, ZERO_SLIP * math.sqrt(p.g * p.R), OPEN, OPEN
+    if in_A and (s.P.A_y > 0 or v_y <= 0):
+        A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
+    if in_B and (s.P.B_x > 0 or v_h <= 0):
+        B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
+    return 3 * A + B
+
+
+@compiled
+def advance(
+    ball: Ball, start: float, dt: float, first: int, count: int, flow: FlowArrays, p: Constants, events: Array
+) -> tuple[Ball, int, int]:
+    """Go on from step `first` of `count` that begin at `start`; return the ball, the next step, and events noted.
+
+    A row of `events` takes time, code of the case before and after, impulses of landings. It ends early when no row
+    is left, or when a step doesn't converge.
+    """
+    noted, k = 0, first
+    while k < count and noted < len(events):
+        before, ball = ball.case, step(ball, dt, _fluid(flow, start + (k + 0.5) * dt), p)
+        k += 1
+        if ball.residual != 0:
+            break
+        if ball.case != before or ball.impact.A_y > 0 or ball.impact.B_x > 0:
+            events[noted, 0], events[noted, 1], events[noted, 2] = start + k * dt, before, ball.case
+            events[noted, 3], events[noted, 4], events[noted, 5] = ball.impact.A_x, ball.impact.A_y, ball.impact.A_z
+            events[noted, 6], events[noted, 7], events[noted, 8] = ball.impact.B_x, ball.impact.B_y, ball.impact.B_z
+            noted += 1
+    return ball, k, noted
+
+
+@compiled
+def follow(
+    ball: Ball,
+    starts: Array,
+    dts: Array,
+    counts: npt.NDArray[np.int64],
+    sampled: npt.NDArray[np.bool_],
+    quiet: float,
+    flow: FlowArrays,
+    p: Constants,
+    x: Array,
+    case: npt.NDArray[np.int8],
+    landings: npt.NDArray[np.int64],
+) -> float:
+    """One run through stretches of steps, into the rows of an `Ensemble`; return its end, less than 0 if it failed.
+
+    Rows beyond the end of a run that has been quiet for long repeat its last state.
+    """
+    row, now, landed, known = 1, 0.0, 0.0, 0
+    for s in range(len(starts)):
+        for k in range(counts[s]):
+            now = float(starts[s] + (k + 1) * dts[s])
+            ball = step(ball, dts[s], _fluid(flow, now - dts[s] / 2), p)
+            if ball.residual != 0:
+                return -now
+            if ball.landings > known:
+                landings[row] += ball.landings - known
+                known, landed = ball.landings, now
+        if sampled[s]:
+            state = rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p)  # type: ignore[arg-type]  # R and r are all
+            for i in range(8):
+                x[row, i] = state[i]
+            case[row] = ball.case
+            row += 1
+            if now - landed > quiet:
+                x[row:] = x[row - 1]
+                case[row:] = case[row - 1]
+                return now
+    return now
+
+
+@compiled
+def _fluid(flow: FlowArrays, time: float) -> float:
+    """`model.Flow` at a time."""
+    k = 0
+    if len(flow.start) > 1:
+        k = max(int(np.searchsorted(flow.start, time, side="right")) - 1, 0)
+    omega_0 = flow.value[k] + flow.slope[k] * max(time - flow.start[k], 0.0)
+    for n in range(len(flow.waves)):
+        omega_0 += flow.waves[n, 0] * math.sin(2 * math.pi * flow.waves[n, 1] * time + flow.waves[n, 2])
+    return float(omega_0)

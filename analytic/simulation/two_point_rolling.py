@@ -1,0 +1,125 @@
+"""Motion in RR, with Stokes' drag in closed form, and the moment when it ends.
+
+There (23) is linear, omega_c' = -k (omega_c - omega_0) with k = c/(1+2j), and omega_0 is a line and waves between the
+breakpoints of the flow; `chart` is for the other laws. What RR leaves open is its forces: where it ends is the choice
+of `Settings.leave_rolling`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from analytic.mechanics import drag, dynamics, flight, rolling_forces
+from analytic.mechanics.rigid_body import Forces
+from analytic.simulation.motion import Chart, Fluid, Moment, Path, natural_units
+from model import Case, Parameters, State
+from model.arrays import Array
+
+_SCAN = 256
+"""Points at which a stretch of RR, or each period of the fastest wave in it, is looked at for its end: exits that
+close again in between are missed."""
+MARGINS = {"slip-stability": rolling_forces.slip_margin, "infeasible": rolling_forces.margin}
+"""How far RR is from where it is left, >= 0 while it lasts, by `Settings.leave_rolling`."""
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+
+
+def omega_c(t: npt.ArrayLike, at: Moment, p: Parameters, omega_0: Fluid) -> Array:
+    """omega_c at times t of a stretch that starts at a moment, same shape: the lag behind a line and behind waves."""
+    t = np.asarray(t, dtype=float)
+    k, tau = p.c / (1 + 2 * p.j), t - at.time
+    a, b = omega_0.value + omega_0.slope * (at.time - omega_0.start), omega_0.slope
+    start = at.x.omega_c - float(_forced(at.time, k, omega_0))
+    # k tau^2 (1 - tau k/3 + …): the lag behind a ramp, without the cancellation of tau - (1 - exp(-k tau))/k.
+    line = start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * flight.second(k * tau)
+    return np.asarray(line + _forced(t, k, omega_0))
+
+
+def _forced(t: npt.ArrayLike, k: float, omega_0: Fluid) -> Array:
+    """What the waves make of omega_c once they have gone on for long: each times k/(k + i omega)."""
+    swing = np.zeros_like(t, dtype=float)
+    for amplitude, omega, phase in omega_0.waves:
+        swing += amplitude * np.imag(k / (k + 1j * omega) * np.exp(1j * (omega * np.asarray(t) + phase)))
+    return swing
+
+
+def path(t: Array, at: Moment, p: Parameters, omega_0: Fluid) -> Path:
+    """States at increasing times t (n,) after `at`; azimuth and work of the drag by Gauss' quadrature, exact here."""
+    k = p.c / (1 + 2 * p.j)
+    span = float(t[-1]) - at.time
+    quickest = max((omega for _, omega, _ in omega_0.waves), default=0.0)
+    ends = np.union1d(np.append(t, at.time), np.linspace(at.time, t[-1], 2 + int((k + quickest) * span)))
+    middle, half = (ends[1:] + ends[:-1]) / 2, np.diff(ends) / 2
+    nodes = middle[:, None] + half[:, None] * _NODES
+    w = omega_c(nodes, at, p, omega_0)
+    power = -p.m * p.c * p.R**2 * w * (w - omega_0(nodes))
+    theta, work = (np.append(0.0, np.cumsum(half * (f @ _WEIGHTS))) for f in (w, power))
+    here = np.searchsorted(ends, t)
+    return _path(t, at.theta + theta[here], omega_c(t, at, p, omega_0), at.work + work[here])
+
+
+def _path(t: Array, theta: Array, omega_c: Array, work: Array) -> Path:
+    none = np.full_like(t, np.nan)
+    return Path(t, theta, State(omega_c=omega_c).stacked(), none, none, work)
+
+
+def end(at: Moment, until: float, p: Parameters, omega_0: Fluid, leave_rolling: str) -> float | None:
+    """First time at which RR can't go on or is left, or None if it lasts until `until`."""
+    margin = MARGINS[leave_rolling]
+
+    def value(t: float) -> float:
+        return float(margin(omega_c(t, at, p, omega_0), p, omega_0(t)))
+
+    periods = sum((until - at.time) * omega / (2 * math.pi) for _, omega, _ in omega_0.waves)
+    for start, stop in pairwise(np.linspace(at.time, until, 2 + int(periods))):
+        times = np.linspace(start, stop, _SCAN)
+        gone = margin(omega_c(times, at, p, omega_0), p, omega_0(times)) < 0
+        if gone[0]:
+            return float(start)
+        if np.any(gone):
+            first = int(np.argmax(gone))
+            ends = times[first - 1], times[first]
+            return float(brentq(value, *ends, xtol=4 * math.ulp(until), rtol=4 * math.ulp(1.0)))
+    return None
+
+
+def chart(at: Moment, p: Parameters, omega_0: Fluid, leave_rolling: str) -> Chart:
+    """Coordinates (theta, omega_c, work) and rates (23) for any law of drag."""
+    margin, (T, _, _, E) = MARGINS[leave_rolling], natural_units(p)
+
+    def rates(t: float, z: Sequence[float]) -> list[float]:
+        omega_c, lag = z[1], z[1] - omega_0(t)
+        pull = -drag.coefficient(p.R * abs(lag), p) * lag
+        return [omega_c, pull / (1 + 2 * p.j), p.m * p.R**2 * pull * omega_c]
+
+    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
+        return (float(margin(z[1], p, omega_0(t))),)
+
+    start = [at.theta, at.x.omega_c, at.work]
+    return Chart(Case.RR, start, [1.0, 1 / T, E], rates, ("RR ends",), guards, lambda t, z: _path(t, *z))
+
+
+def last_forces(omega_c: float, p: Parameters, omega_0: float) -> Forces:
+    """The forces of RR at which it gives way, N (`rolling_forces.last_share`)."""
+    share = float(rolling_forces.last_share(omega_c, p, omega_0))
+    return dynamics.rolling_family(omega_c, p, omega_0, share * p.m * p.g)
+
+
+def onset(at: Moment, p: Parameters, omega_0: float) -> tuple[Case, Moment]:
+    """The case into which RR gives way where its slip margin vanishes, and the moment with the slip directions.
+
+    Friction is full where slip sets in and opposes it: forces and rates pass continuously from rolling to slipping.
+    """
+    A_x, A_y, A_z, B_x, B_y, B_z = last_forces(at.x.omega_c, p, omega_0)
+    alpha, beta = math.atan2(A_z, -A_x), math.atan2(-B_z, B_y)
+    wall_alone = p.eta * (B_x + B_y) - abs(B_z)  # what its cone has left where it carries no weight
+    if wall_alone < p.mu * A_y - math.hypot(A_x, A_z):
+        return Case.RS, at._replace(alpha=math.nan, beta=beta)
+    if abs(A_x) <= 16 * math.ulp(1.0) * B_y:
+        return Case.SR, at._replace(alpha=alpha, beta=math.nan)
+    return Case.SS, at._replace(alpha=alpha, beta=beta)

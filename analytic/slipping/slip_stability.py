@@ -1,0 +1,153 @@
+"""Stability with respect to slipping (section 3): does a slight slip, or lift, out of a rolling case die out or grow?
+
+From a state x* of a case Y the ball is pushed along n into a case Z of more freedom (the arrows of Fig. 6, and NR->NS);
+gamma(x*, n) = lim f_Z(x* + eps n) . n (53), in the paper's Euclidean product, says whether it is driven further. Over
+all directions its maximum may be positive though no slip can last, since with two or more directions to slip the slip
+turns while it grows (docs/errata.md); then the work done on the slip or the forces decide, `stability`.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic.mechanics import dynamics, roots
+from model import Case, Contact, Parameters, State
+from model.arrays import Array
+from model.cases import TRAITS
+
+SLIP_ARROWS = (
+    (Case.RR, Case.RS),
+    (Case.RR, Case.SR),
+    (Case.RR, Case.SS),
+    (Case.RS, Case.SS),
+    (Case.SR, Case.SS),
+    (Case.NR, Case.NS),
+)
+"""The arrows of Fig. 6 along which a contact begins to slip."""
+LIFT_ARROWS = ((Case.RR, Case.NR), (Case.RS, Case.NS), (Case.SR, Case.NR), (Case.SS, Case.NS))
+"""The arrows of Fig. 6 along which the ball leaves the floor."""
+_SLIPS = ("slip_x", "slip_y", "slip_z")
+
+
+class SlipStability(Enum):
+    """Definitions 1-3, by gamma over all directions along which the contacts stay closed."""
+
+    STABLE = "stable"
+    """gamma < 0 in all of them, or nothing rolls."""
+    NEUTRAL = "neutral"
+    """gamma = 0 in one, > 0 in none."""
+    UNSTABLE = "unstable"
+    """gamma > 0 in one."""
+
+
+def normals(inner: Case, outer: Case) -> tuple[str, ...]:
+    """The variables that span W (51): what may slip in `outer` and doesn't in `inner`."""
+    return tuple(name for name in _SLIPS if name in TRAITS[outer].active and name not in TRAITS[inner].active)
+
+
+def slip_rates(
+    inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters
+) -> tuple[Array, Array, Array]:
+    """lim f_Z(x* + eps n) in W, and the normal forces A_y, B_x in N there: (..., d), (...), (...).
+
+    x is one state of `inner`, n directions (..., d) over `normals`, of any length. A negative normal force means that
+    the contact opens instead of slipping that way.
+    """
+    state, names, n = dynamics.check_state(inner, x, p), normals(inner, outer), np.asarray(n, dtype=float)
+    push = State(**dict(zip(names, np.moveaxis(n, -1, 0), strict=True)))
+    slides = zip(
+        (inner.A, inner.B), (outer.A, outer.B), dynamics.slides(state, p), dynamics.slides(push, p), strict=True
+    )
+    slip_A, slip_B = (
+        dynamics.direction(*(old if before is Contact.S else new)) if after is Contact.S else None
+        for before, after, old, new in slides
+    )
+    force = dynamics.forces(outer, state, p, p.omega_0, slip_A, slip_B)
+    rates = dynamics.newton_euler(outer, state, force, p, p.omega_0)
+    slips = (getattr(rates, name) for name in names)
+    *along, A_y, B_x = (np.broadcast_to(value, n.shape[:-1]) for value in (*slips, force.A_y, force.B_x))
+    return np.stack(along, axis=-1), A_y, B_x
+
+
+def gamma(inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters) -> Array:
+    """gamma of (53) in rad s-2 along directions n (..., d) of any length."""
+    n = np.asarray(n, dtype=float)
+    rates, _, _ = slip_rates(inner, outer, x, n, p)
+    return np.asarray(np.sum(n * rates, axis=-1) / np.linalg.norm(n, axis=-1))
+
+
+def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
+    """v_y' in m s-2 of the case without the floor, at a state with it: the ball lifts if it is positive.
+
+    This is (53) for the dotted arrows of Fig. 6, with n along v_y.
+    """
+    return float(dynamics.rates(outer, dynamics.check_state(inner, x, p), p, p.omega_0).v_y)
+
+
+def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
+    """omega_c in rad s-1 at which the ball begins to lift, at states else like x that go round with the fluid.
+
+    Looked for between a tenth and ten times that of x; nan where it lifts at both or at none.
+    """
+    state = dynamics.check_state(inner, x, p)
+
+    def rise(omega_c: float) -> float:
+        return lift_acceleration(inner, outer, state._replace(omega_c=omega_c), p.replace(omega_0=omega_c))
+
+    low, high = 0.1 * float(state.omega_c), 10 * float(state.omega_c)
+    if rise(low) * rise(high) > 0:
+        return float("nan")
+    return float(roots.bisected(np.vectorize(rise), low, high))
+
+
+def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:
+    """Stability with respect to slipping of the stationary solution of a case at omega_c, p.omega_0 if None.
+
+    RR: (67), and (82) if eta < j, else (74): beyond omega_03 slip at A alone would need A_y < 0, and so would slip at
+    both if eta > j, so that for eta < j, mu > 1 rolling goes on beyond omega_03, to omega_01 (`slip_margin`).
+    SR and NR: (61). RS: the friction j m R omega_c^2 that its floor must supply. These are the signs of the work done
+    on a slight slip, over all directions along which the contacts stay closed; on a threshold, to round-off, it is
+    neutral.
+    """
+    Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
+    match case:
+        case Case.RR:
+            divisor = p.mu * p.eta * (1 + p.j) + p.j - p.eta
+            slip = (Omega2 * divisor, p.mu * (1 + p.eta)) if p.eta < p.j else (p.mu * p.j * Omega2, p.mu)
+            kinds = {_sign(0.0, p.eta * Omega2), _sign(*slip)}
+        case Case.SR | Case.NR:
+            smooth_floor = case is Case.SR and p.mu == 0  # the floor then carries the weight, the wall nothing
+            kinds = {_sign(0.0 if smooth_floor else 1.0, p.eta * Omega2)}
+        case Case.RS:
+            kinds = {_sign(p.j * Omega2, p.mu)}
+        case _:
+            kinds = set()
+    worst_first = SlipStability.UNSTABLE, SlipStability.NEUTRAL
+    return next((kind for kind in worst_first if kind in kinds), SlipStability.STABLE)
+
+
+def neutral_flow(case: Case, p: Parameters) -> float:
+    """The flow in rad s-1 at which a stationary motion is neutral (Definition 3), between stable and unstable.
+
+    Looked for within a tenth of p.omega_0, by bisection down to round-off; nan if it is the same on both sides.
+    """
+    low, high = 0.9 * p.omega_0, 1.1 * p.omega_0
+    below, above = (stability(case, p.replace(omega_0=flow)) for flow in (low, high))
+    if below is above:
+        return float("nan")
+    while (middle := (low + high) / 2) not in (low, high):
+        here = stability(case, p.replace(omega_0=middle))
+        if here is SlipStability.NEUTRAL:
+            return middle
+        low, high = (middle, high) if here is below else (low, middle)
+    return low
+
+
+def _sign(drive: float, hold: float) -> SlipStability:
+    """What the sign of drive - hold says; both are >= 0 and carry the few round-offs of their products."""
+    if abs(drive - hold) <= 8 * np.finfo(float).eps * max(drive, hold):
+        return SlipStability.NEUTRAL
+    return SlipStability.UNSTABLE if drive > hold else SlipStability.STABLE

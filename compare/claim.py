@@ -1,0 +1,144 @@
+"""Statements of the paper that can be checked, and the verdicts on them.
+
+A claim says what is stated and where, and which measurements bear on it: a `Bearing` picks measurements by protocol,
+quantity and conditions, and predicts each by a function of `analytic`. The verdict is computed from the numbers. That
+the paper's text had to be corrected, or holds formally only, is another matter: `Claim.text`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import KW_ONLY, dataclass
+from enum import StrEnum
+
+from compare.kit.check import Check, Relation
+from compare.kit.levels import Level
+from compare.kit.quantities import quantity
+from compare.kit.record import Condition, Measurement
+from compare.kit.statistics import Measured
+
+When = Callable[[Measurement], bool]
+Prediction = float | Measured
+"""A predicted value, with its own uncertainty where it comes from an integrator."""
+
+
+class Outcome(StrEnum):
+    """What the numbers say of a claim."""
+
+    CONFIRMED = "confirmed"
+    REFUTED = "refuted"
+    INCONCLUSIVE = "inconclusive"
+    """What was measured is too coarse to tell."""
+    NOT_RUN = "not run"
+    ERROR = "error"
+    """The prediction broke down."""
+
+
+class Text(StrEnum):
+    """How the statement relates to the paper's text."""
+
+    PRINTED = "as printed"
+    CORRECTED = "corrected"
+    """True once a listed erratum is corrected."""
+    FORMAL = "formal only"
+    """Outside the physical model: algebra is all there is."""
+
+
+def given(**conditions: Condition) -> When:
+    """Chooses the measurements that were made under these conditions."""
+    return lambda m: conditions.items() <= m.conditions.items()
+
+
+def every(*whens: When) -> When:
+    """Chooses what all of them choose."""
+    return lambda m: all(when(m) for when in whens)
+
+
+def one(m: Measurement) -> float:
+    """The size of what is a ratio, an angle, or a deviation over its own scale."""
+    return 1.0
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """Measurements that bear on a claim, and what theory says they should be."""
+
+    protocol: str
+    quantity: str
+    predict: Callable[[Measurement], Prediction]
+    """Raises one of `judge.UNKNOWN` where theory knows no such state."""
+    _: KW_ONLY
+    when: When = lambda m: True
+    size: Callable[[Measurement], float] | None = None
+    """Natural size of the quantity, over which errors are counted; None for the predicted value itself."""
+    relation: Relation = Relation.EQUAL
+    by: str = ""
+    """The function or equation that predicts, for the reader."""
+
+    def __post_init__(self) -> None:
+        quantity(self.quantity)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One checkable statement."""
+
+    id: str
+    source: str
+    """Proposition, equation, figure or table."""
+    statement: str
+    bearings: tuple[Bearing, ...] = ()
+    _: KW_ONLY
+    algebra: Callable[[], Iterable[Check]] | None = None
+    """For a claim that is formal only: theory against theory."""
+    text: Text = Text.PRINTED
+    reason: str = ""
+    """What had to be corrected, or why a refutation is expected."""
+    expected: Outcome = Outcome.CONFIRMED
+    level: Level = Level.QUICK
+    """The least level at which it is measured."""
+    section: str = ""
+    """Part of the `catalogue`, which says it."""
+
+    def __post_init__(self) -> None:
+        if (self.algebra is not None) != (self.text is Text.FORMAL) or bool(self.bearings) == bool(self.algebra):
+            raise ValueError(f"claim {self.id}: measurements bear on it, or it is formal only and has its algebra")
+
+    @property
+    def protocols(self) -> frozenset[str]:
+        """The protocols that it needs."""
+        return frozenset(bearing.protocol for bearing in self.bearings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """What the numbers say of a claim."""
+
+    claim: Claim
+    outcome: Outcome
+    checks: tuple[Check, ...] = ()
+    error: str = ""
+    """Why it could not be judged."""
+    missing: tuple[str, ...] = ()
+    """What could not be measured, and why."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the outcome is the one to be expected."""
+        return self.outcome is self.claim.expected
+
+    @property
+    def resolving_power(self) -> Mapping[str, float]:
+        """By quantity, the relative error of theory that every single check would notice: the largest of all."""
+        power: dict[str, float] = {}
+        for check in self.checks:
+            name = check.measurement.quantity
+            if name not in ("case", "cases"):
+                power[name] = max(power.get(name, 0.0), check.resolves)
+        return power
+
+    @property
+    def worst(self) -> float:
+        """Largest deviation over tolerance of all checks; inf where theory knows no such state."""
+        return max((check.share for check in self.checks), default=math.nan)

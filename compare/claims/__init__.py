@@ -1,1 +1,0 @@
-"""What the paper states, what `analytic` predicts, and the judge."""

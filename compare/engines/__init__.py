@@ -1,1 +1,0 @@
-"""Other engines on the same ball: an adapter each, imported only when a run asks for it. None knows the theory."""

@@ -1,1 +1,0 @@
-"""One module a figure; measured points come from stored results, lines from theory."""

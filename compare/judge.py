@@ -1,0 +1,126 @@
+"""Where measurements and predictions meet: the checks of a claim, and the verdict."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, ParamSpec, TypeVar
+
+import analytic
+from analytic.orbits.periodic import NoOrbitError
+from compare.claim import Bearing, Claim, Outcome, Verdict
+from compare.kit.check import Check
+from compare.kit.quantities import quantity
+from compare.kit.record import Measurement, Records
+from compare.kit.statistics import COVERAGE, Measured
+from model import Flow, InputError, Parameters, SimulationError, Trajectory
+from model.errors import suggestion
+
+F = TypeVar("F", bound=Callable[..., Any])
+P = ParamSpec("P")
+R = TypeVar("R")
+_remembered: list[Any] = []
+RTOL = 1e-7
+"""Relative tolerance of simulations that predict: what most of them predict is measured to 1e-4 at best."""
+UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
+"""What a prediction raises where theory knows no such state or motion: that is a deviation, not a breakdown."""
+
+
+def remembered(function: F) -> F:
+    """Compute each prediction once a judgement: a cache that `judge` empties, because theory may be exchanged."""
+    cached = functools.lru_cache(maxsize=None)(function)
+    _remembered.append(cached)
+    return cached  # type: ignore[return-value]
+
+
+@remembered
+def _computed(function: Callable[..., Any], args: tuple[Any, ...], options: tuple[tuple[str, Any], ...]) -> Any:
+    return function(*args, **dict(options))
+
+
+def theory(function: Callable[P, R], *args: P.args, **options: P.kwargs) -> R:
+    """A function of `analytic` at arguments that can be hashed, computed once a judgement.
+
+    Name the function through its module where it is called, as in ``theory(pulsation.slip_onset, p, f)``: then a theory
+    that was exchanged is the one that is asked.
+    """
+    result: R = _computed(function, args, tuple(sorted(options.items())))
+    return result
+
+
+@remembered
+def simulated(
+    p: Parameters, x: tuple[float, ...], t_end: float, samples: int = 1, flow: Flow | None = None, rtol: float = RTOL
+) -> Trajectory:
+    """The motion of theory from a state, with so many samples after the first."""
+    return analytic.simulate(p, x, t_end, flow, sample_interval=t_end / samples, rtol=rtol)
+
+
+def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:
+    """The verdicts on claims, in their order; each stands for itself, whatever becomes of the others."""
+    forget()
+    return [verdict(claim, records) for claim in claims]
+
+
+def forget() -> None:
+    """Forget all predictions."""
+    for cached in _remembered:
+        cached.cache_clear()
+
+
+def verdict(claim: Claim, records: Records) -> Verdict:
+    """Predict, compare, and say what the numbers say.
+
+    Refuted if one check deviates beyond its tolerance; else inconclusive if one is too coarse; else confirmed.
+    Whatever a prediction raises makes the verdict an error of this claim alone.
+    """
+    missing = tuple(
+        dict.fromkeys(f"{each.set}: {each.reason}" for each in records.missing if each.protocol in claim.protocols)
+    )
+    try:
+        checks = tuple(claim.algebra() if claim.algebra else _checks(claim.bearings, records))
+    except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other
+        reason = f"{type(error).__name__}: {error}"
+        return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
+    if not checks:
+        outcome = Outcome.NOT_RUN
+    elif not all(check.agrees for check in checks):
+        outcome = Outcome.REFUTED
+    elif not all(check.conclusive for check in checks):
+        outcome = Outcome.INCONCLUSIVE
+    else:
+        outcome = Outcome.CONFIRMED
+    return Verdict(claim=claim, outcome=outcome, checks=checks, missing=missing)
+
+
+def _checks(bearings: Sequence[Bearing], records: Records) -> Iterator[Check]:
+    for bearing in bearings:
+        for m in records.select(bearing.protocol, bearing.quantity, bearing.when):
+            yield check(bearing, m)
+
+
+def check(bearing: Bearing, m: Measurement) -> Check:
+    """One measurement beside its prediction; what must be equal to the last digit has no scale but 1."""
+    try:
+        prediction = bearing.predict(m)
+    except UNKNOWN:
+        prediction = math.nan
+    own = prediction if isinstance(prediction, Measured) else Measured(float(prediction), 0.0)
+    exact = quantity(m.quantity).resolves == 0
+    return Check(
+        measurement=m,
+        predicted=own.value,
+        tolerance=COVERAGE * math.hypot(m.uncertainty, own.uncertainty),
+        scale=1.0 if exact else bearing.size(m) if bearing.size else abs(own.value),
+        relation=bearing.relation,
+    )
+
+
+def select(claims: Iterable[Claim], ids: Sequence[str] | None) -> list[Claim]:
+    """The claims of the given ids, all for None; `InputError` with a suggestion for an unknown id."""
+    known = {claim.id: claim for claim in claims}
+    for name in ids or ():
+        if name not in known:
+            raise InputError(f"no claim is called {name!r}{suggestion(name, known)}; list them with --list")
+    return [known[name] for name in (ids or known)]

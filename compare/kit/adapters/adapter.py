@@ -1,0 +1,121 @@
+"""What an adapter brings: where its engine comes from, how it is set, and a ball that takes steps."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from model import InputError, Parameters
+from model.arrays import Array
+from model.parameters import POSITIVE, Range, check_choice, check_number
+from model.trajectory import version
+
+Floats = Sequence[float]
+
+
+@dataclass(frozen=True)
+class Library:
+    """What an engine comes in: here a Python package of the extra ``engines``."""
+
+    name: str
+    """What it is called where it is installed."""
+    module: str = ""
+    """The module to import."""
+
+    @property
+    def missing(self) -> str:
+        """Why it can't be used here, and what to do about it; empty if it can."""
+        there = importlib.util.find_spec(self.module.split(".")[0])
+        return "" if there else f'{self.name} is not installed: pip install "dualball[engines]"'
+
+    @property
+    def version(self) -> str:
+        """Or that it isn't installed."""
+        return version(self.name)
+
+    def load(self) -> Any:
+        """What a scene is built with; `InputError` if it is missing."""
+        try:
+            return importlib.import_module(self.module)
+        except ImportError as error:
+            raise InputError(self.missing or f"{self.name} can't be imported: {error}") from error
+
+
+def number(default: Any, unit: str, allowed: Range = POSITIVE) -> Any:
+    """Declare a field of `Settings` that has to be in a range."""
+    return field(default=default, metadata={"unit": unit, "allowed": allowed})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What the settings of all engines have."""
+
+    timestep: float = number(1e-3, "s")
+    """s"""
+    coordinates: str = "joints"
+    """``joints``, or ``free`` for a free ball."""
+
+    memory: ClassVar[bool] = False
+    """Nothing corrects for friction that is regularised."""
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            if each.metadata:
+                check_number(each.name, getattr(self, each.name), each.metadata["unit"], each.metadata["allowed"])
+        check_choice("coordinates", self.coordinates, ("joints", "free"))
+
+    @property
+    def resolution(self) -> float:
+        """The least slip speed that the engine tells from rolling, m s-1."""
+        return 0.0
+
+    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
+        """The resolution, and for round-off at least 1e-9 m s-1."""
+        return np.full(np.shape(load), max(self.resolution, 1e-9))
+
+
+class Touch(NamedTuple):
+    """What a contact point of the engine carried in the last step."""
+
+    contact: int
+    """0 for the floor (A), 1 for the wall (B)."""
+    force: Array
+    """On the ball, in the axes of the scene, shape (3,), N."""
+    gap: float
+    """m"""
+
+
+class Scene(Protocol):
+    """A ball in an engine. Its axes are the world's; on joints, those in which the azimuth is zero."""
+
+    def start(self, place: Floats, velocity: Floats) -> None:
+        """Put the ball somewhere: what the three and six numbers are, `compare.kit.adapters.loop` says."""
+
+    def advance(self, force: Floats) -> tuple[Floats, Floats]:
+        """Take a step under a (generalised) force of three components; return place and velocity after it.
+
+        On joints the azimuth in `place` is that of this step alone. Raises `BreakdownError`.
+        """
+
+    def touches(self) -> list[Touch]:
+        """The contact points of the last step."""
+
+    def close(self) -> None:
+        """Give up what the engine holds."""
+
+
+class BreakdownError(RuntimeError):
+    """The engine can't take the next step."""
+
+
+def tangents(p: Parameters, facets: int) -> list[tuple[Array, Array]]:
+    """Places and inward normals, each (3,), of planes tangent to the vessel's wall, from azimuth 0 round."""
+    normals = [-np.array([math.cos(a), math.sin(a), 0.0]) for a in math.tau * np.arange(facets) / facets]
+    return [(-(p.R + p.r) * normal, normal) for normal in normals]

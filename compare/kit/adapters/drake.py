@@ -1,0 +1,174 @@
+"""Drake: a discrete `MultibodyPlant` with point contact, normal forces implicit, friction regularised below a speed.
+
+TAMSI solves the step by Newton's method, with friction mu v/v_s up to the stiction tolerance v_s: a contact that should
+roll creeps at a part of v_s, and a ball sinks in by its load divided by the stiffness. Both can be made small, as far
+as Newton's method converges. The convex solvers (SAP, its variants "similar" and "lagged") have a softer friction of
+their own, and creep.
+
+Traps: friction is the harmonic mean 2 a b/(a + b) of both bodies' coefficients, stiffness k1 k2/(k1 + k2); without
+`SetUseSampledOutputPorts(False)` there is no update to be evaluated by itself; a plane has to be a half space, since
+boxes are less exact, but one among a dozen of other shapes crashes the engine.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from compare.kit.adapters import adapter
+from compare.kit.adapters.adapter import BreakdownError, Floats, Scene, Touch, number, tangents
+from model import Parameters
+from model.arrays import Array
+from model.parameters import Range, check_choice
+
+_APPROXIMATIONS = {"tamsi": "kTamsi", "sap": "kSap", "lagged": "kLagged", "similar": "kSimilar"}
+_SIZE = 100.0
+"""Edge of the cubes of which a vessel of many facets is made, in units of its radius."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings(adapter.Settings):
+    """The engine's settings: by default the best known, massless joints, TAMSI, stiff contacts and a low v_s."""
+
+    facets: int = number(1, "planes", Range(1, whole=True))
+    """Planes that make up the wall."""
+    approximation: str = "tamsi"
+    """`discrete_contact_approximation`."""
+    stiffness: float | None = 1e10
+    """Of ball, floor and wall, N/m; None for what the engine takes from its `penetration_allowance` of 1 mm."""
+    dissipation: float | None = 100.0
+    """Of each of them, s/m; None for the engine's own. A ball that has landed comes out of its overlap at up to the
+    reciprocal: with less it is thrown back, with more it stays sunk in for long."""
+    stiction: float = number(1e-8, "m s-1")
+    """`stiction_tolerance` v_s, m s-1. With a hundredth of it TAMSI fails when a ball that rolls on both contacts lifts
+    off the floor, and so it does at the first step with a ten times larger v_s and stiffness."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_choice("approximation", self.approximation, tuple(_APPROXIMATIONS))
+
+    @property
+    def resolution(self) -> float:
+        """The stiction tolerance."""
+        return self.stiction
+
+
+def newcomer(timestep: float) -> Settings:
+    """The engine's defaults: a free ball in a prism of 64 boxes."""
+    return Settings(
+        timestep=timestep,
+        coordinates="free",
+        facets=64,
+        approximation="lagged",
+        stiffness=None,
+        dissipation=None,
+        stiction=1e-4,
+    )
+
+
+def scene(engine: Any, p: Parameters, settings: Settings) -> Scene:
+    """The ball in a plant of its own."""
+    logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
+    return _Plant(engine, p, settings)
+
+
+class _Plant(Scene):
+    def __init__(self, engine: Any, p: Parameters, settings: Settings) -> None:
+        self._joints = settings.coordinates == "joints"
+        builder = engine.DiagramBuilder()
+        plant, _ = engine.AddMultibodyPlantSceneGraph(builder, engine.MultibodyPlant(settings.timestep))
+        plant.set_contact_model(engine.ContactModel.kPoint)
+        approximations = engine.DiscreteContactApproximation
+        plant.set_discrete_contact_approximation(getattr(approximations, _APPROXIMATIONS[settings.approximation]))
+        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -p.g])
+        plant.SetUseSampledOutputPorts(False)
+        turning = engine.UnitInertia(*[p.j * p.r**2] * 3)
+        ball = plant.AddRigidBody("ball", engine.SpatialInertia(p.m, [0.0, 0.0, 0.0], turning))
+        if self._joints:
+            _hang(engine, plant, ball, p)
+        springs = {"dissipation": settings.dissipation, "point_stiffness": settings.stiffness}
+        springs = {name: value for name, value in springs.items() if value is not None}
+        world, most = plant.world_body(), max(p.mu, p.eta)
+
+        def surface(body: Any, place: Any, shape: Any, name: str, friction: float) -> Any:
+            material, coefficient = engine.ProximityProperties(), engine.CoulombFriction(friction, friction)
+            engine.AddContactMaterial(**springs, friction=coefficient, properties=material)
+            return plant.RegisterCollisionGeometry(body, place, shape, name, material)
+
+        def of_pair(friction: float) -> float:
+            """The coefficient of a surface whose harmonic mean with that of the ball is the pair's."""
+            return most * friction / (2 * most - friction) if friction else 0.0
+
+        def plane(name: str, place: Array, normal: Array, friction: float) -> Any:
+            if settings.facets == 1:
+                pose, shape = engine.HalfSpace.MakePose(normal, place), engine.HalfSpace()
+            else:  # a half space among a dozen of shapes crashes the engine
+                turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
+                pose, shape = engine.RigidTransform(turn, place - size / 2 * normal), engine.Box(size, size, size)
+            return surface(world, pose, shape, name, of_pair(friction))
+
+        size = _SIZE * (p.R + p.r)
+        surface(ball, engine.RigidTransform(), engine.Sphere(p.r), "ball", most)
+        self._floor = plane("floor", np.zeros(3), np.array([0.0, 0.0, 1.0]), p.mu)
+        for k, (place, normal) in enumerate(tangents(p, settings.facets)):
+            plane(f"wall{k}", place, normal, p.eta)
+        plant.Finalize()
+        plant.set_stiction_tolerance(settings.stiction)
+        self._diagram = builder.Build()
+        self._root = self._diagram.CreateDefaultContext()
+        self._plant, self._context = plant, plant.GetMyMutableContextFromRoot(self._root)
+        self._force = plant.get_applied_generalized_force_input_port()
+        self._results = plant.get_contact_results_output_port()
+        self._ball = ball.index()
+        self._state: Array = np.empty(0)
+
+    def start(self, place: Floats, velocity: Floats) -> None:
+        if self._joints:
+            self._state = np.array([*place, 0.0, 0.0, 0.0, *velocity])
+        else:
+            self._state = np.array([1.0, 0.0, 0.0, 0.0, *place, *velocity[3:], *velocity[:3]])
+
+    def advance(self, force: Floats) -> tuple[Floats, Floats]:
+        if self._joints:
+            self._state[0], self._state[3:6], forces = 0.0, 0.0, [*force, 0.0, 0.0, 0.0]
+        else:
+            forces = [0.0, 0.0, 0.0, *force]
+        self._force.FixValue(self._context, forces)
+        self._plant.SetPositionsAndVelocities(self._context, self._state)
+        try:
+            update = self._plant.EvalUniquePeriodicDiscreteUpdate(self._context)
+        except RuntimeError as error:
+            raise BreakdownError(f"could not go on ({' '.join(str(error).split())[:80]})") from error
+        self._state = update.get_vector(0).CopyToVector()
+        numbers = self._state.tolist()
+        if self._joints:
+            return numbers[:3], numbers[6:]
+        return numbers[4:7], [*numbers[10:], *numbers[7:10]]
+
+    def touches(self) -> list[Touch]:
+        results = self._results.Eval(self._context)
+        shown = []
+        for info in (results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())):
+            pair, sign = info.point_pair(), 1 if info.bodyB_index() == self._ball else -1  # it acts on the second body
+            contact = int(self._floor not in (pair.id_A, pair.id_B))
+            shown.append(Touch(contact, sign * info.contact_force(), -pair.depth))
+        return shown
+
+    def close(self) -> None:
+        del self._diagram, self._root, self._plant, self._context, self._force, self._results
+
+
+def _hang(engine: Any, plant: Any, ball: Any, p: Parameters) -> None:
+    """Join the ball to the world by an azimuth hinge, an inward and an upward slide, and a ball joint."""
+    nothing = engine.SpatialInertia(0.0, [0.0, 0.0, 0.0], engine.UnitInertia(0.0, 0.0, 0.0), skip_validity_check=True)
+    hinge, inward, upward = (plant.AddRigidBody(name, nothing) for name in ("hinge", "in", "up"))
+    up, frame = [0.0, 0.0, 1.0], plant.world_body().body_frame()
+    plant.AddJoint(engine.RevoluteJoint("azimuth", frame, hinge.body_frame(), up, 0.0))
+    place = engine.FixedOffsetFrame("place", hinge.body_frame(), engine.RigidTransform([p.R, 0.0, p.r]))
+    start = plant.AddFrame(place)
+    plant.AddJoint(engine.PrismaticJoint("inward", start, inward.body_frame(), [-1.0, 0.0, 0.0], damping=0.0))
+    plant.AddJoint(engine.PrismaticJoint("upward", inward.body_frame(), upward.body_frame(), up, damping=0.0))
+    plant.AddJoint(engine.BallRpyJoint("spin", upward.body_frame(), ball.body_frame(), 0.0))

@@ -1,0 +1,149 @@
+"""The loop round an engine: the fluid's drag, samples, cases, and what becomes of a run that breaks down.
+
+An engine shows itself as a `Scene` of a ball, a floor and a wall, in one of two kinds of coordinates:
+
+* ``joints``: the ball hangs on an azimuth hinge, an inward and an upward slide, and a ball joint. Before each step the
+  scene turns its azimuth and the ball's orientation back to zero, so that the wall is one fixed plane. A stationary
+  orbit is then a fixed point of the step. Engines that take gyroscopic moments at the beginning of the step spin a
+  ball up by omega_c^2 h/2 a second where nothing rubs against its spin. Place: (angle, h, y) in rad and m; velocity:
+  (omega_c, v_h, v_y, spin about the scene's axes against the joints).
+* ``free``: a free ball in world axes, in a vessel of fixed walls. Place and velocity with spin in m, m s-1 and rad s-1.
+
+The engine is driven by -m c(|w|) w (9) alone, with the velocity w relative to the fluid at the beginning of each step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from compare.kit.adapters.adapter import BreakdownError, Floats, Library, Scene, Settings
+from mjsim import limits, recorder
+from mjsim.classify import Classifier
+from mjsim.contact_settings import ContactSettings
+from mjsim.corrections import Ball, resistance
+from model import Flow, Header, Parameters, State, Trajectory
+from model.arrays import Array
+from model.kinematics import Motion, frame, from_world, to_world
+from model.parameters import Range, check_number
+from model.trajectory import current_versions, samples
+
+_HUGE = 1e8
+"""A coordinate, velocity or force beyond this, in SI units, has diverged."""
+_WIDTH = 1 + 3 + 6 + 2 * 5
+"""A row: azimuth, place, velocity, and for each contact whether it touches, force (3,), gap."""
+_SPIN = np.eye(6)
+_SPIN[3:, 3:] = frame(0.0).T
+"""Turns the spin from the paper's axes to those of a scene on joints."""
+
+
+def simulate(
+    engine: str,
+    library: Library,
+    build: Callable[[Any, Parameters, Any], Scene],
+    p: Parameters,
+    x0: npt.ArrayLike,
+    t_end: float,
+    flow: Flow,
+    settings: Settings,
+    sample_interval: float | None,
+    progress: Callable[[float], None],
+) -> Trajectory:
+    """One run of an engine with the scene that `build` makes of what its library loads, and from rest of the azimuth.
+
+    Where it breaks down, the header says why.
+
+    Forces of a sample are those of the step that begins there, gaps of touching contacts the engine's own.
+
+    Raises
+    ------
+    InputError
+        If the library is not installed, an argument out of range, or the time step too large for the problem.
+    """
+    every, count = limits.sampling(t_end, settings.timestep, sample_interval)
+    limits.check_timestep(settings.timestep, p, flow, t_end)
+    x, joints = State.one(x0), settings.coordinates == "joints"
+    check_number("h", x.h, "m", Range(high=p.R, below=True), "to be off the axis it")
+    drag = _drag_on_joints if joints else _drag_in_world
+    ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
+    rows, done, failure = np.empty((count, _WIDTH)), 0, ""
+    with closing(build(library.load(), p, settings)) as scene:
+        place, velocity = _start(x, p, joints)
+        scene.start(place, velocity)
+        theta = 0.0
+        try:
+            while done < count:
+                row, steps = rows[done], every if done + 1 < count else 1  # of the last sample only forces are needed
+                row[:10], row[10:] = [theta, *place, *velocity], 0.0
+                times = (done * every + np.arange(steps) + 0.5) * settings.timestep
+                for number, omega_0 in enumerate(flow(times).tolist()):
+                    place, velocity = scene.advance(drag(place, velocity, omega_0, ball))
+                    if joints and place[1] >= p.R:
+                        raise BreakdownError("reached the vessel's axis, where polar coordinates end,")
+                    azimuth = math.remainder(math.atan2(place[1], place[0]) - theta, math.tau)
+                    theta += place[0] if joints else azimuth
+                    if number == 0:
+                        for contact, force, gap in scene.touches():
+                            of = row[10 + 5 * contact :][:5]
+                            of[4] = min(gap, of[4]) if of[0] else gap
+                            of[0], of[1:4] = 1.0, of[1:4] + force
+                if not (np.abs(row) < _HUGE).all():
+                    raise BreakdownError("diverged")
+                done += 1
+                progress(done / count)
+        except BreakdownError as error:
+            failure = f"{error} by t = {done * every * settings.timestep:g} s"
+    time = np.arange(done, dtype=float) * (every * settings.timestep)
+    given = {"t_end": float(t_end), "sample_interval": every * settings.timestep, "x0": list(x), "theta_0": 0.0}
+    versions = {**current_versions(), library.name: library.version}
+    header = Header(engine, p, flow, asdict(settings) | given, failure=failure, versions=versions)
+    classifier = Classifier(p, settings)
+    block = classifier.add(_samples(time, rows[:done], joints, p), last=True)
+    return Trajectory.from_blocks(header, [block], classifier.events)
+
+
+def _start(x: State, p: Parameters, joints: bool) -> tuple[Floats, Floats]:
+    """Place and velocity of a state."""
+    if joints:
+        qpos, qvel = recorder.joint_state(x, 0.0, p)
+        return qpos[:3].tolist(), (qvel @ _SPIN.T).tolist()
+    motion = to_world(x, 0.0, p)
+    return motion.position.tolist(), [*motion.velocity.tolist(), *motion.spin.tolist()]
+
+
+def _drag_on_joints(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
+    """The generalised force of the fluid."""
+    rho, (omega_c, v_h, v_y, *_) = ball.R - place[1], velocity
+    along = rho * (omega_c - omega_0)
+    mc = resistance(along, v_h, v_y, ball)
+    return -mc * rho * along, -mc * v_h, -mc * v_y
+
+
+def _drag_in_world(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
+    """The force of the fluid."""
+    (x, y, _), (v_x, v_y, v_z, *_) = place, velocity
+    w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
+    mc = resistance(w_x, w_y, v_z, ball)
+    return -mc * w_x, -mc * w_y, -mc * v_z
+
+
+def _samples(time: Array, rows: Array, joints: bool, p: Parameters) -> npt.NDArray[np.void]:
+    """Samples of dtype `SAMPLE`, shape (n,), all but the case."""
+    theta, place, velocity, *contacts = np.split(rows, [1, 4, 10, 15], axis=1)
+    if joints:
+        upright = np.broadcast_to([1.0, 0.0, 0.0, 0.0], (len(rows), 4))
+        state = recorder.state(np.concatenate([place, upright], axis=1), velocity @ _SPIN, p)
+    else:
+        state, _ = from_world(Motion(place, velocity[:, :3], velocity[:, 3:]), p)
+    block = samples(time, theta[:, 0], state, p)
+    axes = frame(np.zeros(len(rows)) if joints else theta[:, 0])
+    for name, own in zip("AB", contacts, strict=True):
+        block[f"force_{name}"] = np.einsum("nab,nb->na", axes, own[:, 1:4])
+        block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], block[f"gap_{name}"])
+    return block

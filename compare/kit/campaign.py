@@ -1,0 +1,326 @@
+"""Many runs on an executor: each task is carried out once; results do not depend on order or number of workers.
+
+The runs of a batch are one file, ``LABEL-ID.h5``, in which the name of each is `Task.key`, the hash of all that
+determines it. A file appears only when it is whole, so the directory itself is the record of what is done: whatever
+stops a campaign, starting it again does the rest. A run too long for memory has a file of its own, ``LABEL-KEY.h5``,
+and so has one that broke down, ``LABEL-KEY.failed.h5``, with the samples it has and the reason.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import math
+import os
+import re
+import sys
+import threading
+from collections import Counter, deque
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from compare.kit.progress import Show, nowhere
+from compare.kit.tasks import Deadline, OutOfTimeError, Task, carry_out, failed_path, store
+from compare.kit.workers import Workers, processes
+from model import InputError, SimulationError, StorageError, Trajectory, storage
+from model.files import make_directory, remove_leftovers, write_text
+from model.parameters import POSITIVE, Range, check_number
+from model.trajectory import current_versions
+
+BATCH = 64
+"""Runs in one MuJoCo batch: where the engine's cost a step stops falling."""
+HELD = 2**18
+"""Most samples of a batch, some 60 MB; a run that has more is written as it comes."""
+READ = 2**19
+"""Samples of new runs, and of those read last, that are held in memory, some 100 MB: most are looked at soon after."""
+FAILURES = "failures.json"
+Outcome = tuple[str, Path | None, Trajectory | None]
+"""Why a run is not whole, empty if it is; the file that holds what there is of it; the run, if it fits in memory."""
+_NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
+"""Label, ID, and whether it broke down; files of earlier versions have no label."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A task that has no whole run."""
+
+    task: Task
+    reason: str
+
+
+class _Executor:
+    """The executor that a campaign and its parts share: started when it is needed, and anew when its workers died."""
+
+    def __init__(self, workers: Workers) -> None:
+        self.workers, self.closed, self.lock = workers, False, threading.Lock()
+        self.running: Executor | None = None
+
+    def submit(self, *call: Any) -> Future[Any]:
+        """Give a call to the workers; raises `CancelledError` once there is to be no more work."""
+        with self.lock:
+            for _ in range(2):
+                if self.closed:
+                    raise CancelledError("the campaign was given up")
+                self.running = self.running or self.workers.start()
+                try:
+                    return self.running.submit(*call)
+                except self.workers.lost:
+                    self._stop(at_once=True)
+        raise StorageError("workers die as soon as they are started")
+
+    def close(self, at_once: bool) -> None:
+        """Let the workers go, `at_once` or after what is under way."""
+        with self.lock:
+            self.closed = at_once
+            self._stop(at_once)
+
+    def _stop(self, at_once: bool) -> None:
+        if self.running is not None:
+            self.workers.stop(self.running, at_once)
+            self.running = None
+
+
+@dataclass
+class Campaign:
+    """A directory of runs and the workers that fill it; a context manager.
+
+    Parameters
+    ----------
+    directory : where the run files go; made if it doesn't exist
+    workers : number of processes, or `Workers` of another kind; 0 runs everything in this process
+    batch : most runs in one MuJoCo batch
+    limit : longest time a run may take, s; a run that takes longer is reported as failed
+    report : called after every batch with `doing`, and how many runs are done, in all, and failed
+    doing : what the campaign is about
+    label : what the names of new files begin with, see `reduce`
+    """
+
+    directory: Path
+    workers: int | Workers = field(default_factory=lambda: os.cpu_count() or 1)
+    batch: int = BATCH
+    limit: float = math.inf
+    report: Show = nowhere
+    doing: str = ""
+    label: str = "runs"
+
+    def __post_init__(self) -> None:
+        workers = processes(self.workers) if isinstance(self.workers, int) else self.workers
+        check_number("batch", self.batch, "runs", Range(1, whole=True))
+        if self.limit != math.inf:
+            check_number("limit", self.limit, "s", POSITIVE)
+        self.directory = Path(self.directory).resolve()
+        make_directory(self.directory)
+        remove_leftovers(self.directory)
+        self._executor = _Executor(workers)
+        self._files: dict[str, Path] = dict(_stored(self.directory))
+        self._failed: dict[str, Failure] = {}
+        self._read: dict[Path, dict[str, Trajectory]] = {}
+        self._samples = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._executor.close(at_once=kind is not None)
+        remove_leftovers(self.directory)
+
+    def under(self, label: str, doing: str) -> Campaign:
+        """A part of the campaign with a label and runs of its own; parts may be carried out by several threads."""
+        part = copy.copy(self)
+        part.label, part.doing, part._read, part._samples = label, doing, {}, 0
+        part._files = {key: file for key, file in self._files.items() if file.name.rpartition("-")[0] == label}
+        part._files |= {key: file for key, file in self._files.items() if file.stem == label}
+        return part
+
+    @property
+    def at_once(self) -> int:
+        """How many parts keep the workers busy: two more than there are workers, as some wait for a single long run."""
+        count = self._executor.workers.count
+        return count + 2 if count > 1 else 1
+
+    def give_up(self) -> None:
+        """Stop all that is under way, in whatever thread."""
+        self._executor.close(at_once=True)
+
+    def load(self, key: str) -> Trajectory:
+        """The run of a task that was carried out, by its key; raises `StorageError` if it can't be read."""
+        file = self._files[key]
+        if key not in self._read.get(file, ()):
+            self._forget(file)
+            runs = storage.load_runs(file)
+            self._hold(file, runs if key in runs else {key: runs[""]})
+        return self._read[file][key]
+
+    def _hold(self, file: Path, runs: Mapping[str, Trajectory]) -> None:
+        """Keep runs of a file in memory, and forget those of earlier files while there are more than `READ` samples."""
+        self._read.setdefault(file, {}).update(runs)
+        self._samples += sum(len(run.time) for run in runs.values())
+        while self._samples > READ and len(self._read) > 1:
+            self._forget(next(iter(self._read)))
+
+    def _forget(self, file: Path) -> None:
+        self._samples -= sum(len(run.time) for run in self._read.pop(file, {}).values())
+
+    def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
+        """Carry out what is not yet done and load the runs, one a task, in order.
+
+        Raises `SimulationError` for the first task that failed, `InputError` if it could not even start: use
+        `complete` where failures are expected.
+        """
+        for task, reason in ((failure.task, failure.reason) for failure in self.complete(tasks)[:1]):
+            if task.key in self._files:
+                raise SimulationError(f"the run {task.key} {reason}", self.load(task.key))
+            raise InputError(f"the run {task.key} failed: {reason}")
+        return [self.load(task.key) for task in tasks]
+
+    def complete(self, tasks: Iterable[Task]) -> list[Failure]:
+        """Carry out every task that has no run yet; return those that failed, now or earlier.
+
+        The directory's `FAILURES` lists all that have failed in this campaign, for programs.
+        """
+        unique = {task.key: task for task in tasks}
+        todo = [task for key, task in unique.items() if key not in self._files]
+        earlier = [key for key in unique if key in self._files and _broke_down(self._files[key])]
+        failures = [Failure(unique[key], self.load(key).header.failure) for key in earlier]
+        done = len(unique) - len(todo) - len(failures)
+        self.report(self.doing, done, len(unique), len(failures))
+        for batch, outcomes in self._carry_out(_batches(todo, self.batch, self._executor.workers.count)):
+            for task, (reason, file, run) in zip(batch, outcomes, strict=True):
+                failures += [Failure(task, reason)] if reason else []
+                done += not reason
+                if file:
+                    self._files[task.key] = file
+                if file and run:
+                    self._hold(file, {task.key: run})
+            self.report(self.doing, done, len(unique), len(failures))
+        if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
+            self._failed |= new
+            write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
+        return failures
+
+    def reduce(self, label: str, keys: Collection[str] = ()) -> None:
+        """Once what was measured under a label is stored: keep the runs of these keys, in one file, ``LABEL.h5``.
+
+        All other files of the label are removed, but for those of runs that broke down.
+        """
+        gone = {f for f in self._files.values() if f.name.rpartition("-")[0] == label and not _broke_down(f)}
+        if keys and all(self._files.get(key) in gone for key in keys):
+            storage.save_batch({key: self.load(key) for key in sorted(keys)}, self.directory / f"{label}.h5")
+        for file in gone:
+            file.unlink(missing_ok=True)
+            self._forget(file)
+        self._files = {key: file for key, file in self._files.items() if file not in gone}
+
+    def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[tuple[Task, ...], Sequence[Outcome]]]:
+        """Yield each batch that ends, with what became of its tasks.
+
+        A worker that dies takes all batches under way with it. Their tasks are tried again at the end, one at a time;
+        one that then loses its worker twice has failed.
+        """
+        pending: dict[Future[list[Outcome]], tuple[Task, ...]] = {}
+        again: deque[Task] = deque()
+        died: Counter[str] = Counter()
+        while True:
+            # No more than a few batches wait at the executor, so that memory stays flat however long the list.
+            while len(pending) < 2 * self._executor.workers.count and (batch := next(fresh, ())):
+                pending[self._executor.submit(run_batch, batch, self.directory, self.label, self.limit)] = batch
+            alone = not pending
+            if alone:
+                if not again:
+                    return
+                batch = (again.popleft(),)
+                pending[self._executor.submit(run_batch, batch, self.directory, self.label, self.limit)] = batch
+            ended, _ = wait(pending, return_when=FIRST_COMPLETED)
+            for future in ended:
+                batch = pending.pop(future)
+                error = future.exception()
+                if error is None:
+                    yield batch, future.result()
+                elif not isinstance(error, self._executor.workers.lost):
+                    raise error
+                elif alone and died[batch[0].key]:
+                    yield batch, [("its worker died (killed, or out of memory)", None, None)]
+                else:  # a task alone may have died by one of another part of the campaign
+                    died.update(task.key for task in batch if alone)
+                    again.extend(batch)
+
+
+def listed(failures: Iterable[Failure]) -> list[dict[str, Any]]:
+    """Failures as JSON-able data: what failed, why, and all that it takes to try it again."""
+    return [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures]
+
+
+def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) -> list[Outcome]:
+    """Carry out tasks and store their runs under a label; raises `StorageError` if that can't be done.
+
+    Where a batch can't be carried out as a whole, its tasks are tried one by one.
+    """
+    paths = [directory / f"{label}-{task.key}.h5" for task in tasks]
+    try:
+        if len(tasks) == 1 and (tasks[0].long or tasks[0].samples > HELD):
+            failure = store(tasks[0], paths[0], limit)
+            return [(failure, failed_path(paths[0]) if failure else paths[0], None)]
+        runs = carry_out(tasks, Deadline(limit * len(tasks)))
+    except StorageError:  # a full disk is for the user to mend
+        raise
+    except (InputError, OutOfTimeError, MemoryError) as error:
+        if len(tasks) > 1:
+            return [outcome for task in tasks for outcome in run_batch([task], directory, label, limit)]
+        return [(str(error) or "out of memory", None, None)]
+    whole = {task.key: run for task, run in zip(tasks, runs, strict=True) if run.complete}
+    together = directory / f"{label}-{hashlib.sha256(' '.join(whole).encode()).hexdigest()[:24]}.h5"
+    if whole:
+        storage.save_batch(whole, together)
+    files = [together if run.complete else failed_path(path) for run, path in zip(runs, paths, strict=True)]
+    for run, file in zip(runs, files, strict=True):
+        if not run.complete:
+            storage.save(run, file)
+    return [(run.header.failure, file, run) for run, file in zip(runs, files, strict=True)]
+
+
+def _stored(directory: Path) -> Iterator[tuple[str, Path]]:
+    """The runs that the files of a directory hold, by key.
+
+    A file that was cut or changed is set aside, so that its runs are carried out again; those of other versions of the
+    program are left alone. Both are said on standard error.
+    """
+    others, ours = 0, current_versions()["dualball"]
+    for file in sorted(directory.glob("*.h5")):
+        name = _NAME.fullmatch(file.name)
+        if name and name[1] is None:
+            others += 1
+        elif name:
+            try:
+                version, keys = storage.contents(file)
+            except StorageError as error:
+                file.replace(file.with_suffix(".damaged"))
+                print(f"dualball: {error}; it is set aside, its runs are carried out again", file=sys.stderr)
+                continue
+            others += version != ours
+            if version == ours:
+                yield from ((key, file) for key in keys or [name[2]])
+    if others:
+        print(f"dualball: {others} files of runs of other versions are left alone in {directory}", file=sys.stderr)
+
+
+def _broke_down(file: Path) -> bool:
+    return file.name.endswith(".failed.h5")
+
+
+def _batches(tasks: Iterable[Task], size: int, workers: int) -> Iterator[tuple[Task, ...]]:
+    """Tasks that can run together, shared out evenly among the workers: the longest first, so that all end together."""
+    groups: dict[str, list[Task]] = {}
+    for task in tasks:
+        groups.setdefault(task.batch_key, []).append(task)
+    for group in sorted(groups.values(), key=lambda group: -group[0].steps * len(group)):
+        most = min(size, math.ceil(len(group) / workers), int(HELD / group[0].samples))
+        share = 1 if group[0].long else max(1, most)
+        for start in range(0, len(group), share):
+            yield tuple(group[start : start + share])

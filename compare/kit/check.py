@@ -1,0 +1,62 @@
+"""A measured number beside a predicted one, whoever predicted it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from compare.kit.quantities import quantity
+from compare.kit.record import Measurement
+
+
+class Relation(StrEnum):
+    """How a measured value should stand to the predicted one."""
+
+    EQUAL = "="
+    AT_MOST = "≤"
+    AT_LEAST = "≥"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """A measured number beside its prediction."""
+
+    measurement: Measurement
+    predicted: float
+    """nan where theory knows no such state."""
+    tolerance: float
+    """Largest deviation that still agrees."""
+    scale: float
+    relation: Relation = Relation.EQUAL
+
+    @property
+    def deviation(self) -> float:
+        """Measured less predicted, as far as it goes against the relation."""
+        error = self.measurement.value - self.predicted
+        if self.relation is Relation.AT_MOST:
+            return max(error, 0.0)
+        return min(error, 0.0) if self.relation is Relation.AT_LEAST else error
+
+    @property
+    def share(self) -> float:
+        """Deviation over tolerance, without sign; inf where theory knows no such state, or no tolerance is left."""
+        if self.deviation == 0:
+            return 0.0
+        share = abs(self.deviation / self.tolerance) if self.tolerance else math.inf
+        return math.inf if math.isnan(share) else share
+
+    @property
+    def resolves(self) -> float:
+        """Resolving power: the smallest relative error of the prediction that this check would notice."""
+        return self.tolerance / self.scale if self.scale else math.inf
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the deviation is within the tolerance; not for nan."""
+        return abs(self.deviation) <= self.tolerance
+
+    @property
+    def conclusive(self) -> bool:
+        """Whether the check resolves as much as its quantity asks for."""
+        return self.resolves <= quantity(self.measurement.quantity).resolves

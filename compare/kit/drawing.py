@@ -1,0 +1,95 @@
+"""What a figure is: what it selects from the results, how that is drawn, and its caption."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from compare.kit.check import Check
+from compare.kit.record import Measurement, Records
+from model import Parameters, StorageError, Trajectory, storage
+
+if TYPE_CHECKING:  # it takes half a second to load, and much that hands over material never draws
+    from matplotlib.figure import Figure
+
+    from compare.bench.league import Entry
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A trajectory handed to a figure, by a name that stands for its content; it is read only to be drawn."""
+
+    name: str
+    engine: str
+    p: Parameters
+    load: Callable[[], Trajectory] = field(repr=False, compare=False)
+
+
+@dataclass(frozen=True)
+class Material:
+    """What figures are made of: judged numbers, measurements, and run files; without any, theory alone is drawn."""
+
+    checks: Mapping[str, Sequence[Check]] = field(default_factory=dict)
+    """By the id of the claim on which they bear."""
+    records: Records = Records()
+    directory: Path = Path()
+    """The results directory, where names of run files begin."""
+    ladder: tuple[Entry, ...] = ()
+    """What is reached under settings that each have one thing more than the one before."""
+    frontier: tuple[Entry, ...] = ()
+    """What methods reach, with their cost."""
+
+    def select(self, quantity: str, *conditions: str) -> Iterator[Measurement]:
+        """Measurements of a quantity that have conditions of these names."""
+        named = set(conditions)
+        return (m for m in self.records.measurements if m.quantity == quantity and named <= m.conditions.keys())
+
+    def motions(self, m: Measurement) -> list[Motion]:
+        """The runs of a measurement whose files are there."""
+        there = [name for name in m.runs if storage.exists(self.directory / name)]
+        return [Motion(name, m.engine, m.parameters, partial(storage.load, self.directory / name)) for name in there]
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """A figure by its name, a parameter set, and what was measured with it."""
+
+    figure: str
+    p: Parameters
+    states: tuple[Measurement, ...] = ()
+
+
+class GapError(Exception):
+    """Why a figure can't be drawn, in a sentence for the reader."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """One figure: a record of the registry."""
+
+    title: str
+    select: Callable[[Material], Any]
+    """All that is drawn, as data whose repr tells it apart; raises `GapError` where results are missing."""
+    draw: Callable[[Any], Figure]
+    caption: Callable[[Any], str]
+    """What is shown, with the parameters."""
+    claims: tuple[str, ...] = ()
+    """The claims beside which it stands."""
+    background: bool = False
+    """Whether it explains the model rather than showing results."""
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure to a file, in the format that its name says; equal figures make equal files.
+
+    Raises `StorageError` if it can't be written or the name says no format.
+    """
+    date = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix)
+    try:
+        figure.savefig(path, dpi=200, metadata={date: None} if date else {})
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
+        raise StorageError(f"cannot write {path}: {reason}") from error

@@ -1,0 +1,227 @@
+"""The engines on trial and the simulators beside them, one record each: all that the rest of the program knows of them.
+
+To add an engine, add a record. It is named in tasks and files by `Engine.name`; nothing else compares names.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import Any
+
+import analytic
+import mjsim
+from compare.kit.adapters import adapter, drake, loop, pybullet, siconos
+from compare.kit.adapters.adapter import Library
+from mjsim import ContactSettings
+from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
+from model.errors import suggestion
+from model.trajectory import version
+
+Settings = ContactSettings | analytic.Settings | adapter.Settings
+"""Numerical settings of any engine."""
+Simulate = Callable[[Parameters, State, float, Flow, Any, float | None, Callable[[float], None]], Trajectory]
+"""One whole run from parameters, start, duration, flow, settings and sample interval; the function is called with the
+fraction done, from time to time."""
+Stream = Callable[..., mjsim.Run]
+"""Runs that hand out their samples as they come; called as `mjsim.Run`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Engine:
+    """A simulator: how it is run and set, what its results depend on, and its mark in figures.
+
+    One of `simulate` and `stream` is given.
+    """
+
+    name: str
+    settings: type[Settings]
+    options: tuple[str, ...]
+    """Options of the command line that `configure` takes."""
+    configure: Callable[[Mapping[str, float], Parameters], Settings]
+    """Settings of a person's run from such options; those not given have their defaults."""
+    study: Callable[[float, Parameters], Settings] | None = None
+    """Settings of a study for a time step in s, where they are others than those of a person's run."""
+    simulate: Simulate | None = None
+    stream: Stream | None = None
+    sources: tuple[str, ...]
+    """Packages whose sources determine the results."""
+    stands_on: tuple[str, ...]
+    """Packages whose versions do."""
+    needs: Library | None = None
+    """What it can't run without, and what not everybody has; its version counts, too."""
+    as_it_comes: str = ""
+    """Name of the same engine as a newcomer would use it."""
+    mark: str
+    """Marker of matplotlib."""
+    colour: str
+
+    @property
+    def missing(self) -> str:
+        """Why it can't run here; empty if it can."""
+        return self.needs.missing if self.needs else ""
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Of all that determines its results."""
+        return {name: version(name) for name in self.stands_on} | (
+            {self.needs.name: self.needs.version} if self.needs else {}
+        )
+
+    def at(self, step: float | None, p: Parameters) -> Settings:
+        """Settings of a study for a time step in s; engines without a step ignore it."""
+        if step is None or "timestep" not in self.options:
+            return self.configure({}, p)
+        return self.study(step, p) if self.study else self.configure({"timestep": step}, p)
+
+    def configured(self, given: Mapping[str, float], p: Parameters) -> Settings:
+        """`configure`, but an option that belongs to other engines is an `InputError`."""
+        for name in given:
+            if name not in self.options:
+                others = ", ".join(each.name for each in ENGINES.values() if name in each.options)
+                raise InputError(f"--{name} is for {others}, not for {self.name}")
+        return self.configure(given, p)
+
+
+STUDY_SLIP = 2.0
+"""Slip speed in m/s for which contact in the studies' settings is continuous, under the load of gravity, at mu = 1."""
+
+
+def _mujoco_study(step: float, p: Parameters) -> ContactSettings:
+    """One of two settings for all parameter sets, so that runs of a step share a batch."""
+    return _rough(step).suited(p)
+
+
+@cache
+def _rough(step: float) -> ContactSettings:
+    return ContactSettings.for_problem(Parameters.named("reference").replace(mu=1.0, eta=0.0), step, STUDY_SLIP)
+
+
+def newcomer(step: float) -> ContactSettings:
+    """MuJoCo's own contact parameters on the joints of this study, and none of the corrections between the steps."""
+    return ContactSettings(
+        timestep=step,
+        solref=(0.02, 1.0),
+        solreffriction=0.02,
+        solimp=0.9,
+        impratio=1.0,
+        servo=0.0,
+        memory=False,
+        order=1,
+    )
+
+
+def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that contacts hover with these settings is what is shown
+        return mjsim.Run(*given, **more)
+
+
+def _theory(
+    method: str,
+    p: Parameters,
+    x0: State,
+    t_end: float,
+    flow: Flow,
+    settings: analytic.Settings,
+    sample_interval: float | None,
+    progress: Callable[[float], None],
+) -> Trajectory:
+    given = p, x0, t_end, flow, replace(settings, method=method)
+    try:
+        return analytic.simulate(*given, sample_interval=sample_interval, progress=progress)
+    except SimulationError as error:
+        return error.trajectory
+
+
+def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, colour: str) -> tuple[Engine, Engine]:
+    """Records of an engine with the best settings of its adapter and with a newcomer's.
+
+    The adapter is a module of `compare.engines`, with `Settings`, `newcomer` and `scene`; each record has a mark.
+    """
+    name, other = library.name, f"{library.name}-defaults"
+    best = Engine(
+        name=name,
+        settings=adapter.Settings,
+        options=("timestep",),
+        configure=lambda given, p: adapter.Settings(**given),
+        simulate=partial(loop.simulate, name, library, adapter.scene),
+        sources=("model", "mjsim", "compare.engines"),
+        stands_on=("numpy",),
+        needs=library,
+        as_it_comes=other,
+        mark=marks[0],
+        colour=colour,
+    )
+    return best, replace(
+        best,
+        name=other,
+        configure=lambda given, p: adapter.newcomer(given.get("timestep", newcomer_step)),
+        simulate=partial(loop.simulate, other, library, adapter.scene),
+        mark=marks[1],
+    )
+
+
+MUJOCO = Engine(
+    name="mujoco",
+    settings=ContactSettings,
+    options=("timestep",),
+    configure=lambda given, p: ContactSettings.at(given.get("timestep", ContactSettings.timestep)).suited(p),
+    study=_mujoco_study,
+    stream=mjsim.Run,
+    sources=("model", "mjsim"),
+    stands_on=("numpy", "mujoco"),
+    as_it_comes="mujoco-defaults",
+    mark="o",
+    colour="#0072B2",
+)
+NEWCOMER = replace(
+    MUJOCO,
+    name="mujoco-defaults",
+    configure=lambda given, p: newcomer(given.get("timestep", ContactSettings.timestep)),
+    study=None,
+    stream=_unwarned,
+    mark="x",
+    colour="#CC79A7",
+)
+EVENT = Engine(
+    name="event",
+    settings=analytic.Settings,
+    options=("rtol", "restitution"),
+    configure=lambda given, p: analytic.Settings(**given),  # type: ignore[arg-type]
+    simulate=partial(_theory, "event"),
+    sources=("model", "analytic"),
+    stands_on=("numpy", "scipy"),
+    mark="s",
+    colour="#D55E00",
+)
+MOREAU = replace(
+    EVENT,
+    name="time-stepping",
+    options=("timestep", "rtol", "restitution"),
+    configure=lambda given, p: analytic.Settings(method="time-stepping", **given),  # type: ignore[arg-type]
+    simulate=partial(_theory, "time-stepping"),
+    mark="^",
+    colour="#009E73",
+)
+_OTHERS = (
+    _adapted(pybullet, Library("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
+    _adapted(drake, Library("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
+    _adapted(siconos, siconos.LIBRARY, 1e-3, "p2", "#000000"),
+)
+ENGINES: dict[str, Engine] = {
+    each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU, *(each for pair in _OTHERS for each in pair))
+}
+"""Every engine by name."""
+ALIASES = {"analytic": "event"}
+"""Other names that the command line takes."""
+
+
+def engine(name: str) -> Engine:
+    """The engine of a name; `InputError` with a suggestion if there is none."""
+    name = ALIASES.get(name, name)
+    if name not in ENGINES:
+        raise InputError(f"no engine is called {name!r}{suggestion(name, ENGINES)}; there are {', '.join(ENGINES)}")
+    return ENGINES[name]

@@ -1,0 +1,110 @@
+"""What a protocol works with: an engine, a campaign that keeps its runs, and how much is to be measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from compare.kit import levels
+from compare.kit.campaign import Campaign, Failure
+from compare.kit.engines import Engine
+from compare.kit.levels import Level
+from compare.kit.tasks import Task
+from model import Flow, Parameters, Trajectory
+from model.arrays import Array
+from model.drag import STOKES
+
+
+@dataclass(frozen=True)
+class Lab:
+    """Where protocols run what they need: every run is carried out once and read from its file afterwards."""
+
+    campaign: Campaign
+    engine: Engine
+    level: Level
+
+    def effort(self, name: str) -> Any:
+        """How much of something is measured at this level, see `compare.kit.levels`."""
+        return levels.effort(name, self.level)
+
+    def task(
+        self,
+        p: Parameters,
+        x0: npt.ArrayLike,
+        t_end: float,
+        step: float,
+        *,
+        flow: Flow | None = None,
+        samples: int = 100,
+    ) -> Task:
+        """A run of the engine on trial with a time step in s, in the studies' settings."""
+        return Task(
+            engine=self.engine.name,
+            parameters=p,
+            x0=x0,
+            t_end=t_end,
+            flow=flow,
+            settings=self.engine.at(step, p),
+            sample_interval=max(step, t_end / samples),
+        )
+
+    def pair(self, p: Parameters, x0: npt.ArrayLike, steps: int, step: float) -> list[Task]:
+        """A run of so many steps of so many s, and one with twice as many of half; each step is a sample."""
+        return [self.task(p, x0, steps * step, step / times, samples=steps * times) for times in (1, 2)]
+
+    def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
+        """The trajectories of the tasks, in order; raises for one that failed."""
+        return self.campaign.run(tasks)
+
+    def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory]]:
+        """The same group by group: all are carried out together, but not held in memory together."""
+        self.complete([task for group in groups for task in group])
+        for group in groups:
+            yield self.run(group)
+
+    def attempt(self, tasks: Sequence[Task]) -> list[Trajectory] | str:
+        """The trajectories of the tasks, or why one of them failed."""
+        failures = self.complete(tasks)
+        return failures[0].reason if failures else self.run(tasks)
+
+    def each(self, tasks: Sequence[Task]) -> Iterator[Trajectory | str]:
+        """The trajectory of every task, one after the other, or why it failed."""
+        failed = {failure.task.key: failure.reason for failure in self.complete(tasks)}
+        for task in tasks:
+            yield failed.get(task.key) or self.run([task])[0]
+
+    def complete(self, tasks: Sequence[Task]) -> list[Failure]:
+        """Carry out the tasks and return those that failed."""
+        return self.campaign.complete(tasks)
+
+
+def time_unit(p: Parameters) -> float:
+    """sqrt(R/g), s: the time in which the ball falls by half of R."""
+    return math.sqrt(p.R / p.g)
+
+
+def state_units(p: Parameters) -> Array:
+    """Natural sizes of the state (8,): R, sqrt(g R), sqrt(g/R), and sqrt(g R)/r for slip."""
+    speed = math.sqrt(p.g * p.R)
+    return np.array([p.R, speed, speed / p.R, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
+
+
+def dragged_speed(p: Parameters) -> float:
+    """A speed relative to the fluid, m s-1, at which drag is about as large as the weight, or larger.
+
+    By Stokes' law g/c. In thin fluids with another law that is far too fast: no more than 20 sqrt(g R) then.
+    """
+    return p.g / p.c if p.drag == STOKES else min(p.g / p.c, 20 * math.sqrt(p.g * p.R))
+
+
+def coarse_step(p: Parameters) -> float:
+    """A time step in s that resolves `time_unit` about twenty times: a power of two of a millisecond.
+
+    Few sets then need a batch of their own.
+    """
+    return float(1e-3 * 2.0 ** round(math.log2(time_unit(p) / 20e-3)))

@@ -1,0 +1,59 @@
+"""Pages that need nothing but themselves, filled in from templates that share `base.html`; and tables of text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jinja2
+from rich import box
+from rich.console import JustifyMethod
+from rich.table import Table
+from rich.text import Text
+
+Rows = Sequence[Sequence[str]]
+"""A table: its head, then its body."""
+
+
+def readable(unit: str) -> str:
+    """A unit of the files as a reader writes it: rad s-1 is rad/s, 1 is nothing."""
+    if unit == "1":
+        return ""
+    for written, read in (" s-2", "/s²"), (" s-1", "/s"), (" m-3", "/m³"), ("s-1", "1/s"), ("rad-1", "1/rad"):
+        unit = unit.replace(written, read)
+    return unit.replace("m2", "m²").replace("rad2", "rad²")
+
+
+def render(package: str, template: str, **values: Any) -> str:
+    """A template of a package, filled in; what is not marked safe is escaped, a value that is missing is an error."""
+    loader = jinja2.ChoiceLoader([jinja2.PackageLoader(package), jinja2.PackageLoader("compare.kit.pages")])
+    environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    return environment.get_template(template).render(**values)
+
+
+def markdown(rows: Rows) -> str:
+    """A table in Markdown."""
+    cells = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells)
+
+
+def pairs(rows: Mapping[str, str]) -> Table:
+    """Names and what they stand for, for the terminal."""
+    shown = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    for name, text in rows.items():
+        shown.add_row(f"[bold]{name}", Text(text))
+    return shown
+
+
+def table(title: str, rows: Rows, no_wrap: bool = False, justify: JustifyMethod = "right", **look: Any) -> Table:
+    """A table for the terminal; with `no_wrap` only its head and first column may take several lines.
+
+    `justify` is for all columns but the first.
+    """
+    usual: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "caption_justify": "left"}
+    shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
+    for k, name in enumerate(rows[0]):
+        shown.add_column(name, justify=justify if k else "left")
+    for name, *cells in rows[1:]:
+        shown.add_row(Text(name), *(Text(cell, no_wrap=no_wrap) for cell in cells))
+    return shown

@@ -1,0 +1,230 @@
+"""Which protocols there are, in what order they measure, and where their measurements are kept.
+
+A protocol is a function of a lab, the parameter sets, and what was measured before it; it yields measurements, and what
+it could not measure. To add one, write such a function and add a line to `PROTOCOLS`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import KW_ONLY, asdict, dataclass, replace
+from functools import cache
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+from compare.kit import record
+from compare.kit.engines import MOREAU, Engine
+from compare.kit.lab import Lab, coarse_step
+from compare.kit.levels import Level
+from compare.kit.record import Measurement, Missing, Records
+from compare.kit.sets import sets
+from compare.kit.tasks import sources
+from compare.subjects.attractors import measure as attractors
+from compare.subjects.flowmeter.measure import characteristic, unloading
+from compare.subjects.motion.measure import field, laws, motions
+from compare.subjects.slipping.measure import bounds, growth, lift
+from compare.subjects.stability import measure as rates
+from compare.subjects.stationary import measure as settled
+from compare.subjects.thresholds.measure import edge, plane, thresholds
+from compare.subjects.unsteady.measure import jumps as unsteady
+from compare.subjects.unsteady.measure import pulsation
+from model import Parameters, StorageError
+from model.files import make_directory
+
+DIRECTORY = "measurements"
+UNDAMPED = "without drag (c = 0 s-1) no motion settles, and nothing can be measured"
+MOST = 3e4
+"""Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or more at a time; and
+contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c is three times that: as much as
+`omega_c` may be off in a state that counts as settled."""
+HOPS = "hops that last are those of the set hopping"
+Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
+ONE = ("reference",)
+"""For what one ball shows as well as seven, or the paper draws for one."""
+TWO = ("reference", "high-wall-friction")
+"""One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
+SEVEN = (*TWO, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
+"""Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride the wall at one flow;
+drag so strong that nothing folds; two other laws of drag; friction of the wall above that of the floor and the inertia.
+On them all wrong theories are noticed that are noticed on all nine sets chosen by hand."""
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """One way to measure."""
+
+    name: str
+    measure: Measure
+    needs: tuple[str, ...] = ()
+    """Protocols whose measurements it goes out from."""
+    _: KW_ONLY
+    quick: tuple[str, ...] = SEVEN
+    """The sets it measures at the quick level; at the others all of them."""
+    cost: float = 1.0
+    """Processor time at the quick level, s on some machine: what of the whole is done, and what begins first."""
+    level: Level = Level.QUICK
+    """The least level of which it is a part."""
+    waits: bool = True
+    """Whether it waits for motions to settle."""
+    alone: str = ""
+    """Why it needs the set `reference`, and no other; empty if it takes all sets."""
+    engine: Engine | None = None
+    """Who measures, where it isn't the engine on trial."""
+    drawn: Callable[[Measurement], bool] = lambda m: False
+    """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is stored."""
+
+    def measures(self, level: Level) -> dict[str, Parameters]:
+        """The sets that it measures at a level, by name."""
+        return {name: p for name, p in sets(level).items() if level > Level.QUICK or name in self.quick}
+
+
+PROTOCOLS = (
+    # Single long runs begin first: beside them there is work for the other workers.
+    Protocol("recurrent", attractors.hopping, alone=HOPS),
+    Protocol("stepped", attractors.stepped, engine=MOREAU, alone=HOPS),
+    Protocol("choice", attractors.choice, alone="the choice is that of sets of its own with mu > 1"),
+    Protocol("settled", settled.measure),
+    Protocol("newcomer", settled.newcomer, alone="the engine's own settings are measured on reference only"),
+    Protocol("plane", plane.measure, alone="the planes of Figs. 7 and 8 are those of reference only"),
+    Protocol("hysteresis", characteristic.hysteresis, ("settled",), quick=ONE),
+    Protocol("rates", rates.measure, ("settled",)),
+    Protocol("laws", laws.measure, waits=False),
+    Protocol("thresholds", thresholds.measure, ("settled",)),
+    Protocol("edge", edge.measure, ("thresholds",), quick=ONE),
+    Protocol("birth", thresholds.birth, ("thresholds",)),
+    Protocol(
+        "unloading",
+        unloading.measure,
+        ("thresholds",),
+        quick=TWO,
+        drawn=lambda m: m.conditions["start"] == "unloading",
+    ),
+    Protocol("field", field.measure, waits=False),
+    Protocol("growth", growth.measure, waits=False),
+    Protocol("steepest", growth.steepest, waits=False),
+    Protocol("lift", lift.measure, waits=False),
+    Protocol("bounds", bounds.measure, ("thresholds",)),
+    Protocol("motions", motions.measure, quick=ONE, waits=False),
+    Protocol("impacts", motions.impacts, quick=TWO, waits=False),
+    Protocol("followed", attractors.followed, level=Level.DEFAULT, alone=HOPS),
+    Protocol(
+        "swing",
+        attractors.swing,
+        level=Level.DEFAULT,
+        alone="swings that last are those of reference on a very rough floor",
+    ),
+    Protocol("calm", attractors.calm, level=Level.DEFAULT, alone="strong drag is tried on sets of its own"),
+    Protocol("pulsation", pulsation.measure, ("thresholds",)),
+    Protocol("unsteady", unsteady.measure, ("thresholds",), drawn=lambda m: m.quantity == "jump_height"),
+    Protocol("slope", characteristic.slope, ("settled", "thresholds")),
+)
+"""Every protocol there is, in the order in which they measure; each goes out only from those before it."""
+
+
+def file(
+    protocol: Protocol, results: Path, engine: Engine, level: Level, chosen: Mapping[str, Parameters] | None
+) -> Path:
+    """Where measurements are kept; those of another engine, level, choice of sets, or program are apart."""
+    engine, sets = protocol.engine or engine, protocol.measures(level) if chosen is None else chosen
+    identity = [engine.name, level.name, {name: asdict(p) for name, p in sets.items()}, _program(engine)]
+    apart = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
+    return results / DIRECTORY / apart / f"{protocol.name}.h5"
+
+
+@cache
+def _program(engine: Engine) -> str:
+    return sources(*engine.sources, "compare", "compare.measure")
+
+
+def needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
+    """The protocols of these names and those they go out from, in order."""
+    known = {protocol.name: protocol for protocol in protocols}
+    wanted, todo = set[str](), list(names)
+    while todo:
+        name = todo.pop()
+        if name not in wanted:
+            wanted.add(name)
+            todo += known[name].needs
+    return [protocol for name, protocol in known.items() if name in wanted]
+
+
+def run(
+    protocols: Sequence[Protocol], lab: Lab, chosen: Mapping[str, Parameters] | None, results: Path
+) -> Iterator[tuple[Protocol, Records | Exception]]:
+    """Carry out protocols, some at once if they need nothing of each other; yield each as it ends, with its records.
+
+    A protocol that breaks down comes with its exception, and takes no other with it: those that need it go without.
+    The sets are those `chosen`, or each protocol's own. Raises `StorageError` where files can't be read or written.
+    """
+    known = {protocol.name: protocol for protocol in protocols}
+    order = TopologicalSorter({p.name: [name for name in p.needs if name in known] for p in protocols})
+    order.prepare()
+    found: dict[str, Records] = {}
+    running: dict[Future[Records], Protocol] = {}
+    with ThreadPoolExecutor(lab.campaign.at_once) as threads:
+        try:
+            while order.is_active():
+                for protocol in sorted((known[name] for name in order.get_ready()), key=protocols.index):
+                    before = sum((found[name] for name in protocol.needs if name in found), Records())
+                    running[threads.submit(carry_out, protocol, lab, chosen, before, results)] = protocol
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    protocol, error = running.pop(future), future.exception()
+                    order.done(protocol.name)
+                    if error is None:
+                        found[protocol.name] = future.result()
+                        yield protocol, future.result()
+                    elif isinstance(error, StorageError) or not isinstance(error, Exception):
+                        raise error  # a full disk, or a file that was touched, is for the user to mend
+                    else:
+                        yield protocol, error
+        except BaseException:
+            lab.campaign.give_up()  # else the threads would wait for runs that nobody wants any more
+            threads.shutdown(cancel_futures=True)
+            raise
+
+
+def carry_out(
+    protocol: Protocol, lab: Lab, chosen: Mapping[str, Parameters] | None, before: Records, results: Path
+) -> Records:
+    """What a protocol measures after others, on the sets `chosen` or its own; what is kept is not measured again.
+
+    Its measurement file is the record of what is done: once it is there, only the runs that a figure draws are kept.
+
+    Raises `StorageError` where measurements can't be read or written; a run that breaks down raises
+    `SimulationError`, as far as the protocol can't go on without it.
+    """
+    path = file(protocol, results, lab.engine, lab.level, chosen)
+    label = f"{protocol.name}-{path.parent.name}"
+    campaign = lab.campaign.under(label, protocol.name)
+    lab = replace(lab, engine=protocol.engine or lab.engine, campaign=campaign)
+    if not path.exists():
+        sets = protocol.measures(lab.level) if chosen is None else chosen
+        weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
+        strong = {name: p for name, p in sets.items() if name not in weak}
+        rows: list[Measurement | Missing] = [Missing(protocol.name, name, why) for name, why in weak.items()]
+        if protocol.alone and "reference" not in strong:
+            rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.alone))
+        else:
+            rows = [*protocol.measure(lab, strong, before), *rows]
+        make_directory(path.parent)
+        about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
+        place = f"{campaign.directory.name}/{label}.h5"
+        for k, row in enumerate(rows):
+            if isinstance(row, Measurement) and protocol.drawn(row):
+                rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
+        record.save(Records.of(rows), path, about)
+    records = record.load(path)
+    campaign.reduce(label, {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run})
+    return records
+
+
+def _too_weak(p: Parameters, protocol: Protocol) -> str:
+    """Why drag is too weak for a protocol; empty if it isn't."""
+    if p.c == 0:
+        return UNDAMPED
+    steps = 1 / (p.c * coarse_step(p))
+    weak = f"drag is so weak (1/c = {1 / p.c:.3g} s, {steps:.2g} time steps) that motions take too long to settle"
+    return weak if protocol.waits and steps > MOST else ""

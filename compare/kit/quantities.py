@@ -1,0 +1,118 @@
+"""What is measured: every quantity with its symbol, unit, and the resolving power that a check of it must have.
+
+A check resolves r if it would notice a prediction that is off by r of the quantity's scale, see
+`compare.claim`. Where what was measured is too coarse for `Quantity.resolves`, the check is inconclusive,
+however well the numbers agree. The ceilings follow from what each protocol can do at its quick level:
+
+* settled states don't depend on the time step, so that only the settling is left, which is waited for down to 1e-8;
+  a slip is a difference of spins ten times its size, a force one of accelerations;
+* a threshold is bracketed, or extrapolated from settled states as near to it as their settling allows;
+* the unstable state between two attractors is what a ball comes to on its border: its oscillation has died out to 1e-4
+  of the spin, and three times that is to be resolved; a ball that is pushed leaves the floor within a time step, which
+  its height of some tenths of a millimetre shows;
+* friction opposes the slip of some point within a step: the law is off by what the slip turns in it, and the speed of a
+  landing by the fall within a step, about a thousandth of either;
+* a motion through landings follows the step h to second order, (omega_0 h)^2/24 = 5e-5 with the coarser step of a hop,
+  three quarters of which is its difference from the finer; a disturbance that shrinks by a tenth from hop to hop piles
+  up to ten times as much: 4e-4. A step of the flow by 4e-2 has shrunk to a hundredth when the hops are measured: 4e-4.
+  Both together, three times, are 1.7e-3 of omega_c. Hops are as high as the flow is above the one where they begin, a
+  sixteenth of it where they are lowest: sixteen times as much of the height, 2.7e-2. The time in the air goes with the
+  root of the height: half as much of the period. A multiplier comes from the ten hops in which a disturbance is neither
+  too large nor lost in that. Along rougher walls it rises by half of the relative change of eta: known to 4e-3, it
+  says to 8e-3 along which wall it is 1, and three times that is to be resolved;
+* what a pulsation or a jump does is compared at two time steps, to a part in a thousand of itself; the onset of slip is
+  bracketed to that, and slip begins within a time step, a few hundredths of a period, near a maximum; the mean reading
+  and the flow by which a ramp passes a fold are small differences of flows;
+* rates and growths come from short records of the motion and carry the error of a time step, a few tenths of a percent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from model import InputError
+from model.errors import suggestion
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A measured quantity."""
+
+    name: str
+    symbol: str
+    unit: str
+    """SI, as in the HDF5 files."""
+    resolves: float
+    """Largest error of a prediction, over the scale of the quantity, that a check may overlook."""
+
+
+_SPEEDS = {"v_y": "v_y", "v_h": "v_h"}
+_TURNS = {"omega_c": "ω_c", "slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
+_FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
+_FORCES |= {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}
+"""And what the balances say of the forces where both contacts roll."""
+_ALL = (
+    Quantity("case", "case", "1", 0.0),
+    Quantity("cases", "cases reached", "1", 0.0),
+    *(Quantity(n, symbol, "rad s-1", 1e-7 if n == "omega_c" else 1e-6) for n, symbol in _TURNS.items()),
+    Quantity("wall_spin", "ω_x⁰", "rad s-1", 1e-6),
+    Quantity("v_y", "v_y", "m s-1", 1e-6),
+    Quantity("y", "y", "m", 1e-2),
+    *(Quantity(f"force_{name}", symbol, "N", 1e-5) for name, symbol in _FORCES.items()),
+    *(Quantity(f"moving_force_{name}", f"{symbol} in motion", "N", 5e-3) for name, symbol in _FORCES.items()),
+    Quantity("decay_rate", "−Re λ", "s-1", 2e-2),
+    Quantity("frequency", "Im λ", "rad s-1", 2e-2),
+    Quantity("modes", "number of eigenvalues", "1", 0.0),
+    Quantity("gamma", "γ", "rad s-2", 2e-2),
+    Quantity("steepest", "β₁", "rad", 2e-2),
+    Quantity("filippov_share", "δ", "1", 2e-2),
+    Quantity("gamma_zero", "ω₀ at γ = 0", "rad s-1", 2e-2),
+    Quantity("gamma_slope", "dγ/dω₀", "s-1", 2e-2),
+    Quantity("gamma_zero_square", "ω₀² at γ = 0", "rad2 s-2", 2e-2),
+    Quantity("gamma_slope_square", "dγ/d(ω₀²)", "rad-1", 2e-2),
+    *(Quantity(f"rate_{name}", f"d{symbol}/dt", "m s-2", 5e-3) for name, symbol in _SPEEDS.items()),
+    *(Quantity(f"rate_{name}", f"d{symbol}/dt", "rad s-2", 5e-3) for name, symbol in _TURNS.items()),
+    *(Quantity(f"after_{name}", f"{symbol} after", "m s-1", 5e-2) for name, symbol in _SPEEDS.items()),
+    *(Quantity(f"after_{name}", f"{symbol} after", "rad s-1", 5e-2) for name, symbol in _TURNS.items()),
+    *(Quantity(f"omega_0{k}", f"ω₀{'₁₂₃₄'[k - 1]}", "rad s-1", 1e-3 if k == 4 else 1e-4) for k in range(1, 5)),
+    *(Quantity(f"edge_{n}", f"{s} on the edge", "rad s-1", 1e-3) for n, s in (_TURNS | {"wall_spin": "ω_x⁰"}).items()),
+    Quantity("lifts", "leaves the floor", "1", 0.0),
+    Quantity("lift_onset", "ω_c at A_y = 0", "rad s-1", 2e-2),
+    Quantity("critical_drag", "c at η = η_cr", "s-1", 4e-3),
+    Quantity("folds", "number of folds", "1", 0.0),
+    Quantity("slope", "dω_c/dω₀", "1", 1e-4),
+    Quantity("law", "deviation from the law", "1", 1e-6),
+    Quantity("law_in_motion", "typical deviation from the law", "1", 1e-3),
+    Quantity("friction_ratio", "friction over normal force", "1", 1e-6),
+    Quantity("time", "t", "s", 1e-2),
+    Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
+    Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
+    Quantity("orbit_period", "period", "s", 1.5e-2),
+    Quantity("orbit_omega_c", "mean ω_c of a period", "rad s-1", 2e-3),
+    Quantity("orbit_height", "height of the hops", "m", 3e-2),
+    Quantity("orbit_multiplier", "largest |Floquet multiplier|", "1", 0.25),
+    Quantity("orbit_birth", "ω₀ where hopping begins", "rad s-1", 2e-2),
+    Quantity("orbit_death", "η from which hops don't last", "1", 2.5e-2),
+    Quantity("hops", "hops on", "1", 0.0),
+    Quantity("swing_period", "period of the swing", "s", 1e-3),
+    Quantity("swing_omega_c", "mean ω_c of a swing", "rad s-1", 1e-5),
+    Quantity("swing_size", "swing of ω_c", "rad s-1", 2e-2),
+    Quantity("lift", "height of a lifted ball", "m", 5e-2),
+    Quantity("gain", "ω_c over ω₀", "1", 5e-3),
+    Quantity("phase_lag", "phase lag", "rad", 5e-3),
+    Quantity("slip_amplitude", "amplitude at which slip begins", "rad s-1", 1e-2),
+    Quantity("mean_error", "mean of ω_c − ω₀", "rad s-1", 2e-2),
+    Quantity("jump_delay", "delay of a jump", "s", 1e-2),
+    Quantity("jump_peak", "time of the peak after a jump", "s", 1e-2),
+    Quantity("jump_height", "height of the peak after a jump", "1", 1e-2),
+    Quantity("ramp_end", "ω₀ at which a ramp has halved the lag", "rad s-1", 2e-2),
+)
+QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}
+"""Every quantity by name."""
+
+
+def quantity(name: str) -> Quantity:
+    """The quantity of a name; `InputError` with a suggestion if there is none."""
+    if name not in QUANTITIES:
+        raise InputError(f"no quantity is called {name!r}{suggestion(name, QUANTITIES)}")
+    return QUANTITIES[name]

@@ -1,0 +1,214 @@
+"""Measurements as data, and the file that keeps them.
+
+A measurement is a number with its standard uncertainty and all that it belongs to: what was measured, by which engine,
+with which parameters, under which named conditions, in which runs. Labels and sentences are made from it and never
+read back. A file holds the measurements of one protocol as columns, one row a measurement: it opens with
+``xarray.open_dataset(path, engine="h5netcdf").to_dataframe()``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from compare.kit.lab import Lab
+from compare.kit.quantities import quantity
+from compare.kit.statistics import COVERAGE, Measured
+from compare.kit.tasks import Task
+from model import Parameters, StorageError
+from model.arrays import Array
+from model.files import WholeFile, dataset, reading
+from model.kinematics import VARIABLES
+from model.trajectory import current_commit, current_versions
+
+SCHEMA = "dualball-measurements"
+SCHEMA_VERSION = 1
+Condition = float | str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """One measured number."""
+
+    protocol: str
+    """The name of the `compare.kit.programme.Protocol` that measured it."""
+    quantity: str
+    """A name of `compare.kit.quantities`."""
+    value: float
+    uncertainty: float
+    """Standard uncertainty, in the unit of the quantity."""
+    engine: str
+    set: str
+    """Name of the parameter set."""
+    parameters: Parameters
+    """With the omega_0 at which it was measured."""
+    conditions: Mapping[str, Condition] = field(default_factory=dict)
+    """What else it depends on, by name; SI units."""
+    runs: tuple[str, ...] = ()
+    """Keys of its runs; where they are kept, FILE/KEY, relative to the results directory."""
+
+    def __post_init__(self) -> None:
+        quantity(self.quantity)
+        for name in ("value", "uncertainty"):  # whole numbers and numpy's come back from a file as floats
+            object.__setattr__(self, name, float(getattr(self, name)))
+
+    @property
+    def unit(self) -> str:
+        """Unit of value and uncertainty."""
+        return quantity(self.quantity).unit
+
+
+def measurement(
+    lab: Lab,
+    protocol: str,
+    set: str,
+    p: Parameters,
+    quantity: str,
+    value: Measured | float,
+    tasks: Iterable[Task] = (),
+    **conditions: Condition,
+) -> Measurement:
+    """A measurement by the lab's engine; a plain number is exact."""
+    sure = value if isinstance(value, Measured) else Measured(float(value), 0.0)
+    return Measurement(
+        protocol=protocol,
+        quantity=quantity,
+        value=sure.value,
+        uncertainty=sure.uncertainty,
+        engine=lab.engine.name,
+        set=set,
+        parameters=p,
+        conditions=conditions,
+        runs=tuple(task.key for task in tasks),
+    )
+
+
+def sure_enough(name: str, value: Measured, scale: float) -> bool:
+    """Whether a check of a measured quantity can resolve what it should, over a scale that is natural to it."""
+    return COVERAGE * value.uncertainty <= quantity(name).resolves * scale
+
+
+def if_sure(row: Measurement, scale: float, why: str) -> Measurement | Missing:
+    """A measurement that is `sure_enough`, or else why it is missing."""
+    sure = sure_enough(row.quantity, Measured(row.value, row.uncertainty), scale)
+    return row if sure else Missing(row.protocol, row.set, why)
+
+
+def state_of(x: Array) -> dict[str, float]:
+    """A state (8,), or without the last two (6,), as conditions."""
+    return dict(zip(VARIABLES, x.tolist(), strict=False))
+
+
+def state(m: Measurement) -> tuple[float, ...]:
+    """The state (8) among the conditions of a measurement, zero where it isn't named."""
+    return tuple(float(m.conditions.get(name, 0.0)) for name in VARIABLES)
+
+
+@dataclass(frozen=True)
+class Missing:
+    """What a protocol could not measure, and why, in a sentence for the reader."""
+
+    protocol: str
+    set: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Records:
+    """What has been measured so far."""
+
+    measurements: tuple[Measurement, ...] = ()
+    missing: tuple[Missing, ...] = ()
+
+    @classmethod
+    def of(cls, rows: Iterable[Measurement | Missing]) -> Records:
+        """Sort what a protocol yields into the two kinds."""
+        kept = list(rows)
+        return cls(
+            tuple(row for row in kept if isinstance(row, Measurement)),
+            tuple(row for row in kept if isinstance(row, Missing)),
+        )
+
+    def __add__(self, other: Records) -> Records:
+        return Records(self.measurements + other.measurements, self.missing + other.missing)
+
+    def select(
+        self, protocol: str, quantity: str | None = None, where: Callable[[Measurement], bool] = lambda m: True
+    ) -> Iterator[Measurement]:
+        """The measurements of a protocol, of one quantity if it is named, for which `where` holds."""
+        for m in self.measurements:
+            if m.protocol == protocol and quantity in (None, m.quantity) and where(m):
+                yield m
+
+    def threshold(self, set: str, quantity: str) -> Measured | None:
+        """The surest value of a threshold of a set, as the protocol of that name measured it; None if it did not."""
+        measured = self.select("thresholds", quantity, lambda m: m.set == set)
+        best = min(measured, key=lambda m: m.uncertainty, default=None)
+        return Measured(best.value, best.uncertainty) if best else None
+
+
+_OWN = ("protocol", "quantity", "value", "uncertainty", "unit", "engine", "set")
+_PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
+
+
+def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
+    """Write records, whole or not at all; `about` says what they are (JSON-able). Raises `StorageError`.
+
+    A condition that a row doesn't have is nan, or empty where it is text.
+    """
+    rows = records.measurements
+    columns: dict[str, list[Any]] = {name: [getattr(m, name) for m in rows] for name in _OWN}
+    columns["runs"] = [" ".join(m.runs) for m in rows]
+    columns |= {name: [getattr(m.parameters, name) for m in rows] for name in _PARAMETERS}
+    texts = {name: isinstance(value, str) for m in rows for name, value in m.conditions.items()}
+    for name, text in texts.items():
+        columns[f"at_{name}"] = [m.conditions.get(name, "" if text else np.nan) for m in rows]
+    with WholeFile(path) as whole:
+        file = whole.file
+        file.attrs.update(
+            schema=SCHEMA,
+            schema_version=SCHEMA_VERSION,
+            about=json.dumps(dict(about)),
+            missing=json.dumps([dataclasses.asdict(each) for each in records.missing]),
+            versions=json.dumps(dict(current_versions())),
+            commit=current_commit(),
+        )
+        row = file.create_dataset("row", data=np.arange(len(rows)))
+        row.make_scale("row")
+        for name, values in columns.items():
+            kind = h5py.string_dtype() if values and isinstance(values[0], str) else np.dtype(np.float64)
+            column = file.create_dataset(name, data=np.array(values, dtype=kind), dtype=kind)
+            column.dims[0].attach_scale(row)
+        whole.finish()
+
+
+def load(path: Path) -> Records:
+    """Read what `save` wrote.
+
+    Raises `StorageError`, naming the file, if it is missing, damaged, cut, changed, or of another version.
+    """
+    with reading(path) as file:
+        if file.attrs.get("schema") != SCHEMA or file.attrs.get("schema_version") != SCHEMA_VERSION:
+            raise StorageError("it does not hold measurements in this program's format")
+        columns: dict[str, list[Any]] = {}
+        for name in file:
+            stored = dataset(file, name)
+            columns[name] = (stored.asstr() if h5py.check_string_dtype(stored.dtype) else stored)[...].tolist()
+        rows = []
+        for k in range(len(columns["value"])):
+            conditions = {name[3:]: values[k] for name, values in columns.items() if name.startswith("at_")}
+            row = Measurement(
+                **{name: columns[name][k] for name in _OWN if name != "unit"},
+                runs=tuple(columns["runs"][k].split()),
+                parameters=Parameters(**{name: columns[name][k] for name in _PARAMETERS if name in columns}),
+                conditions={name: value for name, value in conditions.items() if value != "" and value == value},
+            )
+            rows.append(row)
+        return Records(tuple(rows), tuple(Missing(**each) for each in json.loads(file.attrs["missing"])))

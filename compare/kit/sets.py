@@ -1,0 +1,56 @@
+"""The parameter sets that are measured: a few chosen by hand, and a design that fills a box of parameters evenly.
+
+Friction is greater on the floor in some, on the wall in others, and the wall's is below and above the inertia j; drag
+is weak in some and strong in others. Two sets have another law of drag, at Reynolds numbers of hundreds. Each protocol
+chooses omega_0 itself: that of a set is not used.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.stats import qmc
+
+from compare.kit.levels import Level
+from model import Parameters
+from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
+
+COUNT = {Level.DEFAULT: 24, Level.FULL: 96}
+SEED = 20161
+LOW = {"mu": 0.05, "eta": 0.05, "j": 0.2, "r/R": 0.1, "kappa": 0.05, "R": 0.04, "g": 6.0, "m": 0.01}
+HIGH = {"mu": 1.0, "eta": 1.0, "j": 0.66, "r/R": 0.4, "kappa": 0.4, "R": 0.08, "g": 10.0, "m": 0.05}
+"""Ranges of the design; lengths in m, masses in kg, g in m s-2."""
+
+_CHOSEN = {
+    "rough-floor": {"m": 0.02, "r": 0.012, "R": 0.06, "j": 0.3, "mu": 0.45, "eta": 0.15, "g": 9.81, "c": 2.0},
+    "rough-wall": {"m": 0.05, "r": 0.015, "R": 0.05, "j": 0.55, "mu": 0.15, "eta": 0.35, "g": 8.0, "c": 1.5},
+    "thick-fluid": {"m": 0.03, "r": 0.008, "R": 0.04, "j": 0.45, "mu": 0.25, "eta": 0.1, "g": 9.0, "c": 5.0},
+    "heavy-core": {"m": 0.01, "r": 0.02, "R": 0.07, "j": 0.25, "mu": 0.7, "eta": 0.5, "g": 9.5, "c": 2.5},
+    "wake": {"m": 0.02, "r": 0.012, "R": 0.06, "j": 0.42, "mu": 0.5, "eta": 0.2, "g": 9.0, "c": 1.4, "nu_f": 8e-5},
+    "blunt": {"m": 0.03, "r": 0.01, "R": 0.05, "j": 0.4, "mu": 0.5, "eta": 0.2, "g": 8.5, "c": 1.2, "nu_f": 4e-5},
+    "rubber-wall": {"m": 0.04, "r": 0.01, "R": 0.055, "j": 0.35, "mu": 0.3, "eta": 0.8, "g": 7.0, "c": 3.0},
+}
+_DRAG = {"wake": SCHILLER_NAUMANN, "blunt": QUADRATIC}
+"""The laws of those that have another than Stokes'."""
+
+
+def sets(level: Level) -> dict[str, Parameters]:
+    """The sets of a level by name."""
+    named = {name: Parameters.named(name) for name in ("reference", "high-wall-friction")}
+    chosen = {name: Parameters(**values, omega_0=1.0, drag=_DRAG.get(name, STOKES)) for name, values in _CHOSEN.items()}
+    by_hand = named | chosen
+    return by_hand | (_design(COUNT[level] - len(by_hand)) if level > Level.QUICK else {})
+
+
+def _design(count: int) -> dict[str, Parameters]:
+    """Sets that fill the box of `LOW` and `HIGH` evenly (scrambled Sobol sequence)."""
+    low, high = np.array(list(LOW.values())), np.array(list(HIGH.values()))
+    unit = qmc.Sobol(len(LOW), rng=np.random.default_rng(SEED)).random(2 ** math.ceil(math.log2(count)))[:count]
+    designed = {}
+    for k, row in enumerate((low + unit * (high - low)).tolist(), start=1):
+        values = dict(zip(LOW, row, strict=True))
+        ratio, kappa = values.pop("r/R"), values.pop("kappa")
+        c = kappa * math.sqrt(values["g"] / values["R"])
+        designed[f"design-{k}"] = Parameters.from_mapping(values | {"r": ratio * values["R"], "c": c, "omega_0": 1.0})
+    return designed

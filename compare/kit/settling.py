@@ -1,0 +1,250 @@
+"""Runs until they are settled, by their own drift; what a settled state is, and how sure each of its numbers is.
+
+A mean over a window that falls off smoothly at both ends passes over the oscillation of a ball on the wall, which dies
+out slowly or, while it sinks, not at all. Three overlapping windows show how far the mean still drifts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
+from compare.kit.quantities import quantity
+from compare.kit.record import Records
+from compare.kit.statistics import COVERAGE, Measured, settled_case, tail
+from compare.kit.tasks import Task
+from compare.kit.trials import Start
+from model import Case, Contact, Parameters, State, Trajectory
+from model.arrays import Array
+from model.drag import STOKES
+
+SPAN = 40.0
+"""Least length of a round in units of 1/c, the time in which the fluid stops a free ball."""
+ROUNDS = (1.0, 2.0, 2.0)
+"""Lengths of successive rounds, in units of `SPAN`. The later ones are longer, because a ball on the wall that goes on
+from its mean swings again, if less, and that has to die out, too."""
+SHORT = (1 / 64, 1 / 8)
+"""Rounds before those where the law isn't Stokes': other drag laws are stronger, so balls settle sooner. The drift
+limit of such a round is reduced in proportion to its length."""
+TAPER = 8
+"""Exponent of the sine that the window is: m periods within it leave about (TAPER/2)!^2/(pi m^(TAPER+1)) of one."""
+STEPS_A_SAMPLE = 8
+"""A coarse time step is a twentieth of sqrt(R/g) or so, and the ball goes round in more than that."""
+SOLVED = 1e-12
+"""Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a time 1/c."""
+LOOSE = 1000.0
+"""Factor on the settling tolerance where only the case matters."""
+FORCES = tuple(f"force_{contact}{axis}" for contact in "AB" for axis in "xyz")
+SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
+"""What mechanics determine of the forces where both contacts roll: the rest is a family of one parameter."""
+GROUPS = (("omega_c",), ("slip_x", "slip_y", "slip_z", "wall_spin"), ("v_y",), (*FORCES, *SUMS[2:]))
+"""Quantities whose errors have the same causes, and are taken to be as large as the largest of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Where a run has come to; `failure` says why it doesn't count as settled, empty if it does."""
+
+    start: Start
+    case: Case
+    values: Mapping[str, Measured] = field(repr=False)
+    mean: Array
+    """Its mean state, (8,), from which it goes on: without the oscillation that it still has."""
+    task: Task = field(repr=False)
+    excess: float = math.inf
+    """How many times as much as it may for a comparison with theory it drifts or swings."""
+    failure: str = ""
+
+
+def begin(set: str, p: Parameters, how: str) -> Start:
+    """At the flow of p from rest, going round with the fluid or half as fast, or with it and so high up on the wall."""
+    orbit = {"rest": 0.0, "half as fast": p.omega_0 / 2}.get(how, p.omega_0)
+    return Start(set, p, how, State(y=high(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked())
+
+
+def rotation_scale(p: Parameters) -> float:
+    """Natural size of a rate of rotation, rad s-1: omega_0, in a fluid at rest 1/`time_unit`."""
+    return abs(p.omega_0) or 1 / time_unit(p)
+
+
+def scale(name: str, p: Parameters) -> float:
+    """Natural size of a quantity of a settled state, over which errors are counted."""
+    if name.startswith("force"):
+        return p.m * p.g
+    if name == "v_y":
+        return dragged_speed(p)
+    return rotation_scale(p) * (1.0 if name == "omega_c" else p.R / p.r)
+
+
+def forces(A: Array, B: Array) -> dict[str, Array]:
+    """Components of contact forces (3, ...) by name, and the sums of them that the balances determine in every case."""
+    components = dict(zip(("Ax", "Ay", "Az", "Bx", "By", "Bz"), (*A, *B), strict=True))
+    return components | {"Ax-By": A[0] - B[1], "Ay+By": A[1] + B[1], "Bx+By": B[0] + B[1]}
+
+
+def determined(case: Case) -> tuple[str, ...]:
+    """The quantities that a settled state of a case has.
+
+    Where both contacts roll, only sums of forces; and nothing but the wall turns a ball about the vertical.
+    """
+    forces = SUMS if case is Case.RR else FORCES
+    upright = () if case.B is Contact.N else ("slip_y",)
+    return ("omega_c", "slip_x", *upright, "slip_z", "wall_spin", "v_y", *forces)
+
+
+def family(case: Case) -> Case:
+    """SR with an unloaded floor and NR at y = 0 are one physical state: both count as NR."""
+    return Case.NR if case is Case.SR else case
+
+
+def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
+    """In which case a ball of a set settled from one kind of start, by flow in rad s-1, the slowest first."""
+    found = records.select("settled", "case", lambda m: m.set == set and m.conditions["start"] == how)
+    return dict(sorted((m.parameters.omega_0, family(Case(int(m.value)))) for m in found))
+
+
+def settle(
+    lab: Lab,
+    starts: Sequence[Start],
+    *,
+    refine: float = 1,
+    span: float = SPAN,
+    loose: float = 1.0,
+    sharp: float = math.inf,
+) -> list[Settled]:
+    """Run each start until it is settled, in the order given; the step is `coarse_step` divided by `refine`.
+
+    A settled state may drift and swing `loose` times as much as values may that are held against theory; but as long as
+    there are rounds, one that exceeds `sharp` times that goes on.
+
+    It goes on from its mean, but at the height from which it started: a ball on the wall alone knows nothing of its
+    height, and one that sinks must not land.
+    """
+    states: dict[int, Settled] = {}
+    todo = dict(enumerate(starts))
+    left = [[*(SHORT if start.p.drag != STOKES else ()), *ROUNDS] for start in starts]
+    while todo:
+        tasks = {}
+        for n, start in todo.items():
+            step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0))
+            samples = round(t_end / (STEPS_A_SAMPLE * step))
+            tasks[n] = lab.task(start.p, start.x0, t_end, step / refine, samples=samples)
+        todo = {}
+        for (n, task), run in zip(tasks.items(), lab.each(list(tasks.values())), strict=True):
+            start = starts[n]
+            if isinstance(run, str):
+                states[n] = Settled(start, Case.NN, {}, start.x0, task, failure=f"the run {run}")
+                continue
+            state = states[n] = judged(start, task, run, loose)
+            part = task.t_end / duration(start.p, span)
+            if left[n] and state.excess > min(part, 1.0) * min(loose, sharp):
+                # A part of a round may end on the way to where the ball settles: it goes on as it is.
+                x = State.of(run.x[-1] if part < 1 else state.mean)
+                if part >= 1 and state.case.A is Contact.N:
+                    x = x._replace(y=max(State.of(start.x0).y, 0.0))
+                todo[n] = replace(start, x0=x.stacked())
+    return [states[n] for n in range(len(starts))]
+
+
+def settle_groups(lab: Lab, groups: Sequence[Sequence[Start]], **how: float) -> list[list[Settled]]:
+    """The same for groups of starts, all of them together."""
+    states = iter(settle(lab, [start for group in groups for start in group], **how))
+    return [[next(states) for _ in group] for group in groups]
+
+
+def duration(p: Parameters, span: float = SPAN) -> float:
+    """Length of a round, s: at least 8 turns of the fluid, in whose rhythm a slipping ball on the wall swings.
+
+    A whole multiple of 2048 coarse time steps, so that sets of about the same drag share a batch.
+    """
+    unit = 2048 * coarse_step(p)
+    turns = 8 * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
+    return unit * math.ceil(max(span / p.c, turns) / unit)
+
+
+def high(p: Parameters) -> float:
+    """A height in m from which a ball that sinks as fast as it may freely doesn't land within a round."""
+    return 1.25 * dragged_speed(p) * duration(p, max(ROUNDS) * SPAN)
+
+
+def lasting(p: Parameters, units: float) -> float:
+    """A time in s of about `units` of 1/c: a power of two, so that sets share batches."""
+    return float(2.0 ** round(math.log2(units / p.c)))
+
+
+def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Settled:
+    """What a run has come to; `loose` as in `settle`.
+
+    A run is settled once its drift lets each check resolve twice as much as it should, with no quantity swinging by
+    more than a thousandth of its scale, in a window with 98 % of its samples in one case. Of two windows that counts
+    which drifts less: half of the run for what oscillates, an eighth for what only decays.
+    """
+    p = start.p
+    series = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
+    series["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
+    series |= {f"force_{name}": values for name, values in forces(run.force_A.T, run.force_B.T).items()}
+    rows = np.stack([*series.values(), *run.x.T])
+    solved = SOLVED / (p.c * coarse_step(p))
+    states = []
+    for length in (len(run.time) // 2, len(run.time) // 8):
+        counts = np.bincount(run.case[-length:])
+        case = Case(int(counts.argmax()))
+        means, drifts = steady_mean(rows, length)
+        mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
+        groups = [[q for q in group if q in determined(case)] for group in GROUPS]
+        worst = {q: max(drift[each] / scale(each, p) for each in group) for group in groups for q in group}
+        values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
+        swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)
+        drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolves for q in worst)
+        floor = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
+        excess, failure = max(drifting, swings / 1e-3), ""
+        if counts.max() < 0.98 * length:
+            excess = math.inf
+            failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
+        elif max(excess, floor) > loose:
+            way = "drifts" if max(drifting, floor) > loose else "swings"
+            failure = f"in {case.name} it still {way} {max(excess, floor):.2g} times as much as it may"
+        states.append(Settled(start, case, values, means[len(series) :], task, excess, failure))
+    return min(states, key=lambda state: state.excess)
+
+
+def presses(run: Trajectory) -> bool:
+    """Whether the floor carries something all the time in the end."""
+    return bool(np.all(run.force_A[tail(run), 1] > 0))
+
+
+def settles(run: Trajectory) -> bool | None:
+    """Whether a ball that slips on the floor comes to rest there, however slowly; None where the run is too short.
+
+    Its speed must change less in the last tenth than in the tenth before the middle. On the way past a fold that it has
+    missed the change falls at most like 1/time^2, from one to the other to 0.22; after that it rises.
+    """
+    if settled_case(run).A is Contact.N or not presses(run):
+        return False
+    middle, last = (abs(float(run.omega_c[k] - run.omega_c[k - 10])) for k in (-51, -1))
+    slowing = last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0  # round-off: at rest
+    return False if slowing > 1 else True if slowing < 0.2 else None
+
+
+def taper(length: int) -> Array:
+    """The window (n,): it falls off smoothly at both ends."""
+    return np.asarray(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER)
+
+
+def steady_mean(values: Array, length: int) -> tuple[Array, Array]:
+    """Mean of rows (k, n) over their last `length` samples, tapered, and how far it may be from its limit; both (k,).
+
+    From three windows, each a quarter of its length later than the one before: what is left of an approach by a
+    constant ratio, plus the last change itself.
+    """
+    weights = taper(length)
+    weights /= weights.sum()
+    n, shift = values.shape[1], length // 4
+    first, second, last = (values[:, n - length - k * shift : n - k * shift] @ weights for k in (2, 1, 0))
+    before, after = np.abs(second - first), np.abs(last - second)
+    ratio = np.minimum(np.divide(after, before, out=np.zeros_like(after), where=before > 0), 0.9)
+    return last, after / (1 - ratio)

@@ -1,0 +1,242 @@
+"""How every figure looks: a colour for each case, solid for stable, dashed for unstable, a mark for each engine."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from compare.kit.engines import ENGINES
+from compare.kit.pages import readable
+from compare.kit.quantities import QUANTITIES
+from compare.kit.record import Measurement
+from compare.kit.statistics import COVERAGE
+from model import Case, Parameters, Trajectory
+from model.drag import STOKES
+
+T = TypeVar("T")
+COLOURS = {
+    Case.RR: "#0072B2",
+    Case.RS: "#56B4E9",
+    Case.RN: "#999999",
+    Case.SR: "#E69F00",
+    Case.SS: "#D55E00",
+    Case.SN: "#8C564B",
+    Case.NR: "#009E73",
+    Case.NS: "#CC79A7",
+    Case.NN: "#000000",
+}
+"""Okabe and Ito's colours, told apart by colour-blind readers; names beside the curves tell them apart in print."""
+FORCE, SLIP, BALL, INK = "#b3261e", "#6a3d9a", "#f5cc6b", "#1c2430"
+"""Of pictures and films: arrows of force and slip, the ball, text."""
+Line = str | tuple[object, ...]
+"""A line style of matplotlib."""
+STABLE, UNSTABLE = "-", (0, (5, 2.5))
+Place = tuple[float, tuple[float, float]]
+"""Where the name of a curve stands: at a share of its length, with an offset in points."""
+GUIDE: dict[str, Any] = {"color": "0.55", "lw": 0.8, "ls": ":", "zorder": 0}
+"""Lines that only help the eye."""
+POINT: dict[str, Any] = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none", "zorder": 5}
+"""A special point."""
+HALO: dict[str, Any] = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.85}
+"""Background of a name that stands on lines."""
+LEAST = 1e-16
+"""Smaller relative errors are drawn here: an error may be zero."""
+SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
+THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
+FREE_0, FREE_C = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$", "$\\Omega_c = \\omega_c\\sqrt{R/g}$"
+FREE_X = "$\\omega_x^0\\sqrt{R/g}$"
+
+
+def figure(width: float, height: float) -> Figure:
+    """An empty figure in inches, sized for a column of print, with room for all labels."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def panels(width: float, height: float, rows: int = 1, columns: int = 1, **layout: Any) -> tuple[Figure, Any]:
+    """A figure in inches and its axes, as `matplotlib.pyplot.subplots` gives them."""
+    made = figure(width, height)
+    return made, made.subplots(rows, columns, **layout)
+
+
+def symbol(name: str) -> str:
+    """A quantity of `compare.kit.quantities`, by its name, in letters of the axes."""
+
+    def typeset(match: re.Match[str]) -> str:
+        letter, tilde, index, zero = match.groups()
+        return "$" + (rf"\tilde{{{letter}}}" if tilde else letter) + f"_{index}" + ("^0$" if zero else "$")
+
+    return re.sub(r"(\w)(\u0303?)_(\w)(⁰?)", typeset, QUANTITIES[name].symbol)
+
+
+def label(name: str, unit: str = "") -> str:
+    """The label of an axis: symbol of a quantity and unit, its own if no other is given."""
+    unit = unit or readable(QUANTITIES[name].unit)
+    return f"{symbol(name)} ({unit})" if unit else symbol(name)
+
+
+OMEGA_0, OMEGA_C, OMEGA_X = "$ω_0$ (rad/s)", label("omega_c"), label("wall_spin")
+
+
+def named(p: Parameters, *names: str) -> str:
+    """The dimensionless parameters as a caption gives them, all but omega_0 if none is named, and the law of drag."""
+    values = [f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names or ("mu", "eta", "j", "kappa")]
+    if p.drag != STOKES:
+        values.append(f"{p.drag} drag with Re = {2 * p.r * math.sqrt(p.g * p.R) / p.nu_f:.3g} at √(gR)")
+    return ", ".join(values)
+
+
+def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = (), names: Sequence[str] = ()) -> str:
+    """Sentences, the parameters (those of `names`, see `named`), and what the marks of measured states are."""
+    return " ".join(filter(None, (*sentences, f"{named(p, *names)}."))) + edge(states) + marks(states)
+
+
+def marks(states: Sequence[Measurement]) -> str:
+    """What a caption says of measured points; nothing where there are none."""
+    many = f" Marks: {len(states)} measured values; three standard uncertainties are smaller than most marks."
+    return many if states else ""
+
+
+def edge(states: Sequence[Measurement]) -> str:
+    """What a caption says of points on the unstable branch; nothing where there are none."""
+    between = any(m.protocol == "edge" for m in states)
+    return " On the unstable SS: the edge between two motions, which the engine was made to follow." if between else ""
+
+
+def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:
+    """Second scales, at the top and on the right if they are named: angular velocity in units of sqrt(g/R)."""
+    unit = math.sqrt(p.g / p.R)
+    scale: Any = (lambda w: w / unit, lambda W: W * unit)
+    if x:
+        axes.secondary_xaxis("top", functions=scale).set_xlabel(x)
+    if y:
+        axes.secondary_yaxis("right", functions=scale).set_ylabel(y)
+
+
+def curve(
+    axes: Axes,
+    case: Case,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    text: str = "",
+    place: Place | None = None,
+    line: Line = STABLE,
+) -> None:
+    """A line of theory (n,) in the colour of its case, where y is a number, and its name if that has a place."""
+    axes.plot(x, y, color=COLOURS[case], ls=line, lw=2)
+    if place:
+        points, (at, offset) = np.transpose([x, y]), place
+        steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))
+        way = steps.cumsum()
+        k = int(np.searchsorted(way, at * way[-1]))
+        here_x, here_y = points[k + 1] - (way[k] - at * way[-1]) / steps[k] * (points[k + 1] - points[k])
+        name(axes, here_x, here_y, text, offset, COLOURS[case])
+
+
+def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float]) -> None:
+    """A black dot with its name beside it, `offset` in points."""
+    axes.plot([x], [y], **POINT)
+    name(axes, x, y, text, offset)
+
+
+def name(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float] = (0, 0), colour: str = "k") -> None:
+    """A name beside a point or a curve, `offset` in points; one that is far off has a line to it."""
+    leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1} if math.hypot(*offset) > 16 else None
+    ha = "center" if offset[0] == 0 else "left" if offset[0] > 0 else "right"
+    va = "center" if offset[1] == 0 else "bottom" if offset[1] > 0 else "top"
+    look: dict[str, Any] = {"color": colour, "arrowprops": leader, "zorder": 6, "ha": ha, "va": va, "fontsize": 9}
+    axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", bbox=HALO, **look)
+
+
+def guides(axes: Axes, values: dict[str, float]) -> None:
+    """Dotted lines at thresholds by name, rad s-1, named at the foot, one higher where names would overlap."""
+    low, high = axes.get_xlim()
+    last, step = -math.inf, 0
+    look: dict[str, Any] = {"xytext": (2, 0), "textcoords": "offset points", "fontsize": 9, "bbox": HALO}
+    for key, value in sorted(values.items(), key=lambda item: item[1]):
+        if low <= value <= high:
+            step = 1 - step if value - last < 0.08 * (high - low) else 0
+            last = value
+            axes.axvline(value, **GUIDE)
+            foot: dict[str, Any] = {"xy": (value, 0.02 + 0.07 * step), "xycoords": ("data", "axes fraction")}
+            axes.annotate(THRESHOLD_LABELS[key], **foot, **look, color="0.25", zorder=0.5)
+
+
+def mark_of(engine: str) -> dict[str, Any]:
+    """The mark of what an engine gave."""
+    given = ENGINES.get(engine)  # theory against theory has none
+    return {"marker": given.mark if given else "D", "color": given.colour if given else "0.3", "mfc": "white"}
+
+
+def by_engine(rows: Iterable[T], engine: Callable[[T], str]) -> dict[str, list[T]]:
+    """Rows by the name of their engine."""
+    sorted_out: dict[str, list[T]] = {}
+    for row in rows:
+        sorted_out.setdefault(engine(row), []).append(row)
+    return sorted_out
+
+
+def omega_0(m: Measurement) -> float:
+    """The flow at which something was measured, rad s-1."""
+    return m.parameters.omega_0
+
+
+def points(
+    axes: Axes,
+    rows: Iterable[Measurement],
+    x: Callable[[Measurement], float] = omega_0,
+    y: Callable[[Measurement], float] = lambda m: m.value,
+    unit: float = 1.0,
+    way: str = "",
+    **look: Any,
+) -> None:
+    """Measured values, one `unit` each, by engine; capped bars of three standard uncertainties."""
+    for engine, own in by_engine(rows, lambda m: m.engine).items():
+        usual = {"ms": 5, "label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
+        bars = [COVERAGE * unit * m.uncertainty for m in own]
+        axes.errorbar([x(m) for m in own], [unit * y(m) for m in own], bars, **mark_of(engine) | usual | look)
+
+
+def deviations(
+    axes: Axes,
+    rows: Iterable[Measurement],
+    predicted: Callable[[Measurement], float],
+    x: Callable[[Measurement], float] = omega_0,
+) -> None:
+    """A panel of relative deviations of measured values from predicted ones, by engine, on a logarithmic axis."""
+    for engine, own in by_engine(rows, lambda m: m.engine).items():
+        off = [max(abs(m.value / predicted(m) - 1), LEAST) for m in own]
+        axes.plot([x(m) for m in own], off, ls="none", ms=5, **mark_of(engine))
+    axes.set(yscale="log", ylim=(LEAST / 10, 10), ylabel="relative deviation")
+    axes.grid(alpha=0.25)
+
+
+def legend(of: Axes | Figure, **where: Any) -> None:
+    """A legend that names everything once, if there is anything to name; of a figure it stands outside the panels."""
+    once: dict[str, Any] = {}
+    for axes in of.axes if isinstance(of, Figure) else [of]:
+        handles, labels = axes.get_legend_handles_labels()
+        once |= dict(zip(labels, handles, strict=True))
+    if once:
+        usual = {"frameon": False, "fontsize": 8} if isinstance(of, Figure) else {"framealpha": 0.95, "fontsize": 8.5}
+        of.legend(list(once.values()), list(once), **usual | where)
+
+
+def ground(
+    axes: Axes, run: Trajectory, span: tuple[float, float], unit: float = 1.0, origin: float = 0.0, named: bool = True
+) -> None:
+    """Shade each stretch of a span of time in the colour of its case, and name it above where there is room."""
+    stretches = run.phases()
+    for (case, first, _), (_, last, _) in zip(stretches, [*stretches[1:], (None, run.time[-1], 0.0)], strict=True):
+        low, high = max(first, span[0]), min(last, span[1])
+        if low < high:
+            x = unit * (np.array([low, high]) - origin)
+            axes.axvspan(*x, color=COLOURS[case], alpha=0.15, lw=0)
+            if named and high - low > 0.04 * (span[1] - span[0]):
+                axes.text(x.mean(), 1.02, case.name, transform=axes.get_xaxis_transform(), ha="center", fontsize=8)

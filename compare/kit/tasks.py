@@ -1,0 +1,237 @@
+"""One run as data: everything that determines it, its identity, and how each engine carries it out."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+
+import mjsim
+from compare.kit import engines
+from compare.kit.engines import Engine, Settings
+from mjsim.journal import Journal
+from model import Flow, InputError, Parameters, State, Trajectory, storage
+
+LONG = 1e6
+"""Steps from which on a run that hands out its samples keeps a journal and is simulated alone, outside a batch."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A run that stands for itself: two tasks with equal `key` give equal data, bit for bit."""
+
+    engine: str
+    """Name of a `compare.kit.engines.Engine`."""
+    parameters: Parameters
+    x0: npt.ArrayLike
+    """Initial state, 6 or 8 numbers; kept as a `State`."""
+    t_end: float
+    """s"""
+    flow: Flow | None = None
+    """omega_0 over time; None for a steady ``parameters.omega_0``."""
+    settings: Settings | None = None
+    """Numerical settings of the engine; None for its defaults."""
+    sample_interval: float | None = None
+    """s; None for a thousandth of t_end."""
+
+    def __post_init__(self) -> None:
+        simulator = self.simulator
+        if self.settings is not None and not isinstance(self.settings, simulator.settings):
+            raise InputError(f"settings of another engine were given to {self.engine!r}")
+        object.__setattr__(self, "x0", State.one(self.x0))
+
+    @property
+    def simulator(self) -> Engine:
+        """The engine itself; `InputError` if there is none of that name."""
+        return engines.engine(self.engine)
+
+    @property
+    def fluid(self) -> Flow:
+        """omega_0 over time, also where `flow` is None."""
+        return self.flow or Flow.steady(self.parameters.omega_0)
+
+    @functools.cached_property
+    def key(self) -> str:
+        """Hash of all that determines the run: the fields of the task, the program's sources, the engine's version."""
+        text = json.dumps({"task": self.describe(), "code": _code(self.simulator)}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+    def describe(self) -> dict[str, Any]:
+        """The task as JSON-able data."""
+        return {
+            "engine": self.engine,
+            "parameters": dataclasses.asdict(self.parameters),
+            "x0": self.x0,
+            "t_end": self.t_end,
+            "flow": self.fluid.to_mapping(),
+            "settings": dataclasses.asdict(self.settings) if self.settings else None,
+            "sample_interval": self.sample_interval,
+        }
+
+    @property
+    def chosen_settings(self) -> Settings:
+        """The settings, also where `settings` is None."""
+        return self.settings or self.simulator.configure({}, self.parameters)
+
+    @property
+    def steps(self) -> float:
+        """Time steps; 1 for an engine that has none."""
+        return self.t_end / (self.chosen_settings.timestep or self.t_end)
+
+    @property
+    def samples(self) -> float:
+        """How many samples it has, about."""
+        return self.t_end / self.sample_interval if self.sample_interval else 1000
+
+    @property
+    def long(self) -> bool:
+        """Whether the run hands out its samples and takes more than `LONG` steps."""
+        return self.simulator.stream is not None and self.steps > LONG
+
+    @property
+    def batch_key(self) -> str:
+        """Tasks of equal batch key can be carried out together."""
+        apart = () if self.long else ("parameters", "x0", "flow")
+        shared = {k: v for k, v in self.describe().items() if k not in apart}
+        return json.dumps(shared, sort_keys=True)
+
+
+class OutOfTimeError(RuntimeError):
+    """A run took longer than it may."""
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """How long something may take, in s of real time from its creation."""
+
+    limit: float = math.inf
+    start: float = field(default_factory=time.monotonic)
+
+    def check(self) -> None:
+        """Raise `OutOfTimeError` if it is over."""
+        if time.monotonic() - self.start > self.limit:
+            raise OutOfTimeError(f"it took longer than {self.limit:g} s")
+
+
+def carry_out(tasks: Sequence[Task], deadline: Deadline | None = None) -> list[Trajectory]:
+    """Run tasks of one `Task.batch_key`; a run that breaks down comes back with its failure in the header."""
+    deadline = deadline or Deadline()
+    if not tasks[0].simulator.stream:
+        return [_simulated(task, deadline) for task in tasks]
+    run, blocks = _begun(tasks), []
+    for block in run:
+        deadline.check()
+        blocks.append(block)
+    return [
+        Trajectory.from_blocks(header, parts, events)
+        for header, parts, events in zip(run.headers, zip(*blocks, strict=True), run.events, strict=True)
+    ]
+
+
+def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bool] = lambda: False) -> str:
+    """Carry out one task into a file of its own; return why the run is not whole, or nothing.
+
+    A run that breaks down is kept under `failed_path`, until one into the same file is whole. Samples of MuJoCo go to
+    the file as they come, and a run of more than `LONG` steps keeps a journal, from which it goes on after having been
+    killed. Once `stop` says so, a run ends as if it had broken down, but MuJoCo's keeps its journal.
+
+    Raises
+    ------
+    StorageError
+        If a file can't be written.
+    OutOfTimeError
+        If it takes longer than `limit` s.
+    """
+    deadline = Deadline(limit)
+    if not task.simulator.stream:
+        run = _simulated(task, deadline, stop)
+        storage.save(run, path if run.complete else failed_path(path))
+        failure = run.header.failure
+    else:
+        journal = Journal(journal_path(task, path)) if task.long else None
+        try:
+            under_way = _begun([task], journal)
+        except InputError:  # there is nothing to go on with
+            if journal:
+                journal.discard()
+            raise
+        stopped = ""
+        with storage.TrajectoryWriter(path, under_way.headers[0]) as writer:
+            for (block,) in under_way:
+                deadline.check()
+                writer.append(block)
+                if stop():
+                    stopped = f"was stopped at t = {block['time'].max(initial=0.0):g} s"
+                    break
+            failure = under_way.headers[0].failure or stopped
+            writer.end(under_way.events[0], failure, failed_path(path) if failure else path)
+        if journal and not stopped:
+            journal.discard()
+    if not failure:
+        failed_path(path).unlink(missing_ok=True)
+    return failure
+
+
+def failed_path(path: Path) -> Path:
+    """Where a run that broke down is kept."""
+    return path.with_suffix(".failed.h5")
+
+
+def journal_path(task: Task, path: Path) -> Path:
+    """Where a long run into a file keeps its journal, under its `Task.key`, since the file may have any name."""
+    return path.with_name(f"{task.key}.journal")
+
+
+def _begun(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
+    """Runs that hand out their samples, in a batch unless they are long."""
+    first = tasks[0]
+    parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
+    assert first.simulator.stream
+    return first.simulator.stream(
+        parameters,
+        x0s,
+        first.t_end,
+        flows,
+        first.chosen_settings,
+        sample_interval=first.sample_interval,
+        batched=not first.long,
+        journal=journal,
+    )
+
+
+def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool] = lambda: False) -> Trajectory:
+    def check(done: float) -> None:
+        deadline.check()
+        if stop():
+            raise KeyboardInterrupt
+
+    assert task.simulator.simulate
+    given = task.parameters, State.one(task.x0), task.t_end, task.fluid, task.chosen_settings, task.sample_interval
+    return task.simulator.simulate(*given, check)
+
+
+@functools.cache
+def _code(engine: Engine) -> dict[str, str]:
+    """Digest of the sources that produce an engine's results, and the versions they stand on."""
+    return {"sources": sources(*engine.sources), **engine.versions}
+
+
+@functools.cache
+def sources(*packages: str) -> str:
+    """Digest of the sources of packages."""
+    digest = hashlib.sha256()
+    for package in packages:
+        for entry in sorted(resources.files(package).iterdir(), key=lambda entry: entry.name):
+            if entry.name.endswith((".py", ".xml")):
+                digest.update(entry.name.encode() + b"\0" + entry.read_bytes() + b"\0")
+    return digest.hexdigest()

@@ -1,0 +1,117 @@
+"""Claims beyond the paper, which asks whether periodic attractors exist: a ball that hops for ever."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+import analytic
+from analytic.orbits import orbit_branch
+from analytic.orbits import periodic as orbits
+from analytic.orbits.orbit_branch import Bifurcation
+from analytic.orbits.periodic import Orbit
+from compare.claim import Bearing, Claim
+from compare.judge import simulated, theory
+from compare.kit.levels import Level
+from compare.kit.record import Measurement, state
+from compare.kit.statistics import hops
+
+_PERIODIC = "Section 5.3, last paragraph"
+
+
+def _hops(m: Measurement) -> float:
+    """Whether the ball hops on that theory lets go in the same state for as long."""
+    return hops(simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
+
+
+def _birth(m: Measurement) -> float:
+    return analytic.thresholds(m.parameters).omega_02
+
+
+def _death(orbit: Orbit) -> float:
+    """Where multipliers leave the unit circle, on the branch from an orbit along rougher walls."""
+    branch = orbit_branch.follow(orbit, "eta", orbit.p.eta, 1.1 * orbit.p.eta)
+    return next((place.value for place in branch.places if place.kind is Bifurcation.TORUS), math.nan)
+
+
+_ORBIT: dict[str, Callable[[Orbit], float]] = {
+    "orbit_period": lambda orbit: orbit.period,
+    "orbit_omega_c": lambda orbit: orbit.turn / orbit.period,
+    "orbit_height": lambda orbit: float(orbit.cycle.y.max()),
+    "orbit_multiplier": lambda orbit: float(np.abs(orbit.multipliers).max()),
+    "orbit_death": _death,
+    "swing_period": lambda orbit: orbit.period,
+    "swing_omega_c": lambda orbit: orbit.turn / orbit.period,
+    "swing_size": lambda orbit: float(np.ptp(orbit.cycle.omega_c)),
+}
+
+
+def _orbiting(protocol: str, *quantities: str) -> tuple[Bearing, ...]:
+    """Numbers of the closed orbit of theory near what was measured."""
+
+    def predict(m: Measurement) -> float:
+        return _ORBIT[m.quantity](theory(orbits.refine, m.parameters, state(m), float(m.conditions["period"])))
+
+    return tuple(Bearing(protocol, quantity, predict, by="analytic.orbits.periodic.refine") for quantity in quantities)
+
+
+def _after_rest(m: Measurement) -> float:
+    """What theory comes to from rest within 60/c; the slowest part decays in 2 (1 + 2 j)/c."""
+    run = simulated(m.parameters, (0.0,) * 6, 60.0 / m.parameters.c)
+    return float(getattr(run, m.quantity)[-1])
+
+
+_HOP = "orbit_period", "orbit_omega_c", "orbit_height"
+_RULE = "analytic.simulate, which leaves rolling by Definitions 1-3"
+CLAIMS = (
+    Claim(
+        "choice",
+        "Definitions 1-3",
+        "For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip grows.",
+        tuple(Bearing("choice", quantity, _after_rest, by=_RULE) for quantity in ("case", "omega_c")),
+    ),
+    Claim(
+        "hopping",
+        _PERIODIC,
+        "A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on the wall. The engine "
+        "and Moreau-Jean time stepping come to the closed orbit of the event-driven simulation.",
+        (*_orbiting("recurrent", *_HOP), *_orbiting("stepped", *_HOP)),
+    ),
+    Claim(
+        "hopping-multiplier",
+        _PERIODIC,
+        "Disturbances of the hopping shrink from hop to hop by its largest Floquet multiplier.",
+        _orbiting("recurrent", "orbit_multiplier"),
+        level=Level.DEFAULT,
+    ),
+    Claim(
+        "swing",
+        _PERIODIC,
+        "Between the Hopf points of SS the ball swings for ever and slips all the time (very rough floor).",
+        _orbiting("swing", "swing_period", "swing_omega_c", "swing_size"),
+        level=Level.DEFAULT,
+    ),
+    Claim(
+        "calm",
+        _PERIODIC,
+        "In strong drag, κ > 2, no ball was found that hops on.",
+        (Bearing("calm", "hops", _hops, by="analytic.simulate"),),
+        level=Level.DEFAULT,
+    ),
+    Claim(
+        "hopping-birth",
+        f"{_PERIODIC}, (85)",
+        "Hopping begins with hops of no height at ω₀₂, where the wall begins to carry the ball.",
+        (Bearing("recurrent", "orbit_birth", _birth, by="analytic.thresholds: omega_02"),),
+        level=Level.DEFAULT,
+    ),
+    Claim(
+        "hopping-death",
+        _PERIODIC,
+        "Along rougher walls hopping ends where a pair of Floquet multipliers leaves the unit circle.",
+        (*_orbiting("followed", "orbit_death"), Bearing("followed", "hops", _hops, by="analytic.simulate")),
+        level=Level.DEFAULT,
+    ),
+)

@@ -1,0 +1,183 @@
+"""Beyond the paper: the ball that hops for ever, and Figs. 9, 10 and 13 with the branch of such motions."""
+
+from __future__ import annotations
+
+import functools
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import analytic
+from analytic.bifurcation import diagram as bifurcation
+from analytic.orbits import orbit_branch
+from analytic.orbits import periodic as orbits
+from analytic.orbits.orbit_branch import OrbitBranch
+from compare.kit import style
+from compare.kit.drawing import Diagram, Material
+from compare.subjects.thresholds.figures.bifurcation_diagrams import Quantity, lifted, slipping, spin, spins
+from model import Case, Parameters, State
+from model.files import reading_json
+
+SET = Parameters.named("hopping")
+LOW, HIGH = 0.9, 1.4
+"""Flows shown, in units of omega_02."""
+COLOUR = "#7B3294"
+
+
+def select(material: Material) -> Diagram:
+    """The measured mean angular velocities of the hopping ball; the orbits are theory's."""
+    return Diagram("hopping", SET, tuple(material.select("orbit_omega_c", "period")))
+
+
+@functools.cache
+def _orbit() -> orbits.Orbit:
+    """By Newton's method, from about a state and the period."""
+    return orbits.refine(SET, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222)
+
+
+@functools.cache
+def _branch() -> OrbitBranch:
+    edge = bifurcation.thresholds(SET).omega_02
+    return orbit_branch.follow(_orbit(), "omega_0", LOW * edge, HIGH * edge)
+
+
+def caption_branch(of: Diagram) -> str:
+    """Of both diagrams."""
+    factors = np.abs([orbit.multipliers[0] for orbit in _branch().orbits])
+    return (
+        "Stationary motions as in Fig. 13 (left) and Figs. 9 and 10 (right), and the hopping ball (purple): its mean "
+        "over a period, shaded from least to greatest. Hops begin with no height at ω₀₂, where NS, NR, SR and the "
+        f"unstable SS meet; the largest |multiplier| is {factors.min():.3f} … {factors.max():.3f} here. "
+        f"{style.named(of.p)}, r/R = {of.p.r / of.p.R:.3g}. Dashed: unstable.{style.marks(of.states)}"
+    )
+
+
+def draw_branch(of: Diagram) -> Figure:
+    """omega_c and the spin on the wall over the flow."""
+    edge = bifurcation.thresholds(of.p).omega_02
+    figure, (orbit, wall) = style.panels(9.0, 4.2, 1, 2)
+    _diagram(orbit, of.p, lambda slip_x, omega_c: omega_c, (-5, -7), (-5, 7), (-5, 12))
+    _diagram(wall, of.p, functools.partial(spin, of.p), (-5, 7), (-60, -50), (-18, -80))
+    orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * HIGH * edge))
+    wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, of.p)))
+    style.points(orbit, of.states)
+    style.legend(orbit, loc="center right")
+    return figure
+
+
+def _diagram(axes: Axes, p: Parameters, quantity: Quantity, *offsets: tuple[float, float]) -> None:
+    """The diagram of a quantity; names stand at offsets in points from the curves of SS, SR and NR, hopping."""
+    slips, rides, hops = offsets
+    edge, branch = bifurcation.thresholds(p).omega_02, _branch()
+    slipping(axes, p, quantity)
+    fast = p.replace(omega_0=0.95 * HIGH * edge)  # the branch goes on far beyond the frame
+    for stable, text in ((True, "SS"), (False, "SS, unstable")):
+        end = analytic.solution(fast, Case.SS, stable=stable).state
+        style.name(axes, fast.omega_0, float(quantity(end.slip_x, end.omega_c)), text, slips, style.COLOURS[Case.SS])
+    for case, x, text, place in (
+        (Case.NR, np.linspace(edge, HIGH * edge, 100), "SR, NR", (0.6, rides)),
+        (Case.NS, np.array([LOW, 1 - 1e-9]) * edge, "NS", (0.5, (-3, 9))),
+    ):
+        slip = np.asarray(spins(case, x, p)) - p.R / p.r * x
+        style.curve(axes, case, x, quantity(slip, x), text, place)
+    cycles = [quantity(orbit.cycle.slip_x, orbit.cycle.omega_c) for orbit in branch.orbits]
+    means = State(*np.transpose([orbit.mean for orbit in branch.orbits]))
+    mean = quantity(means.slip_x, means.omega_c)
+    low, high = [c.min() for c in cycles], [c.max() for c in cycles]
+    axes.fill_between(branch.values, low, high, color=COLOUR, alpha=0.25, lw=0)
+    for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
+        axes.plot(branch.values, np.where(part, mean, np.nan), color=COLOUR, ls=line, lw=2)
+    style.name(axes, float(branch.values[-3]), float(mean[-3]), "hopping", hops, COLOUR)
+    for special in branch.places:
+        if special.kind is orbit_branch.Bifurcation.BIRTH:
+            born = State(*special.orbit.mean)
+            style.mark(axes, special.value, float(quantity(born.slip_x, born.omega_c)), "birth", (-10, -30))
+    axes.set(xlim=(LOW * edge, HIGH * edge), xlabel=style.OMEGA_0)
+    style.guides(axes, {"omega_02": edge})
+
+
+def caption_orbit(of: Diagram) -> str:
+    """Of the orbit."""
+    orbit = _orbit()
+    return (
+        f"The hopping ball over one period of {orbit.period:.5g} s: height, and the orbit in two planes of the state "
+        "space, coloured by case. It lands, slips at both points for some 0.5 ms, slips up the wall (NS), sticks "
+        f"to it (NR), rises to {1e3 * orbit.cycle.y.max():.3g} mm and falls. Largest |Floquet multiplier| "
+        f"{abs(orbit.multipliers[0]):.4g}; {style.named(of.p, 'mu', 'eta', 'j', 'kappa', 'omega_0')} rad/s."
+    )
+
+
+def draw_orbit(of: Diagram) -> Figure:
+    """Height over time, height over its rate, and height over the slip."""
+    cycle = _orbit().cycle
+    figure, axes = style.panels(9.0, 3.2, 1, 3, sharey=True)
+    shown = {"t (ms)": 1e3 * cycle.time, "$v_y$ (m/s)": cycle.v_y, "$\\tilde\\omega_x$ (rad/s)": cycle.slip_x}
+    for ax, (label, x) in zip(axes, shown.items(), strict=True):
+        for case in dict.fromkeys(cycle.cases):
+            own, look = cycle.case == case, {"color": style.COLOURS[case], "label": case.name}
+            ax.plot(x[own], 1e3 * cycle.y[own], ".", ms=2.5, rasterized=True, **look)
+        ax.set_xlabel(label)
+    axes[0].set_ylabel("y (mm)")
+    style.legend(axes[0], loc="lower right", markerscale=4)
+    return figure
+
+
+def walls() -> dict[str, Any]:
+    """The branch of hops over the friction of the wall, which takes minutes, kept as docs/attractors/walls.md says.
+
+    Hops of no height are none: ends of the branch are extrapolated from the last two orbits.
+    """
+    path = Path(str(resources.files("compare.subjects.attractors"))) / "hopping-walls.json"
+    with reading_json(path, "branch") as data:
+        branch: dict[str, Any] = data["sets"][0]["branches"][0]
+    orbits, places = branch["orbits"], branch["places"]
+    for place, (one, two), at in ((places[-1], orbits[:-3:-1], len(orbits)), (places[0], orbits[:2], 0)):
+        if place["kind"] == "nonsmooth birth":
+            share = (place["value"] - one["eta"]) / (two["eta"] - one["eta"])
+            end = {name: one[name] + share * (two[name] - one[name]) for name in ("eta", "height", "omega_c")}
+            place["orbit"] = end | {"stable": one["stable"]}
+            orbits.insert(at, place["orbit"])
+    return branch
+
+
+def select_walls(material: Material) -> Diagram:
+    """The measured end of hopping."""
+    return Diagram("hopping-walls", SET, tuple(material.select("orbit_death")))
+
+
+def caption_walls(of: Diagram) -> str:
+    """What happens along the branch."""
+    places = "; ".join(f"{place['kind']} at η = {place['value']:.4g}" for place in walls()["places"])
+    mark = " Shaded: the wall from which hops don't last, as measured." if of.states else ""
+    groups = style.named(of.p, "mu", "j", "kappa", "omega_0")
+    what = f"Height and mean ω_c of the hopping ball over the friction of the wall: {places}"
+    return f"{what}. {groups} rad/s. Dashed: unstable.{mark}"
+
+
+def draw_walls(of: Diagram) -> Figure:
+    """Height and mean omega_c of the hops over the friction of the wall."""
+    branch = walls()
+    orbits, places = branch["orbits"], branch["places"]
+    figure, panels = style.panels(9.0, 3.8, 1, 2)
+    shown = ("height", "height of the hops (mm)", 1e3), ("omega_c", "mean " + style.OMEGA_C, 1.0)
+    names = {"torus": ("torus", (8, 4)), "fold": ("fold", (8, 4)), "nonsmooth birth": ("birth", (-8, 5))}
+    for axes, (quantity, label, unit) in zip(panels, shown, strict=True):
+        for rows, line in ((orbits, style.UNSTABLE), ([row for row in orbits if row["stable"]], style.STABLE)):
+            axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=COLOUR, ls=line, lw=2)
+        named = dict(names)
+        for place in places:
+            x, y = place["value"], unit * place["orbit"][quantity]
+            axes.plot(x, y, **style.POINT)
+            if place["kind"] in named:
+                style.name(axes, x, y, *named.pop(place["kind"]))
+        for m in of.states:
+            low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
+            axes.axvspan(low, high, color=style.mark_of(m.engine)["color"], alpha=0.4, label=f"{m.engine}: hops end")
+        axes.set(xlabel="η", ylabel=label)
+        axes.margins(0.2, 0.1)
+    style.legend(panels[0], loc="upper left")
+    return figure

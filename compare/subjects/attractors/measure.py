@@ -1,0 +1,288 @@
+"""Motions that never settle: a ball that hops for ever, one that swings for ever, and whether others do.
+
+* A ball hops: it starts near its hop; then the flow is lowered in held steps. At each the tops of the hops say period,
+  height and orbit; how the heights settle says by what factor a disturbance shrinks from hop to hop; and the flow at
+  which the height would be zero is extrapolated. At the flow of the set alone Moreau-Jean time stepping shows it, too.
+* The hop is followed along rougher and rougher walls, to where disturbances grow: from tops that settle, or leave, the
+  top of the steady hop is computed, and from two of them the start at the next wall is extrapolated. On both sides of
+  the wall at which disturbances neither grow nor shrink, a ball is left alone: does it hop on?
+* A ball swings beside a Hopf point: it slips at both points, and goes round now faster and now slower.
+* Balls in strong drag are followed until drag has had its time: do they go on hopping?
+* On floors so rough (mu > 1) that rolling and slipping are both consistent with the forces, rolling on for as long as
+  forces allow would lead to a cycle of sticking and slipping that never settles: what does the ball settle to?
+
+An engine may locate a landing to a step only; the difference of two time steps is then the error of the finer one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import qmc
+
+from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of
+from compare.kit.settling import settle
+from compare.kit.statistics import Measured, hops, peaks, top
+from compare.kit.tasks import Task
+from compare.kit.trials import Start, Trial, carry_out, finer
+from compare.subjects.motion.measure.field import constrained
+from model import Case, Flow, Parameters, State, Trajectory
+from model.arrays import Array
+
+SET = "hopping"
+TOP = State(y=6.4e-3, omega_c=57.3, slip_x=-106.0)
+"""A state near the top of a hop of the set."""
+HOLD, LAST, LATER = 12.0, 3.0, 2.0
+"""How long each flow is held, the last part of it in which the motion is measured, and the first in which disturbances
+are too large to be linear, s."""
+REFINED = 8, 16
+"""Steps of the engine in one of `coarse_step`."""
+SAMPLE = 1e-3
+"""Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
+WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
+"""Friction of the walls along which the hop is followed, in units of that of the set; few balls come to a hop that
+start beside it, so that the first steps, with less to extrapolate from, are short."""
+NEAR = 4
+"""The last walls, among which disturbances come to grow."""
+FOLLOWED, ALONE = 10.0, 60.0
+"""How long the ball hops at each wall, and how long it is left alone, s."""
+SWINGS, SWUNG = 24.0, 4.0
+"""Duration of the swing, and the last part of it that is measured, s."""
+STRONG_DRAG = {"mu": (0.05, 1.0), "eta": (0.05, 1.0), "j": (0.2, 0.6), "kappa": (2.0, 8.0), "Omega_0": (0.5, 6.0)}
+"""The box that the sets with strong drag fill evenly; the rest is as in the reference."""
+ROUGH = {
+    "rough-floor-1": (1.7222, 0.0388, 0.482, 0.292, 0.1099, 2.635),
+    "rough-floor-2": (1.2277, 0.1721, 0.611, 0.154, 0.1198, 2.099),
+}
+"""mu, eta, j, r/R, kappa, omega_0 sqrt(R/g)."""
+
+
+class Hops(NamedTuple):
+    """The tops of the hops in part of a run: times and angles (n,), and states (n, 8)."""
+
+    time: Array
+    theta: Array
+    x: Array
+
+    @property
+    def values(self) -> dict[str, Measured]:
+        """Period, mean angular velocity and height, uncertain by half the range over single hops.
+
+        Disturbances swing while they die out, so that means of parts may agree by chance.
+        """
+        span, periods, height = self.time[-1] - self.time[0], np.diff(self.time), self.x[:, 0]
+        values = {
+            "orbit_period": (span / len(periods), periods),
+            "orbit_omega_c": ((self.theta[-1] - self.theta[0]) / span, np.diff(self.theta) / periods),
+            "orbit_height": (height.mean(), height),
+        }
+        return {name: Measured(float(mean), float(np.ptp(hops)) / 2) for name, (mean, hops) in values.items()}
+
+    def conditions(self, p: Parameters) -> dict[str, float]:
+        """A state at a top, and the period: near a closed orbit."""
+        return {**state_of(constrained(Case.NR, self.x[-1], p)), "period": self.values["orbit_period"].value}
+
+
+def hopping(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would begin."""
+    yield from _staircase(lab, "recurrent", lab.effort("recurrent.flows"), REFINED)
+
+
+def stepped(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The same at the flow of the set, by time stepping: it lets slip begin and turn at steps only."""
+    yield from _staircase(lab, "stepped", (1.0,), (40, 80))
+
+
+def _staircase(
+    lab: Lab, protocol: str, shares: Sequence[float], refine: tuple[int, int]
+) -> Iterator[Measurement | Missing]:
+    p = Parameters.named(SET)
+    flows = [share * p.omega_0 for share in shares]
+    lasts = HOLD * len(flows)
+    samples, flow = round(lasts / SAMPLE), Flow.staircase(flows, HOLD)
+    trial = Trial(SET, p, "hops", TOP.stacked(), lasts, refine, samples, flow=flow)
+    (result,) = carry_out(lab, protocol, [trial])
+    if isinstance(result, Missing):
+        yield result
+        return
+    heights = []
+    for k, omega_0 in enumerate(flows):
+        q, begin, end = p.replace(omega_0=omega_0), k * HOLD, (k + 1) * HOLD
+        coarse, fine = (tops(run, end - LAST, end) for run in (result.coarse, result.fine))
+        at = f"at omega_0 = {omega_0:.4g} rad/s"
+        if min(len(coarse.time), len(fine.time)) < 6:
+            yield Missing(protocol, SET, f"{at} the ball does not hop any more")
+            break
+        known, conditions = coarse.values, fine.conditions(q)
+        heights.append([each["orbit_height"].value for each in (known, fine.values)])
+        for quantity, value in fine.values.items():
+            sure = finer(known[quantity].value, value)
+            yield measurement(lab, protocol, SET, q, quantity, sure, result.tasks, **conditions)
+        if k:
+            parts = (result.coarse, LATER), (result.fine, LATER), (result.fine, 2 * LATER)
+            slow, fast, later = (hop_map(tops(run, begin + after, end - LAST).x, q)[0] for run, after in parts)
+            factor = finer(slow, Measured(fast, abs(fast - later)))
+            row = measurement(lab, protocol, SET, q, "orbit_multiplier", factor, result.tasks, **conditions)
+            yield if_sure(row, 1.0, f"how disturbances shrink {at} is too uncertain")
+    if len(heights) >= 3:
+        coarse_birth, fine_birth = (birth(flows[: len(heights)], each) for each in zip(*heights, strict=True))
+        yield result.row(lab, "orbit_birth", finer(coarse_birth.value, fine_birth))
+
+
+def tops(run: Trajectory, start: float, end: float) -> Hops:
+    """The tops of the hops between two times, those at least half as high as the highest of them."""
+    t, y = run.time, run.y
+    k, late = peaks(y)
+    inside = (t[k] > start) & (t[k] < end)
+    high = inside & (y[k] > y[k][inside].max(initial=0.0) / 2)
+    k, late = k[high], late[high]
+    x, by = run.x, late * (t[1] - t[0])
+    states = x[k] + late[:, None] * (x[k + 1] - x[k - 1]) / 2
+    states[:, 0], states[:, 1] = top(y, k, late), 0.0
+    return Hops(t[k] + by, run.theta[k] + by * run.omega_c[k], states)
+
+
+def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
+    """What states (n, 8) at tops say of the map from hop to hop, linear in height, omega_c and slip_x.
+
+    The modulus of its largest eigenvalue, the factor by which disturbances grow or shrink; and its fixed point.
+    """
+    units = np.array([p.R, 1 / time_unit(p), math.sqrt(p.g * p.R) / p.r])
+    z = states[:, [0, 2, 3]] / units
+    changes = np.diff(z, axis=0)
+    weight = 1 / np.linalg.norm(changes[:-1], axis=1, keepdims=True)
+    matrix = np.linalg.lstsq(weight * changes[:-1], weight * changes[1:])[0]
+    shift = z[1:].mean(axis=0) - z[:-1].mean(axis=0) @ matrix
+    y, omega_c, slip_x = (units * np.linalg.solve(np.eye(3) - matrix.T, shift)).tolist()
+    return float(np.abs(np.linalg.eigvals(matrix)).max()), State(y=y, omega_c=omega_c, slip_x=slip_x)
+
+
+def birth(flows: Sequence[float], heights: Sequence[float]) -> Measured:
+    """Flow at which hops would have no height: a parabola through the last three, uncertain by what a line differs."""
+    parabola, line = (float(np.polyfit(heights[-n:], flows[-n:], n - 1)[-1]) for n in (3, 2))
+    return Measured(parabola, abs(parabola - line))
+
+
+def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The wall beyond which disturbances of the hop grow, and whether balls hop on, on both sides of it."""
+    p = Parameters.named(SET)
+    walls = [p.replace(eta=share * p.eta) for share in WALLS]
+    etas = [q.eta for q in walls]
+    steady = [TOP.stacked().repeat(2).reshape(8, 2).T]  # where hops return to themselves, with both steps (2, 8)
+    factors, tasks, near = [], [], []
+    for k, q in enumerate(walls):
+        ahead = steady[-1]
+        if k > 1:
+            ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
+        pair = [_followed(lab, q, x, FOLLOWED, refined) for x, refined in zip(ahead, REFINED, strict=True)]
+        runs = lab.attempt(pair)
+        parts = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED) for run in runs]
+        if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
+            why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
+            yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
+            return
+        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, FOLLOWED))]
+        factors.append([factor for factor, _ in maps])
+        steady.append(np.array([state for _, state in maps[:2]]))
+        tasks.append(pair)
+        near.append(parts[1].conditions(q))
+    place = death(etas[-NEAR:], factors[-NEAR:])
+    used = [task for pair in tasks[-NEAR:] for task in pair]
+    yield measurement(lab, "followed", SET, walls[-NEAR], "orbit_death", place, used, **near[-NEAR])
+    again = [_followed(lab, walls[k], tasks[k][1].x0, ALONE, REFINED[0]) for k in (-NEAR, -1)]
+    yield from _left_alone(lab, "followed", SET, again)
+
+
+def _followed(lab: Lab, p: Parameters, x: npt.ArrayLike, lasts: float, refined: int) -> Task:
+    return lab.task(p, x, lasts, coarse_step(p) / refined, samples=round(lasts / SAMPLE))
+
+
+def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured:
+    """The wall at which disturbances neither grow nor shrink, by lines through eta (n,) and factors (n, 3).
+
+    Factors are those with the coarser step, with the finer one, and in a later part of the run with the finer one.
+    """
+    slow, fast, later = (float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True))
+    return finer(slow, Measured(fast, abs(fast - later)))
+
+
+def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Period, mean and size of the swing of omega_c, on a very rough floor.
+
+    With other steps than these the contact of the floor, which carries a hundredth of the weight, comes and goes.
+    """
+    p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
+    x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
+    trial = Trial("reference", p, "swing", x0, SWINGS, (60, 80), 12_000)
+    (result,) = carry_out(lab, "swing", [trial])
+    end = SWINGS - SWUNG
+    if isinstance(result, Missing):
+        yield result
+    elif any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
+        yield Missing("swing", "reference", "the ball does not slip at both points for ever")
+    else:
+        parts = (result.coarse, end), (result.fine, end), (result.fine, end - SWUNG)
+        coarse, fine, before = (_swung(run, since) for run, since in parts)
+        conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": fine["swing_period"]}
+        for name, value in fine.items():
+            sure = finer(coarse[name], Measured(value, abs(value - before[name])))
+            yield result.row(lab, name, sure, **conditions)
+
+
+def _swung(run: Trajectory, start: float) -> dict[str, float]:
+    """From the turning points of omega_c in `SWUNG` s after a time."""
+    inside = (run.time > start) & (run.time <= start + SWUNG)
+    time, omega_c = run.time[inside], run.omega_c[inside]
+    (k, late), (low, lower) = peaks(omega_c), peaks(-omega_c)
+    at = time[k] + late * (time[1] - time[0])
+    size = np.mean(top(omega_c, k, late)) - np.mean(top(omega_c, low, lower))
+    theta = np.interp(at[[0, -1]], run.time, run.theta)
+    return {
+        "swing_period": float((at[-1] - at[0]) / (len(at) - 1)),
+        "swing_omega_c": float((theta[1] - theta[0]) / (at[-1] - at[0])),
+        "swing_size": float(size),
+    }
+
+
+def calm(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Whether balls still hop after 60/c of the weakest drag: three of each of 16 sets."""
+    reference, rng = sets["reference"], np.random.default_rng(5)
+    unit, tasks = time_unit(reference), []
+    low, high = zip(*STRONG_DRAG.values(), strict=True)
+    for mu, eta, j, kappa, Omega_0 in qmc.scale(qmc.Sobol(len(low), rng=5).random(16), low, high).tolist():
+        p = reference.replace(mu=mu, eta=eta, j=j, c=kappa / unit, omega_0=Omega_0 / unit)
+        for _ in range(3):
+            slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, 3)
+            x = State(rng.uniform(0, p.R), 0.0, p.omega_0 * rng.uniform(-0.5, 2), *slips)
+            tasks.append(lab.task(p, x, 60.0 * unit / STRONG_DRAG["kappa"][0], coarse_step(p) / 4, samples=2000))
+    yield from _left_alone(lab, "calm", "strong drag", tasks)
+
+
+def _left_alone(lab: Lab, protocol: str, set: str, tasks: list[Task]) -> Iterator[Measurement | Missing]:
+    """Whether each ball hops at the end of a run from a state: 1 or 0."""
+    for task, run in zip(tasks, lab.each(tasks), strict=True):
+        if isinstance(run, str):
+            yield Missing(protocol, set, f"a run {run}")
+        else:
+            at = state_of(State.of(task.x0).stacked())
+            yield measurement(lab, protocol, set, task.parameters, "hops", hops(run), [task], **at, duration=task.t_end)
+
+
+def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Case and omega_c of what a ball settles to from rest, in a flow above omega_01."""
+    reference, starts = sets["reference"], []
+    unit = math.sqrt(reference.g / reference.R)
+    for name, (mu, eta, j, ratio, kappa, Omega_0) in list(ROUGH.items())[: lab.effort("choice.sets")]:
+        p = reference.replace(mu=mu, eta=eta, j=j, r=ratio * reference.R, c=kappa * unit, omega_0=Omega_0 * unit)
+        starts.append(Start(name, p, "rest", np.zeros(8)))
+    for start, settled in zip(starts, settle(lab, starts), strict=True):
+        if settled.failure:
+            yield Missing("choice", start.set, settled.failure)
+            continue
+        for quantity, value in (("case", settled.case), ("omega_c", settled.values["omega_c"])):
+            yield measurement(lab, "choice", start.set, start.p, quantity, value, [settled.task])

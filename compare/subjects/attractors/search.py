@@ -1,0 +1,331 @@
+"""Where the ball hops for ever: over a box of parameters, and over a plane of starts. Both go on where they stopped.
+
+* A search: every set is a point of a scrambled Sobol sequence over mu, eta, j, r/R, kappa = c sqrt(R/g) and Omega_0 =
+  omega_0 sqrt(R/g), and is started from a few random states. What still hops by time stepping is confirmed by the
+  event-driven simulation (`analytic.orbits.hopping`). A chunk of sets is a file, named by the hash of all that
+  determines it; a longer search contains the shorter ones.
+* A map of basins: which attractor the ball comes to from each start of a plane of states, on a fine grid by time
+  stepping and on a coarse one by MuJoCo. They should differ at the boundaries of basins only, where the least error
+  decides: `Basins.differences` says how far away.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from analytic import Settings
+from analytic.orbits import hopping
+from analytic.simulation.ensemble import interval
+from analytic.simulation.settings import fitting_step
+from analytic.simulation.simulator import start_state
+from compare.kit import pages
+from compare.kit.campaign import Campaign
+from compare.kit.engines import EVENT, MOREAU, MUJOCO
+from compare.kit.progress import Show
+from compare.kit.statistics import hops
+from compare.kit.sweep import Axis, sobol
+from compare.kit.tasks import Task, sources
+from compare.kit.workers import Workers
+from mjsim import ContactSettings
+from model import Case, Contact, Flow, InputError, Parameters, SimulationError, State, Trajectory
+from model.arrays import Array
+from model.files import make_directory, reading_json, write_text
+from model.kinematics import VARIABLES
+from model.parameters import check_names
+
+CHUNK = 50
+"""Sets in a file."""
+BOX = {
+    "mu": (0.03, 3.0),
+    "eta": (0.03, 2.0),
+    "j": (0.1, 2 / 3),
+    "r/R": (0.02, 0.6),
+    "kappa": (0.005, 1.0),
+    "Omega_0": (0.3, 6.0),
+}
+"""The box that is searched, unless another one is named."""
+LOGARITHMIC = ("mu", "eta", "r/R", "kappa")
+"""Groups that are spread evenly in their logarithm."""
+FATES = ("hops", "RR", "SS", "off the floor", "undecided")
+"""Where a ball may end. SR and NR are one: in SR the floor carries nothing (Prop. 3)."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """A search: its box, how many starts a set, and the seed of both sets and starts."""
+
+    box: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(BOX))
+    starts: int = 5
+    seed: int = 0
+
+    def key(self, chunk: int) -> str:
+        """Hash of all that determines a chunk: the search, and the sources of screen and confirmation."""
+        text = json.dumps([dataclasses.asdict(self), LOGARITHMIC, chunk, CHUNK, sources(*EVENT.sources)])
+        return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+    def points(self, count: int) -> Array:
+        """The first `count` points, shape (count, 6), in the order of `BOX`."""
+        low, high = np.array([self.box[name] for name in BOX]).T
+        log = np.array([name in LOGARITHMIC for name in BOX])
+        low, high = np.where(log, np.log(low), low), np.where(log, np.log(high), high)
+        spread = low + sobol(len(BOX), count, self.seed) * (high - low)
+        return np.asarray(np.where(log, np.exp(spread), spread))
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What a search has found: the sets among its first `sets` in which some start still hops by time stepping."""
+
+    search: Search
+    sets: int
+    rows: tuple[Mapping[str, Any], ...]
+    """The groups of each, "hops": how many starts hop, "confirmed": the fields of
+    `analytic.orbits.hopping.Hopping` by the event-driven simulation, or None."""
+    failed: int
+    """Runs that broke down."""
+
+    @property
+    def confirmed(self) -> list[Mapping[str, Any]]:
+        """The rows whose hopping the event-driven simulation confirms."""
+        return [row for row in self.rows if row["confirmed"]]
+
+    def save(self, path: Path) -> None:
+        """Write it as JSON."""
+        write_text(path, json.dumps(dataclasses.asdict(self), indent=0))
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
+        with reading_json(path, "search") as data:
+            box = {name: tuple(ends) for name, ends in data["search"].pop("box").items()}
+            return cls(Search(box, **data["search"]), data["sets"], tuple(data["rows"]), data["failed"])
+
+
+def parameters(point: Array) -> Parameters:
+    """The set at a point; R, g and m are those of the reference, and don't matter."""
+    p = Parameters.named("reference")
+    mu, eta, j, size, kappa, Omega_0 = point.tolist()
+    unit = math.sqrt(p.R / p.g)
+    return p.replace(mu=mu, eta=eta, j=j, r=size * p.R, c=kappa / unit, omega_0=Omega_0 / unit)
+
+
+def random_starts(p: Parameters, count: int, seed: Sequence[int]) -> Array:
+    """States (count, 8): orbits from half backwards to twice omega_0, any spin, every other ball off the floor.
+
+    Nearly twice as many of these come to a hop as of `ensemble.random_starts`, which throw balls and turn them back.
+    """
+    rng = np.random.default_rng(seed)
+    y = rng.uniform(0, p.R, count) * rng.integers(0, 2, count)
+    omega_c = p.omega_0 * rng.uniform(-0.5, 2, count)
+    slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, (count, 3))
+    return State(y, 0.0, omega_c, *slips.T).stacked()
+
+
+def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
+    """Search the sets of a chunk and write its file.
+
+    Confirmed is the first hopping state that can be; if none can, "broken" says where the simulation broke down.
+    """
+    rows = []
+    for k, point in enumerate(points):
+        p = parameters(point)
+        hop, x, failed = hopping.screen(p, random_starts(p, search.starts, [search.seed, chunk * CHUNK + k]))
+        row: dict[str, Any] = {"hops": int(hop.sum()), "failed": failed}
+        if hop.any():
+            row |= {"x": x[hop][0].tolist(), "confirmed": None, "broken": ""}
+        for state in x[hop]:
+            try:
+                if confirmed := hopping.confirm(p, state):
+                    row["confirmed"] = dataclasses.asdict(confirmed)
+                    del row["broken"]
+                    break
+            except SimulationError as error:
+                row["broken"] = str(error)
+        rows.append(row)
+    write_text(path, json.dumps({"chunk": chunk, "rows": rows}))
+
+
+def run(directory: Path, search: Search, count: int, workers: Workers, show: Show) -> Searched:
+    """Search `count` sets, rounded up to whole chunks; finished chunks are read."""
+    make_directory(directory)
+    chunks = math.ceil(count / CHUNK)
+    points = search.points(chunks * CHUNK).reshape(chunks, CHUNK, -1)
+    paths = [directory / f"{search.key(chunk)}.json" for chunk in range(chunks)]
+    todo = [chunk for chunk in range(chunks) if not paths[chunk].exists()]
+    done = chunks - len(todo)
+    show("search", done * CHUNK, chunks * CHUNK, 0)
+    executor, at_once = workers.start(), True
+    try:
+        for future in as_completed(executor.submit(carry_out, search, k, points[k], paths[k]) for k in todo):
+            future.result()
+            done += 1
+            show("search", done * CHUNK, chunks * CHUNK, 0)
+        at_once = False
+    finally:
+        workers.stop(executor, at_once)
+    rows = [row for path in paths for row in json.loads(path.read_text("utf-8"))["rows"]]
+    groups = (dict(zip(BOX, point, strict=True)) for point in points.reshape(len(rows), -1).tolist())
+    found = tuple(point | row for point, row in zip(groups, rows, strict=True) if row["hops"])
+    return Searched(search, len(rows), found, sum(row["failed"] for row in rows))
+
+
+def parts(record: Searched) -> Iterator[tuple[str, float, float, int, int]]:
+    """Each sixth of the range of each group, with the number of sets in it, and of those with confirmed hopping."""
+    points = record.search.points(record.sets)
+    for k, name in enumerate(BOX):
+        edges = (np.geomspace if name in LOGARITHMIC else np.linspace)(*record.search.box[name], 7)
+        sets, _ = np.histogram(points[:, k], edges)
+        hopping, _ = np.histogram([row[name] for row in record.confirmed], edges)
+        for low, high, n, hits in zip(edges, edges[1:], sets.tolist(), hopping.tolist(), strict=False):
+            yield name, float(low), float(high), n, hits
+
+
+def page(*searches: Searched) -> str:
+    """Results as a page of Markdown: how often the ball hops for ever in each part of the box, with confidence."""
+    text = [
+        "# Where the ball hops for ever",
+        "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: mu and eta are "
+        "the friction of floor and wall, kappa = c√(R/g) and Omega_0 = ω₀√(R/g). "
+        "`dualball search --kept docs/studies/data/hopping-*.json --page docs/hopping.md` writes this page.",
+    ]
+    for record in searches:
+        search, rows, count = record.search, record.confirmed, len(record.confirmed)
+        periods = [row["confirmed"]["landings"] for row in rows]
+        kinds = [f"{periods.count(n)} with {n}" for n in sorted(set(periods) - {0})]
+        kinds += [f"{periods.count(0)} with no period found"] if 0 in periods else []
+        landings = f"Sets by landings in a period: {', '.join(kinds)}. " if kinds else ""
+        others = f", {len(record.rows) - count} of them not confirmed" if len(record.rows) > count else ""
+        broken = f" {record.failed} runs broke down." if record.failed else ""
+        box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in search.box.items())
+        share, low, high = _share(count, record.sets)
+        ends = [[name, *(f"{end([row[name] for row in rows]):.3g}" for end in (min, max))] for name in BOX if rows]
+        shares = [
+            [name, f"{a:.3g}", f"{b:.3g}", str(n), str(hits), _share(hits, n)[0], " … ".join(_share(hits, n)[1:])]
+            for name, a, b, n, hits in parts(record)
+        ]
+        least, most = search.box["kappa"]
+        text += [
+            f"## Drag from kappa = {least:.3g} to {most:.3g}: {record.sets} sets",
+            f"The box is {box}. Each set was started from {search.starts} random states. In {count} sets some start "
+            f"leads to hopping that the event-driven simulation confirms: {share} %, or {low} to {high} % with 95 % "
+            f"confidence. That is what {search.starts} starts find: an attractor with a small basin is missed. "
+            f"{landings}By time stepping {len(record.rows)} sets still hopped after 60/c{others}.{broken} "
+            "In all other sets every ball stopped landing.",
+            pages.markdown([["", "smallest with hopping", "largest"], *ends]),
+            pages.markdown([["", "from", "to", "sets", "hopping", "share, %", "95 % interval, %"], *shares]),
+        ]
+    return "\n\n".join(text) + "\n"
+
+
+def _share(hits: int, of: int) -> tuple[str, str, str]:
+    """A share in % and the ends of its 95 % interval; no share of nothing."""
+    low, high = interval(hits, of)
+    return f"{100 * hits / of:.2f}" if of else "", f"{100 * low:.2f}", f"{100 * high:.2f}"
+
+
+@dataclass(frozen=True, eq=False)
+class Basins:
+    """Fates over a plane of starts."""
+
+    parameters: Parameters
+    start: tuple[float, ...]
+    """State (8,) whose other variables all starts share."""
+    across: str
+    """Names of the two variables that vary."""
+    up: str
+    x: Array
+    """Their values, shapes (n,) and (m,)."""
+    y: Array
+    fates: npt.NDArray[np.int64]
+    """Indices of `FATES`, by time stepping, shape (m, n)."""
+    coarse: int
+    """MuJoCo has done every `coarse`-th point both ways; 0 for none."""
+    mujoco: npt.NDArray[np.int64]
+    """Its fates, shape (m / coarse, n / coarse) rounded up, and its time step in s."""
+    timestep: float
+
+    def share(self, fate: str) -> tuple[int, int]:
+        """Points of the plane that come to a fate, by time stepping, and all of them."""
+        return int(np.sum(self.fates == FATES.index(fate))), self.fates.size
+
+    def differences(self) -> Array:
+        """How far from a boundary each point is at which the two differ, in cells of the fine map; 1 is next to it."""
+        from scipy.ndimage import distance_transform_cdt  # slow to import
+
+        distance = np.zeros(self.fates.shape)
+        for fate in np.unique(self.fates):
+            own = np.pad(self.fates == fate, 1, mode="edge")
+            distance += distance_transform_cdt(own, metric="chessboard")[1:-1, 1:-1]  # 0 outside its basin
+        coarse = np.s_[:: self.coarse, :: self.coarse]
+        return np.asarray(distance[coarse][self.fates[coarse] != self.mujoco])
+
+    def save(self, path: Path) -> None:
+        """Write it as JSON."""
+        write_text(path, json.dumps(dataclasses.asdict(self), default=np.ndarray.tolist))
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
+        with reading_json(path, "basins") as data:
+            arrays: dict[str, Any] = {name: np.array(data.pop(name)) for name in ("x", "y", "fates", "mujoco")}
+            p, start = Parameters.from_mapping(data.pop("parameters")), tuple(data.pop("start"))
+            return cls(parameters=p, start=start, **data, **arrays)
+
+
+def basins(
+    campaign: Campaign,
+    p: Parameters,
+    start: Mapping[str, float],
+    across: Axis,
+    up: Axis,
+    coarse: int = 0,
+    timestep: float = 2.5e-4,
+) -> Basins:
+    """Fates of starts on a plane of two state variables, all others as in `start`, else zero, after 10/c.
+
+    Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball can't start.
+    """
+    check_names((*start, across.name, up.name), VARIABLES, "state variable")
+    if p.c == 0:
+        raise InputError("c = 0 1/s: without drag a ball doesn't settle, and there are no basins")
+    x, y, lasts = np.array(across.values), np.array(up.values), 10.0 / p.c
+    base = np.array(State(**start))
+    states = np.tile(base, (len(y), len(x), 1))
+    states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
+    few = states[::coarse, ::coarse] if coarse else states[:0, :0]
+    step = fitting_step(140, p, Flow.steady(p.omega_0), lasts)
+    by_engine = (
+        (MOREAU.name, Settings(method=MOREAU.name, timestep=step), states),
+        (MUJOCO.name, ContactSettings.for_problem(p, timestep), few),
+    )
+    tasks = [
+        Task(engine=engine, parameters=p, x0=x0, t_end=lasts, settings=settings, sample_interval=lasts / 500)
+        for engine, settings, chosen in by_engine
+        for x0 in (start_state(x, p, Settings()) for x in chosen.reshape(-1, len(VARIABLES)))
+    ]
+    broken = {failure.task.key for failure in campaign.complete(tasks)}
+    ends = ["undecided" if task.key in broken else _fate(campaign.load(task.key)) for task in tasks]
+    fine, other = np.split(np.array([FATES.index(end) for end in ends]), [len(y) * len(x)])
+    maps = fine.reshape(states.shape[:2]), coarse, other.reshape(few.shape[:2])
+    return Basins(p, tuple(base.tolist()), across.name, up.name, x, y, *maps, timestep)
+
+
+def _fate(run: Trajectory) -> str:
+    """Where the ball of a whole run ends."""
+    case = run.cases[-1]
+    if hops(run, 0.3):
+        return "hops"
+    if case in (Case.RR, Case.SS):
+        return case.name
+    return "off the floor" if case is Case.SR or case.A is Contact.N else "undecided"

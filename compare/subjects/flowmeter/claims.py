@@ -1,0 +1,150 @@
+"""The ball as a flowmeter (section 5.3): slope and range of its characteristic curve, hysteresis (Fig. 13)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import analytic
+from compare.claim import Bearing, Claim, Text, When, every, given, one
+from compare.judge import theory
+from compare.kit.record import Measurement
+from compare.subjects.stationary.claims import (
+    cases,
+    detected,
+    from_floor,
+    is_in,
+    lasting,
+    lifts_first,
+    natural_size,
+    slips_first,
+)
+from model import Case
+
+
+def _slopes(by: str, predict: Callable[[Measurement], float], function: str, *cases: Case) -> Bearing:
+    """Slopes measured in one way, in units of the slope of rolling."""
+    when = every(given(by=by), is_in(*cases))
+    return Bearing("slope", "slope", predict, when=when, size=one, by=f"analytic.{function}")
+
+
+def _local(m: Measurement) -> float:
+    return theory(analytic.characteristic_slope, m.parameters, detected(m))
+
+
+def _settled(quantity: str, predict: Callable[[Measurement], float], when: When) -> Bearing:
+    return Bearing("settled", quantity, predict, when=when, size=natural_size)
+
+
+def _only_rolling(m: Measurement) -> float:
+    """Within the operating range RR, whatever the start on the floor or, as long as it lasts there, on the wall."""
+    if m.parameters.omega_0 < analytic.operating_range(m.parameters):
+        return float(Case.RR)
+    # The start from which it shows that the range has ended: the ball slips on the floor, or stays on the wall.
+    if m.conditions["start"] == ("rest" if slips_first(m) else "on the wall") and detected(m) is Case.RR:
+        raise LookupError("beyond the range, rolling is not the only motion that lasts")
+    return m.value
+
+
+def _reads_flow(m: Measurement) -> float:
+    """omega_0 within the reading range; beyond it, less on the floor."""
+    p = m.parameters
+    if p.omega_0 < analytic.reading_range(p) or detected(m) is Case.NR:
+        return p.omega_0
+    if m.value > p.omega_0 - 3 * m.uncertainty:
+        raise LookupError("beyond the range a ball on the floor lags")
+    return m.value
+
+
+def _unloads(m: Measurement) -> float:
+    """A ball on the wall stays above the limit of unloading, and sinks below."""
+    return float(Case.NR if m.parameters.omega_0 > analytic.unloading_limit(m.parameters) else Case.NS)
+
+
+def _branch(m: Measurement) -> Case:
+    """Case at a level of the hysteresis loop: that of the branch it comes from while it attracts, else of the other."""
+    states = cases(m.parameters) - {Case.NS}
+    lifted = m.conditions["before"] == Case.NR.name
+    here = {case for case in states if (case is Case.NR) == lifted}
+    if len(here or states) != 1:
+        raise LookupError(f"no single state lasts at omega_0 = {m.parameters.omega_0:g}")
+    return next(iter(here or states))
+
+
+def _reading(m: Measurement) -> float:
+    case = _branch(m)
+    return next(float(s.state.omega_c) for s in lasting(m.parameters) if s.case is case)
+
+
+def _flows(m: Measurement) -> bool:
+    return m.parameters.omega_0 > 0
+
+
+def _stays(m: Measurement) -> bool:
+    """Whether there is a flow, and the ball doesn't sink."""
+    return _flows(m) and detected(m) is not Case.NS
+
+
+CLAIMS = (
+    Claim(
+        "slope-rolling",
+        "Section 5.3",
+        "Rolling at both points, or carried by the wall alone, the ball reads the flow: dω_c/dω₀ = 1.",
+        (_slopes("neighbours", _local, "characteristic_slope", Case.RR, Case.NR),),
+    ),
+    Claim(
+        "slope-slipping",
+        "Section 5.3, (38), (41)",
+        "While the ball slips at both points its reading rises by (38), (41), at first hardly at all.",
+        (_slopes("neighbours", _local, "characteristic_slope", Case.SS),),
+    ),
+    Claim(
+        "slope-jump",
+        "Section 5.3",
+        "At ω₀₁ the slope of the characteristic curve jumps: from 1 to 0, as the equations have it.",
+        (_slopes("jump", lambda m: analytic.slope_jump(m.parameters), "slope_jump", Case.SS),),
+    ),
+    Claim(
+        "slope-mean",
+        "Section 5.3",
+        "Between ω₀₁ and ω₀₂ the slope is small: what is measured on average from end to end is what theory says, "
+        "a few hundredths for the reference.",
+        (_slopes("mean", lambda m: analytic.mean_slope(m.parameters), "mean_slope", Case.SS),),
+    ),
+    Claim(
+        "operating-range",
+        "Section 5.3",
+        "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, from rest the ball "
+        "slips (η < j), and on the wall it stays (η > j).",
+        (
+            _settled("case", _only_rolling, every(from_floor, _flows, slips_first)),
+            _settled("case", _only_rolling, every(_stays, lifts_first)),
+            _settled("omega_c", _reads_flow, _stays),
+        ),
+    ),
+    Claim(
+        "unloading-limit",
+        "Section 5.3, (85)",
+        "The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and sinks.",
+        (
+            _settled("case", _unloads, given(start="on the wall")),
+            Bearing(
+                "thresholds",
+                "omega_02",
+                lambda m: analytic.unloading_limit(m.parameters),
+                when=given(side="from above"),
+                by="analytic.unloading_limit",
+            ),
+        ),
+    ),
+    Claim(
+        "fig-13-left",
+        "Fig. 13, left",
+        "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
+        (
+            Bearing("hysteresis", "case", lambda m: float(_branch(m)), by="analytic.stable_solutions"),
+            Bearing("hysteresis", "omega_c", _reading, size=natural_size, by="(32), (38), (46)"),
+        ),
+        text=Text.CORRECTED,
+        reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that is above ω₀₄.",
+    ),
+)

@@ -1,0 +1,163 @@
+"""Motions through all nine cases, and landings: which is it, or how fast, some milliseconds later?
+
+Fixed starts, in natural units, are followed and cut into short pieces. A piece begins and ends away from changes of
+case, at each of which friction has to build up or die out; in between there may be any number of them. A landing, steep
+or at a slant, with slip or none, is looked at a few steps after the engine's own contact has closed, at the same moment
+with two time steps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.kit.short import REFINED
+from compare.kit.statistics import Measured
+from compare.kit.trials import Start
+from compare.subjects.motion.measure.field import constrained
+from model import Case, Contact, Parameters, State, Trajectory
+from model.kinematics import VARIABLES
+
+STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
+    # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
+    (0.86, (0.44, 0.06, 2.36, 0.68, 0.15, 0.03, 0.6, 0.25)),
+    # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
+    (1.03, (0.0, 0.0, -1.62, -0.005, 0.47, -0.14, 0.3, -0.12)),
+    # Long stays in cases that those pass in a moment: spun up from rest, slipping at both points, spinning on wall and
+    # floor, slipping down the wall, rolling and sliding on the floor.
+    (1.43, (0.0,) * 8),
+    (1.80, (0.0, 0.0, 1.02, -0.02, 0.03, 0.12, 0.0, 0.0)),
+    (1.07, (0.0, 0.0, 1.07, 0.34, 0.0, 0.0, 0.0, 0.0)),
+    (1.80, (10.0, 0.0, 1.80, 0.0, 0.17, 0.17, 0.0, 0.0)),
+    (0.60, (0.0, 0.0, 0.60, 0.0, 0.1, 0.0, 0.3, 0.0)),
+    (1.20, (0.0, 0.0, 0.40, 0.6, 0.1, -0.5, 0.5, 0.0)),
+)
+"""omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
+LASTS = 6.0
+"""Duration of a motion in units of sqrt(R/g)."""
+LENGTH = 40
+"""Samples in a piece."""
+APART = 10
+"""Samples between the ends of a piece and any change of case: a slip dies out and a force builds up in three or so, the
+case is taken to have changed after as many more, and a change comes by a few steps earlier or later than it should."""
+NARROW = 1e-4
+"""Least gap of an open contact divided by R at the ends of a piece: an unloaded contact may hover."""
+LATE = 2.0
+"""Steps, of which two landings may come one late each. What weight does to a slip in that time is the least slip at the
+ends of a piece: where two contacts roll one may creep so fast, since how they share a load is not determined.
+"""
+LEFT = 0.01
+"""Least share of the friction limit that a rolling contact leaves at the ends of a piece: with less left it creeps by
+what the limit changes, as fast as a slip that has just begun or is about to end.
+"""
+
+LANDINGS: dict[str, tuple[float, ...]] = {
+    "floor, with slip": (0.05, -0.5, 0.5, 0.6, 0.2, -0.9, 0.4, 0.0),
+    "floor, no slip": (0.05, -0.5, 0.3, 0.0, 0.1, 0.5, 0.5, 0.0),
+    "floor, at a slant": (0.04, -0.4, 0.8, -0.3, 0.3, 0.2, 0.6, -0.5),
+    "wall, with slip": (0.5, 0.2, 0.6, 0.3, 0.8, -0.7, 0.04, -0.5),
+    "wall, no slip": (0.4, 0.0, 0.5, 0.2, 0.0, 0.0, 0.04, -0.5),
+    "wall, at a slant": (0.6, -0.5, 0.9, -0.4, -0.2, 0.1, 0.05, -0.3),
+}
+"""States in the units of `STARTS`."""
+FLOW, LANDED = 0.8, 0.4
+"""omega_0 sqrt(R/g), and the duration in units of sqrt(R/g)."""
+AFTER = 6
+"""Steps of the coarser run after contact at which the ball is looked at: then friction has built up."""
+NAMES = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
+"""Variables that a landing changes."""
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The case at the end of every piece, with the state at its beginning."""
+    starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
+    tasks = []
+    for start in starts:
+        step = coarse_step(start.p) / REFINED
+        count = round(LASTS * time_unit(start.p) / step)
+        tasks.append(lab.task(start.p, start.x0, count * step, step, samples=count))
+    seen = set[tuple[str, Case]]()
+    for start, task, run in zip(starts, tasks, lab.each(tasks), strict=True):
+        name, p = start.set, start.p
+        if isinstance(run, str):
+            yield Missing("motions", name, f"a motion {run}")
+            continue
+        for first in pieces(run, lab.effort("motions.pieces")):
+            last = first + LENGTH
+            case = Case(int(run.case[last]))
+            seen.add((name, case))
+            at = state_of(constrained(Case(int(run.case[first])), run.x[first], p))
+            time = float(run.time[last] - run.time[first])
+            yield measurement(lab, "motions", name, p, "case", case, [task], case=case.name, time=time, **at)
+    for name in sets:
+        unseen = [case.name for case in Case if (name, case) not in seen]
+        if unseen:
+            yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}")
+
+
+def pieces(run: Trajectory, count: int) -> list[int]:
+    """Where pieces begin, about evenly spread: their ends are away from changes of case.
+
+    There contacts are plainly what they are called: an open one is open, a slipping one slips by more than a trace, and
+    a rolling one needs less friction than it may.
+    """
+    p, A, B = run.header.parameters, run.force_A.T, run.force_B.T
+    plain = np.full(len(run.time), True)
+    for side, gap, speed, friction, limit in (
+        ("A", run.y, run.slip_speed_A, np.hypot(A[0], A[2]), p.mu * A[1]),
+        ("B", run.h, run.slip_speed_B, np.hypot(B[1], B[2]), p.eta * B[0]),
+    ):
+        contact = np.array([getattr(case, side).name for case in Case])[run.case]
+        plain &= (contact != "R") | (friction <= (1 - LEFT) * limit)
+        plain &= (contact != "N") | (gap > NARROW * p.R)
+        plain &= (contact != "S") | (speed > LATE * p.g * coarse_step(p) / REFINED)
+    changes = np.flatnonzero(np.diff(run.case)) + 1
+    firsts = np.arange(APART, len(run.time) - LENGTH - APART)
+    for end in (0, LENGTH):
+        near = np.min(np.abs((firsts + end)[:, None] - changes), axis=1, initial=len(run.time))
+        firsts = firsts[(near >= APART) & plain[firsts + end]]
+    # As many pieces with a change of case in them as without, as far as there are.
+    inside = np.any((changes > firsts[:, None]) & (changes < firsts[:, None] + LENGTH), axis=1)
+    chosen: set[int] = set()
+    for some in (firsts[inside], firsts[~inside]):
+        if len(some):
+            chosen |= set(some[np.linspace(0, len(some) - 1, count // 2).round().astype(int)].tolist())
+    return sorted(chosen)
+
+
+def _start(name: str, p: Parameters, Omega_0: float, state: tuple[float, ...], how: str = "") -> Start:
+    """A start from natural units: a flow, and a state (8)."""
+    x = State.of(np.array(state) * state_units(p))
+    if x.y == x.v_y == x.slip_x == 0 and x.h > 0:  # it rolls on the floor
+        x = x._replace(slip_z=-x.v_h / p.r)
+    return Start(name, p.replace(omega_0=Omega_0 / time_unit(p)), how, x.stacked())
+
+
+def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The state shortly after every landing."""
+    starts = [_start(name, p, FLOW, x, how) for name, p in sets.items() for how, x in LANDINGS.items()]
+    steps = [coarse_step(start.p) / REFINED for start in starts]
+    pairs = [
+        lab.pair(start.p, start.x0, round(LANDED * time_unit(start.p) / step), step)
+        for start, step in zip(starts, steps, strict=True)
+    ]
+    for start, step, pair, (coarse, fine) in zip(starts, steps, pairs, lab.groups(pairs), strict=True):
+        contact = [case.A if start.name.startswith("floor") else case.B for case in coarse.cases]
+        at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + AFTER
+        if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
+            why = f"{start.name}: the contact did not close for good within {LANDED:g} sqrt(R/g)"
+            yield Missing("impacts", start.set, why)
+            continue
+        p, units = start.p, state_units(start.p)
+        changed = [VARIABLES.index(name) for name in NAMES]
+        change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
+        # The contact closes at a step, up to one late: for so long weight and friction act otherwise than they should.
+        late = step / time_unit(p) / 2
+        conditions: dict[str, Condition] = {"start": start.name, "time": float(coarse.time[at]), **state_of(start.x0)}
+        for quantity, k in zip(NAMES, changed, strict=True):
+            value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
+            yield measurement(lab, "impacts", start.set, p, f"after_{quantity}", value, pair, **conditions)

@@ -1,0 +1,248 @@
+"""Claims about slip: does a slight one grow or die out, where does the ball lift off (sections 3 and 4, Fig. 6)?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from analytic.slipping import slip_bounds, slip_stability
+from analytic.slipping.slip_bounds import HeldBound, SlipBound
+from compare.claim import Bearing, Claim, Outcome, Text, When, every, given, one
+from compare.kit.check import Relation
+from compare.kit.record import Measurement, state
+from compare.kit.short import slip_unit
+from model import Case
+from model.arrays import Array
+
+_NR_NS, _RR_RS, _RR_SR, _RR_SS = (Case.NR, Case.NS), (Case.RR, Case.RS), (Case.RR, Case.SR), (Case.RR, Case.SS)
+
+
+def _x(m: Measurement) -> Array:
+    return np.array(state(m))
+
+
+def _held(m: Measurement) -> float:
+    return float(m.conditions["omega_c"])
+
+
+def _side(m: Measurement, name: str) -> int:
+    return round(float(m.conditions[name]))
+
+
+def _arrow(m: Measurement) -> tuple[Case, Case]:
+    """The case out of which, and into which, a ball slips or lifts off."""
+    return Case[str(m.conditions["inner"])], Case[str(m.conditions["outer"])]
+
+
+def _along(arrow: tuple[Case, Case], *by: str) -> When:
+    """True for slips along an arrow that were measured in one of some ways."""
+    return lambda m: _arrow(m) == arrow and m.conditions.get("by", "") in by
+
+
+def _growth(predict: Callable[[Measurement], float], when: When, by: str = "slip_stability.gamma") -> Bearing:
+    return Bearing("growth", "gamma", predict, when=when, size=lambda m: slip_unit(m.parameters), by=by)
+
+
+def _gamma(m: Measurement) -> float:
+    n = [float(m.conditions[f"n_{name[-1]}"]) for name in slip_stability.normals(*_arrow(m))]
+    return float(slip_stability.gamma(*_arrow(m), _x(m), np.array(n), m.parameters))
+
+
+def _gamma_nr(m: Measurement) -> float:
+    beta = math.atan2(float(m.conditions["n_y"]), float(m.conditions["n_z"]))
+    return float(slip_bounds.gamma_nr(beta, _x(m), m.parameters))
+
+
+def _greatest_as_printed(m: Measurement) -> float:
+    n = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    return float(slip_stability.gamma(*_RR_SS, _x(m), n, m.parameters).max())
+
+
+def _bound(
+    arrow: tuple[Case, Case],
+    by: str,
+    bound: Callable[[Measurement], SlipBound | HeldBound],
+    side: int = 0,
+    from_rest: bool = False,
+) -> tuple[Bearing, Bearing]:
+    """Zero and slope of gamma.
+
+    `side` is the sign of n_z where that makes another bound; `from_rest`: the zero is 0 or nearly so.
+    """
+    when = every(_along(arrow, by), given(n_z=side)) if side else _along(arrow, by)
+    power = "_square" if by == "stationary" else ""
+    size = (lambda m: m.parameters.g / m.parameters.R) if from_rest else None
+    return (
+        Bearing("bounds", f"gamma_zero{power}", lambda m: bound(m).zero, when=when, size=size, by="slip_bounds"),
+        Bearing("bounds", f"gamma_slope{power}", lambda m: bound(m).slope, when=when, by="slip_bounds"),
+    )
+
+
+def _neutral(quantity: str, case: Case, by: str) -> Bearing:
+    return Bearing(
+        "thresholds",
+        quantity,
+        lambda m: slip_stability.neutral_flow(case, m.parameters),
+        when=given(by=by),
+        by="slip_stability.neutral_flow",
+    )
+
+
+def _on_the_wall(m: Measurement) -> float:
+    """NR where it is stable with respect to slipping, else NS."""
+    stable = slip_stability.stability(Case.NR, m.parameters) is slip_stability.SlipStability.STABLE
+    return float(Case.NR if stable else Case.NS)
+
+
+def _lifting(inner: Case, outer: Case) -> Claim:
+    never = f"Out of {inner.name} the ball never lifts off the floor, whatever its orbit."
+    once = f"Out of {inner.name} the ball lifts off the floor once the wall alone, in {outer.name}, would drive it up."
+
+    def lifts(m: Measurement) -> float:
+        return float(slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0)
+
+    def onset(m: Measurement) -> float:
+        return slip_stability.lift_onset(*_arrow(m), _x(m), m.parameters)
+
+    when = given(inner=inner.name)
+    return Claim(
+        f"lift-{inner.name}-{outer.name}",
+        "Fig. 6, dotted",
+        never if inner is Case.RS else once,
+        (
+            Bearing("lift", "lifts", lifts, when=when, by="slip_stability.lift_acceleration"),
+            Bearing("lift", "lift_onset", onset, when=when, by="slip_stability.lift_onset"),
+        ),
+    )
+
+
+CLAIMS = (
+    *(
+        # Slips at random or dragged; not in the direction that bears on the extrema alone.
+        Claim(
+            f"slip-{arrow[0].name}-{arrow[1].name}",
+            "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
+            f"Out of any state of {arrow[0].name} a slip along any direction of {arrow[1].name} grows at the rate γ.",
+            tuple(
+                _growth(predict, _along(arrow, "", "dragged"), by)
+                for by, predict in (("slip_stability.gamma", _gamma), ("slip_bounds.gamma_nr", _gamma_nr))
+                if predict is _gamma or arrow == _NR_NS
+            ),
+        )
+        for arrow in slip_stability.SLIP_ARROWS
+    ),
+    Claim(
+        "eq-58",
+        "(58)",
+        "Out of rolling on the wall alone, slip grows the most along β₁, whatever the state.",
+        (
+            Bearing(
+                "steepest",
+                "steepest",
+                lambda m: float(slip_bounds.steepest_nr(_x(m), m.parameters)),
+                size=one,
+                by="slip_bounds.steepest_nr",
+            ),
+        ),
+    ),
+    Claim(
+        "eq-61",
+        "(60), (61)",
+        "Rolling on the wall alone is stable with respect to slipping above ω₀₂.",
+        _bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
+    ),
+    Claim(
+        "eq-66",
+        "(66)",
+        "A ball that lags behind the fluid begins to slip at the wall where (66) says.",
+        _bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, _held(m), _side(m, "n_y"))),
+        text=Text.CORRECTED,
+        reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
+    ),
+    Claim(
+        "eq-67",
+        "(67)",
+        "Going round with the fluid, the ball never begins to slip at the wall alone, but at ω₀ = 0.",
+        _bound(_RR_RS, "stationary", lambda m: slip_bounds.rr_to_rs_stationary(m.parameters), from_rest=True),
+    ),
+    Claim(
+        "eq-73",
+        "(73)",
+        "A ball that lags behind the fluid begins to slip at the floor where (73) says.",
+        _bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, _held(m), _side(m, "n_x"))),
+    ),
+    Claim(
+        "eq-74",
+        "(74)",
+        "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, it lifts (η > j).",
+        (
+            *_bound(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
+            _neutral("omega_03", Case.RR, "loss of the floor"),
+        ),
+    ),
+    Claim(
+        "eq-82",
+        "(82)",
+        "Slip at both points at once, with directions (0, 0), grows above ω₀₁ and dies out below.",
+        _bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
+    ),
+    Claim(
+        "eq-83",
+        "(83)",
+        "Slip at both points with directions (π, π) dies out: (83) has no bound for η < 1.",
+        _bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, -1), side=-1, from_rest=True),
+    ),
+    Claim(
+        "fig-4-5",
+        "Figs. 4 and 5",
+        "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below it remains slipping for good.",
+        (
+            *_bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
+            Bearing("settled", "case", _on_the_wall, when=given(start="on the wall"), by="slip_stability.stability"),
+        ),
+    ),
+    Claim(
+        "eq-69",
+        "(69)",
+        "Rolling at both points is the convex combination of slipping to either side that doesn't slip.",
+        (
+            Bearing(
+                "growth",
+                "filippov_share",
+                lambda m: slip_bounds.filippov_share(_arrow(m)[1], _held(m), m.parameters),
+                size=one,
+                by="slip_bounds.filippov_share",
+            ),
+        ),
+    ),
+    Claim(
+        "definition-3",
+        "Definitions 1-3, (67)",
+        "Rolling is stable with respect to slipping up to a flow at which it is neutral, and unstable beyond (on the "
+        "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
+        (
+            _growth(_gamma, _along(_RR_RS, "rest")),
+            _neutral("omega_01", Case.RR, "onset of slip"),
+            _neutral("omega_02", Case.NR, "onset of sliding on the wall"),
+            _neutral("omega_03", Case.RR, "loss of the floor"),
+        ),
+    ),
+    Claim(
+        "extrema",
+        "after (80)",
+        "(α, β) = (0, 0) and (π, π) are the global extrema of γ.",
+        (
+            replace(
+                _growth(_greatest_as_printed, _along(_RR_SS, "sideways"), "slip_stability.gamma at (0, 0), (π, π)"),
+                relation=Relation.AT_MOST,
+            ),
+        ),
+        expected=Outcome.REFUTED,
+        reason="False for the Euclidean normal (75): γ is larger along other directions. With kinetic energy as the "
+        "inner product it is true.",
+    ),
+    *(_lifting(*arrow) for arrow in slip_stability.LIFT_ARROWS),
+)

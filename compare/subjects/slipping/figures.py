@@ -1,0 +1,78 @@
+"""Figs. 4 and 5: a ball carried by the wall is pushed into a slight slip, which dies out or grows."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from analytic.bifurcation import diagram as bifurcation
+from analytic.simulation import scenarios
+from compare.kit import style
+from compare.kit.drawing import Material, Motion
+from compare.kit.engines import EVENT
+from model import Case, Parameters
+
+BETA = 0.9
+"""Direction (54) of the push, rad: across the direction in which slip dies out or grows, so that the path bends."""
+SLIP = 1.0
+"""Size of the push, rad s-1."""
+_ROUGH = Parameters.named("high-wall-friction")
+FLOWS = {"fig-4": _ROUGH.replace(omega_0=25.0), "fig-5": _ROUGH.replace(omega_0=16.0)}
+"""Above and below omega_02 = 18.1 rad/s."""
+_LASTS = 0.012
+"""Time that Fig. 5 shows, s."""
+
+
+def select(_: Material, figure: str) -> Motion:
+    """The motion of the event-driven simulation, which starts in the formal stationary state of NR."""
+    p = FLOWS[figure]
+    return Motion(f"{SLIP}, {BETA}", EVENT.name, p, partial(scenarios.slip_perturbation, p, SLIP, BETA, t_end=_LASTS))
+
+
+def caption(push: Motion) -> str:
+    """Of either figure."""
+    p = push.p
+    stable = p.omega_0 > bifurcation.thresholds(p).omega_02
+    dies = "above ω₀₂: the slip dies out within finite time, and the ball rolls on the wall again"
+    grows = "below ω₀₂: the slip grows, and the ball keeps slipping (NS)"
+    return (
+        f"The stationary orbit on the wall (NR), pushed by a slip of {SLIP:g} rad/s in the direction β = {BETA:g}, "
+        f"{dies if stable else grows}. Left: the slip over time. Right: its path in the plane orthogonal to NR, from "
+        f"the cross; dotted: the straight line. Event-driven simulation; {style.named(p)}, Ω₀ = {p.Omega_0:.3g}."
+    )
+
+
+def draw(push: Motion) -> Figure:
+    """Slip at the wall over time, and its path in the orthogonal plane (55)."""
+    run = push.load()
+    figure = style.figure(8.4, 3.3)
+    time, plane = figure.subplots(1, 2)
+    stops = len(run.events) > 0 and run.cases[-1] is Case.NR
+    end = float(run.events.time[-1]) if stops else float(run.time[-1])
+    shown = run.time <= (1.6 * end if stops else end)
+    t = 1e3 * run.time[shown]
+    for name, line in (("y", "--"), ("z", "-")):
+        slip = getattr(run, f"slip_{name}")[shown]
+        time.plot(t, slip, color=style.COLOURS[Case.NS], ls=line, label=f"$\\tilde\\omega_{name}$")
+    if stops:
+        time.axvline(1e3 * end, **style.GUIDE)
+        for place, case in ((0.3, Case.NS), (1.3, Case.NR)):
+            time.text(1e3 * place * end, 0.93, case.name, ha="center", transform=time.get_xaxis_transform())
+    time.set(xlabel="$t$ (ms)", ylabel="slip at the wall (rad/s)")
+    time.legend(frameon=False)
+    w_y, w_z = run.slip_y[shown], run.slip_z[shown]
+    plane.plot(w_z, w_y, color="black", lw=1.4)
+    plane.plot([w_z[0], 0], [w_y[0], 0], **style.GUIDE)
+    halfway = int(np.searchsorted(np.hypot(np.diff(w_z), np.diff(w_y)).cumsum(), 0.5 * SLIP))
+    tail, head = zip(w_z[halfway : halfway + 2], w_y[halfway : halfway + 2], strict=True)
+    plane.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": "black", "mutation_scale": 14})
+    plane.plot(w_z[0], w_y[0], "kx", ms=7, mew=1.8)
+    style.mark(plane, 0.0, 0.0, "NR", (6, -6))
+    plane.set(xlabel="$\\tilde\\omega_z$ (rad/s)", ylabel="$\\tilde\\omega_y$ (rad/s)")
+    plane.margins(0.12)
+    for axes in (time, plane):
+        axes.axhline(0, **style.GUIDE)
+    plane.axvline(0, **style.GUIDE)
+    return figure

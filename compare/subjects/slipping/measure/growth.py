@@ -1,0 +1,249 @@
+"""Growth of slip: a rolling ball is given a slip along one direction; in the first milliseconds it grows or dies out.
+
+gamma, the initial rate of change of the slip along its direction, is extrapolated to a vanishing size of the slip from
+runs of several sizes. A record counts only if, by the engine's own contacts, all of it is in the case in which the ball
+was to slip. States are at random in natural units, and away from stationary ones.
+
+Out of rolling on the wall alone, growths along directions all round make a curve; where its first harmonic is greatest,
+slip grows the most. The other harmonics are measured, too: what they may turn the direction by is its uncertainty.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compare.kit.fits import slope_error
+from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
+from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
+from compare.kit.short import DOUBT, LIMIT, REFINED, lag_error, polynomials, slip_unit
+from compare.kit.statistics import Measured
+from compare.kit.tasks import Task
+from compare.kit.trials import Start
+from compare.subjects.motion.measure import field
+from compare.subjects.motion.measure.field import random_state
+from model import Case, Parameters, State, Trajectory
+from model.arrays import Array
+from model.kinematics import SLIP_XYZ
+
+SEED, FAN_SEED = 61, 58
+PUSHES = {
+    (Case.RR, Case.RS): 1,
+    (Case.RR, Case.SR): 1,
+    (Case.RR, Case.SS): 2,
+    (Case.RS, Case.SS): 2,
+    (Case.SR, Case.SS): 2,
+    (Case.NR, Case.NS): 3,
+}
+"""Arrows of Fig. 6 along which a contact begins to slip, and directions out of random states at the quick level."""
+SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
+"""Which of slip_x, slip_y, slip_z a case allows beyond the one it leaves."""
+STEPS, SKIPPED = 20, 6
+"""Steps of a record, and those at its start in which contact forces build up."""
+LARGE, SMALL, BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
+"""Slips at the start in units of `start_unit`: so large that they neither end nor turn much in a record; small where
+one contact has to hold, or the ball goes round slowly and the wall carries little; and three where the direction of a
+contact that slips already depends on the size."""
+DEGREES = (4, 3)
+"""Degrees of the polynomials; the lower one shows what the degree changes."""
+AT_START = slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]) / slope_error(
+    np.arange(-field.HALF, field.HALF + 1.0), field.DEGREES[0]
+)
+"""Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a `field` window."""
+SMOOTH = "without friction at both contacts there is nothing that rolls"
+SINKING = 0.5
+"""Speed at which a ball sinks divided by `dragged_speed`; the fluid also pulls along the wall at `dragged_speed`."""
+SIDEWAYS = np.array([0.3, 1.0, 0.3]) / np.linalg.norm([0.3, 1.0, 0.3])
+"""A direction of slip that is almost that of the wall's contact alone."""
+DIRECTIONS = 8
+DRAGGED = (0.5, 3.0)
+"""Least and largest pull of the fluid along the orbit divided by the weight, either way: it turns the direction."""
+AHEAD = 3.0
+"""Largest angle of the greatest growth from the vertical, rad, that is recorded: one beyond may come out on either side
+of pi."""
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """A start that rolls, and the slip that it is given.
+
+    The start's name: ``sideways`` for the direction `SIDEWAYS`, ``dragged`` where the fluid pulls hard, ``rest`` out of
+    rest in a fluid at rest, empty for a direction at random, and those of `compare.subjects.slipping.measure.bounds`.
+    """
+
+    start: Start
+    inner: Case
+    outer: Case
+    n: Array
+    """Direction, a unit vector (3,) over slip_x, slip_y, slip_z."""
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """Sizes of slip, in units of `start_unit`, each half of the one before."""
+        if self.inner in (Case.RS, Case.SR):
+            return BESIDE
+        return SMALL if self.outer in (Case.RS, Case.SR) else LARGE
+
+    def pair(self, lab: Lab, size: float) -> list[Task]:
+        """The runs with one size of slip, in units of `start_unit`, with either step."""
+        p, x = self.start.p, self.start.x0.copy()
+        x[SLIP_XYZ] += size * start_unit(p, x) * self.n
+        return lab.pair(p, x, STEPS, coarse_step(p) / REFINED)
+
+    def tasks(self, lab: Lab) -> list[Task]:
+        """The pairs of every size."""
+        return [task for size in self.sizes for task in self.pair(lab, size)]
+
+    def rates(self, run: Trajectory) -> Array:
+        """Initial rates of the slip along n by polynomials of either degree (2,), rad s-2; nan in another case."""
+        record = slice(SKIPPED * (len(run.time) // STEPS), None)
+        # Beside a ball at rest the wall carries nothing: its contact doesn't show.
+        alike = [self.outer, Case.RN] if self.start.name == "rest" else [self.outer]
+        if not np.isin(run.case[record], alike).all():
+            return np.full(2, np.nan)
+        return polynomials(run.time[record], run.x[record, SLIP_XYZ] @ self.n, DEGREES)[1]
+
+    def row(
+        self, lab: Lab, protocol: str, quantity: str, value: Measured, tasks: Sequence[Task], **more: Condition
+    ) -> Measurement:
+        """What was measured of it, with its state and direction."""
+        start, n = self.start, dict(zip(("n_x", "n_y", "n_z"), self.n.tolist(), strict=True))
+        along = {"inner": self.inner.name, "outer": self.outer.name, "by": start.name} | state_of(start.x0) | n
+        return measurement(lab, protocol, start.set, start.p, quantity, value, tasks, **along)
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """gamma out of random states, along every arrow; where one contact slips to either side, how they share rolling."""
+    rough = {name: p for name, p in sets.items() if p.mu and p.eta}
+    yield from (Missing("growth", name, SMOOTH) for name in sets if name not in rough)
+    sides = [push for name, p in rough.items() for push in _pushes(name, p, lab.effort("growth.more"))]
+    tasks = [push.tasks(lab) for pushes in sides for push in pushes]
+    runs = zip(tasks, lab.groups(tasks), strict=True)
+    left = Counter[tuple[str, Case, Case]]()
+    for pushes in sides:
+        grown = []
+        for push in pushes:
+            own, pairs = next(runs)
+            if value := growth(push, pairs):
+                grown.append(value)
+                yield push.row(lab, "growth", "gamma", value, own)
+            else:
+                left[push.start.set, push.inner, push.outer] += 1
+        if len(grown) == 2:  # the share of the side of negative slip in rolling, as which the two growths cancel
+            plus, minus = grown if pushes[0].n.sum() > pushes[1].n.sum() else grown[::-1]
+            both = plus.value + minus.value
+            error = math.hypot(plus.uncertainty * minus.value, minus.uncertainty * plus.value) / both**2
+            share = Measured(plus.value / both, error)
+            if sure_enough("filippov_share", share, 1.0):
+                yield push.row(lab, "growth", "filippov_share", share, own)
+    for (name, inner, outer), count in left.items():
+        slips = f"{count} slips from {inner.name} to {outer.name}"
+        yield Missing("growth", name, f"{slips} did not stay in {outer.name}, or turned too fast")
+
+
+def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
+    """gamma for a vanishing size and step from `Push.tasks`, None if a record left the case or is too coarse.
+
+    Its uncertainty is what the step and a degree of the polynomials change, and for three sizes a third of what the
+    third one does: the next would change less.
+    """
+    coarse, fine = (np.array([push.rates(run) for run in some]) for some in (runs[::2], runs[1::2]))
+    if np.isnan(coarse).any() or np.isnan(fine).any():
+        return None
+    best = fine + (fine - coarse) * LIMIT
+    value, lower = without_size(best)
+    step = without_size(fine - coarse)[0] * DOUBT
+    size = (value - without_size(best[-2:])[0]) / 3
+    p = push.start.p
+    # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
+    least = lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * slip_unit(p)
+    gamma = Measured(float(value), math.hypot(step, value - lower, size, least))
+    # Where a contact is hardly loaded, slip turns too fast.
+    return gamma if sure_enough("gamma", gamma, slip_unit(p)) else None
+
+
+def without_size(rates: Array) -> Array:
+    """The limit of rows (2 or 3, n), each of which belongs to half the size of the one before."""
+    *first, before, last = rates
+    return np.asarray((first[0] - 6 * before + 8 * last) / 3 if first else 2 * last - before)
+
+
+def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
+    """Pushes out of every state of a set; two of them where one contact alone slips, to either side."""
+    rng = np.random.default_rng([SEED, *name.encode()])
+    slow = 0.4 / time_unit(p) * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
+    going = Start(name, p.replace(omega_0=slow), "sideways", State(omega_c=slow).stacked())
+    yield [Push(going, Case.RR, Case.SS, SIDEWAYS)]
+    still = Start(name, p.replace(omega_0=0.0), "rest", np.zeros(8))
+    for side in (1, -1):
+        yield [Push(still, Case.RR, Case.RS, np.array([0.0, side, 0.0]))]
+        sinking = State.of(random_state(Case.NR, p, rng))._replace(v_y=-SINKING * dragged_speed(p))
+        dragged = p.replace(omega_0=sinking.omega_c + dragged_speed(p) / p.R)
+        start = Start(name, dragged, "dragged", sinking.stacked())
+        yield [Push(start, Case.NR, Case.NS, np.array([0.0, 0.8 * side, 0.6]))]
+    for (inner, outer), count in PUSHES.items():
+        for _ in range(count * more):
+            x = State.of(random_state(inner, p, rng))
+            # The orbit is one at which both contacts press, in whatever way they rub.
+            if outer is Case.SR:  # the spin axis turns with the orbit, and the wall alone turns it
+                x = x._replace(omega_c=math.sqrt(rng.uniform(0.4, 0.8) * p.g / (p.j * p.R)))
+            if outer is Case.SS:
+                least, most = p.mu, min(1 / p.eta, 3.0)
+                x = x._replace(omega_c=math.sqrt((least + rng.uniform(0.3, 0.7) * (most - least)) * p.g / p.R))
+            # A slip that is there already is so fast that a slower one beside it hardly turns it.
+            if inner is Case.RS:
+                fast = rng.choice([-1, 1]) * rng.uniform(3.0, 5.0)
+                x = x._replace(slip_y=fast * start_unit(p, x.stacked()))
+            if inner is Case.SR:  # the faster the ball spins about its radial axis, the faster slip_z sets in
+                x = x._replace(slip_x=-rng.uniform(2.0, 3.0) * p.R / p.r * x.omega_c)
+            free = [k for k in SLIPS[outer] if k != {Case.RS: 1, Case.SR: 0}.get(inner)]
+            n = np.zeros(3)
+            n[free] = rng.choice([-1, 1], len(free)) * rng.uniform(0.4, 1.0, len(free))
+            n /= np.linalg.norm(n)
+            start = Start(name, p.replace(omega_0=float(x.omega_c * rng.uniform(0.6, 1.4))), "", x.stacked())
+            yield [Push(start, inner, outer, side * n) for side in ((1, -1) if len(free) == 1 else (1,))]
+
+
+def start_unit(p: Parameters, x: Array) -> float:
+    """The slip that the weight, and at the wall the centrifugal force, makes in the unit of time, rad s-1."""
+    return (p.g + p.R * float(State.of(x).omega_c) ** 2) / 2 / p.r * time_unit(p)
+
+
+def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The direction in which slip out of NR grows the most, for every state: that of the first harmonic."""
+    rough = {name: p for name, p in sets.items() if p.eta and p.c}
+    why = "without friction at the wall, or drag, no direction stands out"
+    yield from (Missing("steepest", name, why) for name in sets if name not in rough)
+    fans = [fan for name, p in rough.items() for fan in _fans(name, p, lab.effort("steepest.states"))]
+    runs = lab.groups([push.tasks(lab) for fan in fans for push in fan])
+    why = "slip along some direction did not last, or no direction stands out"
+    for fan in fans:
+        grown = [value for push in fan if (value := growth(push, next(runs)))]
+        angle = math.nan
+        if len(grown) == DIRECTIONS:
+            harmonics = np.fft.rfft([g.value for g in grown]) * 2 / DIRECTIONS
+            angle = float(-np.angle(harmonics[1]))
+        if not abs(angle) < AHEAD:
+            yield Missing("steepest", fan[0].start.set, why)
+            continue
+        scatter = np.sqrt(2.0 / DIRECTIONS) * max(g.uncertainty for g in grown)
+        others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
+        beta = Measured(angle, float(np.hypot(scatter, others) / np.abs(harmonics[1])))
+        start, tasks = fan[0].start, [task for push in fan for task in push.tasks(lab)]
+        row = measurement(lab, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
+        yield if_sure(row, 1.0, why)
+
+
+def _fans(name: str, p: Parameters, count: int) -> Iterator[list[Push]]:
+    """Random states, each pushed at angles all round from slip_z to slip_y of the wall's contact (8)."""
+    rng = np.random.default_rng([FAN_SEED, *name.encode()])
+    for _ in range(count):
+        x = random_state(Case.NR, p, rng)
+        pull = rng.choice([-1, 1]) * rng.uniform(*DRAGGED)
+        start = Start(name, p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R), "", x)
+        angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+        yield [Push(start, Case.NR, Case.NS, np.array([0.0, np.sin(b), np.cos(b)])) for b in angles]

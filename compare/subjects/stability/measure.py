@@ -1,0 +1,274 @@
+"""Decay rates and frequencies: settled states are pushed a little, and the motion itself shows its whole spectrum.
+
+Every active variable of a case is pushed by itself, up and down. Half the difference of the two runs, divided by the
+size of the push, is a column of D(t), which a linear motion turns into P D(t) some time later: the logarithms of the
+eigenvalues of P are the exponents, all of them, and no direction is singled out. Two sizes of the push are extrapolated
+to zero, and so are two time steps.
+
+Two states are special. A ball that spins in a fluid at rest (RS) feels the wall only while it goes round, with a
+friction of the order of omega_c^2: it takes a large push. And where floor and ball only just touch (SR), every push
+makes the ball lean on the floor one way and lifts it off the other way: only the first is used.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from compare.kit.engines import STUDY_SLIP
+from compare.kit.fits import exponents, matched, propagator
+from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
+from compare.kit.settling import SOLVED, family, high
+from compare.kit.statistics import Measured
+from compare.kit.tasks import Task
+from compare.kit.trials import Start
+from compare.subjects.stationary.measure import SPIN
+from model import Case, Contact, Parameters, State, Trajectory
+from model.arrays import Array
+from model.cases import TRAITS
+from model.drag import QUADRATIC, STOKES
+from model.kinematics import VARIABLES, slip_speeds
+
+PROTOCOL = "rates"
+RECORD = (64, 256)
+"""Length of a record in coarse steps, which is about 3 sqrt(R/g), and its samples."""
+BRIEF = {Case.RS: (2, 16)}
+"""The same where a large push soon changes the state itself."""
+PUSH = {Case.RS: 0.3, Case.SR: 0.1}
+"""Size of a push, in the `units`, in the two cases in which it is extrapolated to zero from this and half of it."""
+USUAL = 2e-4
+"""Size of a push in all other cases; the run with the coarser step has half of it, and shows that it doesn't matter."""
+SLIGHT = 2e-6
+"""The same where the law of drag isn't Stokes': the drag of the lag that a push makes is in proportion to it only
+as far as its Reynolds number is far below 1."""
+SLOWEST = 0.04
+"""Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
+ORDER = {Case.RS: 2, Case.SR: 1}
+"""Order of the remaining error in the size of a push: second, where up and down are subtracted."""
+STRAYS = 0.4
+"""A record ends once a variable is so far from its settled value, in the `units`."""
+LEAST = {Case.SR: 48}
+"""Samples that a record must have, else 8: a floor that is about to carry nothing follows its load less exactly."""
+STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
+"""Most states of a case and set at the quick level, spread over the flows; more at the others."""
+STOPPED = 4.0
+"""Coarse steps in which friction may stop the slip of a state at the soonest: in less, its decay is not resolved."""
+HOVERS = 10.0
+"""How many times as fast as `STUDY_SLIP` allows for its load a contact may slip: at 20 times it hovers."""
+RESOLVED = 0.25
+"""Largest exponent in units of the finer time step."""
+REST = 0.05
+"""Share of the drag coefficient c below which a measured rate counts as none."""
+Exponents = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class Pushed:
+    """A settled state, from which the ball is pushed."""
+
+    start: Start
+    case: Case
+
+    @property
+    def active(self) -> list[int]:
+        """Which of the variables are pushed."""
+        return [VARIABLES.index(name) for name in TRAITS[self.case].active]
+
+    @property
+    def units(self) -> Array:
+        """Natural sizes of the active variables."""
+        return state_units(self.start.p)[self.active]
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
+        size = PUSH.get(self.case, USUAL if self.start.p.drag == STOKES else SLIGHT)
+        return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
+
+    def tasks(self, lab: Lab) -> list[Task]:
+        """Runs for each of the `sizes`: every active variable is pushed, up and down."""
+        p, step = self.start.p, coarse_step(self.start.p)
+        coarse, fine = lab.effort("rates.refined")
+        lasts, samples = BRIEF.get(self.case, RECORD)
+        tasks = []
+        for size, refined in zip(self.sizes, (coarse, fine, fine), strict=False):
+            for k, unit in zip(self.active, size * self.units, strict=True):
+                for push in (unit, -unit):
+                    x = self.start.x0.copy()
+                    x[k] += push
+                    tasks.append(lab.task(p, x, lasts * step, step / refined, samples=samples))
+        return tasks
+
+    def missing(self, why: str) -> Missing:
+        """That its rates were not measured."""
+        at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
+        return Missing(PROTOCOL, self.start.set, f"{at}: {why}")
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """All exponents of settled states in the six cases in which a ball can go round for ever."""
+    states = [state for name, p in sets.items() for state in chosen(records, name, p, lab.effort("rates.more"))]
+    tasks = [state.tasks(lab) for state in states]
+    lab.complete([task for own in tasks for task in own])
+    for state, own in zip(states, tasks, strict=True):
+        runs, step = lab.attempt(own), coarse_step(state.start.p) / lab.effort("rates.refined")[1]
+        if isinstance(runs, str):
+            yield state.missing(f"a run {runs}")
+            continue
+        count = 2 * len(state.active)
+        answers = [answer(state, size, runs[k * count : (k + 1) * count]) for k, size in enumerate(state.sizes)]
+        if min(map(len, answers)) < LEAST.get(state.case, 8):
+            yield state.missing("pushed, the ball doesn't stay in this case")
+        else:
+            yield from _measurements(lab, state, *spectrum(state, answers, step), step, own[-count:])
+    for name in sets:
+        for case in STATES:
+            if case not in {state.case for state in states if state.start.set == name}:
+                at = f"the ball settles in {case.name} at no flow that was tried"
+                yield Missing(PROTOCOL, name, f"{at}, or slips too slowly or too fast there")
+
+
+def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed]:
+    """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
+
+    One on the wall alone is pushed high up, and where it only just touches the floor. What slips must do so neither
+    so slowly that a push turns it, or friction stops it within a few steps, nor so fast that it hovers.
+    """
+    unit = time_unit(p)
+    spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
+    kept = [Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)]
+    values: dict[tuple[Parameters, Case], dict[str, float]] = {}
+    for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
+        values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
+    states = []
+    for (q, case), value in values.items():
+        x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
+        states.append((q, case, x._replace(y=high(q)) if case.A is Contact.N else x))
+        if case is Case.NR:
+            states.append((q, Case.SR, x))
+    if p.drag == QUADRATIC:  # it settles no ball that goes round with the fluid; but one that begins so goes on so
+        states.append((p.replace(omega_0=0.5 / unit), Case.RR, State(omega_c=0.5 / unit)))
+    for case, most in STATES.items():
+        alike = []
+        for q, _, x in sorted((s for s in states if s[1] is case), key=lambda s: s[0].omega_0):
+            turned = math.sqrt(q.g * q.R) * max(SLOWEST, 2 * PUSH.get(case, 0.0))
+            contacts = zip(
+                case.name, slip_speeds(x.stacked(), q), (q.mu, q.eta), (q.g, q.R * x.omega_c**2), strict=True
+            )
+            if all(
+                max(turned, STOPPED * coarse_step(q) * friction * load) < speed
+                and friction * speed < HOVERS * STUDY_SLIP * load / q.g
+                for contact, speed, friction, load in contacts
+                if contact == "S"
+            ):
+                alike.append(Pushed(Start(name, q, "settled", x.stacked()), case))
+        if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
+            alike = alike[: math.ceil(2 / 3 * len(alike))]
+        places = {int((k + 0.5) * len(alike) / (more * most)) for k in range(more * most)} if alike else set()
+        kept += [alike[k] for k in sorted(places)]
+    return kept
+
+
+def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
+    """D (n, d, d): how the active variables, in `units`, follow pushes of one size; runs in the order of the tasks.
+
+    Only as long as the ball stays in the case and near the state; the first sample, at which forces build up, is not
+    among them.
+    """
+    ups, downs = runs[::2], runs[1::2]
+    if state.case is Case.SR:
+        seen = [max(pair, key=lambda run: stays(run, state.case)) for pair in zip(ups, downs, strict=True)]
+        columns = [(1 if run in ups else -1) * (run.x - state.start.x0) for run in seen]
+    else:
+        # Where the wall carries nothing, as beside a ball that only spins, no contact with it shows.
+        seen = list(runs[:2] if state.case is Case.RS else runs)
+        columns = [(up.x - down.x) / 2 for up, down in zip(ups, downs, strict=True)]
+    D = np.stack(columns, axis=-1)[:, state.active] / (size * state.units[:, None])
+    ends = [stays(run, state.case) for run in seen]
+    ends.append(int(np.argmax(np.append(size * np.abs(D).max(axis=(1, 2)) > STRAYS * (1 + 1e-9), True))))
+    return np.asarray(D[1 : min(ends)])
+
+
+def stays(run: Trajectory, case: Case) -> int:
+    """Samples after the first for which a run is in a case, and the first."""
+    return int(np.argmax(np.append(run.case[1:] != case, True))) + 1
+
+
+def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
+    """Exponents (d,) in s-1 and their standard uncertainties, from the answers to pushes of the `Pushed.sizes`.
+
+    They are extrapolated to a vanishing push, and to a vanishing step by second order. The uncertainty is made up of
+    that correction, which exceeds the remainder even of first order; the difference from the first half of the record;
+    the next order in the size of the push; the error of a step for the fastest exponent; the accuracy of the solver.
+    """
+    lasts, samples = BRIEF.get(state.case, RECORD)
+    interval = lasts * coarse_step(state.start.p) / samples
+    # All records are cut to the length of the shortest, so that all are extrapolated from the same motion.
+    length = min(map(len, answers))
+
+    gain = 1 / (2 ** ORDER.get(state.case, 2) - 1)
+
+    def exponents_of(large: Array, small: Array, share: float = 1.0) -> Exponents:
+        last = max(4, round(share * length))
+
+        def at(lag: int) -> Array:
+            P, P_large = (propagator(record[:last], lag) for record in (small, large))
+            return np.asarray(P + gain * (P - P_large))
+
+        return exponents(at, interval, last // 3)
+
+    coarse, large, small = answers[0], answers[1], answers[-1]
+    values = exponents_of(large, small)
+    plain = matched(exponents_of(small, small), values)
+    correction = (plain - matched(exponents_of(coarse, coarse), plain)) / 3
+    half = np.abs(values - matched(exponents_of(large, small, 0.5), values))
+    bent, size = np.abs(values - plain), max(state.sizes)
+    bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size ** ORDER.get(state.case, 2), 1.0)
+    stepped = np.abs(values) * (np.abs(values).max() * step) ** 2 / 12
+    solved = SOLVED / (size * interval)
+    uncertainty = np.sqrt(np.abs(correction) ** 2 + half**2 + bent**2 + stepped**2 + solved**2)
+    # Relative errors of one propagator have the same causes; that of one exponent may vanish by chance.
+    alike = np.abs(values) * uncertainty.max() / np.abs(values).max()
+    return values + correction, np.maximum(uncertainty, alike)
+
+
+def _measurements(
+    lab: Lab, state: Pushed, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
+) -> Iterator[Measurement | Missing]:
+    """One of each pair of conjugates, in the order of their decay, slowest first; and how many there are in all."""
+    start = state.start
+    at: dict[str, Condition] = {"case": state.case.name, **state_of(start.x0)}
+    yield measurement(lab, PROTOCOL, start.set, start.p, "modes", len(exponents), tasks, **at)
+    rows = []
+    order = [k for k in np.argsort(-exponents.real) if exponents[k].imag >= 0]
+    fast = [k for k in order if abs(exponents[k]) * step > RESOLVED]
+    for k in fast:
+        yield state.missing(f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step")
+    for mode, k in enumerate(order, start=1):
+        if k in fast:
+            continue
+        parts = {"decay_rate": -float(exponents[k].real), "frequency": float(exponents[k].imag)}
+        for (quantity, value), (name, other) in zip(parts.items(), reversed(parts.items()), strict=True):
+            sure, which = Measured(value, float(uncertainty[k])), {"mode": mode, name: other}
+            # They come from one propagator: where one is too vague for a check, the others aren't to be trusted either.
+            if not sure_enough(quantity, sure, natural_size(value, other, start.p)):
+                yield state.missing(f"one of its exponents, {value:.3g} 1/s, is uncertain by {sure.uncertainty:.1g}")
+                return
+            rows.append(measurement(lab, PROTOCOL, start.set, start.p, quantity, sure, tasks, **at, **which))
+    yield from rows
+
+
+def natural_size(rate: float, other: float, p: Parameters) -> float:
+    """Natural size in s-1 of a part of an exponent, of which `other` is the other part.
+
+    Its own, or that of the exponent if it is none, or else that of free fall.
+    """
+    for size in (abs(rate), math.hypot(rate, other)):
+        if size > REST * p.c:
+            return size
+    return 1 / time_unit(p)

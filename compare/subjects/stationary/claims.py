@@ -1,0 +1,253 @@
+"""Stationary states: Propositions 1-6 with their forces, and the bifurcation diagrams of Figs. 9-11."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import analytic
+from analytic import StationarySolution
+from analytic.bifurcation import diagram as bifurcation
+from compare.claim import Bearing, Claim, Text, When, every, given
+from compare.judge import theory
+from compare.kit.record import Measurement
+from compare.kit.settling import FORCES, SUMS, family, forces, scale
+from model import Case, Parameters
+from model.arrays import Array
+
+MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
+
+
+def lasting(p: Parameters) -> list[StationarySolution]:
+    """The stationary solutions that a ball may settle to: those that attract, and the one that sinks for ever."""
+    return theory(analytic.stable_solutions, p, sinking=True)
+
+
+def cases(p: Parameters) -> set[Case]:
+    """Cases of the states that last; SR, the state of NR on an unloaded floor, is none of its own."""
+    return {s.case for s in lasting(p)} - {Case.SR}
+
+
+def detected(m: Measurement) -> Case:
+    """The case of the state that was measured; two cases in which a contact carries nothing count as one.
+
+    SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall.
+    """
+    case = family(Case[str(m.conditions["case"])])
+    return Case.RS if case is Case.RN else case
+
+
+def reached(m: Measurement) -> StationarySolution:
+    """The lasting state of the case that was detected; LookupError if theory has none."""
+    for state in lasting(m.parameters):
+        if state.case is detected(m):
+            return state
+    raise LookupError(f"no state of case {detected(m).name} lasts")
+
+
+def leaning(m: Measurement) -> StationarySolution:
+    """The state of SR."""
+    return theory(analytic.solution, m.parameters, Case.SR)
+
+
+def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
+    """A quantity of a stationary solution by its name in the measurements."""
+    if quantity == "wall_spin":
+        return float(bifurcation.wall_spin(s.state, p))
+    if quantity.startswith("force_"):
+        return force(quantity.removeprefix("force_"), s.force_A, s.force_B)
+    return float(getattr(s.state, quantity))
+
+
+def force(name: str, A: Array, B: Array) -> float:
+    """A component of the contact forces (3,), such as "Ax", or a sum that mechanics determine, such as "Ax-By"."""
+    return float(forces(A, B)[name])
+
+
+def case(m: Measurement) -> float:
+    """The case that was detected, if theory lets a ball from that start settle there; LookupError else.
+
+    From the floor it may settle to whatever attracts. High up on the wall it stays where the wall carries it, and
+    sinks where not.
+    """
+    allowed = cases(m.parameters)
+    if m.conditions["start"] == "on the wall":
+        allowed &= {Case.NR} if Case.NR in allowed else {Case.NS}
+    else:
+        allowed -= {Case.NS}
+    if detected(m) in allowed:
+        return m.value
+    if len(allowed) == 1:
+        return float(allowed.pop())
+    raise LookupError(f"{detected(m).name} is none of {allowed}")
+
+
+def rolling(m: Measurement) -> float:
+    """RR as long as it exists, (84) and (86); beyond, anything but RR."""
+    t = theory(analytic.thresholds, m.parameters)
+    limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
+    if m.parameters.omega_0 < limit:
+        return float(Case.RR)
+    if detected(m) is Case.RR:
+        raise LookupError("RR has ended")
+    return m.value
+
+
+def reachable(m: Measurement) -> float:
+    """The set of cases that last, as the measurement's bit mask."""
+    return float(sum(1 << each for each in cases(m.parameters)))
+
+
+def bearings(
+    quantities: Iterable[str], when: When, state: Callable[[Measurement], StationarySolution] = reached, by: str = ""
+) -> tuple[Bearing, ...]:
+    """Bearings of settled states on a claim, one a quantity."""
+
+    def predict(m: Measurement) -> float:
+        return number(m.quantity, state(m), m.parameters)
+
+    return tuple(Bearing("settled", q, predict, when=when, size=natural_size, by=by) for q in quantities)
+
+
+def natural_size(m: Measurement) -> float:
+    """Over which errors of a settled state are counted."""
+    return scale(m.quantity, m.parameters)
+
+
+def is_in(*cases: Case) -> When:
+    """Chooses the settled states of these cases."""
+    return lambda m: detected(m) in cases
+
+
+def slips_first(m: Measurement) -> bool:
+    """Whether eta < j: slip ends rolling."""
+    return m.parameters.eta < m.parameters.j
+
+
+def lifts_first(m: Measurement) -> bool:
+    """Whether eta > j: the floor is lost before slip begins."""
+    return m.parameters.eta > m.parameters.j
+
+
+def from_floor(m: Measurement) -> bool:
+    """Whether the ball started on the floor."""
+    return m.conditions["start"] in ("rest", "with the fluid")
+
+
+def _cases(when: When) -> Bearing:
+    return Bearing("settled", "case", case, when=when, by="analytic.stable_solutions")
+
+
+def _with_fluid(when: When = lambda m: True) -> Bearing:
+    chosen = every(given(start="with the fluid"), when)
+    return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
+
+
+def _plane(figure: str, source: str, axis: str) -> Claim:
+    return Claim(
+        figure,
+        source,
+        f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
+        "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR).",
+        (Bearing("plane", "cases", reachable, when=given(figure=figure), by="analytic.stable_solutions"),),
+    )
+
+
+_ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
+_LEANS = every(_LIFTED, from_floor)
+_STATE = (*MOTION, *FORCES)
+
+CLAIMS = (
+    Claim(
+        "prop-1",
+        "Prop. 1, (30)-(32)",
+        "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
+        "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j).",
+        (
+            *bearings((*MOTION, *SUMS), _ROLLS, by="(31), (32)"),
+            _cases(_ROLLS),
+            _with_fluid(),
+        ),
+    ),
+    Claim(
+        "prop-1-rough",
+        "Prop. 1, (83), (86)",
+        "With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
+        (*bearings(("omega_c",), every(lifts_first, _ROLLS), by="(32)"), _with_fluid(lifts_first)),
+    ),
+    Claim(
+        "prop-2-forces",
+        "Prop. 2, (33), (34)",
+        "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
+        bearings(
+            ("omega_c", "slip_x", "slip_z", "v_y", *FORCES),
+            is_in(Case.RS),
+            lambda m: theory(analytic.solution, m.parameters, Case.RS),
+            by="(33), (34)",
+        ),
+    ),
+    Claim(
+        "prop-3-5",
+        "Props. 3 and 5, (35), (36), (46), (47)",
+        "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
+        "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR.",
+        (
+            *bearings(_STATE, _LIFTED, by="(46), (47)"),
+            *bearings(_STATE, _LEANS, leaning, by="(35), (36)"),
+            _cases(_LIFTED),
+        ),
+        text=Text.CORRECTED,
+        reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it.",
+    ),
+    Claim(
+        "prop-4",
+        "Prop. 4, (37)-(42)",
+        "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
+        "its contact forces are (42)-(44).",
+        (
+            *bearings(_STATE, _SLIPS, by="(37)-(44)"),
+            _cases(_SLIPS),
+        ),
+    ),
+    Claim(
+        "prop-6",
+        "Prop. 6, (49), (50)",
+        "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
+        "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
+        (
+            *bearings(_STATE, _SINKS, by="(49), (50)"),
+            _cases(_SINKS),
+        ),
+        text=Text.CORRECTED,
+        reason="(49) lost a row: the second of its five is ω_c = ω₀.",
+    ),
+)
+
+DIAGRAMS = (
+    Claim(
+        "fig-9",
+        "Fig. 9",
+        "Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
+        bearings(("wall_spin",), is_in(Case.NS, Case.NR), by="(91)"),
+    ),
+    Claim(
+        "fig-10",
+        "Fig. 10",
+        "For η < j the spins on the wall in rolling, slipping and in the lifted state join as drawn.",
+        (
+            *bearings(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), by="(91)"),
+            *bearings(("wall_spin",), every(slips_first, _LEANS), leaning, by="(91)"),
+        ),
+    ),
+    Claim(
+        "fig-11",
+        "Fig. 11",
+        "For η > j rolling ends at ω₀₃ upon the state whose spin on the wall falls like 1/ω₀.",
+        (
+            *bearings(("wall_spin",), every(lifts_first, _ROLLS), by="(91)"),
+            *bearings(("wall_spin",), every(lifts_first, _LEANS), leaning, by="(91)"),
+            _with_fluid(lifts_first),
+        ),
+    ),
+    _plane("fig-7", "Fig. 7", "η"),
+    _plane("fig-8", "Fig. 8", "μ = η"),
+)

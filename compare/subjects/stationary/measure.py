@@ -1,0 +1,123 @@
+"""Settled states: where the ball ends from fixed starts at fixed flows, with the forces that mechanics determine.
+
+Flows are the same multiples of sqrt(g/R) for every set. States are measured with the coarse step, and once more with
+half of it: what that changes belongs to their uncertainty, as does what different starts make of the same state. Beside
+them stands the engine as it comes: the characteristic curve with its own contact parameters, for display.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import groupby
+
+from compare.kit import engines
+from compare.kit.lab import Lab, time_unit
+from compare.kit.record import Measurement, Missing, Records, measurement
+from compare.kit.settling import GROUPS, Settled, begin, duration, family, judged, scale, settle
+from compare.kit.statistics import Measured
+from compare.kit.trials import Start
+from model import Parameters, State
+from model.drag import QUADRATIC
+
+PROTOCOL = "settled"
+SPIN = 1.0
+"""Spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r."""
+LIVELY = 10.0
+"""How many times within a round the fluid would stop a free ball in a state whose values count."""
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The case that every start ends in, and once for every distinct state its values.
+
+    Starts are at rest, going round with the fluid, and so high up on the wall; and spinning in a fluid at rest.
+    """
+    sharp, starts = lab.effort("settled.sharp"), []
+    for name, p in sets.items():
+        for q in _flows(lab, p):
+            starts += [begin(name, q, how) for how in ("rest", "with the fluid", "on the wall")]
+        spinning = State(slip_y=SPIN / time_unit(p) * p.R / p.r)
+        starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
+    ended = settle(lab, starts, sharp=sharp)
+    yield from _unsettled(ended)
+    sure: list[Settled] = []
+    slack: list[Missing] = []
+    for state in ended:
+        p = state.start.p
+        if state.failure:
+            continue
+        yield _record(lab, state, "case", state.case)
+        if _stopping_rate(state) * duration(p) < LIVELY:
+            what = f"{state.case.name} at omega_0 = {p.omega_0:.4g} rad/s"
+            why = f"{what}: a slight lag is one for ever under the quadratic law"
+            slack.append(Missing(PROTOCOL, state.start.set, why))
+        else:
+            sure.append(state)
+    yield from slack
+    alike = [list(same) for _, same in groupby(sorted(sure, key=_key), key=_key)]
+    again = []  # with half the step, from the mean, at the height from which it started
+    for state, *_ in alike:
+        x0 = State.of(state.mean)._replace(y=max(State.of(state.start.x0).y, 0.0))
+        again.append(replace(state.start, x0=x0.stacked()))
+    refined = settle(lab, again, refine=2, span=20.0, sharp=sharp)
+    yield from _unsettled(refined)
+    for same, fine in zip(alike, refined, strict=True):
+        if not fine.failure and family(fine.case) is family(same[0].case):
+            for group in GROUPS:  # what step and start change is added to the uncertainty, the largest in the group
+                sizes = {n: scale(n, fine.start.p) for n in group if all(n in each.values for each in (fine, *same))}
+                changes = [abs(s.values[n].value - fine.values[n].value) / sizes[n] for s in same for n in sizes]
+                for n, size in sizes.items():
+                    uncertainty = math.hypot(fine.values[n].uncertainty, max(changes) * size)
+                    yield _record(lab, fine, n, Measured(fine.values[n].value, uncertainty))
+
+
+def newcomer(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """omega_c and case from rest with the engine's own contact parameters, with what they drift or swing by the end."""
+    protocol, name, p = "newcomer", "reference", sets["reference"]
+    if not lab.engine.as_it_comes:
+        yield Missing(protocol, name, f"{lab.engine.name} has no settings of its own to be compared with")
+        return
+    plain = replace(lab, engine=engines.engine(lab.engine.as_it_comes))
+    starts = [begin(name, q, "rest") for q in _flows(lab, p)]
+    tasks = [plain.task(start.p, start.x0, 40.0 / p.c, 1e-3, samples=1000) for start in starts]
+    for start, task, run in zip(starts, tasks, plain.each(tasks), strict=True):
+        if isinstance(run, str):
+            yield Missing(protocol, name, f"the run at {start.p.omega_0:.4g} rad/s {run}")
+            continue
+        ended = judged(start, task, run)
+        at = {"case": ended.case.name, "start": start.name}
+        for quantity, value in (("omega_c", ended.values["omega_c"]), ("case", ended.case)):
+            yield measurement(plain, protocol, name, start.p, quantity, value, [task], **at)
+
+
+def _flows(lab: Lab, p: Parameters) -> list[Parameters]:
+    """A set at the flows of a level."""
+    return [p.replace(omega_0=flow / time_unit(p)) for flow in lab.effort("settled.flows")]
+
+
+def _unsettled(states: list[Settled]) -> Iterator[Missing]:
+    """Those that did not settle, each with what it did last."""
+    for each in states:
+        if each.failure:
+            p = each.start.p
+            at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
+            yield Missing(PROTOCOL, each.start.set, f"not settled from {each.start.name} at {at}: {each.failure}")
+
+
+def _stopping_rate(each: Settled) -> float:
+    """At what rate the fluid would stop a free ball, s-1: c, but in proportion to the lag under the quadratic law."""
+    p, (_, v_y, omega_c, *_) = each.start.p, each.mean.tolist()
+    if p.drag != QUADRATIC:
+        return p.c
+    Re = 2 * p.r / p.nu_f * math.hypot(v_y, p.R * (omega_c - p.omega_0))
+    return p.c * p.C_D / 24 * Re
+
+
+def _key(each: Settled) -> tuple[str, float, int]:
+    return each.start.set, each.start.p.omega_0, int(family(each.case))
+
+
+def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> Measurement:
+    start, at = each.start, {"case": each.case.name, "start": each.start.name}
+    return measurement(lab, PROTOCOL, start.set, start.p, quantity, value, [each.task], **at)

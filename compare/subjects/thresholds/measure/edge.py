@@ -1,0 +1,204 @@
+"""The unstable state between two attractors, by following the edge of their basins.
+
+Where at one flow a ball slips on the floor (SS) or goes round with the fluid (SR, which is NR at y = 0), the straight
+line between the two measured states crosses the border between the two basins. Two runs close to it on either side stay
+together for a while near the unstable state, which a ball on the border would reach. The mean of their states while
+they are together begins the next line, across the same border.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from compare.kit.brackets import Bracket, Care, Search, narrow
+from compare.kit.fits import vanishing
+from compare.kit.lab import Lab, coarse_step
+from compare.kit.levels import Level
+from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, sure_enough
+from compare.kit.settling import begin, family, lasting, rotation_scale, settle_groups, taper
+from compare.kit.statistics import Measured, tail
+from compare.kit.tasks import Task
+from model import Case, Parameters, State, Trajectory
+from model.arrays import Array
+from model.drag import QUADRATIC
+from model.kinematics import SLIP_XYZ
+
+PROTOCOL = "edge"
+CLOSING = (0.1, 0.17, 0.26, 0.38)
+"""Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
+FIRST, NEXT = 3e-4, 2.5e-6
+"""Widths of the last brackets on the first line and on the others, in parts of the distance of the attractors."""
+HALF_LENGTH = 5e-3
+"""Half the length of a later line, in those parts; after each line that missed the border four times as much."""
+TOGETHER = 2e-3
+"""The distance up to which two runs count as being together, in those parts."""
+SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """The border between the basins of two attractors at one flow, and where it crosses a line; states are (8,)."""
+
+    set: str
+    p: Parameters
+    slipping: Array
+    lifted: Array
+    """The settled states on either side."""
+    centre: Array
+    line: Array
+    """Direction of the line; its length is the distance of the attractors."""
+    missed: int = 0
+    """How many lines since the last crossing were too short."""
+    bracket: Bracket | None = None
+    moves: tuple[Array, ...] = ()
+    """By how much each of the last crossings differs from that of the line before."""
+
+    @property
+    def crossing(self) -> Array:
+        """The state in the middle of the last bracket."""
+        assert self.bracket is not None
+        return np.asarray(self.centre + self.bracket.place.value * self.line)
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Between the measured omega_02 and omega_04, cross the border again and again.
+
+    Not under the quadratic law: near SR the ball lags so little that this hardly damps its swing along the border. At
+    the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
+    """
+    yield from (Missing(PROTOCOL, name, SWINGS_ON) for name, p in sets.items() if p.drag == QUADRATIC)
+    limits: dict[str, tuple[float, float]] = {}
+    for name in (name for name, p in sets.items() if p.drag != QUADRATIC):
+        holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
+        if holds and folds:
+            limits[name] = holds.value, folds.value
+        else:
+            yield Missing(PROTOCOL, name, "at no flow are a slipping ball and a lifted one both settled")
+    soonest = max(limits, key=lambda name: sets[name].c, default="") if lab.level is Level.QUICK else ""
+    flows = [
+        (name, sets[name].replace(omega_0=low + part * (high - low)))
+        for name, (low, high) in limits.items()
+        for part in (CLOSING if name == soonest else lab.effort("edge.flows"))
+    ]
+    starts = [[begin(name, q, "rest"), begin(name, q, "on the wall")] for name, q in flows]
+    edges = []
+    for (name, q), (slipping, lifted) in zip(flows, settle_groups(lab, starts, loose=10.0), strict=True):
+        if slipping.failure or lifted.failure or (slipping.case, family(lifted.case)) != (Case.SS, Case.NR):
+            fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
+            yield Missing(PROTOCOL, name, f"no two attractors settled at omega_0 = {q.omega_0:.4g} rad/s: {fates}")
+        else:
+            a, b = _grounded(slipping.mean), _grounded(lifted.mean)
+            edges.append(Edge(name, q, a, b, a, b - a))
+    followed = _followed(lab, edges)
+    for edge in followed:
+        yield from _rows(lab, edge)
+    for name, (low, high) in limits.items():
+        last = low + (max(CLOSING) + 1e-6) * (high - low)
+        yield from _closing(lab, name, [edge for edge in followed if edge.set == name and edge.p.omega_0 < last])
+
+
+def _grounded(x: Array) -> Array:
+    """The state on the floor: a lifted ball knows nothing of its height."""
+    return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
+
+
+def _followed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
+    """Cross each border on one line after the other; those that are crossed by the last, and by one before."""
+    current = list(edges)
+    for _ in range(lab.effort("edge.lines")):
+        lines = [_onward(edge) for edge in current]
+        for k, bracket in enumerate(narrow(lab, [_search(lab, line) for line in lines], careful=False)):
+            edge = current[k]
+            if None in bracket.runs:
+                current[k] = replace(edge, moves=(), missed=edge.missed + 1)
+            else:
+                crossed = replace(lines[k], bracket=bracket, missed=0)
+                moves = (*edge.moves, np.abs(crossed.crossing - edge.crossing)) if edge.bracket else ()
+                current[k] = replace(crossed, moves=moves)
+    return [edge for edge in current if edge.moves]
+
+
+def _search(lab: Lab, edge: Edge) -> Search:
+    """On which part of the line the border is, first between the attractors."""
+    t_end, step = lasting(edge.p, lab.effort("edge.time")), coarse_step(edge.p)
+    reach = HALF_LENGTH * 4.0**edge.missed
+    around, width = (Bracket(-reach, reach), NEXT) if edge.bracket else (Bracket(0.0, 1.0), FIRST)
+
+    def task(s: float, bracket: Bracket, care: Care) -> Task:
+        return lab.task(edge.p, edge.centre + s * edge.line, t_end, step, samples=round(t_end / (8 * step)))
+
+    return Search(around, task, partial(ends_slipping, edge=edge), width)
+
+
+def ends_slipping(run: Trajectory, edge: Edge) -> bool:
+    """Whether a ball ends up slipping: by which way it still goes, or where it has come to rest."""
+    slipping, lifted = (float(State.of(x).omega_c) for x in (edge.slipping, edge.lifted))
+    first, second = (float(half.mean()) for half in np.array_split(run.omega_c[tail(run, 0.2)], 2))
+    if abs(second - first) > 1e-5 * (lifted - slipping):
+        return second < first
+    return second - slipping < (lifted - slipping) / 2
+
+
+def _onward(edge: Edge) -> Edge:
+    """A line through the mean of the time in which the last two runs have stayed together, the way they part."""
+    if edge.bracket is None:
+        return edge
+    low, high = (run.x for run in edge.bracket.runs if run is not None)
+    along = np.abs((high - low) @ edge.line / float(edge.line @ edge.line))
+    together = int(np.argmax(along > TOGETHER)) or len(along)
+    length = max(together - together // 4, 1)
+    weights = taper(length)
+    mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
+    parting = _grounded((high - low)[together - 1])
+    line = parting * float(edge.line @ edge.line) / float(parting @ edge.line)
+    return replace(edge, centre=_grounded(mean), line=line)
+
+
+def _uncertainty(edge: Edge) -> Array:
+    """Standard uncertainty of the crossing, (8,): of the last bracket, and of all moves to come.
+
+    They are taken to shrink as the last two did: together they are at least the last one, and at most ten of its size;
+    and no less than the distance from the crossing to the next line, through the mean of the last two runs.
+    """
+    assert edge.bracket is not None
+    *_, before, last = (0.0, *(float(np.linalg.norm(move[SLIP_XYZ])) for move in edge.moves))
+    ratio = min(last / before, 0.9) if before else 0.0
+    onward, roll = _onward(edge), edge.p.R / edge.p.r
+    alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
+    off, along = (onward.centre - edge.crossing) * alike, onward.line * alike
+    ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
+    moves = np.maximum(edge.moves[-1] / (1 - ratio), ahead)
+    return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
+
+
+def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
+    """omega_c, the slips and the spin on the wall, as far as they are sure enough; the uncertainties are alike."""
+    assert edge.bracket is not None
+    x, sure, p = State.of(edge.crossing), State.of(_uncertainty(edge)), edge.p
+    roll, values = p.R / p.r, {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")}
+    values["wall_spin"] = x.slip_x + roll * x.omega_c
+    slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
+    for name, value in values.items():
+        unit = 1.0 if name == "omega_c" else roll
+        of = Measured(value, slips / roll if name == "omega_c" else slips)
+        row = measurement(lab, PROTOCOL, edge.set, p, f"edge_{name}", of, edge.bracket.tasks, case="SS")
+        why = f"{name} on the edge at omega_0 = {p.omega_0:.4g} rad/s is uncertain by {of.uncertainty:.1g} rad/s"
+        yield if_sure(row, rotation_scale(p) * unit, why)
+
+
+def _closing(lab: Lab, name: str, edges: Sequence[Edge]) -> Iterator[Measurement]:
+    """Where the edge would meet the lifted ball: the distance in omega_c, extrapolated to zero."""
+    if len(edges) < len(CLOSING):
+        return
+    noise = max(float(_uncertainty(edge)[2]) for edge in edges)
+    apart = [Measured(float(State.of(edge.crossing).omega_c - State.of(edge.lifted).omega_c), noise) for edge in edges]
+    place = vanishing(np.array([edge.p.omega_0 for edge in edges]), apart)
+    if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
+        tasks = [task for edge in edges if edge.bracket for task in edge.bracket.tasks]
+        q, at = edges[0].p.replace(omega_0=place.value), {"by": "unstable slipping meets the lifted ball"}
+        yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", **at)

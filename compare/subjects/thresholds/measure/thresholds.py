@@ -1,0 +1,354 @@
+"""The thresholds of the bifurcation diagram, each measured in two ways that have nothing in common but the engine.
+
+* Bisected, by the engine's own contacts: the largest flow at which a rolling ball stays without slip, or on the floor;
+  the least at which the wall holds a ball that rides it; the flow up to which a lifted ball, pressed lightly on the
+  floor, goes back to rolling on both; the largest flow at which a slipping ball settles.
+* Extrapolated from settled states on one side: the flow at which their lag behind the fluid, their sinking or the force
+  of the floor would vanish, or at which omega_0 along the branch has its maximum. It is a smooth function of the lag,
+  whatever the law of drag; of the slip it needn't be.
+
+And the drag below which slipping at both points ends in a fold, and above which it passes to the wall without a jump.
+Where the branch of settled slipping comes to its end, the floor carries nothing. How omega_0 goes with the force of the
+floor there, rising or falling, decides whether the branch turns back: the drag is looked for at which it does neither.
+All states are settled in stronger drag than that, where the branch has no fold and they last up to its end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from compare.kit.brackets import Answer, Bracket, Care, Search, narrow
+from compare.kit.fits import POINTS, initial_slope, straight_line, turning, vanishing
+from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, sure_enough
+from compare.kit.settling import Settled, begin, family, high, lasting, presses, settle_groups, settled_cases, settles
+from compare.kit.statistics import COVERAGE, Measured, settled_case, tail
+from compare.kit.tasks import Task
+from compare.subjects.motion.measure.laws import PRESSES
+from model import Case, Parameters, State, Trajectory
+from model.arrays import Array
+
+PROTOCOL = "thresholds"
+COARSE = 1e-2
+"""Relative width of a bracket where only the neighbourhood is wanted."""
+BESIDE: Array = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
+"""Relative distances of settled states from a flow at which something vanishes."""
+TURNS: Array = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
+"""The same below a fold, where slip goes like the root of the distance; in parts of the range of slipping."""
+RIDES: Array = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
+"""The same of the states that are continued to where a ball rides the wall as slowly as it can."""
+SLIPPING_SPEED = 3e-8
+"""Slip speed, divided by sqrt(g R), that counts as slip: far above what contacts are solved to, 1e-12, and reached
+within the time of a run by a ball whose friction falls short by a millionth."""
+FIRST_DRAGS, NEARER_DRAGS = (2.0, 4.0), (1.6, 2.6)
+"""Drags at which the birth of a fold is looked for: two values of c sqrt(R/g), at which the fluid takes a ball along
+within a fraction of the time of its fall; then multiples of the drag extrapolated from those two, near to it but so far
+off that states still settle soon."""
+BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
+"""Distances of the states from omega_02 there, in parts of the range of slipping."""
+
+Key = tuple[str, str]
+"""A set, and what is looked for: the end of "rolling", "slipping", "leaning" or the "fold", the begin of "riding"."""
+From = str | Array | Callable[[Parameters], Array]
+"""How a ball starts, as `settling.begin` has it, or in which state: fixed, or of the parameters with the flow."""
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Begin between flows whose settled cases differ: settle states beside each change, then bisect and extrapolate.
+
+    A change is between the fastest flow at which a ball was seen to settle so, and the next at which it settled
+    otherwise. Without such flows it is looked for from half the slowest, or up to twice the fastest.
+    """
+    fine, narrowest = lab.effort("thresholds.width"), lab.effort("thresholds.fold")
+    kinds = {"rolling": "with the fluid", "riding": "on the wall", "slipping": "rest"}
+    seen = {(name, kind): settled_cases(records, name, how) for name in sets for kind, how in kinds.items()}
+    around: dict[Key, Bracket] = {}
+    for key, cases in seen.items():
+        if flows := list(cases):
+            ended = {Case.NR} if key[1] != "rolling" else set(Case) - {Case.RR}
+            low = max((flow for flow in flows if cases[flow] not in ended), default=flows[0] / 2)
+            around[key] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
+
+    # The largest flow at which a ball that rolls on both goes on so; and roughly, where sinking and slipping end.
+    searches: dict[Key, Search] = {}
+    for (name, kind), change in around.items():
+        if kind == "rolling":
+            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], fine * change.high)
+    brackets, searches = _narrowed(lab, searches), {}
+    for (name, kind), change in around.items():
+        if kind == "riding":
+            searches[name, kind] = _search(lab, sets[name], "sinking", change, kinds[kind], COARSE * change.low)
+        end = brackets.get((name, "rolling"))
+        if kind == "slipping" and end and not lifts(end) and end.high < change.high:
+            change = replace(change, low=max(change.low, end.high))
+            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], COARSE * change.low)
+    brackets |= _narrowed(lab, searches, careful=False)
+    brackets = {key: bracket for key, bracket in brackets.items() if bracket.runs[1] or bracket.high in seen[key]}
+    states, searches = _settled_beside(lab, sets, brackets), {}
+
+    # Where a ball that rides the wall begins to slip on it, and up to where one pressed to the floor rolls again. They
+    # begin from settled states continued to each flow; the pressed one has a thousandth less spin on the wall.
+    for name, p in sets.items():
+        begins, end = brackets.pop((name, "riding"), None), brackets.get((name, "rolling"))
+        if begins and len(riding := states[name, "riding"]) == len(RIDES):
+            ride = rider(riding, height=high(p))
+            searches[name, "riding"] = _search(lab, p, "riding", begins, ride, fine * begins.high)
+        if end and len(lifted := states.get((name, "lifted"), [])) == len(RIDES):
+            pressed = rider(lifted, height=0.0, less=1e-3)
+            change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
+            searches[name, "leaning"] = _search(lab, p, "leaning", change, pressed, fine * end.high)
+    brackets |= _narrowed(lab, searches)
+
+    # The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
+    # the branch. There is no fold where the floor's force on it vanishes just where the wall begins to carry it.
+    folds, searches = {}, {}
+    for name, p in sets.items():
+        turned, held = states.get((name, "turning"), []), brackets.get((name, "riding"))
+        top, unloaded = extrapolated(turned, "slip_x", turning), extrapolated(turned, "force_Ay", vanishing)
+        off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
+        if top and not (held and off < narrowest * held.high):
+            folds[name], half = top, max(narrowest, 5.0 * top.uncertainty / top.value)
+            change = Bracket(top.value * (1 - half), top.value * (1 + half))
+            # At a fold all slows down, like the root of the distance.
+            time, width = 1 / math.sqrt(narrowest), narrowest * top.value
+            searches[name, "fold"] = _search(lab, p, "fold", change, turned[0].mean, width, time)
+    brackets |= _narrowed(lab, searches, careful=False)
+    for name, p in sets.items():
+        shown = {kind: b for (one, kind), b in brackets.items() if one == name and None not in b.runs}
+        beside = {kind: settled for (one, kind), settled in states.items() if one == name}
+        yield from _rows(lab, name, p, shown, beside, folds.get(name))
+
+
+def _settled_beside(lab: Lab, sets: Mapping[str, Parameters], of: Mapping[Key, Bracket]) -> dict[Key, list[Settled]]:
+    """Settled states beside every change, the nearest first; only those that did settle in the case that belongs."""
+    places: dict[Key, tuple[Array, str]] = {}
+    for name in sets:
+        if carried := of.get((name, "riding")):
+            places[name, "riding"] = carried.high * (1 + RIDES), "on the wall"
+            places[name, "sinking"] = carried.low * (1 - BESIDE), "on the wall"
+        end, last = of.get((name, "rolling")), of.get((name, "slipping"))
+        if end and lifts(end):
+            places[name, "lifted"] = end.high * (1 + RIDES), "on the wall"
+        elif end and last:
+            span = last.low - end.high
+            places[name, "slipping"] = end.high + BESIDE * min(span, end.high), "rest"
+            places[name, "turning"] = last.low - TURNS * span, "rest"
+    starts = [
+        [begin(name, sets[name].replace(omega_0=flow), how) for flow in flows.tolist()]
+        for (name, _), (flows, how) in places.items()
+    ]
+    belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
+    rows = settle_groups(lab, starts, loose=lab.effort("thresholds.loose"))
+    return {
+        key: [s for s in states if not s.failure and family(s.case) is belongs.get(key[1], Case.NR)]
+        for key, states in zip(places, rows, strict=True)
+    }
+
+
+def _narrowed(lab: Lab, searches: Mapping[Key, Search], careful: bool = True) -> dict[Key, Bracket]:
+    return dict(zip(searches, narrow(lab, list(searches.values()), careful), strict=True))
+
+
+def _search(
+    lab: Lab, p: Parameters, question: str, around: Bracket, start: From, width: float, time: float = 1.0
+) -> Search:
+    """Narrow a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
+
+    When it is where slipping ends, a run goes out from where the ball has come to at the largest flow so far.
+    """
+    units, answer = ASKED[question]
+
+    def task(omega: float, bracket: Bracket, care: Care) -> Task:
+        q, last = p.replace(omega_0=float(omega)), bracket.runs[0] if question == "slipping" else None
+        x0 = last.x[-1] if last else begin("", q, start).x0 if isinstance(start, str) else start
+        t_end = lasting(q, units * time * care.time)
+        return lab.task(q, x0(q) if callable(x0) else x0, t_end, coarse_step(q) / care.refine)
+
+    return Search(around, task, answer, width)
+
+
+def rider(states: Sequence[Settled], height: float, less: float = 0.0) -> Callable[[Parameters], Array]:
+    """Riding the wall at a height, as continued in omega_0 from settled states, with some part of its spin less."""
+    omegas = np.array([state.start.p.omega_0 for state in states])
+    fit = np.polynomial.Polynomial.fit(omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1)
+
+    def ride(p: Parameters) -> Array:
+        slip_x = float(fit(p.omega_0))
+        wall_spin = slip_x + p.R / p.r * p.omega_0
+        return State(y=height, omega_c=p.omega_0, slip_x=slip_x - less * wall_spin).stacked()
+
+    return ride
+
+
+def lifts(end: Bracket) -> bool:
+    """Whether two-point rolling ends by losing the floor, not by slipping: it carries no more than what hovers."""
+    if (run := end.runs[1]) is None:
+        return False
+    p = run.header.parameters
+    return bool(run.force_A[tail(run), 1].mean() < PRESSES * p.m * p.g)
+
+
+def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
+    """Largest of the slip speeds (n,) in the last part of a run, in units of `SLIPPING_SPEED` sqrt(g R)."""
+    p = run.header.parameters
+    return float(speeds[tail(run, share)].max() / (SLIPPING_SPEED * math.sqrt(p.g * p.R)))
+
+
+def stays_rolling(run: Trajectory) -> bool | None:
+    """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip still dies out.
+
+    It does where slip has fallen below 0.6 of what it was in the second half; a hundredth of what counts as slip is
+    none.
+    """
+    if not presses(run):
+        return False
+    middle = run.slip_speed_A[len(run.time) // 2 :]
+    last, before = slip(run.slip_speed_A, run), slip(middle, run, share=1.0)
+    if last >= 1:
+        return False if last > 0.6 * before else None
+    return True if last < 1e-2 else None
+
+
+ASKED: dict[str, tuple[float, Answer]] = {
+    "rolling": (5, stays_rolling),
+    "sinking": (20, lambda run: family(settled_case(run)) is not Case.NR),
+    "slipping": (40, lambda run: settles(run) is not False),
+    "riding": (5, lambda run: slip(run.slip_speed_B, run) > 1),
+    "leaning": (20, lambda run: presses(run) and settled_case(run) is Case.RR),
+    "fold": (1.4, settles),
+}
+"""How long a run takes, in units of 1/c, and what is asked of it: yes below a threshold, no above.
+
+The ball still rolls; the wall doesn't hold it; it settles on the floor, or may; it begins to slip on the wall; pressed
+to the floor it rolls on both again; it settles on the floor."""
+
+
+def extrapolated(
+    states: Sequence[Settled], quantity: str, to: Callable[[Array, Sequence[Measured]], Measured]
+) -> Measured | None:
+    """The flow to which a quantity of settled states points; None if they are too few, or point nowhere."""
+    if len(states) < POINTS:
+        return None
+    flows = [state.start.p.omega_0 for state in states]
+    values = [state.values["omega_c" if quantity == "lag" else quantity] for state in states]
+    if quantity == "lag":
+        values = [Measured(flow - orbit.value, orbit.uncertainty) for flow, orbit in zip(flows, values, strict=True)]
+    place = to(np.array(flows), values)
+    return place if math.isfinite(place.uncertainty) else None
+
+
+def _rows(
+    lab: Lab,
+    name: str,
+    p: Parameters,
+    brackets: Mapping[str, Bracket],
+    states: Mapping[str, Sequence[Settled]],
+    top: Measured | None,
+) -> Iterator[Measurement | Missing]:
+    """What was measured on one set: the end of rolling, the begin of riding, and the end of slipping on both."""
+    tasks = {kind: [state.task for state in settled] for kind, settled in states.items()}
+
+    def missing(reason: str) -> Missing:
+        return Missing(PROTOCOL, name, reason)
+
+    def record(quantity: str, value: Measured | float, tasks: Sequence[Task], **at: Condition) -> Measurement:
+        q = p.replace(omega_0=value.value) if isinstance(value, Measured) else p
+        return measurement(lab, PROTOCOL, name, q, quantity, value, tasks, **at)
+
+    def bisected(quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
+        # Slip that is still too small to count may have begun below: it is proportional to the distance.
+        speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in (run.slip_speed_A, run.slip_speed_B))
+        unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
+        place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
+        row = record(quantity, place, of.tasks, side=side, by=by)
+        return if_sure(row, place.value, f"{quantity} by {by} is uncertain by {place.uncertainty:.1g} rad/s")
+
+    def vanishes(what: str, kind: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
+        place = extrapolated(states.get(kind, []), what, vanishing)
+        if place and sure_enough(quantity, place, place.value):
+            yield record(quantity, place, tasks[kind], side=side, by=f"{by} → 0")
+        elif kind in states:
+            yield missing(f"too few states settled for {quantity} by {by}, or they point to it too vaguely")
+
+    rolling, leaning, riding, fold = (brackets.get(kind) for kind in ("rolling", "leaning", "riding", "fold"))
+    none = "no flow that was tried, up to twice the fastest of the settled states,"
+    if not rolling:
+        yield missing(f"{none} ends two-point rolling")
+    elif lifts(rolling):
+        yield missing("two-point rolling ends by losing the floor, not by slipping: there is no omega_01")
+        yield bisected("omega_03", rolling, "from below", "loss of the floor")
+        if leaning:
+            yield bisected("omega_03", leaning, "from above", "return to rolling when pressed")
+        else:
+            yield missing("a lifted ball did not settle, and could not be pressed back to the floor")
+    else:
+        yield missing("two-point rolling ends by slipping before the ball is lifted: there is no omega_03")
+        yield bisected("omega_01", rolling, "from below", "onset of slip")
+        yield from vanishes("lag", "slipping", "omega_01", "from above", "lag of settled slipping")
+    if riding:
+        yield bisected("omega_02", riding, "from above", "onset of sliding on the wall")
+    else:
+        yield missing(f"{none} is the least to hold a ball on the wall")
+    yield from vanishes("v_y", "sinking", "omega_02", "from below", "speed of settled sinking")
+    if not states.get("turning"):
+        yield missing("a ball that slips at both points settles at no flow: there is no omega_04")
+    elif top is None:
+        yield missing("slipping at both points passes to the wall without a jump: there is no omega_04")
+        yield from vanishes("force_Ay", "turning", "omega_02", "from below", "floor force of settled slipping")
+        yield record("folds", 0.0, tasks["turning"])
+    else:
+        by = "maximum of omega_0 along the branch"
+        row = record("omega_04", top, tasks["turning"], side="from below", by=by)
+        yield if_sure(row, top.value, f"the {by} is uncertain by {top.uncertainty:.1g} rad/s")
+        if fold:
+            yield bisected("omega_04", fold, "from below", "last settled slipping")
+        else:
+            yield missing("the end of slipping at both points could be extrapolated, but not be bracketed")
+        last = fold.low if fold else states["turning"][0].start.p.omega_0
+        if riding and last > riding.high:
+            yield record("folds", 1.0, tasks["turning"])
+
+
+def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """The drag at which omega_0 as a function of the floor's force has no slope where that vanishes.
+
+    By slopes over 1/c, to which what a force makes a ball lag by is proportional: the zero of the line through them.
+    """
+    ranges = {}
+    for name in sets:
+        begins, ends = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
+        if begins and ends and begins.value < ends.value:
+            ranges[name] = begins.value, ends.value
+    slopes: dict[str, list[tuple[float, Measured, list[Settled]]]] = {name: [] for name in ranges}
+    lags: dict[str, Measured] = {}
+    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
+    for _ in (FIRST_DRAGS, NEARER_DRAGS):
+        starts = [
+            [begin(name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest") for part in BEFORE_END]
+            for name, c in drags
+            for low, high in [ranges[name]]
+        ]
+        for (name, c), states in zip(drags, settle_groups(lab, starts), strict=True):
+            if not any(state.failure or state.case is not Case.SS for state in states):
+                flows = np.array([state.start.p.omega_0 for state in states])
+                slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
+                slopes[name].append((1 / c, slope, states))
+        for name, points in slopes.items():
+            if len(points) >= len(FIRST_DRAGS):
+                at, measured = [lag for lag, *_ in points], [slope for _, slope, _ in points]
+                lags[name], _ = straight_line(at, [m.value for m in measured], [m.uncertainty for m in measured])
+        drags = [(name, 1 / lag.value * k) for name, lag in lags.items() if lag.value > 0 for k in NEARER_DRAGS]
+    for name, p in sets.items():
+        if name not in ranges:
+            yield Missing("birth", name, "there is no range of slipping at both points that ends at the wall")
+        elif len(slopes[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
+            yield Missing("birth", name, "too few states of slipping at both points settle near the end of the branch")
+        else:
+            drag = Measured(1 / lags[name].value, lags[name].uncertainty / lags[name].value ** 2)
+            tasks = [state.task for *_, settled in slopes[name] for state in settled]
+            row = measurement(lab, "birth", name, p.replace(c=drag.value), "critical_drag", drag, tasks)
+            yield if_sure(row, drag.value, f"the drag where the fold is born is too vague: {drag.uncertainty:.2g} 1/s")

@@ -1,0 +1,120 @@
+"""Claims about flows that change: pulsation of a rolling ball, jumps, ramps past the fold."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import analytic
+from analytic.flowmeter import pulsation, response
+from compare.claim import Bearing, Claim
+from compare.judge import simulated, theory
+from compare.kit.check import Relation
+from compare.kit.record import Measurement, state
+from compare.subjects.unsteady.measure.jumps import caught_up
+from model import Case, Flow, Parameters
+from model.drag import STOKES
+
+
+def _at(m: Measurement, name: str = "f") -> float:
+    return float(m.conditions[name])
+
+
+def _ratio(m: Measurement) -> complex:
+    """omega_c divided by omega_0 in a pulsation."""
+    if m.parameters.drag == STOKES:
+        return complex(theory(response.transfer, m.parameters, Case.RR, _at(m)))
+    return theory(pulsation.first_harmonic, m.parameters, _at(m, "amplitude"), _at(m))
+
+
+def _slips(rule: str, relation: Relation) -> Bearing:
+    """The amplitude at which slip begins, if rolling ends by a rule."""
+
+    def onset(m: Measurement) -> float:
+        return theory(pulsation.slip_onset, m.parameters, _at(m), rule)
+
+    return Bearing(
+        "pulsation", "slip_amplitude", onset, relation=relation, by=f"analytic.flowmeter.pulsation.slip_onset, {rule}"
+    )
+
+
+def _mean_error(m: Measurement) -> float:
+    return theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m))
+
+
+def _peak(m: Measurement) -> tuple[float, float]:
+    return theory(response.peak, m.parameters, Case.SS)
+
+
+def ramp_end(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
+    """The flow at which a ramp ends slipping at both points by theory; LookupError if it doesn't."""
+    # The ramp goes on three times as far beyond the fold as a slow one overshoots it.
+    beyond = analytic.thresholds(p).omega_04 + 3.0 * response.ramp_coefficient(p) * rate ** (2 / 3)
+    t_end = (beyond - p.omega_0) / rate
+    end = caught_up(simulated(p, x0, t_end, 5_000, Flow.ramp(p.omega_0, beyond, t_end)))
+    if math.isnan(end):
+        raise LookupError("in theory the ramp doesn't end slipping")
+    return end
+
+
+def _ramp_end(m: Measurement) -> float:
+    return theory(ramp_end, m.parameters, _at(m, "rate"), state(m))
+
+
+def _overshoot(m: Measurement) -> float:
+    return abs(_ramp_end(m) - analytic.thresholds(m.parameters).omega_04)
+
+
+CLAIMS = (
+    Claim(
+        "pulsation-lag",
+        "(23)",
+        "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag alone accelerates it "
+        "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c.",
+        (
+            Bearing(
+                "pulsation",
+                "gain",
+                lambda m: abs(_ratio(m)),
+                by="analytic.flowmeter.response.transfer, pulsation.first_harmonic",
+            ),
+            Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_ratio(m)), by="the same"),
+            Bearing(
+                "unsteady",
+                "jump_delay",
+                lambda m: 1 / response.rolling_rate(m.parameters),
+                by="analytic.flowmeter.response.rolling_rate",
+            ),
+        ),
+    ),
+    Claim(
+        "pulsation-slip",
+        "(23), (66), (67), (73), (82)",
+        "In a pulsating flow a rolling ball begins to slip where the friction that its acceleration takes, or the "
+        "load at its fastest, is more than floor and wall can hold: not before slip can last, and not after no "
+        "forces allow rolling, mostly the same amplitude. In between Coulomb's law allows both; slip that "
+        "lasts below the first or rolling beyond the second would refute it.",
+        (_slips("slip-stability", Relation.AT_LEAST), _slips("infeasible", Relation.AT_MOST)),
+    ),
+    Claim(
+        "pulsation-mean",
+        "(23), (26), Definitions 1-3",
+        "A pulsation that makes the ball slip makes its mean reading low.",
+        (Bearing("pulsation", "mean_error", _mean_error, by="analytic.flowmeter.pulsation.mean_error"),),
+    ),
+    Claim(
+        "jump-slipping",
+        "(26), (38)-(42)",
+        "After a jump of the flow a ball that slips at both points overshoots its new reading and rings.",
+        (
+            Bearing("unsteady", "jump_peak", lambda m: _peak(m)[0], by="analytic.flowmeter.response.peak"),
+            Bearing("unsteady", "jump_height", lambda m: _peak(m)[1], by="analytic.flowmeter.response.peak"),
+        ),
+    ),
+    Claim(
+        "ramp-fold",
+        "(26), (88)",
+        "A flow that rises steadily keeps the ball slipping beyond the fold, before it catches up.",
+        (Bearing("unsteady", "ramp_end", _ramp_end, size=_overshoot, by="analytic.simulate"),),
+    ),
+)
