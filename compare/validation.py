@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from compare.bench import scores
-from compare.catalogue import CLAIMS
+from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Claim, Outcome, Verdict
 from compare.judge import forget, judge, select, verdict
 from compare.kit import programme, record
@@ -21,7 +21,6 @@ from compare.kit.drawing import Material
 from compare.kit.engines import MUJOCO, Engine
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
-from compare.kit.programme import PROTOCOLS
 from compare.kit.progress import Show, Whole, nowhere
 from compare.kit.record import Records
 from compare.kit.workers import Spread, Workers, spread

@@ -15,8 +15,6 @@ from model import Parameters, StorageError, Trajectory, storage
 if TYPE_CHECKING:  # it takes half a second to load, and much that hands over material never draws
     from matplotlib.figure import Figure
 
-    from compare.bench.league import Entry
-
 
 @dataclass(frozen=True)
 class Motion:
@@ -37,9 +35,9 @@ class Material:
     records: Records = Records()
     directory: Path = Path()
     """The results directory, where names of run files begin."""
-    ladder: tuple[Entry, ...] = ()
+    ladder: tuple[Any, ...] = ()
     """What is reached under settings that each have one thing more than the one before."""
-    frontier: tuple[Entry, ...] = ()
+    frontier: tuple[Any, ...] = ()
     """What methods reach, with their cost."""
 
     def select(self, quantity: str, *conditions: str) -> Iterator[Measurement]:
@@ -93,3 +91,12 @@ def save(figure: Figure, path: Path) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
         raise StorageError(f"cannot write {path}: {reason}") from error
+
+
+Figures = dict[str, Drawing]
+"""Figures by their file names."""
+
+
+def figure_of(title: str, module: Any, name: str, *claims: str) -> Drawing:
+    """One of several figures of a module; it stands beside the claim of its own name if no others are named."""
+    return Drawing(title, partial(module.select, figure=name), module.draw, module.caption, claims or (name,))

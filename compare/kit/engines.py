@@ -148,7 +148,7 @@ def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, c
         options=("timestep",),
         configure=lambda given, p: adapter.Settings(**given),
         simulate=partial(loop.simulate, name, library, adapter.scene),
-        sources=("model", "mjsim", "compare.engines"),
+        sources=("model", "mjsim", "compare.kit.adapters"),
         stands_on=("numpy",),
         needs=library,
         as_it_comes=other,

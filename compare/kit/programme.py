@@ -1,7 +1,7 @@
-"""Which protocols there are, in what order they measure, and where their measurements are kept.
+"""How protocols are carried out, and where their measurements are kept.
 
 A protocol is a function of a lab, the parameter sets, and what was measured before it; it yields measurements, and what
-it could not measure. To add one, write such a function and add a line to `PROTOCOLS`.
+it could not measure. To add one, write such a function and add a line to the `PROTOCOLS` of its subject.
 """
 
 from __future__ import annotations
@@ -16,21 +16,12 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 from compare.kit import record
-from compare.kit.engines import MOREAU, Engine
+from compare.kit.engines import Engine
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
 from compare.kit.tasks import sources
-from compare.subjects.attractors import measure as attractors
-from compare.subjects.flowmeter.measure import characteristic, unloading
-from compare.subjects.motion.measure import field, laws, motions
-from compare.subjects.slipping.measure import bounds, growth, lift
-from compare.subjects.stability import measure as rates
-from compare.subjects.stationary import measure as settled
-from compare.subjects.thresholds.measure import edge, plane, thresholds
-from compare.subjects.unsteady.measure import jumps as unsteady
-from compare.subjects.unsteady.measure import pulsation
 from model import Parameters, StorageError
 from model.files import make_directory
 
@@ -40,7 +31,6 @@ MOST = 3e4
 """Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or more at a time; and
 contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c is three times that: as much as
 `omega_c` may be off in a state that counts as settled."""
-HOPS = "hops that last are those of the set hopping"
 Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
 ONE = ("reference",)
 """For what one ball shows as well as seven, or the paper draws for one."""
@@ -64,7 +54,9 @@ class Protocol:
     quick: tuple[str, ...] = SEVEN
     """The sets it measures at the quick level; at the others all of them."""
     cost: float = 1.0
-    """Processor time at the quick level, s on some machine: what of the whole is done, and what begins first."""
+    """Processor time at the quick level, s on some machine: its part of the whole."""
+    first: bool = False
+    """Whether it is a single long run, which begins first: beside it there is work for the other workers."""
     level: Level = Level.QUICK
     """The least level of which it is a part."""
     waits: bool = True
@@ -81,62 +73,26 @@ class Protocol:
         return {name: p for name, p in sets(level).items() if level > Level.QUICK or name in self.quick}
 
 
-PROTOCOLS = (
-    # Single long runs begin first: beside them there is work for the other workers.
-    Protocol("recurrent", attractors.hopping, alone=HOPS),
-    Protocol("stepped", attractors.stepped, engine=MOREAU, alone=HOPS),
-    Protocol("choice", attractors.choice, alone="the choice is that of sets of its own with mu > 1"),
-    Protocol("settled", settled.measure),
-    Protocol("newcomer", settled.newcomer, alone="the engine's own settings are measured on reference only"),
-    Protocol("plane", plane.measure, alone="the planes of Figs. 7 and 8 are those of reference only"),
-    Protocol("hysteresis", characteristic.hysteresis, ("settled",), quick=ONE),
-    Protocol("rates", rates.measure, ("settled",)),
-    Protocol("laws", laws.measure, waits=False),
-    Protocol("thresholds", thresholds.measure, ("settled",)),
-    Protocol("edge", edge.measure, ("thresholds",), quick=ONE),
-    Protocol("birth", thresholds.birth, ("thresholds",)),
-    Protocol(
-        "unloading",
-        unloading.measure,
-        ("thresholds",),
-        quick=TWO,
-        drawn=lambda m: m.conditions["start"] == "unloading",
-    ),
-    Protocol("field", field.measure, waits=False),
-    Protocol("growth", growth.measure, waits=False),
-    Protocol("steepest", growth.steepest, waits=False),
-    Protocol("lift", lift.measure, waits=False),
-    Protocol("bounds", bounds.measure, ("thresholds",)),
-    Protocol("motions", motions.measure, quick=ONE, waits=False),
-    Protocol("impacts", motions.impacts, quick=TWO, waits=False),
-    Protocol("followed", attractors.followed, level=Level.DEFAULT, alone=HOPS),
-    Protocol(
-        "swing",
-        attractors.swing,
-        level=Level.DEFAULT,
-        alone="swings that last are those of reference on a very rough floor",
-    ),
-    Protocol("calm", attractors.calm, level=Level.DEFAULT, alone="strong drag is tried on sets of its own"),
-    Protocol("pulsation", pulsation.measure, ("thresholds",)),
-    Protocol("unsteady", unsteady.measure, ("thresholds",), drawn=lambda m: m.quantity == "jump_height"),
-    Protocol("slope", characteristic.slope, ("settled", "thresholds")),
-)
-"""Every protocol there is, in the order in which they measure; each goes out only from those before it."""
-
-
 def file(
     protocol: Protocol, results: Path, engine: Engine, level: Level, chosen: Mapping[str, Parameters] | None
 ) -> Path:
     """Where measurements are kept; those of another engine, level, choice of sets, or program are apart."""
     engine, sets = protocol.engine or engine, protocol.measures(level) if chosen is None else chosen
-    identity = [engine.name, level.name, {name: asdict(p) for name, p in sets.items()}, _program(engine)]
+    identity = [
+        engine.name,
+        level.name,
+        {name: asdict(p) for name, p in sets.items()},
+        _program(engine, protocol.measure.__module__),
+    ]
     apart = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
     return results / DIRECTORY / apart / f"{protocol.name}.h5"
 
 
 @cache
-def _program(engine: Engine) -> str:
-    return sources(*engine.sources, "compare", "compare.measure")
+def _program(engine: Engine, module: str) -> str:
+    """Digest of the sources of an engine, of what all protocols share, and of those of a subject."""
+    subject, measure, _ = module.partition(".measure")
+    return sources(*engine.sources, "compare.kit", *([subject + measure] if measure else []))
 
 
 def needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
@@ -167,7 +123,9 @@ def run(
     with ThreadPoolExecutor(lab.campaign.at_once) as threads:
         try:
             while order.is_active():
-                for protocol in sorted((known[name] for name in order.get_ready()), key=protocols.index):
+                for protocol in sorted(
+                    (known[name] for name in order.get_ready()), key=lambda p: (not p.first, protocols.index(p))
+                ):
                     before = sum((found[name] for name in protocol.needs if name in found), Records())
                     running[threads.submit(carry_out, protocol, lab, chosen, before, results)] = protocol
                 for future in wait(running, return_when=FIRST_COMPLETED).done:

@@ -22,6 +22,10 @@ from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
+PRESSES = 0.05
+"""Normal force divided by the weight above which friction is looked at: a contact that carries less may hover."""
+SPIN = 1.0
+"""Spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r."""
 SPAN = 40.0
 """Least length of a round in units of 1/c, the time in which the fluid stops a free ball."""
 ROUNDS = (1.0, 2.0, 2.0)

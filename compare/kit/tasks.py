@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -227,11 +227,15 @@ def _code(engine: Engine) -> dict[str, str]:
 
 
 @functools.cache
-def sources(*packages: str) -> str:
-    """Digest of the sources of packages."""
+def sources(*names: str) -> str:
+    """Digest of the sources of packages, with all that is below them, and of modules."""
     digest = hashlib.sha256()
-    for package in packages:
-        for entry in sorted(resources.files(package).iterdir(), key=lambda entry: entry.name):
-            if entry.name.endswith((".py", ".xml")):
-                digest.update(entry.name.encode() + b"\0" + entry.read_bytes() + b"\0")
+    for name in names:
+        spec = find_spec(name)
+        assert spec is not None
+        assert spec.origin is not None
+        top = Path(spec.origin)
+        for path in sorted(top.parent.rglob("*")) if spec.submodule_search_locations else [top]:
+            if path.suffix in (".py", ".xml"):
+                digest.update(path.relative_to(top.parent).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()

@@ -1,0 +1,28 @@
+"""The subjects of the study: a folder each, with its `measure`, `claims` and `figures`, and a line here.
+
+To take one out, remove both.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
+
+NAMES = (
+    "stationary",
+    "thresholds",
+    "stability",
+    "flowmeter",
+    "motion",
+    "slipping",
+    "attractors",
+    "unsteady",
+)
+"""In the order of the report; each measures only after those before it."""
+
+
+def parts(part: str) -> list[ModuleType]:
+    """The `measure`, `claims` or `figures` of all subjects that have them."""
+    modules = (f"{__name__}.{name}.{part}" for name in NAMES)
+    return [import_module(module) for module in modules if find_spec(module)]

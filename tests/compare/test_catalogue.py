@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 
-from compare.catalogue import CLAIMS
+from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Text
 from compare.kit.levels import Level
-from compare.kit.programme import PROTOCOLS, needed
+from compare.kit.programme import needed
 from compare.kit.sets import COUNT, sets
 
 SHOWN = {"newcomer"}

@@ -20,14 +20,13 @@ from compare import gallery as registry
 from compare.bench.league import COST, Entry
 from compare.catalogue import CLAIMS
 from compare.gallery import FIGURES, figures_of
-from compare.kit import drawing, style
+from compare.kit import deviations, drawing, style
 from compare.kit.check import Check
 from compare.kit.drawing import Diagram, GapError, Material, Motion
 from compare.kit.engines import ENGINES
 from compare.kit.record import Measurement, Records
 from compare.subjects.flowmeter.figures import unloading
 from compare.subjects.slipping import figures as slipping
-from compare.subjects.stationary import figures as deviations
 from compare.subjects.thresholds.figures import bifurcation_diagrams
 from compare.subjects.unsteady import figures as unsteady
 from model import Case, InputError, Parameters, StorageError

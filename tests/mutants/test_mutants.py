@@ -20,7 +20,7 @@ from compare.kit.engines import ENGINES, MUJOCO
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.record import Records
-from compare.subjects.motion.measure.field import constrained
+from compare.kit.short import constrained
 from compare.subjects.stationary import claims
 from model import Case, Parameters
 from tests.mutants import engines, trial

@@ -115,3 +115,4 @@ CLAIMS = (
         level=Level.DEFAULT,
     ),
 )
+SECTIONS = {"Beyond the paper": CLAIMS}

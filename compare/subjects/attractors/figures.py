@@ -16,9 +16,9 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import OrbitBranch
+from compare.branches import Quantity, lifted, slipping, spin, spins
 from compare.kit import style
-from compare.kit.drawing import Diagram, Material
-from compare.subjects.thresholds.figures.bifurcation_diagrams import Quantity, lifted, slipping, spin, spins
+from compare.kit.drawing import Diagram, Drawing, Material
 from model import Case, Parameters, State
 from model.files import reading_json
 
@@ -181,3 +181,28 @@ def draw_walls(of: Diagram) -> Figure:
         axes.margins(0.2, 0.1)
     style.legend(panels[0], loc="upper left")
     return figure
+
+
+FIGURES = {
+    "hopping-orbit": Drawing(
+        "Beyond the paper: a ball that hops for ever",
+        select,
+        draw_orbit,
+        caption_orbit,
+        ("hopping",),
+    ),
+    "hopping-branch": Drawing(
+        "Beyond the paper: Figs. 9, 10 and 13 with hopping",
+        select,
+        draw_branch,
+        caption_branch,
+        ("hopping-birth",),
+    ),
+    "hopping-walls": Drawing(
+        "Beyond the paper: hops along rougher walls",
+        select_walls,
+        draw_walls,
+        caption_walls,
+        ("hopping-death",),
+    ),
+}

@@ -24,13 +24,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import qmc
 
+from compare.kit.engines import MOREAU
 from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.levels import Level
+from compare.kit.programme import Protocol
 from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of
 from compare.kit.settling import settle
+from compare.kit.short import constrained
 from compare.kit.statistics import Measured, hops, peaks, top
 from compare.kit.tasks import Task
 from compare.kit.trials import Start, Trial, carry_out, finer
-from compare.subjects.motion.measure.field import constrained
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 
@@ -286,3 +289,17 @@ def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
             continue
         for quantity, value in (("case", settled.case), ("omega_c", settled.values["omega_c"])):
             yield measurement(lab, "choice", start.set, start.p, quantity, value, [settled.task])
+
+
+_HOPS = "hops that last are those of the set hopping"
+_SWINGS = "swings that last are those of reference on a very rough floor"
+_DRAG = "strong drag is tried on sets of its own"
+_ROUGH = "the choice is that of sets of its own with mu > 1"
+PROTOCOLS = (
+    Protocol("recurrent", hopping, alone=_HOPS, first=True),
+    Protocol("stepped", stepped, engine=MOREAU, alone=_HOPS, first=True),
+    Protocol("choice", choice, alone=_ROUGH, first=True),
+    Protocol("followed", followed, level=Level.DEFAULT, alone=_HOPS),
+    Protocol("swing", swing, level=Level.DEFAULT, alone=_SWINGS),
+    Protocol("calm", calm, level=Level.DEFAULT, alone=_DRAG),
+)

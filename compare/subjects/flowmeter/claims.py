@@ -8,7 +8,7 @@ import analytic
 from compare.claim import Bearing, Claim, Text, When, every, given, one
 from compare.judge import theory
 from compare.kit.record import Measurement
-from compare.subjects.stationary.claims import (
+from compare.settled import (
     cases,
     detected,
     from_floor,
@@ -18,6 +18,7 @@ from compare.subjects.stationary.claims import (
     natural_size,
     slips_first,
 )
+from compare.subjects.flowmeter import unloading
 from model import Case
 
 
@@ -148,3 +149,4 @@ CLAIMS = (
         reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that is above ω₀₄.",
     ),
 )
+SECTIONS = {"Flowmeter": (*CLAIMS, *unloading.CLAIMS)}

@@ -6,7 +6,8 @@ import analytic
 from compare.claim import Bearing, Claim, Text, given
 from compare.judge import theory
 from compare.kit.record import state
-from compare.subjects.stationary.claims import force
+from compare.settled import force
+from compare.subjects.motion import cases
 from model import Case
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -64,3 +65,4 @@ CLAIMS = tuple(
     )
     for case in Case
 )
+SECTIONS = {"Laws and cases": cases.CLAIMS, "Equations of motion": CLAIMS}

@@ -246,3 +246,4 @@ CLAIMS = (
     ),
     *(_lifting(*arrow) for arrow in slip_stability.LIFT_ARROWS),
 )
+SECTIONS = {"Slipping": CLAIMS}

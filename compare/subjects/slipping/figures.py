@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from analytic.bifurcation import diagram as bifurcation
 from analytic.simulation import scenarios
 from compare.kit import style
-from compare.kit.drawing import Material, Motion
+from compare.kit.drawing import Drawing, Material, Motion
 from compare.kit.engines import EVENT
 from model import Case, Parameters
 
@@ -76,3 +76,9 @@ def draw(push: Motion) -> Figure:
         axes.axhline(0, **style.GUIDE)
     plane.axvline(0, **style.GUIDE)
     return figure
+
+
+FIGURES = {
+    name: Drawing(title, partial(select, figure=name), draw, caption, ("slip-NR-NS",))
+    for name, title in (("fig-4", "Fig. 4: a slip that dies out"), ("fig-5", "Fig. 5: a slip that grows"))
+}

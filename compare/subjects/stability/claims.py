@@ -119,3 +119,4 @@ CLAIMS = (
         _bearings(Case.NS),
     ),
 )
+SECTIONS = {"Stability": CLAIMS}

@@ -22,12 +22,12 @@ import numpy.typing as npt
 from compare.kit.engines import STUDY_SLIP
 from compare.kit.fits import exponents, matched, propagator
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.programme import Protocol
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
-from compare.kit.settling import SOLVED, family, high
+from compare.kit.settling import SOLVED, SPIN, family, high
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
-from compare.subjects.stationary.measure import SPIN
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -272,3 +272,6 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
         if size > REST * p.c:
             return size
     return 1 / time_unit(p)
+
+
+PROTOCOLS = (Protocol("rates", measure, ("settled",)),)

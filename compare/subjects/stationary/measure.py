@@ -14,16 +14,15 @@ from itertools import groupby
 
 from compare.kit import engines
 from compare.kit.lab import Lab, time_unit
+from compare.kit.programme import Protocol
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.settling import GROUPS, Settled, begin, duration, family, judged, scale, settle
+from compare.kit.settling import GROUPS, SPIN, Settled, begin, duration, family, judged, scale, settle
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start
 from model import Parameters, State
 from model.drag import QUADRATIC
 
 PROTOCOL = "settled"
-SPIN = 1.0
-"""Spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r."""
 LIVELY = 10.0
 """How many times within a round the fluid would stop a free ball in a state whose values count."""
 
@@ -121,3 +120,9 @@ def _key(each: Settled) -> tuple[str, float, int]:
 def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> Measurement:
     start, at = each.start, {"case": each.case.name, "start": each.start.name}
     return measurement(lab, PROTOCOL, start.set, start.p, quantity, value, [each.task], **at)
+
+
+PROTOCOLS = (
+    Protocol("settled", measure),
+    Protocol("newcomer", newcomer, alone="the engine's own settings are measured on reference only"),
+)

@@ -10,7 +10,8 @@ from compare.claim import Bearing, Claim, When, given
 from compare.judge import theory
 from compare.kit.record import Measurement
 from compare.kit.settling import scale
-from compare.subjects.stationary.claims import number
+from compare.settled import number
+from compare.subjects.thresholds import formal
 from model import Case
 
 SLIPPING = "floor force of settled slipping → 0"
@@ -120,3 +121,4 @@ CLAIMS = (
         ),
     ),
 )
+SECTIONS = {"Bifurcations": CLAIMS, "Formal": formal.CLAIMS}

@@ -118,3 +118,4 @@ CLAIMS = (
         (Bearing("unsteady", "ramp_end", _ramp_end, size=_overshoot, by="analytic.simulate"),),
     ),
 )
+SECTIONS = {"Unsteady flow": CLAIMS}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,10 +14,10 @@ from matplotlib.ticker import NullFormatter
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import pulsation, response
+from compare.branches import slipping
 from compare.kit import style
-from compare.kit.drawing import Material, Motion
+from compare.kit.drawing import Drawing, Material, Motion
 from compare.kit.record import Measurement
-from compare.subjects.thresholds.figures.bifurcation_diagrams import slipping
 from compare.subjects.unsteady.measure.jumps import JUMP, caught_up, odd_part
 from model import Case, Flow, Parameters
 
@@ -169,3 +169,21 @@ def _jumps(axes: Axes, of: Measurements) -> None:
         axes.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="MuJoCo")
     axes.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$, 1 in the end")
     style.legend(axes)
+
+
+FIGURES = {
+    "pulsation": Drawing(
+        "Unsteady flow: pulsation",
+        partial(select, figure="pulsation"),
+        draw_pulsation,
+        caption_pulsation,
+        ("pulsation-lag", "pulsation-slip", "pulsation-mean"),
+    ),
+    "unsteady": Drawing(
+        "Unsteady flow: jumps and ramps",
+        partial(select, figure="unsteady"),
+        draw_unsteady,
+        caption_unsteady,
+        ("jump-slipping", "ramp-fold"),
+    ),
+}

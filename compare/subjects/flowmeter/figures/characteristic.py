@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
+from compare.branches import fold_state, slipping
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, GapError, Material
 from compare.kit.engines import NEWCOMER
 from compare.kit.record import Measurement
-from compare.subjects.thresholds.figures.bifurcation_diagrams import fold_state, slipping
 from model import Case, Parameters
 
 SETS = {"fig-13-left": "reference", "fig-13-right": "high-wall-friction"}

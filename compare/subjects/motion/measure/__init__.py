@@ -1,0 +1,13 @@
+"""The equations of motion, the laws of contact and friction, changes of case and landings."""
+
+from __future__ import annotations
+
+from compare.kit.programme import ONE, TWO, Protocol
+from compare.subjects.motion.measure import field, laws, motions
+
+PROTOCOLS = (
+    Protocol("laws", laws.measure, waits=False),
+    Protocol("field", field.measure, waits=False),
+    Protocol("motions", motions.measure, quick=ONE, waits=False),
+    Protocol("impacts", motions.impacts, quick=TWO, waits=False),
+)

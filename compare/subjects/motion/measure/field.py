@@ -16,10 +16,20 @@ import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of, sure_enough
-from compare.kit.short import DOUBT, LIMIT, REFINED, lag_error, polynomials
+from compare.kit.settling import PRESSES
+from compare.kit.short import (
+    DOUBT,
+    HALF_WINDOW,
+    LIMIT,
+    REFINED,
+    WINDOW_DEGREES,
+    constrained,
+    lag_error,
+    polynomials,
+    random_state,
+)
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start
-from compare.subjects.motion.measure.laws import PRESSES
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -27,12 +37,10 @@ from model.kinematics import VARIABLES, slip_velocities
 
 PROTOCOL = "field"
 SEED = 53
-CENTRES, HALF = (16, 40, 64), 8
-"""Centres of the windows and half their width, in steps of the coarser run."""
+CENTRES = (16, 40, 64)
+"""Centres of the windows, in steps of the coarser run."""
 APART = 4
 """Steps before and after a window in which the case doesn't change, either: friction then builds up or dies out."""
-DEGREES = (5, 3)
-"""Degrees of the polynomials; the lower one shows what the degree changes."""
 TURN = 0.5
 """Largest change of a slip in a window divided by the slip itself, and of the change that friction alone would make:
 friction turns too fast where slip is about to vanish, or is held at a trace."""
@@ -52,7 +60,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             rolls = case is Case.RR
             omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
             starts.append(Start(name, p.replace(omega_0=omega_0), case.name, x))
-    steps = CENTRES[-1] + HALF + APART
+    steps = CENTRES[-1] + HALF_WINDOW + APART
     tasks = [lab.pair(start.p, start.x0, steps, coarse_step(start.p) / REFINED) for start in starts]
     runs = list(lab.groups(tasks))
     kept = Counter[tuple[str, Case]]()
@@ -71,41 +79,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 yield measurement(lab, PROTOCOL, start.set, start.p, what, value, pair, case=case.name, **at)
     for name, case in product(sets, Case):
         if not kept[name, case]:
-            yield Missing(PROTOCOL, name, f"no random start moved smoothly in case {case.name} for {2 * HALF} steps")
-
-
-def random_state(case: Case, p: Parameters, rng: np.random.Generator) -> Array:
-    """A state (8,) that satisfies the constraints of a case.
-
-    A ball that rolls goes round so slowly, or one that hangs on the wall so fast, that friction has something to
-    spare; a ball that the wall alone keeps from turning spins backwards about its radial axis.
-    """
-    unit, speed = time_unit(p), math.sqrt(p.g * p.R)
-    slips = rng.uniform(0.4, 1.0, 3) * rng.choice([-1, 1], 3) * speed / p.r
-    omega_c = rng.uniform(0.4, 1.6) / unit
-    if case.A is Contact.R and case.B is not Contact.N:
-        omega_c = rng.uniform(0.2, 0.7) / unit * min(1.0, math.sqrt(p.mu), math.sqrt(p.mu / p.j))
-    if case.B is Contact.R and case.A is not Contact.R:
-        hangs = 1.0 if case.A is Contact.N else p.mu
-        omega_c = rng.uniform(1.05, 1.3) / unit * max(1.0, math.sqrt(hangs / max(p.eta, 0.01)))
-        slips[0] = -rng.uniform(0.6, 1.2) * p.R * omega_c / p.r
-    values = {
-        "y": rng.uniform(0.2, 0.6) * p.R,
-        "v_y": rng.uniform(-0.2, 0.3) * speed,
-        "omega_c": omega_c,
-        **dict(zip(("slip_x", "slip_y", "slip_z"), slips, strict=True)),
-        "h": rng.uniform(0.3, 0.5) * p.R,
-        "v_h": rng.uniform(-0.2, 0.3) * speed,
-    }
-    x = np.array([values[name] if name in TRAITS[case].active else 0.0 for name in VARIABLES])
-    return constrained(case, x, p)
-
-
-def constrained(case: Case, x: Array, p: Parameters) -> Array:
-    """The state (8,) with what the case holds at zero set to exactly that, of which a contact leaves some 1e-9."""
-    held = [name in TRAITS[case].constraints for name in VARIABLES]
-    x = np.where(held, 0.0, x)
-    return State.of(x)._replace(slip_z=-State.of(x).v_h / p.r).stacked() if case is Case.RN else x
+            yield Missing(
+                PROTOCOL, name, f"no random start moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
+            )
 
 
 def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
@@ -114,15 +90,15 @@ def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Ar
     """
     read = []
     for run, times in ((coarse, 1), (fine, 2)):
-        near, half, middle = (HALF + APART) * times, HALF * times, centre * times
+        near, half, middle = ((HALF_WINDOW + APART) * times, HALF_WINDOW * times, centre * times)
         window = slice(middle - half, middle + half + 1)
         if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(case, run, window):
             return None
         time, at = run.time[window], float(run.time[middle])
         # The forces of a sample act from then on for a step: they belong to the middle of it.
         acting = time + (time[1] - time[0]) / 2
-        forces = polynomials(acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], DEGREES, at)[0]
-        read.append(np.concatenate([*polynomials(time, run.x[window], DEGREES, at), forces], axis=1))
+        forces = polynomials(acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at)[0]
+        read.append(np.concatenate([*polynomials(time, run.x[window], WINDOW_DEGREES, at), forces], axis=1))
     (one, _), (two, lower) = read
     best = two + (two - one) * LIMIT
     best[STATE] = constrained(case, best[STATE], fine.header.parameters)

@@ -15,6 +15,7 @@ import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, if_sure, measurement
+from compare.kit.settling import PRESSES
 from compare.kit.statistics import Measured
 from model import Flow, Parameters, State, Trajectory
 from model.arrays import Array
@@ -27,8 +28,6 @@ FASTEST = 3.0
 """The flow rises from rest to this, or falls from it, omega_0 sqrt(R/g)."""
 SLIPS = 0.02
 """Slip speed divided by sqrt(g R) above which friction must be that of slipping, whatever case is detected."""
-PRESSES = 0.05
-"""Normal force divided by the weight above which friction is looked at: a contact that carries less may hover."""
 FEWEST = 20
 """Samples of a law that a set must have."""
 ROUNDING = 100 * float(np.finfo(float).eps)

@@ -15,10 +15,9 @@ import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
-from compare.kit.short import REFINED
+from compare.kit.short import REFINED, constrained
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start
-from compare.subjects.motion.measure.field import constrained
 from model import Case, Contact, Parameters, State, Trajectory
 from model.kinematics import VARIABLES
 

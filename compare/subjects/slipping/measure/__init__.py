@@ -1,0 +1,13 @@
+"""How slip begins: how a slight slip grows, from which flow on, and when a ball leaves the floor."""
+
+from __future__ import annotations
+
+from compare.kit.programme import Protocol
+from compare.subjects.slipping.measure import bounds, growth, lift
+
+PROTOCOLS = (
+    Protocol("growth", growth.measure, waits=False),
+    Protocol("steepest", growth.steepest, waits=False),
+    Protocol("lift", lift.measure, waits=False),
+    Protocol("bounds", bounds.measure, ("thresholds",)),
+)

@@ -20,12 +20,20 @@ import numpy as np
 from compare.kit.fits import slope_error
 from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
-from compare.kit.short import DOUBT, LIMIT, REFINED, lag_error, polynomials, slip_unit
+from compare.kit.short import (
+    DOUBT,
+    HALF_WINDOW,
+    LIMIT,
+    REFINED,
+    WINDOW_DEGREES,
+    lag_error,
+    polynomials,
+    random_state,
+    slip_unit,
+)
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
-from compare.subjects.motion.measure import field
-from compare.subjects.motion.measure.field import random_state
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ
@@ -51,9 +59,9 @@ contact that slips already depends on the size."""
 DEGREES = (4, 3)
 """Degrees of the polynomials; the lower one shows what the degree changes."""
 AT_START = slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]) / slope_error(
-    np.arange(-field.HALF, field.HALF + 1.0), field.DEGREES[0]
+    np.arange(-HALF_WINDOW, HALF_WINDOW + 1.0), WINDOW_DEGREES[0]
 )
-"""Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a `field` window."""
+"""Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a window."""
 SMOOTH = "without friction at both contacts there is nothing that rolls"
 SINKING = 0.5
 """Speed at which a ball sinks divided by `dragged_speed`; the fluid also pulls along the wall at `dragged_speed`."""

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-import analytic
 from analytic.bifurcation import diagram as bifurcation
-from analytic.stationary import branch_stability, slipping_branch
+from analytic.stationary import branch_stability
+from compare.branches import fold_state, lifted, slipping, spin, spins
 from compare.kit import style
 from compare.kit.drawing import Diagram, Material
 from compare.kit.style import UNSTABLE, Place
 from model import Case, Parameters, State
-from model.arrays import Array
 
 RELEASED = Parameters.named("reference").replace(eta=0.43)
 """eta so little over j that the branch of SS, with (12) released, is whole."""
@@ -35,8 +32,6 @@ _SHOWN = {
     "fig-12": "as Fig. 11, but with the floor allowed to pull (A_y < 0), which is formal: the branch of SS and its "
     "bifurcations P3, F and NF2 reappear, and RR and SR exchange stability at NT1",
 }
-Quantity = Callable[[Array, Array], Array]
-"""What is drawn, of slip_x and omega_c."""
 
 
 def select(material: Material, figure: str) -> Diagram:
@@ -115,22 +110,6 @@ def draw(of: Diagram) -> Figure:
     return figure
 
 
-def spin(p: Parameters, slip_x: Array, omega_c: Array) -> Array:
-    """The spin on the wall (91), rad s-1."""
-    return np.asarray(bifurcation.wall_spin(State(omega_c=omega_c, slip_x=slip_x), p))
-
-
-def spins(case: Case, flows: npt.ArrayLike, p: Parameters) -> list[float]:
-    """omega_x^0, rad s-1, of a case at flows, also where it is formal; that of SR is that of NR."""
-    sets = [p.replace(omega_0=float(flow)) for flow in np.ravel(flows)]
-    return [float(bifurcation.wall_spin(analytic.solution(q, case, formal=True).state, q)) for q in sets]
-
-
-def lifted(omega_0: float, p: Parameters) -> float:
-    """That of NR at one flow."""
-    return spins(Case.NR, omega_0, p)[0]
-
-
 def _branch(
     axes: Axes,
     p: Parameters,
@@ -145,21 +124,3 @@ def _branch(
     flows = np.linspace(begin, end, 200)
     values = flows * p.R / p.r if case is Case.RR else spins(Case.NR if case is Case.SR else case, flows, p)
     style.curve(axes, case, flows, values, text, place, line)
-
-
-def slipping(
-    axes: Axes, p: Parameters, quantity: Quantity, stable: Place | None = None, unstable: Place | None = None
-) -> None:
-    """The branch of SS, its line by its eigenvalues; a name at each part that has a place for it."""
-    s = np.linspace(-16.0, 16.0, 1601)
-    x, omega_0 = branch_stability.states(s, p)
-    grows = branch_stability.eigenvalues_at(s, p).real.max(axis=-1) > 0
-    values = quantity(State.of(x).slip_x, State.of(x).omega_c)
-    for part, line, text, place in ((~grows, "-", "SS", stable), (grows, UNSTABLE, "SS, unstable", unstable)):
-        if part.any():
-            style.curve(axes, Case.SS, omega_0, np.where(part, values, np.nan), text, place, line)
-
-
-def fold_state(p: Parameters, released: bool = False) -> State:
-    """The state of SS at the fold."""
-    return State.of(branch_stability.states(slipping_branch.fold(p, released=released), p)[0])

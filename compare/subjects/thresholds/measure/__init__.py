@@ -1,0 +1,13 @@
+"""Flows at which one kind of motion gives way to another, and which motions there are over a plane of parameters."""
+
+from __future__ import annotations
+
+from compare.kit.programme import Protocol
+from compare.subjects.thresholds.measure import edge, plane, thresholds
+
+PROTOCOLS = (
+    Protocol("plane", plane.measure, alone="the planes of Figs. 7 and 8 are those of reference only"),
+    Protocol("thresholds", thresholds.measure, ("settled",)),
+    Protocol("edge", edge.measure, ("thresholds",), quick=("reference", "rough-floor")),
+    Protocol("birth", thresholds.birth, ("thresholds",)),
+)

@@ -25,10 +25,20 @@ from compare.kit.brackets import Answer, Bracket, Care, Search, narrow
 from compare.kit.fits import POINTS, initial_slope, straight_line, turning, vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, sure_enough
-from compare.kit.settling import Settled, begin, family, high, lasting, presses, settle_groups, settled_cases, settles
+from compare.kit.settling import (
+    PRESSES,
+    Settled,
+    begin,
+    family,
+    high,
+    lasting,
+    presses,
+    settle_groups,
+    settled_cases,
+    settles,
+)
 from compare.kit.statistics import COVERAGE, Measured, settled_case, tail
 from compare.kit.tasks import Task
-from compare.subjects.motion.measure.laws import PRESSES
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 

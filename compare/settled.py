@@ -1,0 +1,79 @@
+"""What theory says of a settled state, as claims of several subjects ask for it."""
+
+from __future__ import annotations
+
+import analytic
+from analytic import StationarySolution
+from analytic.bifurcation import diagram as bifurcation
+from compare.claim import When
+from compare.judge import theory
+from compare.kit.record import Measurement
+from compare.kit.settling import family, forces, scale
+from model import Case, Parameters
+from model.arrays import Array
+
+
+def lasting(p: Parameters) -> list[StationarySolution]:
+    """The stationary solutions that a ball may settle to: those that attract, and the one that sinks for ever."""
+    return theory(analytic.stable_solutions, p, sinking=True)
+
+
+def cases(p: Parameters) -> set[Case]:
+    """Cases of the states that last; SR, the state of NR on an unloaded floor, is none of its own."""
+    return {s.case for s in lasting(p)} - {Case.SR}
+
+
+def detected(m: Measurement) -> Case:
+    """The case of the state that was measured; two cases in which a contact carries nothing count as one.
+
+    SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall.
+    """
+    case = family(Case[str(m.conditions["case"])])
+    return Case.RS if case is Case.RN else case
+
+
+def reached(m: Measurement) -> StationarySolution:
+    """The lasting state of the case that was detected; LookupError if theory has none."""
+    for state in lasting(m.parameters):
+        if state.case is detected(m):
+            return state
+    raise LookupError(f"no state of case {detected(m).name} lasts")
+
+
+def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
+    """A quantity of a stationary solution by its name in the measurements."""
+    if quantity == "wall_spin":
+        return float(bifurcation.wall_spin(s.state, p))
+    if quantity.startswith("force_"):
+        return force(quantity.removeprefix("force_"), s.force_A, s.force_B)
+    return float(getattr(s.state, quantity))
+
+
+def force(name: str, A: Array, B: Array) -> float:
+    """A component of the contact forces (3,), such as "Ax", or a sum that mechanics determine, such as "Ax-By"."""
+    return float(forces(A, B)[name])
+
+
+def natural_size(m: Measurement) -> float:
+    """Over which errors of a settled state are counted."""
+    return scale(m.quantity, m.parameters)
+
+
+def is_in(*cases: Case) -> When:
+    """Chooses the settled states of these cases."""
+    return lambda m: detected(m) in cases
+
+
+def slips_first(m: Measurement) -> bool:
+    """Whether eta < j: slip ends rolling."""
+    return m.parameters.eta < m.parameters.j
+
+
+def lifts_first(m: Measurement) -> bool:
+    """Whether eta > j: the floor is lost before slip begins."""
+    return m.parameters.eta > m.parameters.j
+
+
+def from_floor(m: Measurement) -> bool:
+    """Whether the ball started on the floor."""
+    return m.conditions["start"] in ("rest", "with the fluid")
