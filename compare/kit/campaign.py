@@ -238,7 +238,7 @@ class Campaign:
                 batch = (again.popleft(),)
                 pending[self._executor.submit(run_batch, batch, self.directory, self.label, self.limit)] = batch
             ended, _ = wait(pending, return_when=FIRST_COMPLETED)
-            for future in ended:
+            for future in [each for each in pending if each in ended]:  # in order, for what is held in memory
                 batch = pending.pop(future)
                 error = future.exception()
                 if error is None:

@@ -158,7 +158,7 @@ def test_documents_name_what_exists(document: str) -> None:
     """Every test, function and module the documents point to is there."""
     root = Path(__file__).parents[2]
     text = (root / "docs" / document).read_text("utf-8")
-    sources = {path: path.read_text("utf-8") for path in [*root.glob("*/*.py"), *root.glob("tests/*/*.py")]}
+    sources = {path: path.read_text("utf-8") for path in [*root.glob("*/**/*.py")]}
     for path in re.findall(r"\]\(\.\./([\w/]+\.py)\)", text):
         assert (root / path).exists(), path
     everything = "\n".join(sources.values())

@@ -169,7 +169,7 @@ def test_default_sampling_and_progress(method):
 def test_progress_within_a_long_stretch(method, monkeypatch):
     """A single case and a single sample: the steps themselves report, so that a caller can stop the run in time."""
     for between_two_reports in ("hybrid.REPORT_EVERY", "time_stepping.AT_ONCE"):
-        monkeypatch.setattr(f"analytic.{between_two_reports}", 10)
+        monkeypatch.setattr(f"analytic.simulation.{between_two_reports}", 10)
     p, seen = P.replace(omega_0=25.0), []
     run = simulate(
         p, [0, 0, 13.8, -4, 0.5, 10], 0.2, method=method, timestep=1e-3, sample_interval=0.2, progress=seen.append

@@ -156,5 +156,7 @@ def test_functions_that_nothing_tries_are_found() -> None:
     verdicts, called = trial.watched(lambda: analytic.thresholds(P))
     assert verdicts == analytic.thresholds(P)
     names = trial.untried(called)
-    assert not {"bifurcation.thresholds", "slip_bounds.gamma_nr"} & set(names)  # called; changed by a wrong theory
-    assert "flowmeter.operating_limit" in names
+    assert not {"bifurcation.diagram.thresholds", "slipping.slip_bounds.gamma_nr"} & set(
+        names
+    )  # called; changed by a wrong theory
+    assert "flowmeter.characteristic.operating_limit" in names

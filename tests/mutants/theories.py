@@ -90,22 +90,28 @@ def _ramped(right: Function) -> Function:
 
 _FAULTS: dict[str, dict[str, Fault]] = {
     # Forces and equations of motion, (20)-(29)
-    "dynamics._rs": {
+    "mechanics.dynamics._rs": {
         "B_x of RS 1 % large": scaled(1.01, 3),
         "A_z of RS 2 % large": scaled(1.02, 2),
         "B_z of RS with the wrong sign": scaled(-1.0, 5),
     },
-    "dynamics._sr": {"A_y of SR 1 % large": scaled(1.01, 1), "B_z of SR 2 % large": scaled(1.02, 5)},
-    "dynamics._ss": {"forces of SS with μ and η exchanged": given(swapped), "A_y of SS 1 % large": scaled(1.01, 1)},
-    "dynamics._nr": {"B_y of NR 1 % large": scaled(1.01, 4), "B_z of NR 2 % large": scaled(1.02, 5)},
-    "dynamics._ns": {"B_y of NS 1 % large": scaled(1.01, 4), "B_z of NS with the wrong sign": scaled(-1.0, 5)},
-    "dynamics._rn": {"friction of RN 2 % large": scaled(1.02, 0, 2)},
-    "dynamics._sn": {"friction of SN 1 % large": scaled(1.01, 0, 2)},
-    "dynamics.rolling_family": {
+    "mechanics.dynamics._sr": {"A_y of SR 1 % large": scaled(1.01, 1), "B_z of SR 2 % large": scaled(1.02, 5)},
+    "mechanics.dynamics._ss": {
+        "forces of SS with μ and η exchanged": given(swapped),
+        "A_y of SS 1 % large": scaled(1.01, 1),
+    },
+    "mechanics.dynamics._nr": {"B_y of NR 1 % large": scaled(1.01, 4), "B_z of NR 2 % large": scaled(1.02, 5)},
+    "mechanics.dynamics._ns": {
+        "B_y of NS 1 % large": scaled(1.01, 4),
+        "B_z of NS with the wrong sign": scaled(-1.0, 5),
+    },
+    "mechanics.dynamics._rn": {"friction of RN 2 % large": scaled(1.02, 0, 2)},
+    "mechanics.dynamics._sn": {"friction of SN 1 % large": scaled(1.01, 0, 2)},
+    "mechanics.dynamics.rolling_family": {
         "A_z, B_z of RR 2 % large": scaled(1.02, 2, 5),
         "B_x of RR 1 % large": scaled(1.01, 3),
     },
-    "dynamics.newton_euler": {
+    "mechanics.dynamics.newton_euler": {
         "ω_c' of RR 2 % large": in_case(Case.RR, scaled(1.02, 2)),
         "row of ω̃_x of SR 1 % large": in_case(Case.SR, scaled(1.01, 3)),
         "row of ω̃_z of SS 1 % large": in_case(Case.SS, scaled(1.01, 5)),
@@ -114,7 +120,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "no drag on the vertical motion": _without_drag_on_y,
     },
     # Stationary solutions, Propositions 1-6
-    "stationary.stationary_solutions": {
+    "stationary.solutions.stationary_solutions": {
         "stationary forces 2 % large": _of(None, fields(force_A=times(1.02), force_B=times(1.02))),
         "stationary wall force of NR 5 % large": _of(Case.NR, fields(force_B=times(1.05))),
         "SR exists nowhere": _of(Case.SR, _gone),
@@ -124,21 +130,21 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "NS sinks 2 % too fast": _of(Case.NS, fields(x=times(1.02, 1))),
         "RR is unstable": _of(Case.RR, fields(slip_stability=lambda s: type(s).UNSTABLE)),
     },
-    "stationary._ss": {
+    "stationary.solutions._ss": {
         "SS with μ and η exchanged": given(swapped),
         "SS of a ball with 1 % more inertia": given(other(j=1.01)),
         "SS in a fluid with 1 % more drag": given(other(c=1.01)),
         "SS lags as under Stokes' drag": given(_by_stokes),
     },
-    "stationary._ns": {"NS sinks as under Stokes' drag": given(_by_stokes)},
-    "stationary._lifting_spin": {"spin of SR and NR with 1 % more weight": given(other(g=1.01))},
-    "stationary._wall_carries": {"(35) with the sign as printed": answer(lambda carries: not carries)},
-    "stationary.stable_solutions": {"a ball on the wall is no attractor": _of(Case.NR, _gone)},
-    "branch_stability.eigenvalues_at": {"eigenvalues of SS 3 % large": scaled(1.03)},
-    "jacobian.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
-    "leaning.leaning_modes": {"leaning rate of SR 5 % large": scaled(1.05, 0)},
+    "stationary.solutions._ns": {"NS sinks as under Stokes' drag": given(_by_stokes)},
+    "stationary.solutions._lifting_spin": {"spin of SR and NR with 1 % more weight": given(other(g=1.01))},
+    "stationary.solutions._wall_carries": {"(35) with the sign as printed": answer(lambda carries: not carries)},
+    "stationary.solutions.stable_solutions": {"a ball on the wall is no attractor": _of(Case.NR, _gone)},
+    "stationary.branch_stability.eigenvalues_at": {"eigenvalues of SS 3 % large": scaled(1.03)},
+    "mechanics.jacobian.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
+    "stationary.leaning.leaning_modes": {"leaning rate of SR 5 % large": scaled(1.05, 0)},
     # Bifurcations, (84)-(90)
-    "bifurcation.threshold_curves": {
+    "bifurcation.diagram.threshold_curves": {
         "ω₀₁ with 1 + μ for 1 + η": _mu_for_eta,
         "ω₀₁ 0.5 % high": answer(entries(omega_01=times(1.005))),
         "ω₀₂ 0.5 % high": answer(entries(omega_02=times(1.005))),
@@ -147,48 +153,50 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "a fold below η_cr": answer(_fold_everywhere),
         "ω₀₄ as under Stokes' drag": given(_by_stokes),
     },
-    "slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04)},
-    "bifurcation.critical_drag": {"drag at which a fold is born 3 % high": scaled(1.03)},
-    "bifurcation.number_of_folds": {"a fold where there is none, none where there is one": answer(lambda n: 1 - n)},
+    "stationary.slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04)},
+    "bifurcation.diagram.critical_drag": {"drag at which a fold is born 3 % high": scaled(1.03)},
+    "bifurcation.diagram.number_of_folds": {
+        "a fold where there is none, none where there is one": answer(lambda n: 1 - n)
+    },
     # Stability with respect to slipping, (53)-(83)
-    "slip_stability.gamma": {"γ 3 % large": scaled(1.03)},
-    "slip_stability.slip_rates": {"γ with μ and η exchanged": given(swapped)},
-    "slip_bounds.gamma_nr": {
+    "slipping.slip_stability.gamma": {"γ 3 % large": scaled(1.03)},
+    "slipping.slip_stability.slip_rates": {"γ with μ and η exchanged": given(swapped)},
+    "slipping.slip_bounds.gamma_nr": {
         "(56) with 3 % more drag": given(other(c=1.03)),
         "(56) with 3 % more wall friction": given(other(eta=1.03)),
         "(56) with sin β of the wrong sign": lambda right: lambda beta, *rest: right(-np.asarray(beta), *rest),
     },
-    "slip_bounds.steepest_nr": {"(58) with 5 % more drag": given(other(c=1.05))},
-    "slip_stability.lift_acceleration": {
+    "slipping.slip_bounds.steepest_nr": {"(58) with 5 % more drag": given(other(c=1.05))},
+    "slipping.slip_stability.lift_acceleration": {
         "lift out of RR, SR and SS with 2 % more inertia": given(other(j=1.02)),
         "lift with 2 % more wall friction": given(other(eta=1.02)),
     },
-    "slip_stability.lift_onset": {"lift begins 2 % late": scaled(1.02)},
-    "slip_stability.neutral_flow": {"slip is neutral at 1 % more flow": scaled(1.01)},
-    "slip_stability.stability": {"Definitions 1-3 with 1 % more wall friction": given(other(eta=1.01))},
-    "slip_bounds.nr_to_ns": {"(61) with 3 % more wall friction": given(other(eta=1.03))},
-    "slip_bounds.rr_to_rs": {"(66) with μ, as printed": given(swapped)},
-    "slip_bounds.rr_to_rs_stationary": {"(67) with 3 % more wall friction": given(other(eta=1.03))},
-    "slip_bounds.rr_to_sr": {"(73) with 3 % more floor friction": given(other(mu=1.03))},
-    "slip_bounds.rr_to_sr_stationary": {"(74) with 3 % more inertia": given(other(j=1.03))},
-    "slip_bounds.filippov_share": {"share of the sheets in (69) 5 % large": scaled(1.05)},
-    "slip_bounds.rr_to_ss": {"(82), (83) with μ and η exchanged": given(swapped)},
+    "slipping.slip_stability.lift_onset": {"lift begins 2 % late": scaled(1.02)},
+    "slipping.slip_stability.neutral_flow": {"slip is neutral at 1 % more flow": scaled(1.01)},
+    "slipping.slip_stability.stability": {"Definitions 1-3 with 1 % more wall friction": given(other(eta=1.01))},
+    "slipping.slip_bounds.nr_to_ns": {"(61) with 3 % more wall friction": given(other(eta=1.03))},
+    "slipping.slip_bounds.rr_to_rs": {"(66) with μ, as printed": given(swapped)},
+    "slipping.slip_bounds.rr_to_rs_stationary": {"(67) with 3 % more wall friction": given(other(eta=1.03))},
+    "slipping.slip_bounds.rr_to_sr": {"(73) with 3 % more floor friction": given(other(mu=1.03))},
+    "slipping.slip_bounds.rr_to_sr_stationary": {"(74) with 3 % more inertia": given(other(j=1.03))},
+    "slipping.slip_bounds.filippov_share": {"share of the sheets in (69) 5 % large": scaled(1.05)},
+    "slipping.slip_bounds.rr_to_ss": {"(82), (83) with μ and η exchanged": given(swapped)},
     # Laws of drag
-    "stokes.sinking_speed": {"(10) 1 % large": scaled(1.01)},
-    "drag.of_velocity": {"the drag's slope left out of the eigenvalues": answer(np.real)},
-    "drag.law": {
+    "mechanics.stokes.sinking_speed": {"(10) 1 % large": scaled(1.01)},
+    "mechanics.drag.of_velocity": {"the drag's slope left out of the eigenvalues": answer(np.real)},
+    "mechanics.drag.law": {
         "Schiller and Naumann's wake 5 % strong": answer(fields(wake=times(1.05))),
         "quadratic drag 5 % strong": answer(fields(blunt=times(1.05))),
     },
     # The flowmeter, section 5.3
-    "flowmeter.operating_range": {
+    "flowmeter.characteristic.operating_range": {
         "operating range up to ω₀₂": lambda right: lambda p: bifurcation.thresholds(p).omega_02,
     },
-    "flowmeter.characteristic_slope": {"slope of the characteristic 5 % large": scaled(1.05)},
-    "flowmeter.slope_jump": {"the slope jumps by 3 % more": scaled(1.03)},
-    "flowmeter.unloading_limit": {"unloading 2 % too high": scaled(1.02)},
+    "flowmeter.characteristic.characteristic_slope": {"slope of the characteristic 5 % large": scaled(1.05)},
+    "flowmeter.characteristic.slope_jump": {"the slope jumps by 3 % more": scaled(1.03)},
+    "flowmeter.characteristic.unloading_limit": {"unloading 2 % too high": scaled(1.02)},
     # Motions
-    "simulation.simulate": {
+    "simulation.simulator.simulate": {
         "motions of a ball with 2 % more inertia": given(other(j=1.02)),
         "motions with 2 % more wall friction": given(other(eta=1.02)),
         "rolling goes on while forces allow it": lambda right: (
@@ -196,34 +204,38 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         ),
         "a ramp in a fluid with 5 % more drag": _ramped,
     },
-    "orbits.refine": {"hops with 10 % more floor friction": given(other(mu=1.1))},
+    "orbits.periodic.refine": {"hops with 10 % more floor friction": given(other(mu=1.1))},
     # Unsteady flow
-    "response.rolling_rate": {"a rolling ball follows the flow at the rate c": lambda right: lambda p: p.c},
-    "response.transfer": {"response to a pulsation 2 % large": scaled(1.02)},
-    "response.step_response": {"ringing after a jump in a fluid with 5 % more drag": given(other(c=1.05))},
+    "flowmeter.response.rolling_rate": {"a rolling ball follows the flow at the rate c": lambda right: lambda p: p.c},
+    "flowmeter.response.transfer": {"response to a pulsation 2 % large": scaled(1.02)},
+    "flowmeter.response.step_response": {"ringing after a jump in a fluid with 5 % more drag": given(other(c=1.05))},
     # The fluid goes round as the ball does, and its acceleration takes no friction.
-    "pulsation._swing": {"pulsation takes no friction": answer(lambda swing: (swing[0], swing[0]))},
-    "pulsation.lag_harmonics": {"rolling follows a pulsation as under Stokes' drag": given(_by_stokes)},
-    "pulsation.slip_onset": {
+    "flowmeter.pulsation._swing": {"pulsation takes no friction": answer(lambda swing: (swing[0], swing[0]))},
+    "flowmeter.pulsation.lag_harmonics": {"rolling follows a pulsation as under Stokes' drag": given(_by_stokes)},
+    "flowmeter.pulsation.slip_onset": {
         "slip begins 3 % late in a pulsation": scaled(1.03),
         "slip begins 3 % early in a pulsation": scaled(0.97),
     },
-    "pulsation.mean_error": {"mean reading of a pulsation with 2 % more floor friction": given(other(mu=1.02))},
+    "flowmeter.pulsation.mean_error": {
+        "mean reading of a pulsation with 2 % more floor friction": given(other(mu=1.02))
+    },
 }
 """By function of `analytic`, and what is wrong with it."""
 _FAULTS_OF_ATTRACTORS: dict[str, dict[str, Fault]] = {
-    "orbits.refine": {
+    "orbits.periodic.refine": {
         "a swing with 0.1 % more floor friction": where(lambda p: p.mu > 1, given(other(mu=1.001))),
         "Floquet multipliers of two periods": answer(fields(derivative=lambda derivative: derivative @ derivative)),
     },
-    "bifurcation.thresholds": {"hopping begins 1 % late": where(_hopping, answer(fields(omega_02=times(1.01))))},
-    "orbit_branch.follow": {"hopping ends 2 % late": answer(fields(places=_late))},
-    "simulation.simulate": {"strong drag in minutes": where(lambda p: p.kappa > 2, given(other(c=1 / 60)))},
+    "bifurcation.diagram.thresholds": {
+        "hopping begins 1 % late": where(_hopping, answer(fields(omega_02=times(1.01))))
+    },
+    "orbits.orbit_branch.follow": {"hopping ends 2 % late": answer(fields(places=_late))},
+    "simulation.simulator.simulate": {"strong drag in minutes": where(lambda p: p.kappa > 2, given(other(c=1 / 60)))},
 }
 """The same, of what is measured from the default level on."""
 THEORIES = tuple(
     WrongTheory(what, f"analytic.{module}", function, wrong, level)
     for level, table in ((Level.QUICK, _FAULTS), (Level.DEFAULT, _FAULTS_OF_ATTRACTORS))
-    for (module, _, function), faults in ((name.partition("."), faults) for name, faults in table.items())
+    for (module, _, function), faults in ((name.rpartition("."), faults) for name, faults in table.items())
     for what, wrong in faults.items()
 )
