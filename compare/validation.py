@@ -95,10 +95,9 @@ def validate(
     verdicts = {name: future.result() for name, future in judged.items()}
     files = [path for each in PROTOCOLS if (path := programme.file(each, output, engine, level, sets)).exists()]
     count = workers if isinstance(workers, int) else workers.count
-    if report:
-        progress("drawing figures", 0, 1, 0)
     with spread(min(count, os.cpu_count() or 1)) as over:
-        _write(output, level, files, sum(map(record.load, files), Records()), verdicts, over if report else None)
+        draw = whole.drawing(over) if report else None
+        _write(output, level, files, sum(map(record.load, files), Records()), verdicts, draw)
     return [verdicts[claim.id] for claim in chosen]
 
 

@@ -54,7 +54,7 @@ class Protocol:
     quick: tuple[str, ...] = SEVEN
     """The sets it measures at the quick level; at the others all of them."""
     cost: float = 1.0
-    """Processor time at the quick level, s on some machine: its part of the whole."""
+    """Processor time at the quick level, s on some machine: its part of the whole, and the most costly begin first."""
     first: bool = False
     """Whether it is a single long run, which begins first: beside it there is work for the other workers."""
     level: Level = Level.QUICK

@@ -5,12 +5,15 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from compare.kit.workers import Spread
 
 INTERVAL = 10.0
 """Seconds between plain lines."""
@@ -113,6 +116,19 @@ class Whole:
         with self._lock:
             self._judged += 1
             self._tell()
+
+    def drawing(self, over: Spread) -> Spread:
+        """A `map` for figures that shows how many are drawn."""
+
+        def counted(one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
+            todo = list(items)
+            for k, result in enumerate(over(one, todo)):
+                left = DRAWING * (1 - (k + 1) / len(todo))
+                self.show(f"drawing figures: {k + 1} of {len(todo)}", round(1000 * (1 - left)), 1000, 0)
+                yield result
+
+        self.show("drawing figures", round(1000 * (1 - DRAWING)), 1000, 0)
+        return counted
 
     def _tell(self) -> None:
         runs = [f"{name} {done}/{total}" for name, (done, total, _) in self._under_way.items()]

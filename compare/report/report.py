@@ -48,8 +48,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
     """The page as text; what was not run is named in one line, a figure that can't be drawn is a gap."""
     directory, option = material.directory, _OPTIONS[Level[summary.level]]
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
-    judged = {verdict.claim.id for verdict in ran}
-    free = {name: each for name, each in FIGURES.items() if not judged & set(each.claims)}
+    free = {name: each for name, each in FIGURES.items() if not each.claims}
     beside = {verdict.claim.id: figures_of(verdict.claim.id) for verdict in ran if verdict.checks}
     drawings = dict(free)
     for own in beside.values():

@@ -296,7 +296,7 @@ _SWINGS = "swings that last are those of reference on a very rough floor"
 _DRAG = "strong drag is tried on sets of its own"
 _ROUGH = "the choice is that of sets of its own with mu > 1"
 PROTOCOLS = (
-    Protocol("recurrent", hopping, alone=_HOPS, first=True),
+    Protocol("recurrent", hopping, alone=_HOPS, first=True, cost=5),
     Protocol("stepped", stepped, engine=MOREAU, alone=_HOPS, first=True),
     Protocol("choice", choice, alone=_ROUGH, first=True),
     Protocol("followed", followed, level=Level.DEFAULT, alone=_HOPS),

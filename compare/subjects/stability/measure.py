@@ -274,4 +274,4 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
     return 1 / time_unit(p)
 
 
-PROTOCOLS = (Protocol("rates", measure, ("settled",)),)
+PROTOCOLS = (Protocol("rates", measure, ("settled",), cost=10),)

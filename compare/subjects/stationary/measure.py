@@ -123,6 +123,6 @@ def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> 
 
 
 PROTOCOLS = (
-    Protocol("settled", measure),
+    Protocol("settled", measure, cost=11),
     Protocol("newcomer", newcomer, alone="the engine's own settings are measured on reference only"),
 )

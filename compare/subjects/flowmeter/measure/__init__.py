@@ -12,7 +12,8 @@ PROTOCOLS = (
         unloading.measure,
         ("thresholds",),
         quick=TWO,
+        cost=4,
         drawn=lambda m: m.conditions["start"] == "unloading",
     ),
-    Protocol("slope", characteristic.slope, ("settled", "thresholds")),
+    Protocol("slope", characteristic.slope, ("settled", "thresholds"), cost=6),
 )

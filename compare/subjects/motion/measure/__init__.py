@@ -6,7 +6,7 @@ from compare.kit.programme import ONE, TWO, Protocol
 from compare.subjects.motion.measure import field, laws, motions
 
 PROTOCOLS = (
-    Protocol("laws", laws.measure, waits=False),
+    Protocol("laws", laws.measure, waits=False, cost=3),
     Protocol("field", field.measure, waits=False),
     Protocol("motions", motions.measure, quick=ONE, waits=False),
     Protocol("impacts", motions.impacts, quick=TWO, waits=False),

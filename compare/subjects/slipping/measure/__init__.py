@@ -9,5 +9,5 @@ PROTOCOLS = (
     Protocol("growth", growth.measure, waits=False),
     Protocol("steepest", growth.steepest, waits=False),
     Protocol("lift", lift.measure, waits=False),
-    Protocol("bounds", bounds.measure, ("thresholds",)),
+    Protocol("bounds", bounds.measure, ("thresholds",), cost=2),
 )

@@ -6,8 +6,8 @@ from compare.kit.programme import Protocol
 from compare.subjects.thresholds.measure import edge, plane, thresholds
 
 PROTOCOLS = (
-    Protocol("plane", plane.measure, alone="the planes of Figs. 7 and 8 are those of reference only"),
-    Protocol("thresholds", thresholds.measure, ("settled",)),
-    Protocol("edge", edge.measure, ("thresholds",), quick=("reference", "rough-floor")),
-    Protocol("birth", thresholds.birth, ("thresholds",)),
+    Protocol("plane", plane.measure, alone="the planes of Figs. 7 and 8 are those of reference only", cost=3),
+    Protocol("thresholds", thresholds.measure, ("settled",), cost=20),
+    Protocol("edge", edge.measure, ("thresholds",), quick=("reference", "rough-floor"), cost=8),
+    Protocol("birth", thresholds.birth, ("thresholds",), cost=3),
 )

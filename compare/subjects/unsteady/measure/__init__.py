@@ -6,6 +6,6 @@ from compare.kit.programme import Protocol
 from compare.subjects.unsteady.measure import jumps, pulsation
 
 PROTOCOLS = (
-    Protocol("pulsation", pulsation.measure, ("thresholds",)),
-    Protocol("unsteady", jumps.measure, ("thresholds",), drawn=lambda m: m.quantity == "jump_height"),
+    Protocol("pulsation", pulsation.measure, ("thresholds",), cost=11),
+    Protocol("unsteady", jumps.measure, ("thresholds",), drawn=lambda m: m.quantity == "jump_height", cost=8),
 )
