@@ -7,6 +7,7 @@
 # make check      what CI runs: lint, types, import contracts, a quick validation judged by wrong theories, a small league,
 #                 tests, docs, wheel
 # make league     physics engines on the same tasks, PyBullet and Drake where they have a wheel, Siconos where it is
+# make help       this list
 # make lock       resolve the dependencies anew (needs uv)
 
 PYTHON ?= python3
@@ -14,10 +15,13 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 RESULTS ?= results
 
-.PHONY: validate mutants verdicts league test test-all docs wheel check lint lock clean
+.PHONY: help validate mutants verdicts league test test-all docs wheel check lint lock clean
 
 validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
+
+help:
+	@sed -n 's/^# //p' $(firstword $(MAKEFILE_LIST))
 
 mutants: $(VENV)/installed
 	$(BIN)/dualball validate --quick --quiet
@@ -54,17 +58,17 @@ league: $(VENV)/installed-engines
 $(VENV)/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "dualball needs Python 3.11 or newer; name one with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	@.ci/install $(BIN)/python --require-hashes -r requirements.lock
+	@.ci/install $(BIN)/python --no-deps -e .
 	@touch $@
 
 $(VENV)/installed-dev: requirements-dev.lock $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+	@.ci/install $(BIN)/python --require-hashes -r requirements-dev.lock
 	@touch $@
 
 $(VENV)/installed-engines: requirements-engines.lock $(VENV)/installed
 	@for engine in drake pybullet; do \
-	    $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary :all: -c $< $$engine || \
+	    .ci/install $(BIN)/python --only-binary :all: -c $< $$engine || \
 	        echo "the league goes on without $$engine, which has no wheel for this Python"; \
 	done
 	@touch $@
