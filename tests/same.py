@@ -1,0 +1,44 @@
+"""Do two results directories hold the same measurements, to the bit? ``python -m tests.same A B [PROTOCOL ...]``
+
+A pure refactoring of what measures must leave them so. Which runs a number came from is not compared.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from compare.kit import record
+from compare.kit.record import Records
+
+
+def protocols(directory: Path) -> dict[str, Records]:
+    """The measurements of each protocol in a results directory."""
+    return {path.stem: record.load(path) for path in sorted(directory.glob("measurements/*/*.h5"))}
+
+
+def differences(one: Records, other: Records) -> list[str]:
+    """What differs between the records of a protocol, a line each; floats are compared to the bit."""
+    found = [] if one.missing == other.missing else ["what is missing, or why"]
+    if len(one.measurements) != len(other.measurements):
+        return [*found, f"{len(one.measurements)} and {len(other.measurements)} measurements"]
+    for a, b in zip(one.measurements, other.measurements, strict=True):
+        names = [name for name in vars(a) if name != "runs" and getattr(a, name) != getattr(b, name)]
+        if names:
+            found.append(f"{a.quantity} of {a.set} at {a.parameters.omega_0:g} rad/s: {', '.join(names)}")
+    return found
+
+
+def main(first: str, second: str, *names: str) -> int:
+    """Print what differs; 1 if anything does."""
+    one, other = protocols(Path(first)), protocols(Path(second))
+    worst = 0
+    for name in names or sorted(one.keys() | other.keys()):
+        found = differences(one[name], other[name]) if name in one and name in other else ["in one of them only"]
+        print(f"{name}: {f'{len(found)} differences, such as {found[0]}' if found else 'the same'}")
+        worst = max(worst, bool(found))
+    return worst
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
