@@ -155,19 +155,19 @@ def test_a_run_that_diverges_is_kept_and_told(tmp_path: Path, capsys: pytest.Cap
 INTERRUPTED = """
 import os, signal, sys
 from compare.commands import cli, simulate
-from compare.runs import tasks
+from compare.kit import tasks
 from mjsim.journal import Journal
 tasks.LONG, stop_after = 1000, int(sys.argv[1])
 tasks.Journal = lambda directory: Journal(directory, interval=0.0)
 store, stored = tasks.store, 0
-def pressing(tasks, paths, stop):
+def pressing(task, path, stop):
     def pressed():
         global stored
         stored += 1
         if stored == stop_after:
             os.kill(os.getpid(), signal.SIGINT)
         return stop()
-    return store(tasks, paths, stop=pressed)
+    return store(task, path, stop=pressed)
 simulate.store = pressing
 raise SystemExit(cli.main(["simulate", "--time", "6", "--sample-interval", "0.005", "-o", sys.argv[2]]))
 """

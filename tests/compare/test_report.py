@@ -137,9 +137,7 @@ def test_what_the_page_says(page: Path) -> None:
     assert text.count("<h3>Stability</h3>") == 1
     assert re.search(r"Not part of this run: <code[^>]*>deeper</code>", text)
     assert 'data-id="deeper"' not in text
-    assert (
-        "Not drawn: From a newcomer&#39;s settings to the study&#39;s: the ladder of settings was not measured" in text
-    )
+    assert "Not drawn: The user&#39;s own: it was not measured" in text
 
 
 def test_every_number_is_on_the_page() -> None:
