@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import math
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 import analytic
 from analytic.orbits import orbit_branch
@@ -70,9 +68,15 @@ def run(args: argparse.Namespace) -> int:
         row |= {"attractors": list(map(attractor_data, attractors)), "branches": list(map(branch_data, branches))}
         rows.append(row)
     data = {"engine": args.engine.name, "seed": args.seed, "sets": rows}
+    table = _table(data)
     if args.page:
-        write_text(args.page, page(args.page.stem.capitalize(), args.words, options.parameters(args), data))
-    options.show(data, _table, args.json)
+        write_text(args.page, _page(args.page.stem.capitalize(), args.words, options.parameters(args), data, table))
+    title, lines = f"What balls come to ({args.engine.name})", []
+    for branch in _branches(data):
+        name, values = branch["parameter"], [orbit[branch["parameter"]] for orbit in branch["orbits"]]
+        lines.append(f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:")
+        lines += [f"  {place['kind']} at {place['value']:.7g} {place['reason']}" for place in branch["places"]]
+    options.show(data, args.json, pages.table(title, table, caption="\n".join(lines)))
     return 0
 
 
@@ -119,7 +123,12 @@ def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
     return {"parameter": branch.name, "places": places, "orbits": list(map(data, branch.orbits))}
 
 
-def _rows(data: dict[str, Any]) -> pages.Rows:
+def _branches(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """Those of all sets."""
+    return [branch for each in data["sets"] for branch in each["branches"]]
+
+
+def _table(data: dict[str, Any]) -> pages.Rows:
     """A row for each attractor of each set."""
     varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
     head = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
@@ -142,23 +151,14 @@ def _rows(data: dict[str, Any]) -> pages.Rows:
     return rows
 
 
-def _table(data: dict[str, Any]) -> Table:
-    lines = []
-    for branch in (branch for each in data["sets"] for branch in each["branches"]):
-        name, values = branch["parameter"], [orbit[branch["parameter"]] for orbit in branch["orbits"]]
-        lines.append(f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:")
-        lines += [f"  {place['kind']} at {place['value']:.7g} {place['reason']}" for place in branch["places"]]
-    return pages.table(f"What balls come to ({data['engine']})", _rows(data), caption="\n".join(lines))
-
-
-def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) -> str:
-    """The same in Markdown, with the parameters, the command that writes it and the orbits of each branch."""
+def _page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any], table: pages.Rows) -> str:
+    """The table in Markdown, with the parameters, the command that writes it and the orbits of each branch."""
     values = (f"{f.metadata['symbol']} = {getattr(p, f.name):.5g} {f.metadata['unit']}" for f in p.quantities())
     given = ", ".join(value.removesuffix(" 1") for value in values)
     lines = [f"# {title}: what balls come to", ""]
     lines += [f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by", ""]
-    lines += ["```sh", shlex.join(words), "```", "", pages.markdown(_rows(data))]
-    for branch in (branch for each in data["sets"] for branch in each["branches"]):
+    lines += ["```sh", shlex.join(words), "```", "", pages.markdown(table)]
+    for branch in _branches(data):
         name = branch["parameter"]
         lines += ["", f"## Followed in {name}", ""]
         lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}".rstrip() for p in branch["places"]), ""]
@@ -172,4 +172,4 @@ def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) 
 
 def _largest(row: dict[str, Any]) -> float:
     """The largest modulus of the multipliers; nan if there are none."""
-    return max((abs(complex(*each)) for each in row["multipliers"]), default=math.nan)
+    return max((abs(complex(*each)) for each in row["multipliers"]), default=float("nan"))

@@ -41,7 +41,8 @@ def run(args: argparse.Namespace) -> int:
         except KeyboardInterrupt:  # the second Ctrl-C
             print("dualball: interrupted; no samples are kept", file=sys.stderr)
             return 130
-        options.show(inspection.describe(failed_path(path) if failure else path), inspection.table, args.json)
+        about = inspection.describe(failed_path(path) if failure else path)
+        options.show(about, args.json, inspection.table(about))
         if args.output and not failure and not args.json:
             print(f"written to {args.output}")
         if failure:

@@ -25,7 +25,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from compare.claim import Bearing, Claim, Outcome, Text, Verdict
-from compare.commands import tables
+from compare.commands import validate
 from compare.gallery import FIGURES
 from compare.kit import record
 from compare.kit.check import Check
@@ -161,12 +161,12 @@ def test_every_number_is_on_the_page() -> None:
 def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page: Path) -> None:
     text = html.unescape(page.read_text("utf-8"))
     for verdict in RAN:
-        line = tables.line(verdict).plain
+        line = validate.line(verdict).plain
         for heading, found in wording.findings(verdict).items():
             assert f"{heading.lower()} {found}" in line
             assert f"<dt>{heading}</dt>" in row(text, verdict.claim.id)
             assert found in row(text, verdict.claim.id)
-    summary = tables.summary(VERDICTS).plain
+    summary = validate.summary(VERDICTS).plain
     assert wording.headline(RAN) in summary
     for count, what in wording.totals(RAN):
         assert f"{count} {what}" in summary

@@ -41,7 +41,7 @@ def pairs(rows: Mapping[str, str]) -> Table:
     """Names and what they stand for, for the terminal."""
     shown = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for name, text in rows.items():
-        shown.add_row(f"[bold]{name}", Text(text))
+        shown.add_row(Text(name, "bold"), Text(text))
     return shown
 
 
