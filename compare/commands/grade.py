@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
+from rich.text import Text
 
 from compare.bench import native
 from compare.bench.native import CHOICES, Native
@@ -70,13 +69,8 @@ def run(args: argparse.Namespace) -> int:
         columns = grade.grade(*given, show=show)
     if args.output:
         write_text(args.output, grade.html(columns, described))
-    if args.json:
-        print(json.dumps([column.to_mapping() for column in columns], indent=1))
-        return 0
-    console = Console()
-    console.print(grade.table(columns))
-    for item in columns[0].advice:
-        console.print(f"• {item}", markup=False, highlight=False)
+    advice = (Text(f"• {item}") for item in columns[0].advice)
+    options.show([column.to_mapping() for column in columns], args.json, grade.table(columns), *advice)
     return 0
 
 

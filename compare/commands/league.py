@@ -7,8 +7,6 @@ import json
 import sys
 from typing import Any
 
-from rich.console import Console
-
 from compare.commands import options, running
 from compare.kit import pages
 from compare.kit.engines import ENGINES
@@ -49,12 +47,9 @@ def run(args: argparse.Namespace) -> int:
     data = league.to_mapping(those, entries)
     write_text(args.output / JSON, json.dumps(data, indent=1))
     write_text(args.output / PAGE, html(data))
-    if args.json:
-        print(json.dumps(data, indent=1))
-    else:
-        console = Console()
-        console.print(*league.tables(entries), league.CAPTION)
-        console.print(f"page: {args.output / PAGE}", soft_wrap=True)
+    options.show(data, args.json, *league.tables(entries), league.CAPTION)
+    if not args.json:
+        print(f"page: {args.output / PAGE}")
     return 0
 
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 from pathlib import Path
 
-from rich.console import Console
 from rich.markdown import Markdown
 
 from analytic.simulation.ensemble import interval
@@ -66,10 +64,7 @@ def run(args: argparse.Namespace) -> int:
         searches[0].save(args.save)
     if args.page:
         write_text(args.page, search.page(*searches))
-    if args.json:
-        print(json.dumps([dataclasses.asdict(each) for each in searches], indent=1))
-    else:
-        Console().print(Markdown(search.page(*searches)))
+    options.show([dataclasses.asdict(each) for each in searches], args.json, Markdown(search.page(*searches)))
     return 0
 
 
@@ -85,14 +80,11 @@ def plane(args: argparse.Namespace) -> int:
         mapped.save(args.save)
     shares = {fate: mapped.share(fate) for fate in FATES if mapped.share(fate)[0]}
     differ = mapped.differences().tolist() if coarse else []
-    if args.json:
-        print(json.dumps({"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}))
-        return 0
+    said = []
     for fate, (hits, of) in shares.items():
         low, high = interval(hits, of)
-        print(f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to {100 * high:.1f} %)")
-    if coarse:
-        print(
-            f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a boundary: {differ}"
-        )
+        said.append(f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to {100 * high:.1f} %)")
+    where = f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a boundary: {differ}"
+    data = {"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}
+    options.show(data, args.json, *said, *([where] if coarse else []))
     return 0

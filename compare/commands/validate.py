@@ -122,6 +122,7 @@ def checks(verdict: Verdict) -> Table:
         m = check.measurement
         numbers = wording.value(m, check.predicted), wording.value(m, m.value)
         sizes = wording.size(check.deviation, "+"), wording.size(check.tolerance)
-        mark = ("pass" if check.conclusive else "coarse") if check.agrees else "FAIL"
-        rows.append([m.set, f"{m.parameters.omega_0:.6g}", wording.SYMBOLS[m.quantity], *numbers, *sizes, mark])
+        rows.append(
+            [m.set, f"{m.parameters.omega_0:.6g}", wording.SYMBOLS[m.quantity], *numbers, *sizes, wording.mark(check)]
+        )
     return pages.table(f"{verdict.claim.id}  {verdict.claim.statement}", rows, no_wrap=True)
