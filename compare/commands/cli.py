@@ -20,7 +20,7 @@ from model.trajectory import current_versions
 GROUPS = {
     "study": {"validate": "validate", "judge": "validate", "report": "look", "figures": "look"},
     "the ball": {
-        **{"predict": "predict", "simulate": "simulate", "inspect": "look", "sweep": "sweep", "collect": "sweep"},
+        **{"predict": "predict", "simulate": "simulate", "inspect": "look", "sweep": "simulate", "collect": "simulate"},
         **{"attractors": "attractors", "basins": "search", "search": "search", "design": "design"},
         **{"render": "look", "view": "look"},
     },
