@@ -21,10 +21,10 @@ GROUPS = {
     "study": {"validate": "validate", "judge": "validate", "report": "look", "figures": "look"},
     "the ball": {
         **{"predict": "predict", "simulate": "simulate", "inspect": "look", "sweep": "simulate", "collect": "simulate"},
-        **{"attractors": "attractors", "basins": "search", "search": "search", "design": "design"},
+        **{"attractors": "attractors", "basins": "attractors", "search": "attractors", "design": "design"},
         **{"render": "look", "view": "look"},
     },
-    "contacts and engines": {"grade": "grade", "league": "league"},
+    "contacts and engines": {"grade": "bench", "league": "bench"},
 }
 """The commands, as help groups them, and the module of each: `predict` doesn't wait for the engines of the others."""
 
