@@ -44,7 +44,7 @@ CAPTION = (
 )
 Cell = tuple[str, bool | None]
 """A text, and whether what it says is good; None: neither."""
-Line = tuple[str, str, list[Cell]]
+Row = tuple[str, str, list[Cell]]
 """One line of the card: its group, what it is, and a cell for each column."""
 
 
@@ -212,7 +212,7 @@ def advice(native: Native, creep: float, chatter: float) -> Iterator[str]:
     )
 
 
-def lines(columns: Sequence[Column]) -> list[Line]:
+def lines(columns: Sequence[Column]) -> list[Row]:
     """The card as text, without the advice."""
 
     def line(
@@ -222,7 +222,7 @@ def lines(columns: Sequence[Column]) -> list[Line]:
         good: float | None = None,
         form: str = "{:.1e}",
         nan: str = "diverged",
-    ) -> Line:
+    ) -> Row:
         """Numbers that are good up to a size, if it is given."""
         cells: list[Cell] = []
         for v in values:
@@ -230,7 +230,7 @@ def lines(columns: Sequence[Column]) -> list[Line]:
             cells.append((nan, False) if math.isnan(v) else (form.format(v), fine))
         return group, name, cells
 
-    shares: list[Line] = []
+    shares: list[Row] = []
     for case in columns[0].cases:
         held = [(column.cases[case], column.cases[case] >= AGREES) for column in columns]
         cells = [(f"{'✓' if good else '✗'} {math.floor(100 * share)} %", good) for share, good in held]
