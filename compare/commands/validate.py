@@ -34,18 +34,15 @@ def add(commands: options.Commands) -> None:
     running.add_engine_name(command)
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     running.add_workers(command)
-    _add_shared(command, "results")
 
-    command = options.command(commands, "judge", judge, "judge the stored measurements of a validation again")
-    command.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR")
-    running.add_processes(command)
-    _add_shared(command)
+    again = options.command(commands, "judge", judge, "judge the stored measurements of a validation again")
+    again.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR")
+    running.add_processes(again)
 
-
-def _add_shared(command: argparse.ArgumentParser, directory: str = "") -> None:
-    command.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
-    command.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
-    options.outputs(command, directory, "print the verdicts as JSON")
+    for each, directory in ((command, "results"), (again, "")):
+        each.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
+        each.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
+        options.outputs(each, directory, "print the verdicts as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
