@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from compare import bench, subjects
+from compare import subjects
 from compare.kit import deviations, drawing
 from compare.kit.drawing import Figures, GapError, Material
 from model import InputError, StorageError
@@ -13,7 +13,7 @@ from model.files import make_directory, write_text
 
 FORMATS = ("svg", "pdf", "png")
 CAPTIONS = "captions.txt"
-FIGURES: Figures = {name: each for part in (*subjects.parts("figures"), bench) for name, each in part.FIGURES.items()}
+FIGURES: Figures = {name: each for part in subjects.parts("figures") for name, each in part.FIGURES.items()}
 """Every figure, in the order of the report."""
 
 

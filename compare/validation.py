@@ -11,7 +11,6 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from compare.bench import scores
 from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Claim, Outcome, Verdict
 from compare.judge import forget, judge, select, verdict
@@ -88,10 +87,6 @@ def validate(
             else:  # a protocol that breaks down takes its own claims with it, and no others
                 broken[protocol.name] = f"{protocol.name}: {type(found).__name__}: {found}"
             judge_what_is_there()
-        if level > Level.QUICK and claims is None:
-            ladder = campaign.under("ladder", "ladder of settings, error against cost")
-            scores.write(ladder, output)
-            ladder.reduce("ladder")
     verdicts = {name: future.result() for name, future in judged.items()}
     files = [path for each in PROTOCOLS if (path := programme.file(each, output, engine, level, sets)).exists()]
     count = workers if isinstance(workers, int) else workers.count
@@ -135,7 +130,7 @@ def stored(directory: Path) -> Records:
 
 def material(directory: Path, verdicts: Sequence[Verdict], records: Records) -> Material:
     """What figures of a results directory are made of."""
-    return Material({v.claim.id: v.checks for v in verdicts}, records, directory, **scores.read(directory))
+    return Material({v.claim.id: v.checks for v in verdicts}, records, directory)
 
 
 def stored_material(directory: Path) -> Material:

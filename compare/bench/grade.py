@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
@@ -44,7 +44,7 @@ CAPTION = (
 )
 Cell = tuple[str, bool | None]
 """A text, and whether what it says is good; None: neither."""
-Line = tuple[str, str, list[Cell]]
+Row = tuple[str, str, list[Cell]]
 """One line of the card: its group, what it is, and a cell for each column."""
 
 
@@ -212,37 +212,43 @@ def advice(native: Native, creep: float, chatter: float) -> Iterator[str]:
     )
 
 
-def lines(columns: Sequence[Column]) -> list[Line]:
+def lines(columns: Sequence[Column]) -> list[Row]:
     """The card as text, without the advice."""
 
-    def share(share: float) -> Cell:
-        good = share >= AGREES
-        return f"{'✓' if good else '✗'} {math.floor(100 * share)} %", good
+    def line(
+        group: str,
+        name: str,
+        values: Iterable[float],
+        good: float | None = None,
+        form: str = "{:.1e}",
+        nan: str = "diverged",
+    ) -> Row:
+        """Numbers that are good up to a size, if it is given."""
+        cells: list[Cell] = []
+        for v in values:
+            fine = None if good is None else abs(v) <= good
+            cells.append((nan, False) if math.isnan(v) else (form.format(v), fine))
+        return group, name, cells
 
-    def relative(error: float, sign: str = "+") -> Cell:
-        return ("missing", False) if math.isnan(error) else (f"{error:{sign}.1e}", abs(error) <= GOOD)
-
-    def speed(error: float) -> Cell:
-        return ("diverged", False) if math.isnan(error) else (f"{error:.1e}", error <= GOOD_SPEED)
-
-    def lost(share: float) -> Cell:
-        return ("diverged", False) if math.isnan(share) else (f"{100 * share:.3g} %", share == 0)
-
-    def line(group: str, name: str, cells: Iterable[Cell]) -> Line:
-        return group, name, list(cells)
-
-    cases, slipping = columns[0].cases, [state for state in STATES if state.case is Case.SS]
+    shares: list[Row] = []
+    for case in columns[0].cases:
+        held = [(column.cases[case], column.cases[case] >= AGREES) for column in columns]
+        cells = [(f"{'✓' if good else '✗'} {math.floor(100 * share)} %", good) for share, good in held]
+        shares.append(("share of time in the case", case, [*cells]))
+    of = {state.name: [column.of(state) for column in columns] for state in STATES}
+    slipping = [state.name for state in STATES if state.case is Case.SS]
+    sign, missing, off = "{:+.1e}", "missing", "relative error of ω_c"
     return [
-        *[line("share of time in the case", name, (share(c.cases[name]) for c in columns)) for name in cases],
-        *[line("relative error of ω_c", s.name, (relative(c.of(s).omega_c) for c in columns)) for s in STATES],
-        *[line("error of slip (m/s)", s.name, (speed(c.of(s).slip) for c in columns)) for s in STATES],
-        *[line("steps that lose contact", s.name, (lost(c.of(s).open) for c in columns)) for s in slipping],
-        line("other errors", f"creep in {ROLLING.name} (m/s)", (speed(c.of(ROLLING).creep) for c in columns)),
-        line("other errors", "ω₀₁, end of rolling", (relative(c.omega_01) for c in columns)),
-        line("other errors", f"{APPROACH.name}, rms", (relative(c.transient, "") for c in columns)),
-        line("cost", "time step (ms)", ((f"{1e3 * c.timestep:g}", None) for c in columns)),
-        line("cost", f"a step ({OURS.name} 1)", ((f"{c.cost:.2f}", None) for c in columns)),
-        line("cost", f"a second ({OURS.name} 1)", ((f"{c.cost_of_a_second:.2f}", None) for c in columns)),
+        *shares,
+        *(line(off, name, [h.omega_c for h in own], GOOD, sign, missing) for name, own in of.items()),
+        *(line("error of slip (m/s)", name, [h.slip for h in own], GOOD_SPEED) for name, own in of.items()),
+        *(line("steps that lose contact", name, [100 * h.open for h in of[name]], 0, "{:.3g} %") for name in slipping),
+        line("other errors", f"creep in {ROLLING.name} (m/s)", [h.creep for h in of[ROLLING.name]], GOOD_SPEED),
+        line("other errors", "ω₀₁, end of rolling", [c.omega_01 for c in columns], GOOD, sign, missing),
+        line("other errors", f"{APPROACH.name}, rms", [c.transient for c in columns], GOOD, nan=missing),
+        line("cost", "time step (ms)", [1e3 * c.timestep for c in columns], form="{:g}"),
+        line("cost", f"a step ({OURS.name} 1)", [c.cost for c in columns], form="{:.2f}"),
+        line("cost", f"a second ({OURS.name} 1)", [c.cost_of_a_second for c in columns], form="{:.2f}"),
     ]
 
 
@@ -256,19 +262,12 @@ def headline(column: Column) -> str:
 
 def table(columns: Sequence[Column]) -> Table:
     """The card for the terminal."""
-    shown = Table(box=box.SIMPLE_HEAD, title="Score card", title_justify="left", title_style="bold")
-    shown.add_column("")
-    for column in columns:
-        shown.add_column(column.name, justify="right")
-    last = ""
-    for group, name, cells in lines(columns):
-        if group != last:
-            shown.add_row(Text(group, style="dim"))
-            last = group
-        colours = {True: "green", False: "red", None: ""}
-        shown.add_row(f"  {name}", *(Text(text, style=colours[good]) for text, good in cells))
-    shown.caption, shown.caption_justify = CAPTION, "left"
-    return shown
+    colours = {True: "green", False: "red", None: ""}
+    rows: list[list[str | Text]] = [["", *(column.name for column in columns)]]
+    for group, own in itertools.groupby(lines(columns), key=lambda line: line[0]):
+        rows.append([Text(group, "dim")])
+        rows += [[f"  {name}", *(Text(text, colours[good]) for text, good in cells)] for _, name, cells in own]
+    return pages.table("Score card", rows, caption=CAPTION)
 
 
 def html(columns: Sequence[Column], settings: str) -> str:

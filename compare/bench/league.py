@@ -105,17 +105,14 @@ def as_it_comes(step: float) -> ContactSettings:
 def contestants(chosen: Sequence[str] | None = None, steps: Sequence[float] = STEPS) -> list[Contestant]:
     """The engines chosen by name, or all, whether installed or not, with each time step that they don't choose."""
 
-    def settings(engine: Engine, step: float | None) -> Settings:
-        if engine is NEWCOMER and step:
-            return as_it_comes(step)
-        return engine.configure({"timestep": step} if step else {}, SLIPPING.p)
-
-    return [
-        Contestant(engine.name, engine, step, settings(engine, step))
-        for engine in ENGINES.values()
-        if chosen is None or engine.name in chosen
-        for step in (steps if "timestep" in engine.options else [None])
-    ]
+    those = []
+    for engine in ENGINES.values():
+        for step in steps if "timestep" in engine.options else [None]:
+            if chosen is None or engine.name in chosen:
+                given = {"timestep": step} if step else {}
+                own = as_it_comes(step) if engine is NEWCOMER and step else engine.configure(given, SLIPPING.p)
+                those.append(Contestant(engine.name, engine, step, own))
+    return those
 
 
 def measure(campaign: Campaign, those: Sequence[Contestant], quick: bool = False) -> list[Entry]:
@@ -194,18 +191,17 @@ def from_mapping(data: dict[str, Any]) -> list[Entry]:
 def rows(entries: Sequence[Entry]) -> Rows:
     """A table with a head, and a row for each entry; only disciplines that some entry has."""
     forms = {CASES: "{:.0f}".format, COST: "{:.2g}".format, OPEN: "{:.0%}".format, WALL: "≤ {:g}".format}
-
-    def cell(entry: Entry, name: str) -> str:
-        score = entry.scores.get(name)
-        if name in entry.failures or score is None:
-            return "failed" if name in entry.failures else ""
-        return "not seen" if math.isnan(score) else forms.get(name, number)(score)
-
     asked = list(dict.fromkeys(name for entry in entries for name in entry.scores))
     table = [["engine", "step", *asked]]
     for entry in entries:
-        step = "its own" if entry.step is None else f"{1e3 * entry.step:g} ms"
-        table.append([entry.name, step, *(cell(entry, name) for name in asked)])
+        row = [entry.name, "its own" if entry.step is None else f"{1e3 * entry.step:g} ms"]
+        for name in asked:
+            score = entry.scores.get(name)
+            if name in entry.failures or score is None:
+                row.append("failed" if name in entry.failures else "")
+            else:
+                row.append("not seen" if math.isnan(score) else forms.get(name, number)(score))
+        table.append(row)
     return table
 
 
@@ -266,11 +262,6 @@ def _wall_holds() -> Discipline:
     return Discipline(WALL, tuple(runs), score)
 
 
-def _reproduced(runs: Runs) -> float:
-    """In how many of the nine cases a run is where the event-driven simulation is in it."""
-    return float(sum(trials.share(run, case) >= trials.AGREES for run, case in zip(runs, Case, strict=True)))
-
-
 def _open(runs: Runs) -> float:
     """Largest share of samples in which a contact that should carry a force carries none."""
     *ended, passing = runs
@@ -289,6 +280,11 @@ CONTACT = Discipline(OPEN, tuple(run for each in ERRORS for run in each.runs), _
 @functools.cache
 def disciplines() -> tuple[Discipline, ...]:
     """Those of the league, in the order of its table."""
+
+    def reproduced(runs: Runs) -> float:
+        """In how many of the nine cases a run is where the event-driven simulation is in it."""
+        return float(sum(trials.share(run, case) >= trials.AGREES for run, case in zip(runs, Case, strict=True)))
+
     onset, cases = tuple(state.run for state in trials.beyond_rolling()), tuple(map(trials.scenario, Case))
     return (
         *ERRORS[:3],
@@ -298,5 +294,5 @@ def disciplines() -> tuple[Discipline, ...]:
         _motion(HITTING),
         Discipline(ROLLING_ENDS, onset, lambda runs: abs(trials.onset(runs))),
         _wall_holds(),
-        Discipline(CASES, cases, _reproduced, quick=True),
+        Discipline(CASES, cases, reproduced, quick=True),
     )

@@ -1,35 +1,39 @@
-"""``dualball attractors``: what balls come to from many starts, and where periodic motions are born and end."""
+"""``dualball attractors``, ``basins``, ``search``: what balls come to, over starts and over parameters."""
 
 from __future__ import annotations
 
 import argparse
-import math
+import dataclasses
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table
+from rich.markdown import Markdown
 
 import analytic
 from analytic.orbits import orbit_branch
 from analytic.orbits.fates import LASTING, Attractor
 from analytic.orbits.periodic import Orbit
+from analytic.simulation.ensemble import interval
 from compare.commands import options, running
-from compare.kit import pages
+from compare.kit import pages, progress
 from compare.kit.engines import EVENT
 from compare.kit.statistics import plain
 from compare.kit.sweep import Axis, grid
 from compare.kit.tasks import carry_out
+from compare.subjects.attractors import search
+from compare.subjects.attractors.search import BOX, FATES, Search, Searched
 from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
-from model.kinematics import VARIABLES
+from model.kinematics import UNITS, VARIABLES
+from model.parameters import POSITIVE, Range, check_number
 
 
 def add(commands: options.Commands) -> None:
-    """Declare the command."""
+    """Declare the commands."""
     command = options.command(
         commands, "attractors", run, "what balls come to from many starts: stationary, periodic, chaotic motions"
     )
@@ -49,6 +53,34 @@ def add(commands: options.Commands) -> None:
     options.add_axes(command, "--follow", follow, "NAME=FROM:TO")
     command.add_argument("--page", type=Path, metavar="FILE", help="write the tables as Markdown, too")
     options.outputs(command, shown="print as JSON")
+
+    command = options.command(
+        commands, "search", searched, "where in parameter space the ball hops for ever, resumable"
+    )
+    command.add_argument("--sets", type=int, default=500, metavar="N", help="parameter sets (default 500)")
+    command.add_argument("--starts", type=int, default=5, metavar="N", help="random starts of each (default 5)")
+    command.add_argument("--seed", type=int, default=0)
+    options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
+    running.add_workers(command)
+    command.add_argument("--kept", type=Path, nargs="+", metavar="FILE", help="show what --save wrote instead")
+    command.add_argument("--save", type=Path, metavar="FILE", help="write the sets with hopping as JSON")
+    command.add_argument("--page", type=Path, metavar="FILE", help="write the table as Markdown")
+    options.outputs(command, "search", "print the sets with hopping as JSON")
+
+    command = options.command(
+        commands, "basins", plane, "what becomes of the ball from each start of a plane of states, resumable"
+    )
+    options.add_parameters(command)
+    running.add_start(command)
+    for name, example in (("across", "omega_c=0:150:61"), ("up", "slip_x=-900:900:61")):
+        command.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=f"as {example}")
+    command.add_argument(
+        "--mujoco", type=int, default=0, metavar="N", help="MuJoCo, too, on every N-th point both ways"
+    )
+    command.add_argument("--timestep", type=options.number, default=2.5e-4, metavar="s", help="that of MuJoCo")
+    running.add_workers(command)
+    command.add_argument("--save", type=Path, metavar="FILE", help="write the map as JSON")
+    options.outputs(command, "basins", "print the shares as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -70,9 +102,15 @@ def run(args: argparse.Namespace) -> int:
         row |= {"attractors": list(map(attractor_data, attractors)), "branches": list(map(branch_data, branches))}
         rows.append(row)
     data = {"engine": args.engine.name, "seed": args.seed, "sets": rows}
+    table = _table(data)
     if args.page:
-        write_text(args.page, page(args.page.stem.capitalize(), args.words, options.parameters(args), data))
-    options.show(data, _table, args.json)
+        write_text(args.page, _page(args.page.stem.capitalize(), args.words, options.parameters(args), data, table))
+    title, lines = f"What balls come to ({args.engine.name})", []
+    for branch in _branches(data):
+        name, values = branch["parameter"], [orbit[branch["parameter"]] for orbit in branch["orbits"]]
+        lines.append(f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:")
+        lines += [f"  {place['kind']} at {place['value']:.7g} {place['reason']}" for place in branch["places"]]
+    options.show(data, args.json, pages.table(title, table, caption="\n".join(lines)))
     return 0
 
 
@@ -119,7 +157,12 @@ def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
     return {"parameter": branch.name, "places": places, "orbits": list(map(data, branch.orbits))}
 
 
-def _rows(data: dict[str, Any]) -> pages.Rows:
+def _branches(data: dict[str, Any]) -> list[dict[str, Any]]:
+    """Those of all sets."""
+    return [branch for each in data["sets"] for branch in each["branches"]]
+
+
+def _table(data: dict[str, Any]) -> pages.Rows:
     """A row for each attractor of each set."""
     varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
     head = "motion", "cases", "starts (95 %)", "period (s)", "ω_c (rad/s)", "y max (mm)", "|multiplier|", "theory"
@@ -142,23 +185,14 @@ def _rows(data: dict[str, Any]) -> pages.Rows:
     return rows
 
 
-def _table(data: dict[str, Any]) -> Table:
-    lines = []
-    for branch in (branch for each in data["sets"] for branch in each["branches"]):
-        name, values = branch["parameter"], [orbit[branch["parameter"]] for orbit in branch["orbits"]]
-        lines.append(f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:")
-        lines += [f"  {place['kind']} at {place['value']:.7g} {place['reason']}" for place in branch["places"]]
-    return pages.table(f"What balls come to ({data['engine']})", _rows(data), caption="\n".join(lines))
-
-
-def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) -> str:
-    """The same in Markdown, with the parameters, the command that writes it and the orbits of each branch."""
+def _page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any], table: pages.Rows) -> str:
+    """The table in Markdown, with the parameters, the command that writes it and the orbits of each branch."""
     values = (f"{f.metadata['symbol']} = {getattr(p, f.name):.5g} {f.metadata['unit']}" for f in p.quantities())
     given = ", ".join(value.removesuffix(" 1") for value in values)
     lines = [f"# {title}: what balls come to", ""]
     lines += [f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by", ""]
-    lines += ["```sh", shlex.join(words), "```", "", pages.markdown(_rows(data))]
-    for branch in (branch for each in data["sets"] for branch in each["branches"]):
+    lines += ["```sh", shlex.join(words), "```", "", pages.markdown(table)]
+    for branch in _branches(data):
         name = branch["parameter"]
         lines += ["", f"## Followed in {name}", ""]
         lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}".rstrip() for p in branch["places"]), ""]
@@ -172,4 +206,46 @@ def page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any]) 
 
 def _largest(row: dict[str, Any]) -> float:
     """The largest modulus of the multipliers; nan if there are none."""
-    return max((abs(complex(*each)) for each in row["multipliers"]), default=math.nan)
+    return max((abs(complex(*each)) for each in row["multipliers"]), default=float("nan"))
+
+
+def searched(args: argparse.Namespace) -> int:
+    """Search what hasn't been searched yet, and show the table."""
+    if args.kept:
+        searches = [Searched.load(path) for path in args.kept]
+    else:
+        count, starts = (
+            int(check_number(name, getattr(args, name), name, Range(1, whole=True))) for name in ("sets", "starts")
+        )
+        axes = [Axis.parse(text, dict.fromkeys(BOX, "1"), "group", POSITIVE) for text in args.range]
+        asked = Search(BOX | {axis.name: axis.ends for axis in axes}, starts, args.seed)
+        with progress.shown(args.quiet or args.json) as show:
+            searches = [search.run(args.output, asked, count, running.workers(args), show)]
+    if args.save:
+        searches[0].save(args.save)
+    if args.page:
+        write_text(args.page, search.page(*searches))
+    options.show([dataclasses.asdict(each) for each in searches], args.json, Markdown(search.page(*searches)))
+    return 0
+
+
+def plane(args: argparse.Namespace) -> int:
+    """Map the basins and show their shares."""
+    p = options.parameters(args)
+    coarse = int(check_number("mujoco", args.mujoco, "points", Range(0, whole=True)))
+    units = dict(zip(VARIABLES, UNITS, strict=True))
+    across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
+    with running.campaign(args, "basins") as campaign:
+        mapped = search.basins(campaign, p, running.start(args)._asdict(), across, up, coarse, args.timestep)
+    if args.save:
+        mapped.save(args.save)
+    shares = {fate: mapped.share(fate) for fate in FATES if mapped.share(fate)[0]}
+    differ = mapped.differences().tolist() if coarse else []
+    said = []
+    for fate, (hits, of) in shares.items():
+        low, high = interval(hits, of)
+        said.append(f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to {100 * high:.1f} %)")
+    where = f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a boundary: {differ}"
+    data = {"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}
+    options.show(data, args.json, *said, *([where] if coarse else []))
+    return 0

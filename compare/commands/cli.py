@@ -20,11 +20,11 @@ from model.trajectory import current_versions
 GROUPS = {
     "study": {"validate": "validate", "judge": "validate", "report": "look", "figures": "look"},
     "the ball": {
-        **{"predict": "predict", "simulate": "simulate", "inspect": "look", "sweep": "sweep", "collect": "sweep"},
-        **{"attractors": "attractors", "basins": "search", "search": "search", "design": "design"},
+        **{"predict": "predict", "simulate": "simulate", "inspect": "look", "sweep": "simulate", "collect": "simulate"},
+        **{"attractors": "attractors", "basins": "attractors", "search": "attractors", "design": "design"},
         **{"render": "look", "view": "look"},
     },
-    "contacts and engines": {"grade": "grade", "league": "league"},
+    "contacts and engines": {"grade": "bench", "league": "bench"},
 }
 """The commands, as help groups them, and the module of each: `predict` doesn't wait for the engines of the others."""
 

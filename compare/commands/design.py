@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from analytic.flowmeter import design
 from analytic.flowmeter.design import Interval, Request
 from compare.commands import options
-from compare.kit.statistics import plain
 from model import InputError, Parameters, drag, parameters
 from model.files import check_writable, write_text
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names, check_number, refuse_missing
@@ -53,10 +49,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.file}: {error}") from error
     if args.output:
         write_text(args.output, meter.page(made))
-    if args.json:
-        print(json.dumps(plain(meter.described(made)), indent=1))
-    else:
-        Console(markup=False).print(*meter.tables(made), sep="\n")
+    options.show(meter.described(made), args.json, *meter.tables(made))
     return 0 if made.choice.margin >= 1 else 1
 
 

@@ -86,14 +86,16 @@ def inspect(args: argparse.Namespace) -> int:
     if collection.is_collection(args.file):
         if args.plot:
             raise InputError(f"{args.file} is a collection: only a run can be drawn")
-        options.show(collection.describe(args.file), collection.table, args.json)
+        gathered = collection.describe(args.file)
+        options.show(gathered, args.json, collection.table(gathered))
         return 0
     if args.plot:
         from compare.kit import drawing
         from compare.view import plot as trajectory  # here, because drawing takes a second to load
 
         drawing.save(trajectory.draw(storage.load(args.file)), args.plot)
-    options.show(inspection.describe(args.file), inspection.table, args.json)
+    about = inspection.describe(args.file)
+    options.show(about, args.json, inspection.table(about))
     return 0
 
 

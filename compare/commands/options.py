@@ -12,6 +12,7 @@ from typing import Any
 from rich.console import Console
 
 from compare.kit.pages import readable
+from compare.kit.statistics import plain
 from model import Parameters, drag
 
 Parser = argparse.ArgumentParser
@@ -55,12 +56,12 @@ def outputs(parser: Parser, directory: str = "", shown: str = "print JSON") -> N
     parser.add_argument("--json", action="store_true", help=shown)
 
 
-def show(data: dict[str, Any], table: Callable[[dict[str, Any]], Any], as_json: bool) -> None:
-    """Print data as JSON or as a table."""
+def show(data: Any, as_json: bool, *shown: Any) -> None:
+    """Print data as JSON, numbers that are not finite as null; or what is shown of it, tables and lines."""
     if as_json:
-        print(json.dumps(data, indent=1))
+        print(json.dumps(plain(data), indent=1))
     else:
-        Console().print(table(data))
+        Console(markup=False).print(*shown, sep="\n")
 
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:

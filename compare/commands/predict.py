@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import math
 from collections.abc import Callable
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 import analytic
-from analytic import StationarySolution
 from analytic.bifurcation import fluid_inertia
 from analytic.mechanics import drag
 from compare.commands import options
+from compare.kit import pages
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES
-from compare.kit.statistics import plain
 from model import Case, Parameters
 from model.drag import REYNOLDS, SCHILLER_NAUMANN
 from model.kinematics import UNITS, VARIABLES
@@ -35,11 +33,8 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Predict and show."""
-    p = options.parameters(args)
-    if args.json:
-        print(json.dumps(plain(described(p)), indent=1))
-    else:
-        Console().print(*tables(p), sep="\n")
+    data = described(p := options.parameters(args))
+    options.show(data, args.json, *tables(p, data))
     return 0
 
 
@@ -91,60 +86,52 @@ def reading(p: Parameters) -> str:
     return f"ambiguous: {', '.join(c.name for c in cases)} all attract, the reading depends on the history"
 
 
-def tables(p: Parameters) -> list[Table | str]:
-    """Thresholds, solutions, the reading and what to mind, for the terminal."""
-    look: dict[str, Any] = {"title_justify": "left", "title_style": "bold"}
-    head = Table(title="Parameters", show_header=False, box=None, **look)
+def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
+    """What `described` says of p: thresholds, solutions, the reading and what to mind, for the terminal."""
+    given = [["", "", ""]]
     for field in p.quantities():
         meta, value = field.metadata, f"{getattr(p, field.name):.8g}"
-        head.add_row(meta["symbol"], f"{value} {readable(meta['unit'])}", f"[dim]{meta['meaning']}")
-    head.add_row("drag", p.drag, "[dim]law of drag")
-    groups = f"[dim]κ = c√(R/g) = {p.kappa:.6g}, Ω₀ = ω₀√(R/g) = {p.Omega_0:.6g}"
+        given.append([meta["symbol"], f"{value} {readable(meta['unit'])}", meta["meaning"]])
+    look: dict[str, Any] = {"justify": "left", "show_header": False, "box": None}
+    head = pages.table("Parameters", [*given, ["drag", p.drag, "law of drag"]], **look)
+    groups = Text(f"κ = c√(R/g) = {p.kappa:.6g}, Ω₀ = ω₀√(R/g) = {p.Omega_0:.6g}", "dim")
 
-    limits = Table("", title="Thresholds", **look)
-    limits.add_column("value", justify="right")
-    limits.add_column("what happens there")
-    for name, value in dataclasses.asdict(analytic.thresholds(p)).items():
+    limits = [["", "value", "what happens there"]]
+    for name, value in data["thresholds"].items():
         symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")
-        limits.add_row(symbol, "does not exist" if math.isnan(value) else f"{value:.12g}{unit}", _MEANING[name])
+        limits.append([symbol, "does not exist" if math.isnan(value) else f"{value:.12g}{unit}", _MEANING[name]])
 
-    solutions, attracting = analytic.stationary_solutions(p), {s.case for s in analytic.stable_solutions(p)}
-    shown = Table("", title="Stationary solutions", **look)
-    for s in solutions:
-        shown.add_column(s.case.name, justify="right", style="" if s.exists and s.case in attracting else "dim")
-    for label, show in _ROWS.items():
-        shown.add_row(label, *map(show, solutions))
-    numbers = {s.case.name: drag.reynolds_of(s.state, p) for s in solutions} if p.nu_f else {}
-    if numbers:
-        shown.add_row("Re", *(f"{Re:.4g}" for Re in numbers.values()))
+    solutions = data["solutions"]
+    rows = [[label, *map(show, solutions)] for label, show in _ROWS.items() if label != "Re" or p.nu_f]
+    shown = pages.table("Stationary solutions", [["", *(s["case"] for s in solutions)], *rows])
+    attracting = {s.case.name for s in analytic.stable_solutions(p)}
+    for column, s in zip(shown.columns[1:], solutions, strict=True):
+        column.style = "" if s["exists"] and s["case"] in attracting else "dim"
 
-    limit = analytic.operating_limit(p)
-    reach = f"it has no operating range: {limit.end.value}"
-    if limit.omega_0:
-        reach = f"rolling is its only lasting motion up to ω₀ = {limit.omega_0:.8g} rad/s: there {limit.end.value}"
-        if math.isinf(analytic.reading_range(p)):
+    reach = f"it has no operating range: {data['operating_range_ends']['because']}"
+    if limit := data["operating_range"]:
+        end = data["operating_range_ends"]["because"]
+        reach = f"rolling is its only lasting motion up to ω₀ = {limit:.8g} rad/s: there {end}"
+        if math.isinf(data["reading_range"]):
             reach += "; ω_c = ω₀ holds in every motion, however fast the flow"
-    remarks = [f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {reading(p)}; {reach}."]
-    if p.density_ratio:
+    remarks: list[Text | str] = [f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {data['reading']}; {reach}."]
+    if data["fluid_inertia"]:
         shifts = ", ".join(
             f"{QUANTITIES[name].symbol if name in QUANTITIES else 'the rate at which rolling follows the flow'} "
             f"by {100 * shift:+.2g} %"
-            for name, shift in fluid_inertia.shifts(p).items()
+            for name, shift in data["fluid_inertia"].items()
             if math.isfinite(shift)
         )
         remarks.append(
             f"Left out is the fluid's inertia (added mass, pressure gradient): it would shift {shifts}; not ω₀₃."
         )
-    existing = {s.case.name for s in solutions if s.exists}
-    outside = {case: Re for case, Re in numbers.items() if case in existing and not drag.covers(Re, p.drag)}
+    outside = [f"{s['Re']:.3g} in {s['case']}" for s in solutions if s["exists"] and s["drag_law_covers_Re"] is False]
     if outside:
         (low, high), (_, most) = REYNOLDS[p.drag], REYNOLDS[SCHILLER_NAUMANN]
-        seen = ", ".join(f"{Re:.3g} in {case}" for case, Re in outside.items())
         hint = f" (--drag {SCHILLER_NAUMANN}: up to {most:g})" if p.drag != SCHILLER_NAUMANN else ""
-        remarks.append(
-            f"[yellow]Warning: Re = {seen}, but the law {p.drag!r} is meant for {low:g} to {high:g}{hint}.[/]"
-        )
-    return [head, groups, limits, shown, *remarks]
+        law = f"the law {p.drag!r} is meant for {low:g} to {high:g}{hint}"
+        remarks.append(Text(f"Warning: Re = {', '.join(outside)}, but {law}.", "yellow"))
+    return [head, groups, pages.table("Thresholds", limits, justify="left"), shown, *remarks]
 
 
 _MEANING = {
@@ -156,19 +143,21 @@ _MEANING = {
 }
 
 
-_ROWS: dict[str, Callable[[StationarySolution], str]] = {
-    "ω_c (rad/s)": lambda s: f"{s.state.omega_c:.8g}",
-    "ω̃_x (rad/s)": lambda s: f"{s.state.slip_x:.8g}",
-    "ω̃_y (rad/s)": lambda s: f"{s.state.slip_y:.8g}",
-    "ω̃_z (rad/s)": lambda s: f"{s.state.slip_z:.8g}",
-    "v_y (m/s)": lambda s: f"{s.state.v_y:.6g}",
-    "A_y (N)": lambda s: f"{s.force_A[1]:.6g}",
-    "B_x (N)": lambda s: f"{s.force_B[0]:.6g}",
-    "forces admissible": lambda s: "yes" if s.exists else "no",
-    "within the case": lambda s: s.stability.value.removesuffix(" stable"),
-    "against slipping": lambda s: "stable" if s.slip_stable else "unstable",
+_ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
+    "ω_c (rad/s)": lambda s: f"{s['x']['omega_c']:.8g}",
+    "ω̃_x (rad/s)": lambda s: f"{s['x']['slip_x']:.8g}",
+    "ω̃_y (rad/s)": lambda s: f"{s['x']['slip_y']:.8g}",
+    "ω̃_z (rad/s)": lambda s: f"{s['x']['slip_z']:.8g}",
+    "v_y (m/s)": lambda s: f"{s['x']['v_y']:.6g}",
+    "A_y (N)": lambda s: f"{s['force_A'][1]:.6g}",
+    "B_x (N)": lambda s: f"{s['force_B'][0]:.6g}",
+    "forces admissible": lambda s: "yes" if s["exists"] else "no",
+    "within the case": lambda s: s["stability"].removesuffix(" stable"),
+    "against slipping": lambda s: "stable" if s["slip_stable"] else "unstable",
     "rightmost eigenvalue (1/s)": lambda s: (
-        f"{s.eigenvalues[0].real:.4g}" + (f" ± {abs(s.eigenvalues[0].imag):.4g}i" if s.eigenvalues[0].imag else "")
+        "{:.4g}".format(s["eigenvalues"][0][0])
+        + (f" ± {abs(s['eigenvalues'][0][1]):.4g}i" if s["eigenvalues"][0][1] else "")
     ),
-    "free": lambda s: ", ".join(s.family) or "-",
+    "free": lambda s: ", ".join(s["family"]) or "-",
+    "Re": lambda s: f"{s['Re']:.4g}",
 }

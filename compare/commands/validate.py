@@ -8,14 +8,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
 from compare.catalogue import CLAIMS
 from compare.claim import Outcome, Verdict
-from compare.commands import options, running, tables
-from compare.kit import progress
+from compare.commands import options, running
+from compare.kit import pages, progress
 from compare.kit.levels import Level
-from compare.report import results
+from compare.report import results, wording
 from model import Parameters
+
+_STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"}
 
 
 def add(commands: options.Commands) -> None:
@@ -30,18 +34,15 @@ def add(commands: options.Commands) -> None:
     running.add_engine_name(command)
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     running.add_workers(command)
-    _add_shared(command, "results")
 
-    command = options.command(commands, "judge", judge, "judge the stored measurements of a validation again")
-    command.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR")
-    running.add_processes(command)
-    _add_shared(command)
+    again = options.command(commands, "judge", judge, "judge the stored measurements of a validation again")
+    again.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR")
+    running.add_processes(again)
 
-
-def _add_shared(command: argparse.ArgumentParser, directory: str = "") -> None:
-    command.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
-    command.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
-    options.outputs(command, directory, "print the verdicts as JSON")
+    for each, directory in ((command, "results"), (again, "")):
+        each.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
+        each.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
+        options.outputs(each, directory, "print the verdicts as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -54,13 +55,14 @@ def run(args: argparse.Namespace) -> int:
     elif args.set:
         chosen = {args.set: Parameters.named(args.set)}
     if args.list:
-        Console().print(tables.claims(CLAIMS))
+        rows = [[claim.id, claim.source, claim.statement, str(claim.text)] for claim in CLAIMS]
+        Console().print(pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left"))
         return 0
     with progress.shown(quiet=args.quiet or args.json) as show:
         wanted = {"level": args.level, "claims": args.claim, "sets": chosen, "limit": args.limit, "engine": args.engine}
         wanted |= {"workers": running.workers(args), "progress": show}
         verdicts = validation.validate(
-            args.output, **wanted, announce=lambda verdict: console.print(tables.line(verdict), soft_wrap=True)
+            args.output, **wanted, announce=lambda verdict: console.print(line(verdict), soft_wrap=True)
         )
     admitted = [v for v in verdicts if v.outcome is not Outcome.NOT_RUN] if chosen else verdicts
     return _finish(verdicts, admitted, args, console)
@@ -72,7 +74,7 @@ def judge(args: argparse.Namespace) -> int:
 
     console, verdicts = Console(quiet=args.json), validation.judge_stored(args.output, args.claim, args.workers)
     for verdict in verdicts:
-        console.print(tables.line(verdict), soft_wrap=True)
+        console.print(line(verdict), soft_wrap=True)
     return _finish(verdicts, [v for v in verdicts if v.outcome is not Outcome.NOT_RUN], args, console)
 
 
@@ -83,7 +85,41 @@ def _finish(
     if args.json:
         print(json.dumps([results.described(verdict) for verdict in verdicts], indent=1))
     if args.verbose:
-        console.print(*(tables.checks(verdict) for verdict in verdicts if verdict.checks))
-    console.print(tables.summary(verdicts), soft_wrap=True)
+        console.print(*(checks(verdict) for verdict in verdicts if verdict.checks))
+    console.print(summary(verdicts), soft_wrap=True)
     console.print(f"report: {args.output / results.REPORT}")
     return 0 if all(verdict.passed for verdict in counting) else 1
+
+
+def line(verdict: Verdict) -> Text:
+    """A claim in one line: verdict, largest deviation, what error of theory would be noticed, or what went wrong."""
+    kind, mark = wording.MARKS[Outcome.CONFIRMED if verdict.passed else verdict.outcome]
+    shown = Text.assemble((f"{mark} {verdict.outcome:<13}", _STYLES[kind]), f"{verdict.claim.id:<18}")
+    if verdict.checks:
+        found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
+        count = len(verdict.checks)
+        shown.append("; ".join([f"{count:>5} number{'s' if count > 1 else ''}", *found]))
+    if verdict.error:
+        shown.append(f"  {verdict.error}", "red")
+    if verdict.outcome is Outcome.NOT_RUN and verdict.missing:
+        shown.append(f"  {verdict.missing[0]}", "dim")
+    return shown
+
+
+def summary(verdicts: Sequence[Verdict]) -> Text:
+    """How many claims and numbers came out how."""
+    ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
+    return Text("; ".join([wording.headline(ran), *map(" ".join, wording.totals(ran))]), "bold")
+
+
+def checks(verdict: Verdict) -> Table:
+    """Every number of one claim."""
+    rows = [["set", "ω₀ (rad/s)", "quantity", "predicted", "measured", "deviation", "tolerance", ""]]
+    for check in verdict.checks:
+        m = check.measurement
+        numbers = wording.value(m, check.predicted), wording.value(m, m.value)
+        sizes = wording.size(check.deviation, "+"), wording.size(check.tolerance)
+        rows.append(
+            [m.set, f"{m.parameters.omega_0:.6g}", wording.SYMBOLS[m.quantity], *numbers, *sizes, wording.mark(check)]
+        )
+    return pages.table(f"{verdict.claim.id}  {verdict.claim.statement}", rows, no_wrap=True)

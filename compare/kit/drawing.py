@@ -35,10 +35,6 @@ class Material:
     records: Records = Records()
     directory: Path = Path()
     """The results directory, where names of run files begin."""
-    ladder: tuple[Any, ...] = ()
-    """What is reached under settings that each have one thing more than the one before."""
-    frontier: tuple[Any, ...] = ()
-    """What methods reach, with their cost."""
 
     def select(self, quantity: str, *conditions: str) -> Iterator[Measurement]:
         """Measurements of a quantity that have conditions of these names."""

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from rich import box
 from rich.table import Table
 
 from analytic.flowmeter import characteristic as flowmeter
@@ -26,10 +25,10 @@ _NONE = "–"
 
 def sentences(made: Design) -> list[str]:
     """What the design comes to."""
-    chosen, request, curve = made.choice, made.request, made.curve
-    said = [f"Best: {made.material}, {_values(chosen.values)}."]
+    chosen, request, curve, said = made.choice, made.request, made.curve, []
     if chosen.margin < 1:
-        said.insert(0, f"No meter within the bounds covers the flows up to {request.fastest:g} rad/s.")
+        said.append(f"No meter within the bounds covers the flows up to {request.fastest:g} rad/s.")
+    said.append(f"Best: {made.material}, {_values(chosen.values)}.")
     if chosen.margin:
         said.append(
             "Rolling at both points is the ball's only lasting motion up to at worst "
@@ -60,32 +59,35 @@ def sentences(made: Design) -> list[str]:
     return said
 
 
-def _titled(made: Design) -> list[tuple[str, pages.Rows]]:
-    """The tables: a column for the best meter of each material, the best of all first; rows for the thresholds."""
-    names, choices = zip(*sorted(made.choices.items(), key=lambda item: -item[1].margin), strict=True)
-    numbers: dict[str, list[float]] = {_named(name): [c.values[name] for c in choices] for name in made.choice.values}
-    numbers |= {
-        "limit at worst (rad/s)": [c.worst.omega_0 for c in choices],
-        "nominal limit (rad/s)": [c.limit.omega_0 for c in choices],
-        "margin at worst": [c.margin for c in choices],
-        "time constant (s)": [c.response for c in choices],
+def rows(made: Design) -> dict[str, pages.Rows]:
+    """Tables by title, with a column for the best meter of each material, the best of all first, and of thresholds."""
+    best = dict(sorted(made.choices.items(), key=lambda item: -item[1].margin))
+    numbers = {
+        **{_named(name): [c.values[name] for c in best.values()] for name in made.choice.values},
+        "limit at worst (rad/s)": [c.worst.omega_0 for c in best.values()],
+        "nominal limit (rad/s)": [c.limit.omega_0 for c in best.values()],
+        "margin at worst": [c.margin for c in best.values()],
+        "time constant (s)": [c.response for c in best.values()],
     }
-    materials = [["", *names], *([name, *map(_number, row)] for name, row in numbers.items())]
-    thresholds = [["threshold", "nominal (rad/s)", "lowest", "highest"]]
-    for key in THRESHOLDS:
-        thresholds.append([SYMBOLS[key], *map(_number, (getattr(made.thresholds, key), *made.spread[key]))])
+    spread = {key: [getattr(made.thresholds, key), *made.spread[key]] for key in THRESHOLDS}
     sensitivities = [["% per %", *(SYMBOLS[key] for key in THRESHOLDS)]]
     for name in made.sensitivities[THRESHOLDS[0]]:
         values = [made.sensitivities[key][name].value for key in THRESHOLDS]
         shown = [f"{value:+.3f}" if abs(value) >= 5e-4 else "0" if math.isfinite(value) else _NONE for value in values]
         sensitivities.append([SYMBOLS.get(name, name), *shown])
-    titles = ("The best of each material", "Thresholds", "Sensitivities")
-    return list(zip(titles, (materials, thresholds, sensitivities), strict=True))
+    return {
+        "The best of each material": [["", *best], *([name, *map(_number, row)] for name, row in numbers.items())],
+        "Thresholds": [
+            ["threshold", "nominal (rad/s)", "lowest", "highest"],
+            *([SYMBOLS[key], *map(_number, row)] for key, row in spread.items()),
+        ],
+        "Sensitivities": sensitivities,
+    }
 
 
 def tables(made: Design) -> list[Table | str]:
     """All of it, for the terminal."""
-    shown = [pages.table(title, rows, box=box.HEAVY_HEAD) for title, rows in _titled(made)]
+    shown = [pages.table(title, own) for title, own in rows(made).items()]
     return [*shown, *(f"{name} can't be used: {why}" for name, why in made.refused.items()), *sentences(made)]
 
 
@@ -97,10 +99,7 @@ def described(made: Design) -> dict[str, Any]:
         ends = {name: {"omega_0": of.omega_0, "end": of.end.name} for name, of in limits.items()}
         return {"values": c.values, **ends, "margin": c.margin, "response": c.response}
 
-    def span(low: Any, high: Any) -> dict[str, Any]:
-        return {"lowest": low, "highest": high}
-
-    curve, p = made.curve, made.choice.p
+    curve, p, ends = made.curve, made.choice.p, ("lowest", "highest")
     return {
         "request": dataclasses.asdict(made.request),
         "material": made.material,
@@ -112,14 +111,17 @@ def described(made: Design) -> dict[str, Any]:
         "unloading_limit": flowmeter.unloading_limit(p),
         "materials": {name: meter(c) for name, c in made.choices.items()},
         "refused": made.refused,
-        "thresholds": {k: {"value": getattr(made.thresholds, k)} | span(*made.spread[k]) for k in made.spread},
+        "thresholds": {
+            key: {"value": getattr(made.thresholds, key), **dict(zip(ends, of, strict=True))}
+            for key, of in made.spread.items()
+        },
         "sensitivities": {
             key: {name: dataclasses.asdict(s) for name, s in own.items()} for key, own in made.sensitivities.items()
         },
         "characteristic": {
             "omega_0": curve.omega_0.tolist(),
-            "omega_c": span(*(each.tolist() for each in curve.meant)),
-            "within_tolerances": span(*(each.tolist() for each in curve.band)),
+            "omega_c": dict(zip(ends, (each.tolist() for each in curve.meant), strict=True)),
+            "within_tolerances": dict(zip(ends, (each.tolist() for each in curve.band), strict=True)),
         },
     }
 
@@ -139,7 +141,7 @@ def page(made: Design) -> str:
         "tolerances": ", ".join(f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()) or "none",
     }
     drawn = [(pictures.svg(draw(made)), caption) for draw, caption in figures.FIGURES]
-    shown = {"sentences": sentences(made), "tables": _titled(made), "asked": asked, "figures": drawn}
+    shown = {"sentences": sentences(made), "tables": rows(made).items(), "asked": asked, "figures": drawn}
     return pages.render("compare.report", "meter.html", made=made, **shown)
 
 

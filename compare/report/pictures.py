@@ -14,12 +14,11 @@ import matplotlib
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from compare.kit.drawing import Drawing
+from compare.kit.drawing import Drawing, GapError
 from compare.kit.tasks import sources
+from model import StorageError
 from model.files import write_text
 
-_PROGRAM = ("model", "analytic", "compare", "compare.runs", "compare.measure", "compare.scorecard", "compare.figures")
-"""Packages whose constants and functions a picture may show."""
 _UNESCAPED = " !$'()*+,-./:;<=>?@_~"
 """What needs no escape in an address between double quotes."""
 
@@ -34,19 +33,23 @@ def kept(path: Path, drawing: Drawing, data: Any) -> dict[str, str] | None:
     return {"picture": address(before + after), "caption": html.unescape(caption)}
 
 
-def drawn(path: Path, drawing: Drawing, data: Any) -> dict[str, str]:
+def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
     """The same of a picture that is drawn and written into the file, where it describes itself by the caption.
 
-    Raises what drawing raises, and `StorageError` if it can't be written.
+    Where it can't be drawn or written, the reason as a "gap".
     """
-    picture, caption = svg(drawing.draw(data)), drawing.caption(data)
-    described = picture.replace("<defs>", f"<desc>{html.escape(caption)}</desc><defs>", 1)
-    write_text(path, described + _mark(drawing, data))
+    path, drawing, data = new
+    try:
+        picture, caption = svg(drawing.draw(data)), drawing.caption(data)
+        described = picture.replace("<defs>", f"<desc>{html.escape(caption)}</desc><defs>", 1)
+        write_text(path, described + _mark(drawing, data))
+    except (GapError, StorageError) as error:
+        return {"gap": str(error)}
     return {"picture": address(picture + _mark(drawing, data)), "caption": caption}
 
 
 def _mark(drawing: Drawing, data: Any) -> str:
-    made_from = "\n".join([repr(data), drawing.title, matplotlib.__version__, sources(*_PROGRAM)])
+    made_from = "\n".join([repr(data), drawing.title, matplotlib.__version__, sources("model", "analytic", "compare")])
     return f"<!-- {hashlib.sha256(made_from.encode()).hexdigest()} -->"
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import functools
+import json
 import math
 import re
+import zlib
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -15,13 +18,14 @@ from markdown_it import MarkdownIt
 from compare.claim import Outcome, Verdict
 from compare.gallery import FIGURES, figures_of
 from compare.kit import pages
+from compare.kit.check import Check
 from compare.kit.drawing import Drawing, GapError, Material
 from compare.kit.levels import Level
+from compare.kit.record import Measurement, Records
 from compare.kit.workers import Spread
-from compare.report import numbers, pictures, results, wording
+from compare.report import pictures, results, wording
 from compare.report.results import Summary
 from model import storage
-from model.errors import StorageError
 from model.files import make_directory, write_text
 
 ROWS = 12
@@ -100,7 +104,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         outcomes=sorted({verdict.outcome for verdict in ran}),
         wording=wording,
         run_of=lambda m: next((name for name in m.runs if storage.exists(directory / name)), ""),
-        numbers=numbers.packed(numbers.columns(material.records, {v.claim.id: v.checks for v in ran})),
+        numbers=packed(columns(material.records, {v.claim.id: v.checks for v in ran})),
         not_run=[verdict.claim for verdict in verdicts if verdict.outcome is Outcome.NOT_RUN],
         not_drawn=[f"{figure['title']}: {figure['gap']}" for figure, _ in apart if figure["gap"]],
         command=f"dualball validate --full -o {directory}",
@@ -128,6 +132,46 @@ def errata() -> str:
     return made.replace("<table>", region).replace("</table>", "</table></div>")
 
 
+def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str, list[Any]]:
+    """What the page searches, by column: a row for each check, and for each measurement on which no claim bears."""
+
+    def key(m: Measurement) -> tuple[Any, ...]:  # the same for a copy that another process has judged
+        conditions = tuple(sorted(m.conditions.items()))
+        return m.protocol, m.quantity, m.engine, m.set, m.parameters.omega_0, m.value, conditions
+
+    def rounded(m: Measurement, value: float) -> float | str:
+        """With two digits of its uncertainty, nine in all at most; cases by their names."""
+        if not math.isfinite(value) or m.quantity in ("case", "cases"):
+            return wording.value(m, value)
+        digits = 1 - math.floor(math.log10(m.uncertainty)) if m.uncertainty else 15
+        return float(f"{round(value, digits):.9g}") + 0.0  # no negative zero
+
+    judged = [(claim, check.measurement, check) for claim, own in checks.items() for check in own]
+    known = {key(m) for _, m, _ in judged}
+    rows = [*judged, *(("", m, None) for m in records.measurements if key(m) not in known)]
+    return {
+        "set": [m.set for _, m, _ in rows],
+        "omega_0": [float(f"{m.parameters.omega_0:.6g}") for _, m, _ in rows],
+        "quantity": [f"{wording.SYMBOLS[m.quantity]} {pages.readable(m.unit)}".rstrip() for _, m, _ in rows],
+        "conditions": [wording.conditions(m.conditions) for _, m, _ in rows],
+        "engine": [m.engine for _, m, _ in rows],
+        "measured": [rounded(m, m.value) for _, m, _ in rows],
+        "uncertainty": [float(f"{m.uncertainty:.2g}") for _, m, _ in rows],
+        "relation": [c.relation.replace("=", "") if c else "" for *_, c in rows],
+        "predicted": [rounded(m, c.predicted) if c else "" for _, m, c in rows],
+        "deviation": [float(f"{c.deviation:.2g}") if c and math.isfinite(c.deviation) else "" for *_, c in rows],
+        "tolerance": [float(f"{c.tolerance:.2g}") if c else "" for *_, c in rows],
+        "claim": [claim for claim, *_ in rows],
+        "mark": [wording.mark(c) if c else "" for *_, c in rows],
+    }
+
+
+def packed(of: Mapping[str, Sequence[Any]]) -> str:
+    """Columns as JSON, compressed (deflate) and written in base64: about a tenth of their length."""
+    text = json.dumps(of, ensure_ascii=False, separators=(",", ":"))
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
+
+
 def _figures(material: Material, drawings: Mapping[str, Drawing], spread: Spread) -> dict[str, dict[str, str]]:
     """What the page shows of every figure: a picture with its caption, or why there is none."""
     figures, new = {}, []
@@ -144,13 +188,6 @@ def _figures(material: Material, drawings: Mapping[str, Drawing], spread: Spread
             else:
                 new.append((path, drawing, data))
     new.reverse()  # the last ones take longest
-    for (path, *_), drawn in zip(new, spread(_drawn, new), strict=True):
+    for (path, *_), drawn in zip(new, spread(pictures.drawn, new), strict=True):
         figures[path.stem] |= drawn
     return figures
-
-
-def _drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
-    try:
-        return pictures.drawn(*new)
-    except (GapError, StorageError) as error:
-        return {"gap": str(error)}

@@ -14,7 +14,6 @@ from typing import Any
 
 from compare.claim import Verdict
 from compare.kit import record
-from compare.kit.check import Check
 from compare.kit.levels import Level
 from compare.kit.record import Records
 from compare.kit.statistics import plain
@@ -58,7 +57,14 @@ def described(verdict: Verdict) -> dict[str, Any]:
     """A verdict with all its checks as JSON-able data; a number that is not finite is null."""
     claim = verdict.claim
     texts = {name: getattr(claim, name) for name in ("section", "source", "statement", "text", "reason")}
-    return _outcome(verdict) | texts | {"checks": plain([_check(check) for check in verdict.checks])}
+    of_measurement = ("protocol", "quantity", "unit", "engine", "set", "conditions", "uncertainty", "runs")
+    numbers = ("relation", "predicted", "deviation", "tolerance", "scale", "resolves", "agrees", "conclusive")
+    checks = []
+    for check in verdict.checks:
+        m = check.measurement
+        about = {name: getattr(m, name) for name in of_measurement} | {name: getattr(check, name) for name in numbers}
+        checks.append(about | {"parameters": dataclasses.asdict(m.parameters), "measured": m.value})
+    return _outcome(verdict) | texts | {"checks": plain(checks)}
 
 
 def _outcome(verdict: Verdict) -> dict[str, Any]:
@@ -69,14 +75,6 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
     less = {"expected": verdict.claim.expected, "missing": list(verdict.missing), "error": verdict.error}
     told: dict[str, Any] = plain(about | {"checks": len(verdict.checks)} | counts | power | less)
     return told
-
-
-def _check(check: Check) -> dict[str, Any]:
-    m = check.measurement
-    of_measurement = ("protocol", "quantity", "unit", "engine", "set", "conditions", "uncertainty", "runs")
-    numbers = ("relation", "predicted", "deviation", "tolerance", "scale", "resolves", "agrees", "conclusive")
-    about = {name: getattr(m, name) for name in of_measurement} | {name: getattr(check, name) for name in numbers}
-    return about | {"parameters": dataclasses.asdict(m.parameters), "measured": m.value}
 
 
 def open_directory(directory: Path) -> None:

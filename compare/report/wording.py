@@ -58,6 +58,11 @@ def conditions(of: Mapping[str, Condition]) -> str:
     return ", ".join(said)
 
 
+def mark(check: Check) -> str:
+    """What a check comes to, in one word."""
+    return "fail" if not check.agrees else "pass" if check.conclusive else "coarse"
+
+
 def ranked(checks: Sequence[Check]) -> list[Check]:
     """Checks, the worst first: what fails, then what is too coarse, then by deviation divided by tolerance."""
     return sorted(checks, key=lambda check: (check.agrees, check.conclusive, -check.share))

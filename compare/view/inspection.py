@@ -83,4 +83,4 @@ def table(about: dict[str, Any]) -> Table:
         "events": listed([f"{e['time']:.9g} s  {e['from']} → {e['to']}" for e in about["events"]]),
         "last state": "\n".join(f"{n} = {about['last'][n]:.9g} {pages.readable(u)}" for n, u in last),
     }
-    return pages.pairs(rows | ({"[red]failure": about["failure"]} if about["failure"] else {}))
+    return pages.pairs(rows | ({"failure": about["failure"]} if about["failure"] else {}))

@@ -71,7 +71,15 @@ def write(
     images = (_labelled(*pair, shown, k, note, slips) for k, pair in enumerate(pairs))
     first, options = next(images), dict[str, Any](optimize=True)
     if film:
-        palette = _palette(first)
+        # 256 colours for all frames, so that none flickers: half from the first, half shades of those that mean
+        # something, since what moves is small, and a palette of the first frame alone would make it grey.
+        seen = first.quantize(120, dither=Image.Dither.NONE).getpalette() or []
+        meant = np.array([to_rgb(colour) for colour in (*style.COLOURS.values(), FORCE, SLIP, BALL)])
+        shades = np.linspace(0.45, 1.0, 6)[:, None, None] * meant
+        tints = 1 - (1 - meant) * np.array([0.25, 0.5, 0.75])[:, None, None]
+        chosen = np.concatenate([shades.reshape(-1, 3), tints.reshape(-1, 3)])
+        palette = Image.new("P", (1, 1))
+        palette.putpalette([*seen[:360], *np.round(255 * chosen).astype(int).ravel().tolist()])
         frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in itertools.chain([first], images)]
         first = frames[0]
         options = {"save_all": True, "append_images": frames[1:], "duration": round(1000 / rate), "loop": 0}
@@ -80,21 +88,6 @@ def write(
     except OSError as error:
         raise StorageError(f"cannot write {output}: {error.strerror or error}") from error
     return f"{output}: {len(times)} frames" if film else f"{output}: {width} × {first.height}"
-
-
-def _palette(image: Image.Image) -> Image.Image:
-    """256 colours for all frames, so that none flickers: half from the first, half shades of those that mean something.
-
-    What moves is small, and a palette of the first frame alone would give it the greys of its surroundings.
-    """
-    seen = image.quantize(120, dither=Image.Dither.NONE).getpalette() or []
-    meant = [to_rgb(colour) for colour in (*style.COLOURS.values(), FORCE, SLIP, BALL)]
-    shades = np.linspace(0.45, 1.0, 6)[:, None, None] * np.array(meant)
-    tints = 1 - (1 - np.array(meant)) * np.array([0.25, 0.5, 0.75])[:, None, None]
-    chosen = np.concatenate([shades.reshape(-1, 3), tints.reshape(-1, 3)])
-    made = Image.new("P", (1, 1))
-    made.putpalette([*seen[:360], *np.round(255 * chosen).astype(int).ravel().tolist()])
-    return made
 
 
 def _labelled(image: Image.Image, small: Image.Image, run: Trajectory, k: int, note: str, slips: bool) -> Image.Image:

@@ -76,56 +76,50 @@ def frames(
     data, ball, most = mujoco.MjData(model), model.geom("ball").id, 100 + math.ceil(_LONGEST_TRAIL / STEP)
     mujoco.mj_forward(model, data)
     choose_opengl()
+    above, behind = mujoco.MjvCamera(), mujoco.MjvCamera()
+    above.lookat, above.distance = (0.0, 0.0, 0.35 * p.r), 2.9 * (p.R + p.r)
+    above.azimuth, above.elevation = 90.0, -38.0
+    behind.distance, behind.elevation = 6.4 * p.r, -14.0
     with (  # twice the size, scaled down: smooth edges without support of the driver
         mujoco.Renderer(model, 2 * height, 2 * width, most) as outside,
         mujoco.Renderer(model, 2 * inset, 2 * inset, most) as beside,
     ):
         for k, centre in enumerate(centres):
             data.geom_xpos[ball], data.geom_xmat[ball] = centre, turns[k].as_matrix().ravel()
-            outside.update_scene(data, _camera((0.0, 0.0, 0.35 * p.r), 2.9 * (p.R + p.r), 90.0, -38.0))
             # From behind the ball and a little inwards, so that floor and wall are both seen edge-on.
-            beside.update_scene(data, _camera(centre, 6.4 * p.r, math.degrees(now.theta[k]) + 78.0, -14.0))
-            _add_trail(outside.scene, past, now.time[k], now.theta[k])
+            behind.lookat, behind.azimuth = centre, math.degrees(now.theta[k]) + 78.0
+            outside.update_scene(data, above)
+            beside.update_scene(data, behind)
+            # The trail: where the ball touched the floor's height before, in the colours of the cases, fading.
+            some = (past.time > now.time[k] - _LONGEST_TRAIL) & (past.time < now.time[k])
+            age = np.abs(past.theta[some] - now.theta[k]) / (2 * math.pi * _TRAIL)
+            points = to_world(past.x[some], past.theta[some], p).position - [0.0, 0.0, 0.92 * p.r]
+            for i, case in enumerate(past.case[some][:-1]):
+                if max(age[i], age[i + 1]) < 1:
+                    colour, alpha = style.COLOURS[Case(case)], 0.9 * (1 - age[i])
+                    geom = _add(outside.scene, mujoco.mjtGeom.mjGEOM_CAPSULE, colour, alpha)
+                    mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[i], points[i + 1])
+            arrows = []
+            for normal, contact, force, slip in zip(
+                normals[:, k], contacts[:, k], forces[:, k], slips[:, k], strict=True
+            ):
+                arrows.append((0.16 * p.r, contact, force * (force_arrow * p.r / (p.m * p.g)), FORCE))
+                if fastest > 0 and np.any(force):
+                    begin = contact + 0.1 * p.r * normal
+                    arrows.append((0.13 * p.r, begin, slip * (slip_arrow * p.r / fastest), SLIP))
             images = []
             for renderer in (outside, beside):
                 for spot in turns[k].apply(_SPOTS):
                     geom = _add(renderer.scene, mujoco.mjtGeom.mjGEOM_SPHERE, "#8a6d1f")
                     geom.size[:], geom.pos[:] = 0.11 * p.r, centre + 0.95 * p.r * spot
-                for normal, contact, force, slip in zip(
-                    normals[:, k], contacts[:, k], forces[:, k], slips[:, k], strict=True
-                ):
-                    arrow = force * (force_arrow * p.r / (p.m * p.g))
-                    _add_arrow(renderer.scene, 0.16 * p.r, contact, arrow, FORCE)
-                    if fastest > 0 and np.any(force):
-                        arrow = slip * (slip_arrow * p.r / fastest)
-                        _add_arrow(renderer.scene, 0.13 * p.r, contact + 0.1 * p.r * normal, arrow, SLIP)
+                for thick, begin, arrow, colour in arrows:
+                    if np.linalg.norm(arrow) > 2 * thick:
+                        geom = _add(renderer.scene, mujoco.mjtGeom.mjGEOM_ARROW, colour)
+                        mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, thick, begin, begin + arrow)
                 renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
                 size = (renderer.width // 2, renderer.height // 2)
                 images.append(Image.fromarray(renderer.render()).resize(size, Image.Resampling.LANCZOS))
             yield images[0], images[1]
-
-
-def _camera(lookat: Any, distance: float, azimuth: float, elevation: float) -> Any:
-    camera = mujoco.MjvCamera()
-    camera.lookat, camera.distance, camera.azimuth, camera.elevation = lookat, distance, azimuth, elevation
-    return camera
-
-
-def _add_trail(drawn: Any, past: Trajectory, time: float, theta: float) -> None:
-    """Where the ball touched the floor's height before, in the colours of the cases, fading."""
-    p, some = past.header.parameters, (past.time > time - _LONGEST_TRAIL) & (past.time < time)
-    age = np.abs(past.theta[some] - theta) / (2 * math.pi * _TRAIL)
-    points = to_world(past.x[some], past.theta[some], p).position - [0.0, 0.0, 0.92 * p.r]
-    for k, case in enumerate(past.case[some][:-1]):
-        if max(age[k], age[k + 1]) < 1:
-            geom = _add(drawn, mujoco.mjtGeom.mjGEOM_CAPSULE, style.COLOURS[Case(case)], 0.9 * (1 - age[k]))
-            mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[k], points[k + 1])
-
-
-def _add_arrow(drawn: Any, width: float, begin: Array, arrow: Array, colour: str) -> None:
-    if np.linalg.norm(arrow) > 2 * width:
-        geom = _add(drawn, mujoco.mjtGeom.mjGEOM_ARROW, colour)
-        mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, width, begin, begin + arrow)
 
 
 def _add(drawn: Any, kind: Any, colour: str, alpha: float = 1.0) -> Any:

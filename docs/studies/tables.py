@@ -14,20 +14,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from compare.bench import league, scores
+from compare.bench import league
 from compare.bench.league import Entry
 from compare.kit import pages, progress
 from compare.kit.campaign import Campaign
 from compare.kit.engines import newcomer
 from compare.kit.pages import Rows
-from docs.studies import accuracy, confirmation
+from docs.studies import accuracy, confirmation, settings
 from mjsim import ContactSettings
 from model import InputError
 from model.files import write_text
 from model.parameters import check_choice, check_names
-
-STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
-"""Time steps of error against cost, s."""
 
 
 def write(page: Path, name: str, rows: Rows) -> None:
@@ -46,7 +43,7 @@ def _of_settings(entries: Sequence[Entry]) -> Rows:
     return [["settings", *head], *([name, *cells] for name, _, *cells in body)]
 
 
-def variants(step: float) -> scores.Ways:
+def variants(step: float) -> settings.Ways:
     """Other ways to set MuJoCo; a firmer impedance keeps the damping b_f h = 1 of the friction rows."""
     firm = {"solimp": 0.1, "solreffriction": 2 * step / 0.1}
     firmly = f"ours, solreffriction {firm['solreffriction']:g}, solimp 0.1"
@@ -71,9 +68,9 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "transient": accuracy.transient,
     "events": accuracy.event_times,
     "split": accuracy.force_split,
-    "ablation": lambda campaign: _of_settings(scores.reached(campaign, scores.rungs(scores.STEP))),
-    "frontier": lambda campaign: league.rows(scores.frontier(campaign, STEPS)),
-    "variants": lambda campaign: _of_settings(scores.reached(campaign, variants(scores.STEP))),
+    "ablation": lambda campaign: _of_settings(settings.reached(campaign, settings.rungs(settings.STEP))),
+    "frontier": lambda campaign: league.rows(settings.frontier(campaign, settings.STEPS)),
+    "variants": lambda campaign: _of_settings(settings.reached(campaign, variants(settings.STEP))),
 }
 """The tables by name."""
 

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 
 import pytest
 
 from compare.gallery import FIGURES
 from compare.kit.campaign import Campaign
+from compare.kit.drawing import GapError
 from compare.kit.engines import MUJOCO
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.report import report
 
 
+def lacking(_: object) -> None:
+    raise GapError("it was not measured")
+
+
 @pytest.fixture(scope="module")
 def few_figures() -> Iterator[None]:
     """Reports with two figures, of which one was not measured: each is drawn in the tests of figures."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "FIGURES", {name: FIGURES[name] for name in ("ladder", "fig-9")})
+        fig_9 = FIGURES["fig-9"]
+        lost = dataclasses.replace(fig_9, title="The user's own", select=lacking)
+        patch.setattr(report, "FIGURES", {"lost": lost, "fig-9": fig_9})
         yield
 
 

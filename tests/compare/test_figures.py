@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import io
-import math
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,6 @@ import mjsim
 from analytic import thresholds
 from analytic.orbits import orbit_branch
 from compare import gallery as registry
-from compare.bench.league import COST, Entry
 from compare.catalogue import CLAIMS
 from compare.gallery import FIGURES, figures_of
 from compare.kit import deviations, drawing, style
@@ -70,9 +68,7 @@ def material() -> Material:
         "fig-7": (check(plane[0], 129.0, 0.0), check(plane[1], 1.0, 0.0)),
         "prop-1": (check(states[0], 10.0), check(states[1], 10.0)),
     }
-    errors = {"a": 0.0, "b": math.nan, "c": 1e-3}
-    scores = tuple(Entry(name, 1e-3, {"RR at 12": error, COST: 0.1}) for name, error in errors.items())
-    return Material(checks, Records((*states, *plane)), Path("nowhere"), scores, scores)
+    return Material(checks, Records((*states, *plane)), Path("nowhere"))
 
 
 @pytest.fixture
@@ -99,7 +95,7 @@ def few_points() -> Iterator[None]:
 @pytest.mark.parametrize("name", FIGURES)
 def test_every_figure_draws_and_gives_its_parameters(name: str, results: bool, material: Material, no_engine) -> None:
     drawing = FIGURES[name]
-    if not results and name in ("characteristic", "ladder", "frontier"):
+    if not results and name in ("characteristic",):
         with pytest.raises(GapError, match="measured"):
             drawing.select(Material())
         return
@@ -227,11 +223,11 @@ def test_claims_have_their_own_figures_or_deviations() -> None:
 
 
 def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    chosen = {name: FIGURES[name] for name in ("fig-9", "ladder")}
+    chosen = {name: FIGURES[name] for name in ("fig-9", "characteristic")}
     monkeypatch.setattr(registry, "FIGURES", chosen)
     assert dict(registry.write(tmp_path, Material(), ("svg", "png"))) == {
         "fig-9": "",
-        "ladder": "not drawn: the ladder of settings was not measured",
+        "characteristic": "not drawn: no settled states were measured with its parameter sets",
     }
     assert sorted(path.name for path in tmp_path.iterdir()) == ["captions.txt", "fig-9.png", "fig-9.svg"]
     assert "Stationary solutions off the floor" in (tmp_path / "captions.txt").read_text("utf-8")

@@ -1,17 +1,27 @@
-"""What writes the tables of pages: each has its place, and its numbers hold together."""
+"""What writes tables and figures of pages: each has its place, and its numbers hold together."""
 
 from __future__ import annotations
 
+import dataclasses
+import io
 import itertools
 import math
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+import analytic
+from compare.bench import league
+from compare.bench.league import COST, ERRORS, OPEN, Entry
+from compare.bench.trials import APPROACH, ROLLING, SLIPPING, STATES
 from compare.kit import pages
 from compare.kit.campaign import Campaign
-from docs.studies import accuracy, confirmation, tables
+from compare.kit.engines import newcomer
+from docs.studies import accuracy, confirmation, settings, tables
+from mjsim import ContactSettings
 from model import InputError
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -19,11 +29,20 @@ ROWS = [["a", "b"], ["1", "2"], ["3", "4"]]
 ROUNDED = 0.05 + 0.1 / math.log(2)
 """An order as it is written, to a digit, less the slope of errors as they are written, to two."""
 
+STEP = 4e-3
+
 
 @pytest.fixture
 def campaign(tmp_path: Path) -> Iterator[Campaign]:
     with Campaign(tmp_path, workers=0) as made:
         yield made
+
+
+def drawn(figure: Figure) -> bool:
+    """Whether a figure can be written."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=40)
+    return buffer.tell() > 1000
 
 
 def test_a_table_is_put_in_its_place(tmp_path: Path) -> None:
@@ -88,3 +107,97 @@ def test_splits_lie_in_the_admissible_interval(campaign: Campaign) -> None:
     least, greatest = (float(end) for end in row[1].split(" … "))
     digit = 1e-4  # of what is written
     assert all(least - digit <= float(chosen) <= greatest + digit for chosen in row[2:])
+
+
+def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time() -> None:
+    rungs = list(settings.rungs(1e-3).values())
+    assert rungs[-1] == ContactSettings()
+    contact = {"solref", "solreffriction", "solimp", "impratio"}  # one thing: what makes it stiff and continuous
+    for low, high in itertools.pairwise(rungs):
+        changed = {f.name for f in dataclasses.fields(low) if getattr(low, f.name) != getattr(high, f.name)}
+        assert len(changed) == 1 or changed == contact
+
+
+@pytest.mark.parametrize("step", [1e-3, STEP])
+def test_settings_are_named_after_what_they_are(step: float) -> None:
+    """After the nearer of ours and MuJoCo's defaults, and each setting that differs, in the order of the fields."""
+
+    def text(value: object) -> str:
+        return (
+            ("off", "on")[value]
+            if isinstance(value, bool)
+            else f"{value:g}"
+            if isinstance(value, float)
+            else str(value)
+        )
+
+    bases = {"ours": ContactSettings.at(step), "MuJoCo's defaults": newcomer(step)}
+    for name, way in (settings.rungs(step) | settings.rivals(step) | tables.variants(step)).items():
+        values = dataclasses.asdict(way).items()
+        named = [[base, *(f"{n} {text(v)}" for n, v in values if v != getattr(at, n))] for base, at in bases.items()]
+        assert name == ", ".join(min(named, key=len))
+
+
+def test_no_run_begins_where_it_should_end() -> None:
+    for state, discipline in zip(STATES, ERRORS, strict=False):
+        ((asked, x0, *_),) = discipline.runs
+        assert asked is state.p
+        assert abs(x0[2] / state.solution.x[2] - 1) > 0.01
+
+
+def test_errors_are_those_of_the_run() -> None:
+    """A run of the slipping state, with known errors put in."""
+    run, exact = analytic.simulate(SLIPPING.p, SLIPPING.solution.x, 0.1), APPROACH.exact
+    off = dataclasses.replace(run, omega_c=1.01 * run.omega_c, slip_z=run.slip_z + 2.0, force_B=0 * run.force_B)
+    held = SLIPPING.held(off, 0.05)
+    assert held.omega_c == pytest.approx(0.01)
+    assert held.slip == pytest.approx(2.0 * SLIPPING.p.r)
+    assert held.open == 1
+    broken = dataclasses.replace(run, header=dataclasses.replace(run.header, failure="diverged"))
+    assert math.isnan(SLIPPING.held(broken, 0.05).omega_c)
+    scaled = exact.x * np.where(np.arange(8) == 2, 1.001, 1.0)
+    omega_c, slip = APPROACH.errors(exact.time, scaled)
+    assert omega_c == pytest.approx(1e-3)
+    assert slip == 0
+
+
+def test_ladder_as_records_and_drawn(campaign: Campaign) -> None:
+    rungs = settings.rungs(STEP)
+    entries = settings.reached(campaign, {name: rungs[name] for name in ("MuJoCo's defaults", "ours")})
+    poor, ours = entries
+    assert poor.name == "MuJoCo's defaults"
+    assert list(ours.scores) == [*(state.name for state in STATES), APPROACH.name, OPEN]
+    assert all(ours.scores[name] < poor.scores[name] for name in ours.scores)
+    assert ours.scores[OPEN] == 0
+    assert drawn(settings.draw_ladder(entries))
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_run_that_breaks_down_has_no_error(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Known to diverge: a pyramidal cone with a low impedance."""
+    wild = ContactSettings.at(STEP, solimp=0.1, solreffriction=20 * STEP, cone="pyramidal", memory=False, order=1)
+    monkeypatch.setattr(settings, "ERRORS", ERRORS[:1])
+    monkeypatch.setattr(settings, "CONTACT", ERRORS[0])
+    (entry,) = settings.reached(campaign, {"wild": wild})
+    assert math.isnan(entry.scores[ROLLING.name])
+    assert entry.failures.keys() == {ROLLING.name}
+
+
+def test_frontier_has_a_cost_that_is_measured_once(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(settings, "rivals", lambda step: {"ours": ContactSettings.at(step)})
+    monkeypatch.setattr(settings, "BATCH", 2)
+    entries = settings.frontier(campaign, [STEP])
+    assert [(e.name, e.step) for e in entries] == [("ours", STEP), ("time-stepping", STEP), ("event", None)]
+    assert all(entry.scores[COST] > 0 for entry in entries)
+    assert settings.frontier(campaign, [STEP]) == entries
+    assert drawn(settings.draw_frontier(entries))
+
+
+def test_figures_are_drawn_where_an_error_is_zero_or_missing() -> None:
+    entries = [Entry(n, 1e-3, {"RR at 12": e, COST: 0.1}) for n, e in {"a": 0.0, "b": math.nan, "c": 1e-3}.items()]
+    assert drawn(settings.draw_ladder(entries))
+    assert drawn(settings.draw_frontier(entries))
+
+
+def test_numbers_of_tables() -> None:
+    assert [league.number(value) for value in (1.23e-5, 1e-16, math.nan)] == ["1.2e-05", "< 1e-14", "diverged"]

@@ -70,11 +70,17 @@ def simulate(
     limits.check_timestep(settings.timestep, p, flow, t_end)
     x, joints = State.one(x0), settings.coordinates == "joints"
     check_number("h", x.h, "m", Range(high=p.R, below=True), "to be off the axis it")
-    drag = _drag_on_joints if joints else _drag_in_world
     ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
     rows, done, failure = np.empty((count, _WIDTH)), 0, ""
     with closing(build(library.load(), p, settings)) as scene:
-        place, velocity = _start(x, p, joints)
+        place: Floats
+        velocity: Floats
+        if joints:
+            qpos, qvel = recorder.joint_state(x, 0.0, p)
+            place, velocity = qpos[:3].tolist(), (qvel @ _SPIN.T).tolist()
+        else:
+            motion = to_world(x, 0.0, p)
+            place, velocity = motion.position.tolist(), [*motion.velocity.tolist(), *motion.spin.tolist()]
         scene.start(place, velocity)
         theta = 0.0
         try:
@@ -83,7 +89,7 @@ def simulate(
                 row[:10], row[10:] = [theta, *place, *velocity], 0.0
                 times = (done * every + np.arange(steps) + 0.5) * settings.timestep
                 for number, omega_0 in enumerate(flow(times).tolist()):
-                    place, velocity = scene.advance(drag(place, velocity, omega_0, ball))
+                    place, velocity = scene.advance(_drag(place, velocity, omega_0, ball, joints))
                     if joints and place[1] >= p.R:
                         raise BreakdownError("reached the vessel's axis, where polar coordinates end,")
                     azimuth = math.remainder(math.atan2(place[1], place[0]) - theta, math.tau)
@@ -108,25 +114,13 @@ def simulate(
     return Trajectory.from_blocks(header, [block], classifier.events)
 
 
-def _start(x: State, p: Parameters, joints: bool) -> tuple[Floats, Floats]:
-    """Place and velocity of a state."""
+def _drag(place: Floats, velocity: Floats, omega_0: float, ball: Ball, joints: bool) -> Floats:
+    """The (generalised) force of the fluid."""
     if joints:
-        qpos, qvel = recorder.joint_state(x, 0.0, p)
-        return qpos[:3].tolist(), (qvel @ _SPIN.T).tolist()
-    motion = to_world(x, 0.0, p)
-    return motion.position.tolist(), [*motion.velocity.tolist(), *motion.spin.tolist()]
-
-
-def _drag_on_joints(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
-    """The generalised force of the fluid."""
-    rho, (omega_c, v_h, v_y, *_) = ball.R - place[1], velocity
-    along = rho * (omega_c - omega_0)
-    mc = resistance(along, v_h, v_y, ball)
-    return -mc * rho * along, -mc * v_h, -mc * v_y
-
-
-def _drag_in_world(place: Floats, velocity: Floats, omega_0: float, ball: Ball) -> Floats:
-    """The force of the fluid."""
+        rho, (omega_c, v_h, v_y, *_) = ball.R - place[1], velocity
+        along = rho * (omega_c - omega_0)
+        mc = resistance(along, v_h, v_y, ball)
+        return -mc * rho * along, -mc * v_h, -mc * v_y
     (x, y, _), (v_x, v_y, v_z, *_) = place, velocity
     w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
     mc = resistance(w_x, w_y, v_z, ball)

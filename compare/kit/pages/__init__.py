@@ -41,11 +41,17 @@ def pairs(rows: Mapping[str, str]) -> Table:
     """Names and what they stand for, for the terminal."""
     shown = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for name, text in rows.items():
-        shown.add_row(f"[bold]{name}", Text(text))
+        shown.add_row(Text(name, "bold"), Text(text))
     return shown
 
 
-def table(title: str, rows: Rows, no_wrap: bool = False, justify: JustifyMethod = "right", **look: Any) -> Table:
+def table(
+    title: str,
+    rows: Sequence[Sequence[str | Text]],
+    no_wrap: bool = False,
+    justify: JustifyMethod = "right",
+    **look: Any,
+) -> Table:
     """A table for the terminal; with `no_wrap` only its head and first column may take several lines.
 
     `justify` is for all columns but the first.
@@ -54,6 +60,7 @@ def table(title: str, rows: Rows, no_wrap: bool = False, justify: JustifyMethod 
     shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
     for k, name in enumerate(rows[0]):
         shown.add_column(name, justify=justify if k else "left")
-    for name, *cells in rows[1:]:
-        shown.add_row(Text(name), *(Text(cell, no_wrap=no_wrap) for cell in cells))
+    for row in rows[1:]:
+        texts = (Text(cell, no_wrap=no_wrap and k > 0) if isinstance(cell, str) else cell for k, cell in enumerate(row))
+        shown.add_row(*texts)
     return shown

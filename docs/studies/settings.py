@@ -1,34 +1,58 @@
-"""Ladder of settings, and error against cost: what ways of setting MuJoCo, and other methods, reach and take.
+"""What ways of setting MuJoCo, and other methods, reach and take: ``python -m docs.studies.settings`` draws it.
 
-Each is a contestant of a small league: the stationary states and the approach to one of `trials`.
+Each is a contestant of a small league: the stationary states and the approach to one of `compare.bench.trials`. Runs
+are kept in results/settings, as those of the tables of the same page (`docs.studies.tables`).
 """
 
 from __future__ import annotations
 
-import json
+import itertools
+import math
+import os
 import statistics
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from compare.bench import league
-from compare.bench.league import CONTACT, ERRORS, Contestant, Entry
+import matplotlib
+from matplotlib.figure import Figure
+
+from compare.bench import figures, league
+from compare.bench.league import CONTACT, ERRORS, OPEN, Contestant, Entry
+from compare.kit import drawing, progress, style
 from compare.kit.campaign import BATCH, Campaign
 from compare.kit.engines import EVENT, MOREAU, NEWCOMER, newcomer
-from compare.kit.statistics import plain
 from compare.kit.tasks import Task
 from mjsim import ContactSettings, Run
-from model.files import reading_json, write_text
+from model.files import make_directory
 
-FILE = "scores.json"
 STEP = 1e-3
 """Time step of the ladder, s."""
-STEPS = (4e-3, 2e-3, 1e-3)
-"""Time steps of error against cost that figures show, s."""
+STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
+"""Time steps of error against cost, s."""
 Ways = Mapping[str, ContactSettings]
 """Ways to set MuJoCo, named after ours or MuJoCo's defaults and what differs from them."""
+LOOKS: list[dict[str, Any]] = [
+    {"marker": mark, "color": colour, "mfc": "white"}
+    for mark, colour in zip(
+        "os^vDP*X",
+        ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B"),
+        strict=True,
+    )
+]
+
+
+def main() -> None:
+    """Measure what isn't there yet, and draw both figures into docs/settings/."""
+    matplotlib.rcParams["svg.hashsalt"] = "dualball"  # equal figures make equal files
+    runs, pictures = Path("results/settings"), Path(__file__).parents[1] / "settings"
+    make_directory(pictures)
+    with progress.shown(counted=True) as show, Campaign(runs, os.cpu_count() or 1, report=show) as campaign:
+        drawing.save(draw_ladder(reached(campaign, rungs(STEP))), pictures / "ladder.svg")
+        drawing.save(draw_frontier(frontier(campaign, STEPS)), pictures / "frontier.svg")
 
 
 def rungs(step: float) -> Ways:
@@ -91,18 +115,26 @@ def _cost(task: Task) -> float:
     return statistics.median(spent) / BATCH / task.t_end
 
 
-def write(campaign: Campaign, directory: Path) -> None:
-    """Measure ladder and error against cost for figures, and keep them beside the results, unless they are there."""
-    if not (directory / FILE).exists():
-        measured = {"ladder": reached(campaign, rungs(STEP)), "frontier": frontier(campaign, STEPS)}
-        content = plain({name: [asdict(entry) for entry in row] for name, row in measured.items()})
-        write_text(directory / FILE, json.dumps(content, indent=1))
+def draw_ladder(entries: Sequence[Entry]) -> Figure:
+    """Rows of settings, a mark for each error of omega_c; a run that diverged has none."""
+    figure = style.figure(9, 1.1 + 0.33 * len(entries))
+    axes = figure.add_subplot()
+    for name, look in zip((name for name in entries[0].scores if name != OPEN), LOOKS, strict=False):
+        own = [(max(e.scores[name], figures.LEAST), k) for k, e in enumerate(entries) if math.isfinite(e.scores[name])]
+        axes.plot([x for x, _ in own], [k for _, k in own], "-", lw=0.6, label=name, **look)
+    axes.set_yticks(range(len(entries)), [entry.name for entry in entries], fontsize=8.5)
+    axes.invert_yaxis()
+    axes.set(xscale="log", xlabel="$|\\Delta\\omega_c|/\\omega_c$")
+    axes.grid(alpha=0.3)
+    style.legend(figure, loc="outside upper center", ncols=5)
+    return figure
 
 
-def read(directory: Path) -> dict[str, tuple[Entry, ...]]:
-    """The entries by name, none where none were measured; raises `StorageError` for a file that isn't whole."""
-    path = directory / FILE
-    if not path.exists():
-        return {}
-    with reading_json(path, "scores: remove it, and they are measured again") as rows:
-        return {name: tuple(league.from_mapping({"entries": rows[name]})) for name in ("ladder", "frontier")}
+def draw_frontier(entries: Sequence[Entry]) -> Figure:
+    """A panel for each state, a line for each method."""
+    names = dict.fromkeys(entry.name for entry in entries)
+    return figures.draw_error_over_cost(entries, dict(zip(names, itertools.cycle(LOOKS), strict=False)))
+
+
+if __name__ == "__main__":
+    main()

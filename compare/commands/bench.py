@@ -1,4 +1,4 @@
-"""``dualball grade``: a score card for a person's own contact settings."""
+"""``dualball grade``: a score card for a person's own contact settings; and ``dualball league``: all engines."""
 
 from __future__ import annotations
 
@@ -7,23 +7,24 @@ import dataclasses
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from rich.console import Console
+from rich.text import Text
 
-from compare.bench import native
+from compare.bench import grade, league, native
+from compare.bench.league import Contestant
 from compare.bench.native import CHOICES, Native
 from compare.bench.trials import SLIPPING
 from compare.commands import options, running
-from compare.kit import engines, progress
+from compare.kit import engines, pages, progress
+from compare.kit.engines import ENGINES
 from mjsim import ContactSettings
 from model import InputError
-from model.files import check_writable, write_text
+from model.files import check_writable, make_directory, write_text
+from model.parameters import check_names
 
-if TYPE_CHECKING:
-    from compare.bench.league import Contestant
-
+JSON, PAGE, RUNS = "league.json", "league.html", "league"
 _NUMBERS = {"timestep": float, "impratio": float, "iterations": int, "tolerance": float, "noslip_iterations": int}
 _PAIR: dict[str, tuple[Any, Any, str | None]] = {
     "solref": (2, ("TIMECONST", "DAMPRATIO"), None),
@@ -35,9 +36,9 @@ _PAIR: dict[str, tuple[Any, Any, str | None]] = {
 
 
 def add(commands: options.Commands) -> None:
-    """Declare the command."""
+    """Declare the commands."""
     summary = "a score card for MuJoCo contact settings: yours, dualball's, MuJoCo's own; or for another engine"
-    command = options.command(commands, "grade", run, summary)
+    command = options.command(commands, "grade", graded, summary)
     command.add_argument(
         "file", type=Path, nargs="?", metavar="FILE.xml", help="MJCF file with a ball and its contacts"
     )
@@ -53,11 +54,19 @@ def add(commands: options.Commands) -> None:
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write")
     options.outputs(command)
 
+    command = options.command(
+        commands, "league", ranked, "all engines that are installed on the same tasks, against theory"
+    )
+    command.add_argument("--quick", action="store_true", help="one time step and fewer tasks: within a minute")
+    command.add_argument(
+        "--engine", action="append", metavar="NAME", help=f"only this one (repeatable): {', '.join(ENGINES)}"
+    )
+    running.add_workers(command)
+    options.outputs(command, "results")
 
-def run(args: argparse.Namespace) -> int:
+
+def graded(args: argparse.Namespace) -> int:
     """Grade the settings and show the card."""
-    from compare.bench import grade  # here, because nothing else needs it
-
     if args.output:
         check_writable(args.output)
     if args.engine is engines.MUJOCO:
@@ -70,13 +79,8 @@ def run(args: argparse.Namespace) -> int:
         columns = grade.grade(*given, show=show)
     if args.output:
         write_text(args.output, grade.html(columns, described))
-    if args.json:
-        print(json.dumps([column.to_mapping() for column in columns], indent=1))
-        return 0
-    console = Console()
-    console.print(grade.table(columns))
-    for item in columns[0].advice:
-        console.print(f"• {item}", markup=False, highlight=False)
+    advice = (Text(f"• {item}") for item in columns[0].advice)
+    options.show([column.to_mapping() for column in columns], args.json, grade.table(columns), *advice)
     return 0
 
 
@@ -102,8 +106,6 @@ def _of_mujoco(args: argparse.Namespace) -> tuple[Native, str]:
 
 def _of_another(args: argparse.Namespace) -> tuple[list[Contestant], str]:
     """Another engine in its best settings and as it comes, also in words."""
-    from compare.bench.league import Contestant  # here, because nothing else needs it
-
     engine: engines.Engine = args.engine
     if engine.missing:
         raise InputError(engine.missing)
@@ -115,3 +117,35 @@ def _of_another(args: argparse.Namespace) -> tuple[list[Contestant], str]:
     those = [engines.engine(name) for name in dict.fromkeys((engine.name, engine.as_it_comes)) if name]
     columns = [Contestant(each.name, each, step, each.configure({"timestep": step}, SLIPPING.p)) for each in those]
     return columns, f"{engine.name} in its best known settings and as it comes, step {1e3 * step:g} ms."
+
+
+def ranked(args: argparse.Namespace) -> int:
+    """Measure what isn't there yet, show the table, write JSON and page."""
+    from compare.bench import figures  # here, because drawing takes a second to load
+    from compare.report.pictures import address, svg
+
+    check_names(args.engine or (), list(ENGINES), "engine")
+    those = league.contestants(args.engine, league.QUICK if args.quick else league.STEPS)
+    missing = {each.name: each.engine.missing for each in those if each.engine.missing}
+    if all(each.name in missing for each in those):
+        raise InputError(f"there is nothing to compare: {'; '.join(missing.values())}")
+    for name, why in missing.items():
+        print(f"dualball: {name} is left out: {why}", file=sys.stderr)
+    make_directory(args.output)
+    with running.campaign(args, "league", RUNS) as campaign:
+        entries = league.measure(campaign, those, args.quick)
+    data = league.to_mapping(those, entries)
+    write_text(args.output / JSON, json.dumps(data, indent=1))
+    failures = [
+        (f"{entry.name}, {1e3 * (entry.step or 0):g} ms, {name}", reason)
+        for entry in entries
+        for name, reason in entry.failures.items()
+    ]
+    picture = address(svg(figures.draw_league(entries)))
+    shown = {"rows": league.rows(entries), "settings": league.settings_table(data), "caption": league.CAPTION}
+    page = pages.render("compare.report", "league.html", **shown, failures=failures, picture=picture)
+    write_text(args.output / PAGE, page)
+    options.show(data, args.json, *league.tables(entries), league.CAPTION)
+    if not args.json:
+        print(f"page: {args.output / PAGE}")
+    return 0
