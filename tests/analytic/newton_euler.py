@@ -4,8 +4,6 @@ The ball's centre stands at (-rho, r + y, 0) in the co-rotating frame (1), with 
 split by (4), with rho for R. Everything else is differentiation of vectors in a rotating frame.
 """
 
-from __future__ import annotations
-
 import sympy as sp
 
 from model.cases import TRAITS, Case, Contact

@@ -1,7 +1,5 @@
 """Thresholds, the fold and the maps of Figs. 7 and 8, against arithmetic of 50 digits and against the solutions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import sympy as sp

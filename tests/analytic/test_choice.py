@@ -4,8 +4,6 @@ The steep contact has friction against the direction of v/sqrt(v^2 + eps^2) in t
 (26) hold throughout, nothing ever sticks and no case is chosen. The simulation has to be its limit for eps -> 0.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from concurrent.futures import ProcessPoolExecutor

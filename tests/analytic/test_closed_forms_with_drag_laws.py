@@ -4,8 +4,6 @@ The law, the branch of SS and the equations of motion are written out here again
 `slipping_branch` or `dynamics` is used for what is expected.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

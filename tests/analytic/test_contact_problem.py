@@ -1,7 +1,5 @@
 """Coulomb's law at two contacts: the conditions that define the solution, and a contact alone in closed form."""
 
-from __future__ import annotations
-
 import math
 import sys
 

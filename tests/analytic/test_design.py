@@ -1,7 +1,5 @@
 """Design of a flowmeter, against closed forms, differences of other widths, sampling and brute force."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from functools import partial

@@ -1,7 +1,5 @@
 """Laws of drag against the coefficients of their sources, written out here."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

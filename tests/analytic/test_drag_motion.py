@@ -1,7 +1,5 @@
 """Motions under other laws of drag than Stokes': known solutions, balances, and both simulators beside each other."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ is simplified to zero. Numerically: the linear system (21) with Table 3 is solve
 measured against the largest term of the equation they enter, as round-off is.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Many runs at once are the same runs one by one; and the step settles and chooses where it once did not."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

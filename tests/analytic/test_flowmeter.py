@@ -1,7 +1,5 @@
 """The flowmeter's range and characteristic curve, against the stationary solutions themselves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

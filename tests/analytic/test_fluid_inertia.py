@@ -1,7 +1,5 @@
 """The fluid's inertia against the balance of forces and moments of a ball in a swirl, written out here."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 Event times are compared at 1e-9 relative, the default tolerance of the integrator.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

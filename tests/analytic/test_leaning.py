@@ -1,7 +1,5 @@
 """SR at the border to NR: the modes of a ball that leans on the floor."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import sympy as sp

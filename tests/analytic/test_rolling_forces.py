@@ -1,7 +1,5 @@
 """The one-parameter family of forces in RR against brute force over its parameter, and against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

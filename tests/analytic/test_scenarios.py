@@ -1,7 +1,5 @@
 """The trajectories of sections 3 and 5.3, by what the paper says of them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

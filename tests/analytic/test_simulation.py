@@ -1,7 +1,5 @@
 """Both simulators through their common door: laws that hold at every sample, input that is refused, interruption."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import math

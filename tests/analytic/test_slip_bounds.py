@@ -1,7 +1,5 @@
 """The slip bounds of sections 3.2 and 4: as printed, from Newton and Euler by algebra, and at random sets by gamma."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stability with respect to slipping: the paper's formulas, the other two routes, and where the paper's claim fails."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Stationary solutions: zeros of the vector fields, the formulas of Propositions 1-6, eigenvalues by differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Time stepping: exact where it should be, of second order between events, and in the end the event-driven result."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

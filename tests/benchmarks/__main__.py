@@ -3,8 +3,6 @@
 They depend less on the machine and its load than times do.
 """
 
-from __future__ import annotations
-
 from rich.console import Console
 
 from analytic import stable_solutions

@@ -1,7 +1,5 @@
 """What drag, wall, servo and recording cost on top of MuJoCo's own step."""
 
-from __future__ import annotations
-
 import functools
 import statistics
 import time

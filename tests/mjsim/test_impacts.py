@@ -1,7 +1,5 @@
 """Landings: no rebound, the impulse of friction, and the other contact's answer, all within the step of the impact."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A run that is taken up again gives the bits of one that was never interrupted."""
 
-from __future__ import annotations
-
 from itertools import islice
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Landings within a step: motions through impacts converge at second order, on a ball that hops for ever."""
 
-from __future__ import annotations
-
 from itertools import islice
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The longest step of a problem."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
