@@ -167,19 +167,6 @@ def test_solutions_appear_and_vanish_at_the_thresholds(eta: float, changes: dict
         assert {case: number for case, number in change.items() if number} == expected
 
 
-@pytest.mark.parametrize("trial", range(40))
-def test_one_fold_beyond_eta_cr_and_none_before(trial: int) -> None:
-    """Proposition 7, and that omega_04 is unique, by counting; omega_04 > omega_02 > omega_01."""
-    rng = np.random.default_rng(trial)
-    j, mu, kappa = rng.uniform(0.1, 2 / 3), 10 ** rng.uniform(-1.5, 0.5), 10 ** rng.uniform(-3, 0.5)
-    p = P.replace(j=float(j), mu=float(mu), c=float(kappa * np.sqrt(P.g / P.R)))
-    p = p.replace(eta=float(p.j * rng.uniform(0.001, 0.999)))
-    t = thresholds(p)
-    assert number_of_folds(p) == (p.eta > t.eta_cr) == np.isfinite(t.omega_04)
-    if p.eta > t.eta_cr:
-        assert t.omega_04 > t.omega_02 > t.omega_01
-
-
 def test_the_branch_is_asked_for_where_there_is_one() -> None:
     for change in ({"eta": 0.6}, {"eta": 0.0}, {"mu": 0.0}, {"c": 0.0}):
         with pytest.raises(InputError, match="SS has a branch from RR to SR for"):
