@@ -7,26 +7,21 @@ import sympy as sp
 from analytic import contact_forces, leaning_modes, simulate, solution
 from analytic.mechanics import dynamics
 from model import Case, InputError, Parameters, State
+from tests.analytic import newton_euler as ne
 
 P = Parameters.named("high-wall-friction")
 
 
 def test_modes_in_closed_form() -> None:
     """Trace and determinant of the Jacobian of f_SR, by computer algebra from Newton and Euler."""
-    j, mu, c, g, R, r, w, sign, omega_c, slip = sp.symbols("j mu c g R r w s omega_c slip")
-
-    class Symbols:
-        m, drag = sp.Integer(1), "stokes"
-
-    p = Symbols()
-    p.j, p.mu, p.eta, p.c, p.g, p.R, p.r = j, mu, sp.Symbol("eta"), c, g, R, r
+    p, w, sign, omega_c, slip = ne.PARAMETERS, *sp.symbols("w s omega_c slip")
     x = State(omega_c=omega_c, slip_x=slip)
     rates = dynamics.newton_euler(Case.SR, x, dynamics.FORCES[Case.SR](x, p, w, (sign, 0)), p, w)
-    at = {omega_c: w, slip: g / (j * w * r) - w * R / r}
+    at = {omega_c: w, slip: p.g / (p.j * w * p.r) - w * p.R / p.r}
     J = sp.Matrix([rates.omega_c, rates.slip_x]).jacobian([omega_c, slip]).subs(at)
-    trace = -(c + mu * sign * (g / (R * w) - (1 + j) * w)) / (1 + j)
+    trace = -(p.c + p.mu * sign * (p.g / (p.R * w) - (1 + p.j) * w)) / (1 + p.j)
     assert sp.simplify(J.trace() - trace) == 0
-    assert sp.simplify(J.det() + mu * sign * c * w / (1 + j)) == 0
+    assert sp.simplify(J.det() + p.mu * sign * p.c * w / (1 + p.j)) == 0
 
 
 @pytest.mark.parametrize("omega_0", [20.0, 25.0, 40.0, -20.0, -30.0])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from analytic import Settings, simulate, stationary_solutions, thresholds
+from analytic import Settings, simulate, thresholds
 from analytic.simulation.stepping import TOLERANCE, step
 from analytic.simulation.time_stepping import prepared
 from model import Case, Flow, InputError, Parameters, SimulationError, State
@@ -21,43 +21,11 @@ def order(steps, errors):
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
-@pytest.mark.parametrize(
-    ("name", "omega_0", "case"),
-    [
-        ("reference", 12.0, Case.RR),
-        ("reference", 20.0, Case.SS),
-        ("reference", 25.0, Case.SS),
-        ("high-wall-friction", 25.0, Case.NR),
-    ],
-)
-def test_stationary_orbits_are_exact_at_large_steps(name, omega_0, case):
-    """Axes that turn with the ball make a stationary orbit a fixed point of the scheme, to what the solver leaves."""
-    p = Parameters.named(name).replace(omega_0=omega_0)
-    (solution,) = [s for s in stationary_solutions(p) if s.case is case and s.exists]
-    x0 = np.asarray(solution.x)[:6].copy()
-    x0[0] = 0.01 if case is Case.NR else 0.0
-    run = simulate(p, x0, 0.5, method="time-stepping", timestep=2e-3)
-    # 24 TOLERANCE an iteration and step; slow modes amplify by their number, stiff ones not.
-    np.testing.assert_allclose(run.x[:, :6], np.tile(x0, (len(run.time), 1)), atol=1e-9)
-    assert set(run.cases) == {case}
-    np.testing.assert_allclose(run.force_A[-1], solution.force_A, atol=1e-8 * p.m * p.g) if case is Case.SS else None
-
-
 def test_no_drift_at_the_wall():
     """Held by the wall the ball stays at it exactly, whatever the step."""
     run = simulate(P.replace(omega_0=14.0), [0, 0, 10.0, 20, 30, 10], 1.0, method="time-stepping", timestep=5e-3)
     assert np.all(run.h == 0.0)
     assert np.all(run.y >= 0.0)
-
-
-def test_sliding_ball_on_the_floor():
-    """Rolls with v/(1+j) after the exact time, to within a step."""
-    p, v, h, dt = P.replace(c=0.0), 0.05, 0.03, 1e-4
-    x0 = [0, 0, v / (p.R - h), -v / p.r, v / p.r, 0, h, 0]
-    run = simulate(p, x0, 0.1, method="time-stepping", timestep=dt, sample_interval=1e-3)
-    speed = np.hypot((p.R - run.h) * run.omega_c, run.v_h)
-    np.testing.assert_allclose(speed[-1], v / (1 + p.j), rtol=1e-11)
-    assert run.events.time[0] == pytest.approx(v / (p.mu * p.g * (1 + 1 / p.j)), abs=1.01 * dt)
 
 
 def test_flight_is_of_second_order():

@@ -53,6 +53,7 @@ def test_a_mapping_holds_all_of_it(flow: Flow) -> None:
         (lambda: Flow.sampled([0, 1, 1], [1, 2, 3]), "times must increase, but sample 2 is at 1 s"),
         (lambda: Flow.sampled([0, math.nan], [1, 2]), "time of flow sample 1"),
         (lambda: Flow.sampled([0, 1], [1, "two"]), "omega_0"),
+        (lambda: Flow.sampled([0, 1], [1.0, math.nan]), "omega_0 of flow sample 1 = nan"),
         (lambda: Flow.sine(math.inf, 1, 1), "omega_0 of flow sample 0"),
         (lambda: Flow.sine(1, 1, 0), "frequency of wave 0 = 0 Hz is out of range: must be > 0"),
         (lambda: Flow.sines(1, [(1, 1, 0), (math.nan, 1, 0)]), "amplitude of wave 1 = nan"),
