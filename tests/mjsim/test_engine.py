@@ -1,13 +1,15 @@
-"""The engine against motions whose exact form is short enough to stand in the test."""
+"""The engine against motions whose exact form is short enough to stand in the test, and itself compiled."""
 
 from itertools import pairwise
 
+import mujoco
 import numpy as np
 import pytest
 
 import mjsim
-from mjsim import ContactSettings, recorder
+from mjsim import ContactSettings, backend, recorder, scene
 from model import Flow, InputError, Parameters, SimulationError
+from model.drag import LAWS
 
 P = Parameters.named("reference")
 
@@ -177,3 +179,39 @@ def test_without_the_servo_sliding_states_are_of_second_order_in_the_step() -> N
     change = abs(coarse - fine) / abs(fine)
     assert 1e-3 < change < 0.1
     assert (coarse - middle) / (middle - fine) == pytest.approx(4, rel=2 * change)
+
+
+# --- the scene file ------------------------------------------------------------------------------------------
+
+
+def test_file_opens_as_it_is_and_holds_the_reference() -> None:
+    model = mujoco.MjModel.from_xml_path(str(scene.SCENE))
+    built, mjcf = scene.build(P, ContactSettings())
+    for name in ("body_mass", "body_inertia", "body_pos", "jnt_pos", "geom_size", "geom_pos", "pair_solref"):
+        assert getattr(built, name) == pytest.approx(getattr(model, name)), name
+        assert getattr(mujoco.MjModel.from_xml_string(mjcf), name) == pytest.approx(getattr(model, name)), name
+
+
+# --- the compiled corrections are those of the source, whatever a run goes through ---------------------------
+
+
+SETS = [P.replace(omega_0=12.0, drag=law, nu_f=1e-4) for law in LAWS]
+STARTS = [[0.02, -0.2, 12.0, 30, -10, 20, 0, 0], [0, 0, 12.0, -2, 1, 6, 0, 0], [0.01, 0, 10.0, 1, 2, 3, 0.002, -0.3]]
+"""A landing, slip at both contacts, and a landing on the wall."""
+
+
+@pytest.mark.parametrize("changes", [{}, {"servo": 0.0}, {"memory": False, "order": 1}])
+def test_compiled_gives_the_same_run(monkeypatch: pytest.MonkeyPatch, changes: dict[str, object]) -> None:
+    """For all laws of drag in one batch; not to the bit everywhere: numpy and numba may round a cosine in two ways."""
+    pytest.importorskip("numba")
+    settings, flow = ContactSettings.at(1e-3, **changes), Flow.ramp(12.0, 25.0, 0.2)
+
+    def runs() -> list[np.ndarray]:
+        together = mjsim.simulate_many(SETS, STARTS, 0.3, flow, settings, sample_interval=2e-3)
+        alone = [mjsim.simulate(p, x0, 0.3, flow, settings) for p, x0 in zip(SETS, STARTS, strict=True)]
+        return [run.x for run in (*together, *alone)]
+
+    fast = runs()
+    monkeypatch.setattr(backend, "compiled", lambda: None)
+    for x, exact in zip(fast, runs(), strict=True):
+        np.testing.assert_allclose(x, exact, rtol=0, atol=1e-9)
