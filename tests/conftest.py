@@ -13,8 +13,3 @@ settings.load_profile("dualball")
 @pytest.fixture
 def reference() -> Parameters:
     return Parameters.named("reference")
-
-
-@pytest.fixture
-def rough_wall() -> Parameters:
-    return Parameters.named("high-wall-friction")

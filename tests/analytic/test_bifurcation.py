@@ -92,31 +92,26 @@ def test_all_curves_meet_at_eta_equal_j(kappa: float) -> None:
     assert np.isnan(at_j.omega_04)
 
 
-@pytest.mark.parametrize("name", Parameters.names())
-def test_order_of_the_thresholds(name: str) -> None:
-    p = Parameters.named(name)
-    t = thresholds(p)
-    if p.eta < p.j:
-        assert t.omega_01 < t.omega_02
-        assert np.isnan(t.omega_04) or t.omega_04 > t.omega_02
-    else:
-        assert np.isnan(t.omega_01)
-        assert t.omega_02 < t.omega_03
-    assert t.eta_cr == pytest.approx(p.c**2 * p.R / (4 * p.g * p.mu**2), rel=8 * EPS)
+def test_order_and_existence_of_the_thresholds() -> None:
+    for p in map(Parameters.named, Parameters.names()):
+        t = thresholds(p)
+        if p.eta < p.j:
+            assert t.omega_01 < t.omega_02
+            assert np.isnan(t.omega_04) or t.omega_04 > t.omega_02
+        else:
+            assert np.isnan(t.omega_01)
+            assert t.omega_02 < t.omega_03
+        assert t.eta_cr == pytest.approx(p.c**2 * p.R / (4 * p.g * p.mu**2), rel=8 * EPS)
 
-
-def test_thresholds_that_do_not_exist() -> None:
-    def names(**change: float) -> set[str]:
+    def missing(**change: float) -> set[str]:
         t = thresholds(P.replace(**change))
         return {n for n in ("omega_01", "omega_02", "omega_03", "omega_04", "eta_cr") if np.isnan(getattr(t, n))}
 
-    assert names() == set()
-    assert names(eta=0.6) == {"omega_01", "omega_04"}
-    assert names(eta=0.0) == {"omega_02", "omega_04"}
-    assert names(eta=0.02) == {"omega_04"}  # below eta_cr
-    assert names(c=0.0) == {"omega_04"}
-    assert names(mu=0.0) == {"omega_04"}
-    assert names(mu=0.0, c=0.0) == {"omega_04", "eta_cr"}
+    assert missing() == set()
+    assert missing(eta=0.6) == {"omega_01", "omega_04"}
+    assert missing(eta=0.0) == {"omega_02", "omega_04"}
+    assert missing(eta=0.02) == missing(c=0.0) == missing(mu=0.0) == {"omega_04"}  # the first is below eta_cr
+    assert missing(mu=0.0, c=0.0) == {"omega_04", "eta_cr"}
     assert thresholds(P.replace(mu=0.0)).omega_01 == 0
     assert thresholds(P.replace(mu=0.0)).eta_cr == np.inf
     assert thresholds(P.replace(c=0.0)).eta_cr == 0
@@ -248,22 +243,16 @@ def rolls(p: Parameters, omega: float) -> bool:
 
 
 @pytest.mark.parametrize("s", RATIOS)
-@pytest.mark.parametrize(("mu", "eta"), [(0.2, 0.2), (0.05, 0.3), (0.5, 0.1)])
-def test_rolling_ends_where_no_forces_hold_it(s, mu, eta):
-    p = BALL.replace(mu=mu, eta=eta, density_ratio=s)
-    omega_01 = fluid_inertia.thresholds(p)["omega_01"]
-    # B_y is tried in 2e5 parts of m g: relative changes of omega_01 that matter are far above their size.
-    assert rolls(p, omega_01 * (1 - 1e-4))
-    assert not rolls(p, omega_01 * (1 + 1e-4))
-
-
-@pytest.mark.parametrize("s", RATIOS)
-def test_the_wall_carries_the_ball(s):
+def test_rolling_ends_where_no_forces_hold_it_and_the_wall_carries_it(s):
+    for mu, eta in ((0.2, 0.2), (0.05, 0.3), (0.5, 0.1)):
+        p = BALL.replace(mu=mu, eta=eta, density_ratio=s)
+        omega_01 = fluid_inertia.thresholds(p)["omega_01"]
+        # B_y is tried in 2e5 parts of m g: relative changes of omega_01 that matter are far above their size.
+        assert rolls(p, omega_01 * (1 - 1e-4))
+        assert not rolls(p, omega_01 * (1 + 1e-4))
     p = BALL.replace(density_ratio=s)
-    changed = fluid_inertia.thresholds(p)
-    weight = p.m * p.g
-    load = (1 + s / 2) * p.m * p.R * changed["omega_02"] ** 2 - 1.5 * s * p.m * p.R * changed["omega_02"] ** 2
-    assert p.eta * load == pytest.approx(weight, rel=1e-12)
+    centripetal = p.m * p.R * fluid_inertia.thresholds(p)["omega_02"] ** 2
+    assert p.eta * ((1 + s / 2) * centripetal - 1.5 * s * centripetal) == pytest.approx(p.m * p.g, rel=1e-12)
 
 
 def test_shifts():

@@ -8,8 +8,6 @@ measured against the largest term of the equation they enter, as round-off is.
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given
-from hypothesis import strategies as st
 
 from analytic import contact_forces, vector_field
 from analytic.mechanics import dynamics
@@ -159,10 +157,10 @@ def linear_solution(case: Case, x: np.ndarray, p: Parameters) -> tuple[np.ndarra
     return force, dx, np.concatenate([largest, np.repeat(load[:, None], 6, axis=1)], axis=1)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("law", "mu", "eta"), zip(LAWS, (0.3, 0.01, 0.9), (0.45, 0.9, 0.01), strict=True))
 @pytest.mark.parametrize("case", list(Case))
-def test_against_the_linear_system(case: Case, law: str) -> None:
-    x, p = random_states(case, N), P.replace(drag=law, nu_f=1e-5)
+def test_against_the_linear_system(case: Case, law: str, mu: float, eta: float) -> None:
+    x, p = random_states(case, N), P.replace(drag=law, nu_f=1e-5, mu=mu, eta=eta)
     force, dx, scale = linear_solution(case, x, p)
     if case is Case.RR:
         mine = np.stack(np.broadcast_arrays(*dynamics.rolling_family(x[:, 2], p, p.omega_0, 0.0)), axis=-1)
@@ -216,34 +214,17 @@ def test_constraints_are_kept_exactly_and_mirror_images_too(case: Case) -> None:
 
 
 @pytest.mark.parametrize("case", list(Case))
-@pytest.mark.parametrize("zero", [{"mu": 0.0}, {"eta": 0.0}, {"c": 0.0}, {"omega_0": 0.0}, {"mu": 0.0, "eta": 0.0}])
-def test_vanishing_parameters(case: Case, zero: dict[str, float]) -> None:
+def test_vanishing_parameters(case: Case) -> None:
     """Each has a defined result, also with an orbit at rest (omega_c = 0)."""
-    p = P.replace(**zero)
     x = random_states(case, 50)
     x[:25, 2] = 0.0
-    rates = vector_field(case, x, p)
-    assert np.all(np.isfinite(rates))
-    if case is not Case.RR:
-        F_A, F_B = contact_forces(case, x, p)
-        assert np.all(np.isfinite([F_A, F_B]))
-        if case.A is Contact.S and p.mu == 0:
-            assert np.all(F_A[:, [0, 2]] == 0)
-
-
-@given(st.floats(-60, 60), st.floats(-100, 100), st.floats(0.01, 0.9), st.floats(0.01, 0.9))
-def test_coulomb_in_slipping(omega_c: float, w_z: float, mu: float, eta: float) -> None:
-    """In SS friction is exactly the friction coefficient times the normal force, against the sliding velocity."""
-    p = P.replace(mu=mu, eta=eta)
-    x = np.array([0, 0, omega_c, 3.0, -2.0, w_z])
-    for force, velocity, normal, friction in zip(
-        contact_forces(Case.SS, x, p), slip_velocities(x, p), (1, 0), (mu, eta), strict=True
-    ):
-        tangential = np.delete(force, normal)
-        v = np.delete(velocity, normal)
-        np.testing.assert_allclose(
-            tangential, -friction * force[normal] * v / np.linalg.norm(v), atol=1e-14 * np.abs(force).max()
-        )
+    for zero in (["mu"], ["eta"], ["c"], ["omega_0"], ["mu", "eta"]):
+        p = P.replace(**dict.fromkeys(zero, 0.0))
+        assert np.all(np.isfinite(vector_field(case, x, p)))
+        if case is not Case.RR:
+            F_A, F_B = contact_forces(case, x, p)
+            assert np.all(np.isfinite([F_A, F_B]))
+            assert case.A is not Contact.S or p.mu > 0 or np.all(F_A[:, [0, 2]] == 0)
 
 
 # --- bad input -------------------------------------------------------------------------------------------------

@@ -46,13 +46,6 @@ def test_what_ends_the_operating_range(trial: int) -> None:
     assert (limit.end is End.SLIP) == (p.eta < p.j)
 
 
-@pytest.mark.parametrize("smooth", [{"mu": 0.0}, {"eta": 0.0}, {"mu": 0.0, "eta": 0.6}])
-def test_smooth_contacts_leave_no_operating_range(smooth: dict[str, float]) -> None:
-    p = P.replace(omega_0=0.1, **smooth)
-    assert operating_limit(p).end is End.SMOOTH
-    assert {s.case for s in stable_solutions(p)} != {Case.RR}
-
-
 @pytest.mark.parametrize("p", [P, ROUGH])
 def test_reading_range(p: Parameters) -> None:
     """omega_c = omega_0 in every attractor up to it, however far if it is inf, and not beyond."""
@@ -64,20 +57,20 @@ def test_reading_range(p: Parameters) -> None:
             assert all(np.isclose(s.state.omega_c, omega_0, rtol=1e-12) for s in lasting) == reads
 
 
-def test_unloading_limit() -> None:
-    """On either side of it a ball on the wall can stay, or not."""
+def test_limits_and_edges() -> None:
+    """On either side of the unloading limit a ball on the wall can stay, or not; smooth contacts leave no range."""
     limit = unloading_limit(ROUGH)
     assert operating_range(ROUGH) == limit < thresholds(ROUGH).omega_03
     for factor, stays in ((0.999, False), (1.001, True)):
         lasting = stable_solutions(ROUGH.replace(omega_0=factor * limit))
         assert (Case.NR in {s.case for s in lasting}) == stays
-
-
-def test_ranges_at_the_edges() -> None:
+    for smooth in ({"mu": 0.0}, {"eta": 0.0}, {"mu": 0.0, "eta": 0.6}):
+        p = P.replace(omega_0=0.1, **smooth)
+        assert operating_limit(p).end is End.SMOOTH
+        assert {s.case for s in stable_solutions(p)} != {Case.RR}
     assert reading_range(ROUGH) == reading_range(P.replace(mu=0.0)) == np.inf
     assert operating_range(P.replace(mu=0.0)) == 0
-    for ask in (operating_range, reading_range):
-        assert ask(P.replace(c=0.0)) == 0
+    assert operating_range(P.replace(c=0.0)) == reading_range(P.replace(c=0.0)) == 0
     assert operating_limit(P.replace(c=0.0)).end is End.NO_DRAG
     assert np.isnan(unloading_limit(P.replace(eta=0.0)))
 
@@ -108,9 +101,6 @@ def test_characteristic_slope_between_omega_02_and_omega_04() -> None:
     # omega_c - its value at the fold goes with the root of the distance, its slope with the inverse of the root.
     assert slopes[2] / slopes[1] == pytest.approx(10, rel=0.2)
     assert characteristic_slope(P.replace(omega_0=-10.0)) == 1.0
-
-
-def test_no_slope_where_nothing_follows_the_flow() -> None:
     with pytest.raises(InputError, match=r"no motion follows the flow at omega_0 = 12 rad s-1 with c = 0"):
         characteristic_slope(P.replace(c=0.0, omega_0=12.0))
 
@@ -124,18 +114,15 @@ def test_slope_jumps_at_omega_01(name: str) -> None:
     assert slope_jump(p) == pytest.approx(after - before, abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["reference", "steel-in-water"])
-def test_mean_slope(name: str) -> None:
+def test_mean_slope() -> None:
     """The mean of the slope, integrated over omega_0: evenly spread midpoints err by the square of their distance."""
-    p = Parameters.named(name)
-    t, n = thresholds(p), 100
-    flows = t.omega_01 + (t.omega_02 - t.omega_01) * (np.arange(n) + 0.5) / n
-    slopes = [characteristic_slope(p.replace(omega_0=float(w)), Case.SS) for w in flows]
-    assert mean_slope(p) == pytest.approx(np.mean(slopes), rel=10 / n**2)
-
-
-def test_mean_slope_without_a_fold() -> None:
-    """Below eta_cr SS gains on the fluid again until it meets SR at omega_02."""
+    for name in ("reference", "steel-in-water"):
+        p = Parameters.named(name)
+        t, n = thresholds(p), 100
+        flows = t.omega_01 + (t.omega_02 - t.omega_01) * (np.arange(n) + 0.5) / n
+        slopes = [characteristic_slope(p.replace(omega_0=float(w)), Case.SS) for w in flows]
+        assert mean_slope(p) == pytest.approx(np.mean(slopes), rel=10 / n**2)
+    # Below eta_cr SS gains on the fluid again until it meets SR at omega_02.
     p = P.replace(eta=0.5 * thresholds(P).eta_cr)
     t = thresholds(p)
     near = solution(p.replace(omega_0=t.omega_02 * (1 - 1e-10)), Case.SS).state.omega_c

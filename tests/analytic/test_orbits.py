@@ -210,10 +210,7 @@ def test_undecided_says_what_it_did_last() -> None:
 def test_bad_input(given: dict[str, object], match: str) -> None:
     with pytest.raises(InputError, match=match):
         attractors(HOPPING, **given)  # type: ignore[arg-type]
-
-
-def test_without_drag_a_time_must_be_given() -> None:
-    with pytest.raises(InputError, match="lasting"):
+    with pytest.raises(InputError, match="lasting"):  # no time constant to take it from
         attractors(HOPPING.replace(c=0.0), 1)
 
 

@@ -152,18 +152,12 @@ def test_stable_solutions(eta: float, omega_0: float, expected: set[Case]) -> No
     assert len(attracting) == len(expected)
 
 
-def test_slowest_time_constant() -> None:
-    """The groups of time in theory.md: RR, NR's swing; inf where nothing decays."""
-    p = P.replace(omega_0=9.0)
-    assert slowest_time_constant(solution(p, Case.RR)) == pytest.approx((1 + 2 * p.j) / p.c)
-    fast = P.replace(omega_0=45.0)
-    assert slowest_time_constant(solution(fast, Case.NR)) == pytest.approx(2 * (1 + p.j) / p.c)
-    assert slowest_time_constant(solution(P.replace(c=0.0), Case.RR)) == np.inf
-
-
 @pytest.mark.parametrize(("omega_0", "c"), [(3.0, 0.1), (9.0, 1.0), (20.0, 4.0), (30.0, 1.0)])
-def test_time_constants_of_ns(omega_0: float, c: float) -> None:
-    """c, and the roots of x^2 - (1 + q (1+j)/j) x + q/j in units of c: the slower one is that of the spin slip_y."""
+def test_slowest_time_constant(omega_0: float, c: float) -> None:
+    """In NS c, and the roots of x^2 - (1 + q (1+j)/j) x + q/j in units of c: the slower one is that of the spin slip_y.
+
+    The groups of time in theory.md in RR and of NR's swing; inf where nothing decays.
+    """
     p = P.replace(omega_0=omega_0, c=c)
     q = p.eta * p.Omega_0**2 / (1 - p.eta * p.Omega_0**2)
     expected = np.sort([1.0, *np.roots([1.0, -(1 + q * (1 + p.j) / p.j), q / p.j])])
@@ -171,6 +165,10 @@ def test_time_constants_of_ns(omega_0: float, c: float) -> None:
     decaying = -s.eigenvalues.real[np.abs(s.eigenvalues.imag) < 0.5 * omega_0] / c
     np.testing.assert_allclose(decaying, expected, rtol=1e-10)
     assert slowest_time_constant(s) == pytest.approx(1 / (c * expected[0]), rel=1e-10)
+    p = P.replace(omega_0=9.0, c=c)
+    assert slowest_time_constant(solution(p, Case.RR)) == pytest.approx((1 + 2 * p.j) / c)
+    assert slowest_time_constant(solution(p.replace(omega_0=45.0), Case.NR)) == pytest.approx(2 * (1 + p.j) / c)
+    assert slowest_time_constant(solution(p.replace(c=0.0), Case.RR)) == np.inf
 
 
 # --- eigenvalues -----------------------------------------------------------------------------------------------
@@ -392,9 +390,6 @@ def test_a_leaning_ball_moves_at_that_rate(omega_0: float) -> None:
     assert set(run.cases) == {Case.SR}
     lean = run.force_A[:, 1]
     assert np.log(lean[-1] / lean[0]) / run.time[-1] == pytest.approx(values[0].real, rel=1e-3)
-
-
-def test_nothing_to_lean_with() -> None:
     for change in ({"omega_0": 0.0}, {"mu": 0.0}):
         with pytest.raises(InputError, match="SR has no stationary solution that leans"):
             leaning_modes(ROUGH.replace(**change))

@@ -25,6 +25,13 @@ def order(steps, errors):
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
+def deviations(p, x0, t_end, steps, flow=None, **given):
+    """The event-driven run, and mean errors of time stepping against it with these steps, in natural sizes."""
+    exact = simulate(p, x0, t_end, flow, rtol=1e-11, **given)
+    runs = [simulate(p, x0, t_end, flow, method="time-stepping", timestep=s, **given) for s in steps]
+    return exact, [np.mean(np.abs(run.x[1:] - exact.x[1:]) / SCALE) for run in runs]
+
+
 def test_no_drift_at_the_wall():
     """Held by the wall the ball stays at it exactly, whatever the step."""
     run = simulate(P.replace(omega_0=14.0), [0, 0, 10.0, 20, 30, 10], 1.0, method="time-stepping", timestep=5e-3)
@@ -44,12 +51,9 @@ def test_flight_is_of_second_order():
 @pytest.mark.parametrize("x0", [[0, 0, 9, 30, 60, -40], [0, 0, 20, 100, 150, -200]])
 def test_sliding_is_of_second_order(x0):
     """Friction opposes the mean slip: against the event-driven result while both contacts slide."""
-    p, t = P.replace(omega_0=25.0), 0.1
-    exact = simulate(p, x0, t, rtol=1e-11, sample_interval=t)
+    steps = [1e-3, 5e-4, 2.5e-4]
+    exact, errors = deviations(P.replace(omega_0=25.0), x0, 0.1, steps, sample_interval=0.1)
     assert exact.cases == [Case.SS, Case.SS]
-    steps = np.array([1e-3, 5e-4, 2.5e-4])
-    runs = [simulate(p, x0, t, method="time-stepping", timestep=s, sample_interval=t) for s in steps]
-    errors = [np.max(np.abs(run.x[-1] - exact.x[-1]) / SCALE) for run in runs]
     assert order(steps, errors) == pytest.approx(2.0, abs=0.1)
 
 
@@ -100,35 +104,21 @@ ALL_NINE = [
 ]
 
 
-def test_the_sequences_below_visit_all_nine_cases():
-    assert {name for _, _, visited in ALL_NINE for name in visited} == {case.name for case in Case}
-
-
 @pytest.mark.parametrize(("omega_0", "x0", "visited"), ALL_NINE)
 def test_converges_to_the_event_driven_result(omega_0, x0, visited):
     """First order in the step, in the mean over the run, through every kind of transition and impact."""
-    p = P.replace(omega_0=omega_0, eta=0.6)
-    events = simulate(p, x0, 0.4, sample_interval=2e-3)
-    seen = {Case(code).name for code in (*events.events.from_case, *events.events.to_case)}
-    assert seen >= set(visited)
-    steps = np.array([4e-4, 2e-4, 1e-4, 5e-5])
-    errors = []
-    for s in steps:
-        run = simulate(p, x0, 0.4, method="time-stepping", timestep=s, sample_interval=2e-3)
-        errors.append(np.mean(np.abs(run.x - events.x) / SCALE))
+    assert {name for *_, names in ALL_NINE for name in names} == {case.name for case in Case}
+    steps = [4e-4, 2e-4, 1e-4, 5e-5]
+    exact, errors = deviations(P.replace(omega_0=omega_0, eta=0.6), x0, 0.4, steps, sample_interval=2e-3)
+    assert {Case(code).name for code in (*exact.events.from_case, *exact.events.to_case)} >= set(visited)
     # Single steps may be lucky or not with the moment of an impact within them.
     assert order(steps, errors) > 0.8
     assert errors[-1] < steps[-1] * SPEED / P.R * 0.1
 
 
 def test_converges_through_bounces_and_a_ramp():
-    p, flow = P.replace(c=2.0), Flow.ramp(5.0, 25.0, 0.2, 0.1)
-    x0, t_end = [0.01, 0.1, 8.0, 1.0, 2.0, 30.0, 0.01, 0.0], 0.4
-    events = simulate(p, x0, t_end, flow, restitution=0.5, sample_interval=4e-3)
-    steps, errors = np.array([4e-4, 2e-4, 1e-4]), []
-    for s in steps:
-        run = simulate(p, x0, t_end, flow, method="time-stepping", timestep=s, restitution=0.5, sample_interval=4e-3)
-        errors.append(np.mean(np.abs(run.x - events.x) / SCALE))
+    x0, flow, steps = [0.01, 0.1, 8.0, 1.0, 2.0, 30.0, 0.01, 0.0], Flow.ramp(5.0, 25.0, 0.2, 0.1), [4e-4, 2e-4, 1e-4]
+    _, errors = deviations(P.replace(c=2.0), x0, 0.4, steps, flow, restitution=0.5, sample_interval=4e-3)
     assert order(steps, errors) > 0.7
     assert errors[-1] < 1e-3
 
@@ -175,6 +165,13 @@ def test_no_convergence_keeps_the_samples():
     assert not kept.complete
     assert len(kept.time) > 1
     assert np.all(np.isfinite(kept.x))
+    # Among many at once it leaves the others alone.
+    x0, settings = State(y=1.0, h=P.R / 2), Settings(timestep=dt)
+    many = simulate_many([P, p], x0, 0.2, settings=settings, sample_interval=0.1)
+    assert many.failure[0] == ""
+    assert "a shorter step" in many.failure[1]
+    assert np.all(np.isfinite(many.x[0]))
+    assert np.all(np.isnan(many.x[1, 1:]))
 
 
 def test_where_no_step_is_given_it_fits_the_problem():
@@ -234,17 +231,6 @@ def test_landings_and_quiet():
     assert many.landings.tolist() == [[0, 1, *[0] * 9]]
     assert fall + 0.25 < many.end[0] <= fall + 0.25 + 0.1
     np.testing.assert_array_equal(many.x[0, -1], many.x[0, 4])
-
-
-def test_a_run_that_fails_leaves_the_others_alone():
-    """One that falls until its drag is too strong for the step, as in the tests of time stepping."""
-    fast = P.replace(drag="quadratic", nu_f=1e-6, c=10 / P.R * 24e-6 / (2 * P.r * P.C_D), omega_0=0.0)
-    x0, settings = State(y=1.0, h=P.R / 2), Settings(timestep=0.4 * math.sqrt(P.R / P.g))
-    many = simulate_many([P, fast], x0, 0.2, settings=settings, sample_interval=0.1)
-    assert many.failure[0] == ""
-    assert "a shorter step" in many.failure[1]
-    assert np.all(np.isfinite(many.x[0]))
-    assert np.all(np.isnan(many.x[1, 1:]))
 
 
 @pytest.mark.parametrize(
@@ -308,6 +294,7 @@ np.save(sys.argv[1], simulate_many(sets, x0, 0.05, settings=Settings(timestep=2e
 
 def test_compiled_and_not_are_the_same(tmp_path):
     """Without numba the source itself runs; results may differ by rounding only."""
+    assert compiled(lambda x: x + 1)(1) == 2
     pytest.importorskip("numba")
     results = []
     for switch in ("0", "1"):
@@ -324,7 +311,3 @@ def test_what_was_compiled_from_other_sources_is_deleted(tmp_path):
         kept.write_text("")
         forget_stale(tmp_path, [str(source)])
         assert kept.exists() is not compiles_again
-
-
-def test_functions_are_compiled_or_run_as_they_are():
-    assert compiled(lambda x: x + 1)(1) == 2

@@ -38,6 +38,8 @@ def test_a_mapping_holds_all_of_it(flow: Flow) -> None:
     t = np.linspace(0, 10, 101)
     np.testing.assert_array_equal(back(t), flow(t))
     assert back.kind == flow.kind
+    older = Flow.from_mapping({"kind": "steady", "start": [0], "value": [1], "slope": [0]})  # without waves
+    assert older.is_steady
 
 
 @pytest.mark.parametrize(
@@ -68,10 +70,6 @@ def test_a_mapping_holds_all_of_it(flow: Flow) -> None:
 def test_bad_flows(make, says: str) -> None:
     with pytest.raises(InputError, match=says):
         make()
-
-
-def test_flow_of_an_older_file() -> None:
-    assert Flow.from_mapping({"kind": "steady", "start": [0], "value": [1], "slope": [0]}).is_steady
 
 
 @pytest.mark.parametrize(

@@ -68,23 +68,14 @@ def test_the_frame_is_right_handed_and_points_inwards(theta: float) -> None:
     np.testing.assert_array_equal(j, [0, 0, 1])
 
 
-def test_pure_rolling_is_the_state_without_slip() -> None:
-    x = np.array([0, 0, 7.0, 0, 0, 0])
-    v_A, v_B = slip_velocities(x, P)
-    assert not v_A.any()
-    assert not v_B.any()
-    # (4): the ball turns against its orbit, R/r times as fast, about i and j.
-    np.testing.assert_allclose(angular_velocity(x, P), [P.R / P.r * 7, -P.R / P.r * 7, 0])
-
-
 def test_slip_speeds_and_directions_are_7_and_8() -> None:
     x = np.array([0, 0, 5.0, 3.0, -2.0, 4.0])
-    v_A, v_B = slip_speeds(x, P)
-    assert v_A == pytest.approx(P.r * 5)
-    assert v_B == pytest.approx(P.r * np.sqrt(20))
-    alpha, beta = slip_directions(x, P)
-    assert alpha == pytest.approx(np.arctan2(3, 4))
-    assert beta == pytest.approx(np.arctan2(-2, 4))
+    assert slip_speeds(x, P) == pytest.approx((P.r * 5, P.r * np.sqrt(20)))
+    assert slip_directions(x, P) == pytest.approx((np.arctan2(3, 4), np.arctan2(-2, 4)))
+    # (4): without slip the ball turns against its orbit, R/r times as fast, about i and j.
+    x = np.array([0, 0, 7.0, 0, 0, 0])
+    assert not np.any(slip_velocities(x, P))
+    np.testing.assert_allclose(angular_velocity(x, P), [P.R / P.r * 7, -P.R / P.r * 7, 0])
 
 
 def test_arrays_of_states_are_the_states_one_by_one() -> None:
@@ -142,19 +133,12 @@ TABLE_4 = {
 }
 
 
-@pytest.mark.parametrize("case", TABLE_4)
-def test_active_variables(case: Case) -> None:
-    assert set(TRAITS[case].active) == TABLE_4[case]
-
-
-@pytest.mark.parametrize("case", list(Case))
-def test_constraints_and_active_variables_fill_the_state_space(case: Case) -> None:
-    assert len(TRAITS[case].constraints) + TRAITS[case].dimension == 8
-
-
-def test_a_case_is_its_two_contacts() -> None:
+def test_cases() -> None:
+    """Active variables and constraints fill the state space; a case is its two contacts."""
+    for case, active in TABLE_4.items():
+        assert set(TRAITS[case].active) == active
     assert len(Case) == 9
     for case in Case:
+        assert len(TRAITS[case].constraints) + TRAITS[case].dimension == 8
         assert Case.of(case.A, case.B) is case
-    assert Case.NS.A is Contact.N
-    assert Case.NS.B is Contact.S
+    assert (Case.NS.A, Case.NS.B) == (Contact.N, Contact.S)
