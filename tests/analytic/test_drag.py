@@ -28,6 +28,12 @@ def test_the_drag_is_that_of_its_coefficient(law, Re):
 
 
 def test_the_drag_is_half_the_dynamic_pressure_times_area_and_coefficient():
+    """And the speed relative to the fluid has three components; Stokes' law is what it was."""
+    for zero in (0.0, np.array([0.0])):
+        assert drag.speed(zero + 2.0, zero + 3.0, zero + 6.0) == 7.0
+    assert drag.coefficient(0.3, BALL) == drag.rate(0.3, drag.law(BALL)) == BALL.c
+    assert drag.speed_of(0.3, BALL) == 0.3 / BALL.c
+    assert math.isnan(drag.reynolds(0.3, Parameters.named("reference")))
     p, rho_f, speed = BY_LAW["quadratic"], 998.2, 0.7
     force = rho_f / 2 * speed**2 * math.pi * p.r**2 * p.C_D
     assert p.m * drag.coefficient(speed, p) * speed == pytest.approx(force, rel=1e-13)
@@ -44,21 +50,10 @@ def test_arrays_and_floats_agree_and_rest_has_no_drag(law):
     assert drag.speed_of([0.0, 1.0], p.replace(c=0.0)).tolist() == [0.0, math.inf]
 
 
-def test_stokes_is_what_it_was():
-    assert drag.coefficient(0.3, BALL) == drag.rate(0.3, drag.law(BALL)) == BALL.c
-    assert drag.speed_of(0.3, BALL) == 0.3 / BALL.c
-    assert math.isnan(drag.reynolds(0.3, Parameters.named("reference")))
-
-
 def test_a_law_without_a_formula_is_not_taken_for_another(monkeypatch):
     monkeypatch.setattr("model.drag.LAWS", (*LAWS, "oseen"))
     with pytest.raises(KeyError, match="oseen"):
         drag.coefficient(0.3, BALL.replace(drag="oseen"))
-
-
-@pytest.mark.parametrize("zero", [0.0, np.array([0.0])])
-def test_the_speed_relative_to_the_fluid_has_three_components(zero):
-    assert drag.speed(zero + 2.0, zero + 3.0, zero + 6.0) == 7.0
 
 
 @pytest.mark.parametrize(("nu_f", "rho_f", "rho_b", "r"), [(1e-6, 998.0, 7850.0, 5e-3), (1e-3, 1260.0, 2500.0, 8e-3)])

@@ -108,17 +108,13 @@ def test_characteristic_slope_between_omega_02_and_omega_04() -> None:
         characteristic_slope(P.replace(c=0.0, omega_0=12.0))
 
 
-@pytest.mark.parametrize("name", ["reference", "steel-in-water", "air"])
-def test_slope_jumps_at_omega_01(name: str) -> None:
-    """1 just below, next to nothing just above."""
-    p = Parameters.named(name)
-    edge = thresholds(p).omega_01
-    before, after = (characteristic_slope(p.replace(omega_0=edge * f)) for f in (1 - 1e-9, 1 + 1e-9))
-    assert slope_jump(p) == pytest.approx(after - before, abs=1e-6)
-
-
-def test_mean_slope() -> None:
+def test_jump_and_mean_of_the_slope() -> None:
     """The mean of the slope, integrated over omega_0: evenly spread midpoints err by the square of their distance."""
+    for name in ("reference", "steel-in-water", "air"):
+        p = Parameters.named(name)
+        edge = thresholds(p).omega_01  # where the slope falls from 1 to next to nothing
+        before, after = (characteristic_slope(p.replace(omega_0=edge * f)) for f in (1 - 1e-9, 1 + 1e-9))
+        assert slope_jump(p) == pytest.approx(after - before, abs=1e-6)
     for name in ("reference", "steel-in-water"):
         p = Parameters.named(name)
         t, n = thresholds(p), 100
@@ -275,6 +271,9 @@ def test_forces_may_allow_more_on_a_rough_floor() -> None:
     assert pulsation.slip_onset(p, 1.0, "infeasible") == pytest.approx(pulsation.slip_onset(p, 1.0), rel=1e-9)
     rough = p.replace(mu=0.92, eta=0.4, j=0.66)
     assert pulsation.slip_onset(rough, 100.0, "infeasible") > 1.05 * pulsation.slip_onset(rough, 100.0)
+    # No pulsation ends rolling without drag, any does beyond omega_01 and from rest.
+    for changes, onset in (({"c": 0.0}, math.inf), ({"omega_0": 14.0}, 0.0), ({"omega_0": 0.0}, 0.0)):
+        assert pulsation.slip_onset(P.replace(**changes), 1.0) == onset
 
 
 @pytest.mark.parametrize("frequency", [0.1, 1.0])
@@ -299,13 +298,6 @@ def test_limits_of_the_onset(p: Parameters) -> None:
     slow = [abs(pulsation.slip_onset(p, f * k) / pulsation.slow_onset(p) - 1) for f in (1e-4, 1e-5)]
     assert slow[1] < 0.5 * slow[0] or slow[1] < 1e-8
     assert slow[1] < 1e-3
-
-
-@pytest.mark.parametrize(
-    ("changes", "wanted"), [({"c": 0.0}, math.inf), ({"omega_0": 14.0}, 0.0), ({"omega_0": 0.0}, 0.0)]
-)
-def test_no_onset(changes: dict[str, float], wanted: float) -> None:
-    assert pulsation.slip_onset(P.replace(**changes), 1.0) == wanted
 
 
 @pytest.mark.parametrize("name", ["slips at both", "wake", "quadratic"])

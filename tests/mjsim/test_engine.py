@@ -67,18 +67,16 @@ def test_batch_is_the_single_run() -> None:
         np.testing.assert_array_equal(run.force_B, first.force_B)
 
 
-def test_contact_force_is_the_weight_at_rest() -> None:
-    """At rest in still fluid away from the wall, the floor carries m g and nothing else acts."""
-    run = mjsim.simulate(P.replace(omega_0=0.0), [0, 0, 0, 0, 0, 0, 0.01, 0], 1.0)
-    np.testing.assert_allclose(run.force_A[-1], [0, P.m * P.g, 0], atol=1e-9 * P.m * P.g)
-    assert abs(run.gap_A[-1]) < 1e-12
+def test_forces_of_a_single_contact() -> None:
+    """At rest in still fluid away from the wall, the floor carries m g and nothing else acts.
 
-
-def test_forces_of_rolling_on_the_wall_alone() -> None:
-    """Carried by the wall alone at the fluid's speed: it turns the path, B_x = m R omega_0^2, and bears the weight.
+    Carried by the wall alone at the fluid's speed: it turns the path, B_x = m R omega_0^2, and bears the weight.
 
     The axial oscillation about that state decays with 2(1 + j)/c = 2.8 s, so that 1e-9 is left of it after 60 s.
     """
+    run = mjsim.simulate(P.replace(omega_0=0.0), [0, 0, 0, 0, 0, 0, 0.01, 0], 1.0)
+    np.testing.assert_allclose(run.force_A[-1], [0, P.m * P.g, 0], atol=1e-9 * P.m * P.g)
+    assert abs(run.gap_A[-1]) < 1e-12
     p = Parameters.named("high-wall-friction").replace(omega_0=25.0)
     settings = ContactSettings.at(4e-3)
     slip_x = (p.g / p.j - p.R * p.omega_0**2) / (p.r * p.omega_0)  # B_y = m g carries no moment about the centre's path

@@ -86,9 +86,7 @@ def test_arrays_of_states_are_the_states_one_by_one() -> None:
         one, one_angle = from_world(to_world(x[index], theta[index], P), P)
         np.testing.assert_array_equal(many.stacked()[index], one)
         assert angle[index] == one_angle
-
-
-def test_on_the_axis_the_orbit_has_no_angular_velocity() -> None:
+    # On the axis the orbit has no angular velocity.
     world = to_world(np.array([0, 0, 3.0, 0, 0, 0, P.R, -1.0]), 0.0, P)
     x, theta = from_world(world, P)
     assert np.isnan(x.omega_c)

@@ -193,9 +193,6 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path, reference: Paramet
         Parameters.load(tmp_path / "binary.toml")
     with pytest.raises(StorageError, match="cannot write"):
         reference.save(tmp_path / "absent" / "p.toml")
-
-
-def test_an_unknown_name_gets_a_suggestion(reference: Parameters) -> None:
     with pytest.raises(InputError, match=r"did you mean 'reference'"):
         Parameters.named("referense")
     with pytest.raises(InputError, match=r"did you mean 'omega_0'"):
