@@ -1,7 +1,5 @@
 """Shared by all tests."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import settings
 
@@ -15,8 +13,3 @@ settings.load_profile("dualball")
 @pytest.fixture
 def reference() -> Parameters:
     return Parameters.named("reference")
-
-
-@pytest.fixture
-def rough_wall() -> Parameters:
-    return Parameters.named("high-wall-friction")

@@ -1,7 +1,5 @@
 """Slip directions (8), as tests need them."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """The laws of drag written out from the coefficient of a sphere, for tests of the code's own."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """Measurements made up for tests."""
 
-from __future__ import annotations
-
 import analytic
 from compare.kit.record import Condition, Measurement, Records
 from model import Parameters

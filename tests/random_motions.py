@@ -1,7 +1,5 @@
 """Seeded random parameters and starts, all over the range in which the simulators are tried."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,7 +4,7 @@ The ball's centre stands at (-rho, r + y, 0) in the co-rotating frame (1), with 
 split by (4), with rho for R. Everything else is differentiation of vectors in a rotating frame.
 """
 
-from __future__ import annotations
+from types import SimpleNamespace
 
 import sympy as sp
 
@@ -13,6 +13,8 @@ from model.cases import TRAITS, Case, Contact
 t = sp.Symbol("t")
 m, r, R, j, mu, eta, g, c = sp.symbols("m r R j mu eta g c", positive=True)
 omega_0, alpha, beta = sp.symbols("omega_0 alpha beta", real=True)
+PARAMETERS = SimpleNamespace(m=m, r=r, R=R, j=j, mu=mu, eta=eta, g=g, c=c, drag="stokes")
+"""Stands for `Parameters`: forces, rates and bounds are plain arithmetic."""
 NAMES = ("y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z", "h", "v_h")
 STATE = sp.symbols(NAMES, real=True)
 RATE = sp.symbols([f"d{name}" for name in NAMES], real=True)

@@ -1,12 +1,13 @@
 """Thresholds, the fold and the maps of Figs. 7 and 8, against arithmetic of 50 digits and against the solutions."""
 
-from __future__ import annotations
+import math
 
 import numpy as np
 import pytest
 import sympy as sp
 
 from analytic import stationary_solutions, thresholds
+from analytic.bifurcation import fluid_inertia
 from analytic.bifurcation.diagram import (
     Exists,
     case_map,
@@ -91,31 +92,26 @@ def test_all_curves_meet_at_eta_equal_j(kappa: float) -> None:
     assert np.isnan(at_j.omega_04)
 
 
-@pytest.mark.parametrize("name", Parameters.names())
-def test_order_of_the_thresholds(name: str) -> None:
-    p = Parameters.named(name)
-    t = thresholds(p)
-    if p.eta < p.j:
-        assert t.omega_01 < t.omega_02
-        assert np.isnan(t.omega_04) or t.omega_04 > t.omega_02
-    else:
-        assert np.isnan(t.omega_01)
-        assert t.omega_02 < t.omega_03
-    assert t.eta_cr == pytest.approx(p.c**2 * p.R / (4 * p.g * p.mu**2), rel=8 * EPS)
+def test_order_and_existence_of_the_thresholds() -> None:
+    for p in map(Parameters.named, Parameters.names()):
+        t = thresholds(p)
+        if p.eta < p.j:
+            assert t.omega_01 < t.omega_02
+            assert np.isnan(t.omega_04) or t.omega_04 > t.omega_02
+        else:
+            assert np.isnan(t.omega_01)
+            assert t.omega_02 < t.omega_03
+        assert t.eta_cr == pytest.approx(p.c**2 * p.R / (4 * p.g * p.mu**2), rel=8 * EPS)
 
-
-def test_thresholds_that_do_not_exist() -> None:
-    def names(**change: float) -> set[str]:
+    def missing(**change: float) -> set[str]:
         t = thresholds(P.replace(**change))
         return {n for n in ("omega_01", "omega_02", "omega_03", "omega_04", "eta_cr") if np.isnan(getattr(t, n))}
 
-    assert names() == set()
-    assert names(eta=0.6) == {"omega_01", "omega_04"}
-    assert names(eta=0.0) == {"omega_02", "omega_04"}
-    assert names(eta=0.02) == {"omega_04"}  # below eta_cr
-    assert names(c=0.0) == {"omega_04"}
-    assert names(mu=0.0) == {"omega_04"}
-    assert names(mu=0.0, c=0.0) == {"omega_04", "eta_cr"}
+    assert missing() == set()
+    assert missing(eta=0.6) == {"omega_01", "omega_04"}
+    assert missing(eta=0.0) == {"omega_02", "omega_04"}
+    assert missing(eta=0.02) == missing(c=0.0) == missing(mu=0.0) == {"omega_04"}  # the first is below eta_cr
+    assert missing(mu=0.0, c=0.0) == {"omega_04", "eta_cr"}
     assert thresholds(P.replace(mu=0.0)).omega_01 == 0
     assert thresholds(P.replace(mu=0.0)).eta_cr == np.inf
     assert thresholds(P.replace(c=0.0)).eta_cr == 0
@@ -167,19 +163,6 @@ def test_solutions_appear_and_vanish_at_the_thresholds(eta: float, changes: dict
         )
         change = {case.name: high.count(case) - low.count(case) for case in Case}
         assert {case: number for case, number in change.items() if number} == expected
-
-
-@pytest.mark.parametrize("trial", range(40))
-def test_one_fold_beyond_eta_cr_and_none_before(trial: int) -> None:
-    """Proposition 7, and that omega_04 is unique, by counting; omega_04 > omega_02 > omega_01."""
-    rng = np.random.default_rng(trial)
-    j, mu, kappa = rng.uniform(0.1, 2 / 3), 10 ** rng.uniform(-1.5, 0.5), 10 ** rng.uniform(-3, 0.5)
-    p = P.replace(j=float(j), mu=float(mu), c=float(kappa * np.sqrt(P.g / P.R)))
-    p = p.replace(eta=float(p.j * rng.uniform(0.001, 0.999)))
-    t = thresholds(p)
-    assert number_of_folds(p) == (p.eta > t.eta_cr) == np.isfinite(t.omega_04)
-    if p.eta > t.eta_cr:
-        assert t.omega_04 > t.omega_02 > t.omega_01
 
 
 def test_the_branch_is_asked_for_where_there_is_one() -> None:
@@ -235,3 +218,49 @@ def test_critical_drag(c: float) -> None:
     assert [number_of_folds(p.replace(c=factor * critical)) for factor in (0.999, 1.001)] == [1, 0]
     with pytest.raises(InputError):
         critical_drag(p.replace(eta=0.5))
+
+
+# --- the fluid's inertia against the balance of forces and moments of a ball in a swirl ----------------------
+
+
+BALL = Parameters.named("steel-in-water")
+RATIOS = [0.0, 0.127, 0.4, 0.7]
+
+
+def rolls(p: Parameters, omega: float) -> bool:
+    """Whether forces within both cones hold a ball that rolls round with the fluid: some free force B_y does.
+
+    Newton with the pressure gradient of the swirl, 3/2 of the displaced mass times its centripetal acceleration, and
+    with half the displaced mass added to the ball's; Euler without either.
+    """
+    s, centripetal = p.density_ratio, p.R * omega**2
+    pull = 1.5 * s * p.m * centripetal
+    B_y = np.linspace(0.0, p.m * p.g, 200_001)
+    A_y = p.m * p.g - B_y
+    A_x = B_y - p.j * p.m * centripetal  # turns the spin with the orbit
+    B_x = (p.m + s * p.m / 2) * centripetal - pull - A_x
+    return bool(np.any((np.abs(A_x) <= p.mu * A_y) & (B_y <= p.eta * B_x)))
+
+
+@pytest.mark.parametrize("s", RATIOS)
+def test_rolling_ends_where_no_forces_hold_it_and_the_wall_carries_it(s):
+    for mu, eta in ((0.2, 0.2), (0.05, 0.3), (0.5, 0.1)):
+        p = BALL.replace(mu=mu, eta=eta, density_ratio=s)
+        omega_01 = fluid_inertia.thresholds(p)["omega_01"]
+        # B_y is tried in 2e5 parts of m g: relative changes of omega_01 that matter are far above their size.
+        assert rolls(p, omega_01 * (1 - 1e-4))
+        assert not rolls(p, omega_01 * (1 + 1e-4))
+    p = BALL.replace(density_ratio=s)
+    centripetal = p.m * p.R * fluid_inertia.thresholds(p)["omega_02"] ** 2
+    assert p.eta * ((1 + s / 2) * centripetal - 1.5 * s * centripetal) == pytest.approx(p.m * p.g, rel=1e-12)
+
+
+def test_shifts():
+    p = BALL.replace(density_ratio=0.4)
+    by = fluid_inertia.shifts(p)
+    assert by["omega_02"] == pytest.approx(1 / math.sqrt(0.6) - 1, rel=1e-12)
+    assert by["rolling_rate"] == pytest.approx(1.8 / 2.0 - 1, rel=1e-12)
+    assert all(shift == 0.0 for shift in fluid_inertia.shifts(p.replace(density_ratio=0.0)).values())
+    assert math.isnan(fluid_inertia.shifts(p.replace(eta=0.5))["omega_01"])  # there is none without it
+    assert math.isfinite(fluid_inertia.thresholds(p.replace(eta=0.5))["omega_01"])  # but eta < j/(1 - s) is enough
+    assert "omega_01" not in fluid_inertia.shifts(p.replace(mu=0.0))

@@ -1,7 +1,5 @@
 """The coordinates of each case against the vector field in the paper's: the chain rule, by central differences."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ The steep contact has friction against the direction of v/sqrt(v^2 + eps^2) in t
 (26) hold throughout, nothing ever sticks and no case is chosen. The simulation has to be its limit for eps -> 0.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from concurrent.futures import ProcessPoolExecutor
@@ -26,15 +24,14 @@ from tests.random_motions import UNIT, P, random_start
 
 RUNS = int(os.environ.get("DUALBALL_LONG_RUNS", "1500"))
 """Number of runs of 60/c in the slow test."""
-JAMMING = {  # (mu, eta, j, r/R, kappa, Omega_0): where Moreau's time stepping and MuJoCo settle, omega_c in rad s-1
-    (1.7222, 0.0388, 0.482, 0.292, 0.1099, 2.635): 25.46520,
-    (1.2277, 0.1721, 0.611, 0.154, 0.1198, 2.099): 19.08114,
+JAMMING = {  # where Moreau's time stepping and MuJoCo settle, omega_c in rad s-1
+    P.replace(mu=mu, eta=eta, j=j, r=r * P.R, c=kappa * UNIT, omega_0=Omega_0 * UNIT): settles
+    for mu, eta, j, r, kappa, Omega_0, settles in (
+        (1.7222, 0.0388, 0.482, 0.292, 0.1099, 2.635, 25.46520),
+        (1.2277, 0.1721, 0.611, 0.154, 0.1198, 2.099, 19.08114),
+    )
 }
 """Sets in which forces can hold RR beyond omega_01, by jamming."""
-
-
-def parameters(mu, eta, j, r, kappa, Omega_0):
-    return P.replace(mu=mu, eta=eta, j=j, r=r * P.R, c=kappa * UNIT, omega_0=Omega_0 * UNIT)
 
 
 def steep(p, eps):
@@ -90,14 +87,13 @@ def test_a_steep_contact_creeps_exactly_where_the_margin_is_positive():
     assert seen >= {(True, True), (False, False)}
 
 
-@pytest.mark.parametrize("values", JAMMING)
-def test_the_limit_of_a_steep_contact(values):
+@pytest.mark.parametrize("p", JAMMING)
+def test_the_limit_of_a_steep_contact(p):
     """From SS through RS and RR into SS: errors shrink as eps does; those of rolling on while it is feasible don't.
 
     At the onset the creep eps/sqrt(2 (1 - utilisation)) ~ eps t^(-1/2) meets the slip ~ t^2 when both are of the order
     of eps^(4/5). So is the error from then on; that from where slip dies out is smaller, of the order of eps.
     """
-    p = parameters(*values)
     x0 = [0, 0, 0.9 * p.omega_0, 0, 0, 0]
     ours, jammed = (
         simulate(p, x0, 2.0, sample_interval=0.1, leave_rolling=policy) for policy in ("slip-stability", "infeasible")
@@ -112,11 +108,10 @@ def test_the_limit_of_a_steep_contact(values):
     assert fine[1] > 0.9 * coarse[1]
 
 
-@pytest.mark.parametrize("values", JAMMING)
-def test_settles_where_the_other_simulators_do(values):
-    p = parameters(*values)
+@pytest.mark.parametrize("p", JAMMING)
+def test_settles_where_the_other_simulators_do(p):
     settled = solution(p, Case.SS)
-    assert settled.state.omega_c == pytest.approx(JAMMING[values], abs=5e-6)
+    assert settled.state.omega_c == pytest.approx(JAMMING[p], abs=5e-6)
     run = simulate(p, np.zeros(6), 60 / p.c, sample_interval=1.0)
     assert run.cases[-1] is Case.SS
     np.testing.assert_allclose(run.x[-1], settled.state, atol=1e-6 * p.omega_0)

@@ -1,7 +1,5 @@
 """Coulomb's law at two contacts: the conditions that define the solution, and a contact alone in closed form."""
 
-from __future__ import annotations
-
 import math
 import sys
 
@@ -98,18 +96,15 @@ def test_a_slip_that_is_known_beforehand():
             np.testing.assert_allclose(force, expected, atol=1e3 * EPS * np.abs(expected).max())
 
 
-def test_nearly_locked_in_the_corner():
-    """Frictions just below one: sweeps alone creep, for the impulses at both contacts all but balance each other."""
-    p = P.replace(mu=0.993, eta=0.989, j=0.538)
-    assert_solves((0.0, -0.0839, 0.1367, 27.66, -6.504, 9.0227), Closed(), Closed(), p)
-
-
 def test_locked_in_the_corner():
     """Both frictions above one, and a fall into the corner along its bisector without spin.
 
     After a rebound both contacts would slip away from the corner, and friction pull the ball into it with mu P_n at
-    each, more than the P_n that push it out. Rest needs no such thing.
+    each, more than the P_n that push it out. Rest needs no such thing. Frictions just below one lock the ball nearly:
+    sweeps alone creep, for the impulses at both contacts all but balance each other.
     """
+    p = P.replace(mu=0.993, eta=0.989, j=0.538)
+    assert_solves((0.0, -0.0839, 0.1367, 27.66, -6.504, 9.0227), Closed(), Closed(), p)
     p, e, v = P.replace(mu=1.3, eta=1.3), 0.5, 0.4
     u = (-v, -v, 0.0, 0.0, 0.0, 0.0)
     with pytest.raises(NotConvergedError, match=r"still a change of .* after 1000 sweeps") as caught:

@@ -1,7 +1,5 @@
 """Design of a flowmeter, against closed forms, differences of other widths, sampling and brute force."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from functools import partial
@@ -63,9 +61,7 @@ def test_sensitivities_of_the_fold_by_differences_of_other_widths() -> None:
     # All flows scale with sqrt(g/R) and else depend on R, g, c by kappa = c sqrt(R/g) only.
     assert fold["R"].value == pytest.approx(-0.5 + fold["c"].value / 2, abs=1e-8)
     assert fold["g"].value == pytest.approx(-fold["R"].value, abs=1e-8)
-
-
-def test_no_sensitivity_where_a_threshold_or_a_value_ends() -> None:
+    # There is none where a threshold or a value ends.
     by = design.sensitivities(P.replace, {"eta": 0.4})
     assert math.isnan(by["omega_01"]["eta"].value)
     assert math.isnan(design.sensitivities(P.replace, {"j": 2 / 3})["omega_03"]["j"].value)
@@ -149,8 +145,6 @@ def test_a_response_to_keep() -> None:
     with pytest.raises(InputError, match=r"response = 1 s excludes everything: .* time constant of 7\.0\d s"):
         design.best(WATER, bounds, {}, 10.0, 1.0)
 
-
-def test_response_time_is_that_of_rolling() -> None:
     rolling = solution(P.replace(omega_0=5.0), Case.RR)
     assert design.response_time(P) == pytest.approx(-1 / rolling.eigenvalues[0].real)
     quadratic = P.replace(nu_f=1e-6, drag="quadratic")

@@ -1,16 +1,16 @@
-"""Laws of drag against the coefficients of their sources, written out here."""
-
-from __future__ import annotations
+"""Laws of drag against the coefficients of their sources, and motions under them by both simulators."""
 
 import math
 
 import numpy as np
 import pytest
 
+from analytic import Settings, simulate
 from analytic.mechanics import drag, stokes
-from model import Parameters
+from model import Case, Parameters, State
 from model.drag import LAWS
 from tests.drag_laws import BALL, BY_LAW, resistance
+from tests.random_motions import random_start
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -28,6 +28,12 @@ def test_the_drag_is_that_of_its_coefficient(law, Re):
 
 
 def test_the_drag_is_half_the_dynamic_pressure_times_area_and_coefficient():
+    """And the speed relative to the fluid has three components; Stokes' law is what it was."""
+    for zero in (0.0, np.array([0.0])):
+        assert drag.speed(zero + 2.0, zero + 3.0, zero + 6.0) == 7.0
+    assert drag.coefficient(0.3, BALL) == drag.rate(0.3, drag.law(BALL)) == BALL.c
+    assert drag.speed_of(0.3, BALL) == 0.3 / BALL.c
+    assert math.isnan(drag.reynolds(0.3, Parameters.named("reference")))
     p, rho_f, speed = BY_LAW["quadratic"], 998.2, 0.7
     force = rho_f / 2 * speed**2 * math.pi * p.r**2 * p.C_D
     assert p.m * drag.coefficient(speed, p) * speed == pytest.approx(force, rel=1e-13)
@@ -44,21 +50,10 @@ def test_arrays_and_floats_agree_and_rest_has_no_drag(law):
     assert drag.speed_of([0.0, 1.0], p.replace(c=0.0)).tolist() == [0.0, math.inf]
 
 
-def test_stokes_is_what_it_was():
-    assert drag.coefficient(0.3, BALL) == drag.rate(0.3, drag.law(BALL)) == BALL.c
-    assert drag.speed_of(0.3, BALL) == 0.3 / BALL.c
-    assert math.isnan(drag.reynolds(0.3, Parameters.named("reference")))
-
-
 def test_a_law_without_a_formula_is_not_taken_for_another(monkeypatch):
     monkeypatch.setattr("model.drag.LAWS", (*LAWS, "oseen"))
     with pytest.raises(KeyError, match="oseen"):
         drag.coefficient(0.3, BALL.replace(drag="oseen"))
-
-
-@pytest.mark.parametrize("zero", [0.0, np.array([0.0])])
-def test_the_speed_relative_to_the_fluid_has_three_components(zero):
-    assert drag.speed(zero + 2.0, zero + 3.0, zero + 6.0) == 7.0
 
 
 @pytest.mark.parametrize(("nu_f", "rho_f", "rho_b", "r"), [(1e-6, 998.0, 7850.0, 5e-3), (1e-3, 1260.0, 2500.0, 8e-3)])
@@ -67,3 +62,81 @@ def test_a_ball_with_the_drag_10_sinks_at_stokes_speed(nu_f, rho_f, rho_b, r):
     p = Parameters.from_fluid(nu_f=nu_f, rho_f=rho_f, rho_b=rho_b, r=r, R=5 * r, mu=0.2, eta=0.2, gravity=9.81)
     assert p.m * p.c * speed == pytest.approx(p.m * p.g, rel=1e-14)
     assert 6 * math.pi * nu_f * rho_f * r * speed == pytest.approx(p.m * p.g, rel=1e-14)
+
+
+# --- motions -------------------------------------------------------------------------------------------------
+
+
+METHODS = [Settings(), Settings(method="time-stepping", timestep=1e-4)]
+OTHERS = LAWS[1:]
+
+
+@pytest.mark.parametrize("settings", METHODS, ids=lambda s: s.method)
+def test_rolling_after_the_fluid_under_quadratic_drag(settings):
+    """(23) with c|w| for c: the lag L falls as L/(1 + K L t)."""
+    p = BY_LAW["quadratic"].replace(mu=2.0, eta=2.0)
+    K, t_end, lag = p.c * p.C_D / 24 * 2 * p.r / p.nu_f * p.R / (1 + 2 * p.j), 2.0, 10.0
+    run = simulate(p, [0, 0, p.omega_0 - lag, 0, 0, 0], t_end, settings=settings, sample_interval=0.02)
+    assert set(run.cases) == {Case.RR}
+    expected = p.omega_0 - lag / (1 + K * lag * run.time)
+    step = 0.0 if settings.method == "event" else 1e-4
+    # Global error of the midpoint rule, t/24 h^2 max|f'''| and as much from the products of lower derivatives.
+    allowed = 1e-8 * p.omega_0 + 2 * t_end / 24 * step**2 * 6 * K**3 * lag**4
+    np.testing.assert_allclose(run.omega_c, expected, rtol=0, atol=allowed)
+
+
+@pytest.mark.parametrize("law", OTHERS)
+@pytest.mark.parametrize("settings", METHODS, ids=lambda s: s.method)
+def test_a_fall_through_still_fluid_ends_at_the_terminal_speed(law, settings):
+    """In the middle of the vessel, at rest, both contacts open; weight is balanced by the force of the law."""
+    p = BY_LAW[law].replace(omega_0=0.0, c=1.0, nu_f=1e-4)
+    run = simulate(p, [50.0, 0, 0, 0, 0, 0, p.R / 2, 0], 4.0, settings=settings, sample_interval=0.1)
+    assert set(run.cases) == {Case.NN}
+    speed = -run.v_y[-1]
+    assert float(resistance(speed, p)) * speed == pytest.approx(p.g, rel=1e-8)
+    if law == "quadratic":
+        np.testing.assert_allclose(run.v_y, -speed * np.tanh(p.g * run.time / speed), rtol=0, atol=1e-6 * speed)
+    assert run.h[-1] == pytest.approx(p.R / 2, abs=1e-12)
+
+
+@pytest.mark.parametrize("law", OTHERS)
+def test_sinking_along_a_wall_without_friction_ends_at_the_terminal_speed(law):
+    p = BY_LAW[law].replace(eta=0.0, c=1.0, nu_f=1e-4)
+    run = simulate(p, [50.0, 0, p.omega_0 / 2, 0, 0, 0], 6.0, sample_interval=0.1)
+    w = math.hypot(run.v_y[-1], p.R * (run.omega_c[-1] - p.omega_0))
+    assert run.cases[-1] is Case.NS
+    assert float(resistance(w, p)) * -run.v_y[-1] == pytest.approx(p.g, rel=1e-8)
+
+
+def random_ball(seed: int, law: str) -> tuple[Parameters, State]:
+    """Reynolds numbers up to some 1e4."""
+    p, x = random_start(seed)
+    return p.replace(drag=law, nu_f=1e-4, c=p.c / 10), x
+
+
+@pytest.mark.parametrize("law", OTHERS)
+@pytest.mark.parametrize("seed", [0, 1, 7, 12, 17, 19])
+def test_both_simulators_agree_and_balance_energy(law, seed):
+    """Random starts with landings, slip and rolling; changes of case within a step make time stepping first order."""
+    p, x = random_ball(seed, law)
+    runs = [simulate(p, x, 2.0, settings=s, sample_interval=0.02, initial_impact=True) for s in METHODS]
+    for run, tolerance in zip(runs, (1e-7, 1e-9), strict=True):
+        assert run.header.settings["energy_residual"] <= tolerance * run.header.settings["energy_scale"]
+    exact, stepped = (run.omega_c[-1] for run in runs)
+    assert runs[0].cases[-1] is runs[1].cases[-1]
+    assert stepped == pytest.approx(exact, abs=10 * METHODS[1].timestep * math.sqrt(p.g / p.R) * abs(p.omega_0))
+
+
+@pytest.mark.parametrize("law", OTHERS)
+def test_slipping_converges_with_the_square_of_the_step(law):
+    """SS without a change of case: errors of two steps, four to one, against the event-driven simulation."""
+    p = BY_LAW[law].replace(mu=0.15, eta=0.15, omega_0=20.0)
+    start, t_end = [0, 0, 13.0, -20.0, -5.0, 22.0], 0.08
+    exact = simulate(p, start, t_end, rtol=1e-12)
+    assert set(exact.cases) == {Case.SS}
+    errors = [
+        simulate(p, start, t_end, method="time-stepping", timestep=step, sample_interval=0.01).omega_c[-1]
+        - exact.omega_c[-1]
+        for step in (1e-3, 5e-4)
+    ]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)

@@ -1,7 +1,5 @@
 """The errors of the paper that docs/errata.md lists: the printed form fails, the corrected one holds."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

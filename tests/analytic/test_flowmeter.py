@@ -1,24 +1,27 @@
-"""The flowmeter's range and characteristic curve, against the stationary solutions themselves."""
+"""The flowmeter's range, characteristic curve, response and pulsations, against solutions and simulations."""
 
-from __future__ import annotations
+import math
 
 import numpy as np
 import pytest
 
+import analytic
 from analytic import (
     characteristic_slope,
     mean_slope,
     operating_limit,
     operating_range,
     reading_range,
+    simulate,
     slope_jump,
     solution,
     stable_solutions,
     thresholds,
     unloading_limit,
 )
+from analytic.flowmeter import pulsation, response
 from analytic.flowmeter.characteristic import End
-from model import Case, InputError, Parameters
+from model import Case, Contact, Flow, InputError, Parameters
 
 P = Parameters.named("reference")
 ROUGH = Parameters.named("high-wall-friction")
@@ -46,13 +49,6 @@ def test_what_ends_the_operating_range(trial: int) -> None:
     assert (limit.end is End.SLIP) == (p.eta < p.j)
 
 
-@pytest.mark.parametrize("smooth", [{"mu": 0.0}, {"eta": 0.0}, {"mu": 0.0, "eta": 0.6}])
-def test_smooth_contacts_leave_no_operating_range(smooth: dict[str, float]) -> None:
-    p = P.replace(omega_0=0.1, **smooth)
-    assert operating_limit(p).end is End.SMOOTH
-    assert {s.case for s in stable_solutions(p)} != {Case.RR}
-
-
 @pytest.mark.parametrize("p", [P, ROUGH])
 def test_reading_range(p: Parameters) -> None:
     """omega_c = omega_0 in every attractor up to it, however far if it is inf, and not beyond."""
@@ -64,20 +60,20 @@ def test_reading_range(p: Parameters) -> None:
             assert all(np.isclose(s.state.omega_c, omega_0, rtol=1e-12) for s in lasting) == reads
 
 
-def test_unloading_limit() -> None:
-    """On either side of it a ball on the wall can stay, or not."""
+def test_limits_and_edges() -> None:
+    """On either side of the unloading limit a ball on the wall can stay, or not; smooth contacts leave no range."""
     limit = unloading_limit(ROUGH)
     assert operating_range(ROUGH) == limit < thresholds(ROUGH).omega_03
     for factor, stays in ((0.999, False), (1.001, True)):
         lasting = stable_solutions(ROUGH.replace(omega_0=factor * limit))
         assert (Case.NR in {s.case for s in lasting}) == stays
-
-
-def test_ranges_at_the_edges() -> None:
+    for smooth in ({"mu": 0.0}, {"eta": 0.0}, {"mu": 0.0, "eta": 0.6}):
+        p = P.replace(omega_0=0.1, **smooth)
+        assert operating_limit(p).end is End.SMOOTH
+        assert {s.case for s in stable_solutions(p)} != {Case.RR}
     assert reading_range(ROUGH) == reading_range(P.replace(mu=0.0)) == np.inf
     assert operating_range(P.replace(mu=0.0)) == 0
-    for ask in (operating_range, reading_range):
-        assert ask(P.replace(c=0.0)) == 0
+    assert operating_range(P.replace(c=0.0)) == reading_range(P.replace(c=0.0)) == 0
     assert operating_limit(P.replace(c=0.0)).end is End.NO_DRAG
     assert np.isnan(unloading_limit(P.replace(eta=0.0)))
 
@@ -108,37 +104,247 @@ def test_characteristic_slope_between_omega_02_and_omega_04() -> None:
     # omega_c - its value at the fold goes with the root of the distance, its slope with the inverse of the root.
     assert slopes[2] / slopes[1] == pytest.approx(10, rel=0.2)
     assert characteristic_slope(P.replace(omega_0=-10.0)) == 1.0
-
-
-def test_no_slope_where_nothing_follows_the_flow() -> None:
     with pytest.raises(InputError, match=r"no motion follows the flow at omega_0 = 12 rad s-1 with c = 0"):
         characteristic_slope(P.replace(c=0.0, omega_0=12.0))
 
 
-@pytest.mark.parametrize("name", ["reference", "steel-in-water", "air"])
-def test_slope_jumps_at_omega_01(name: str) -> None:
-    """1 just below, next to nothing just above."""
-    p = Parameters.named(name)
-    edge = thresholds(p).omega_01
-    before, after = (characteristic_slope(p.replace(omega_0=edge * f)) for f in (1 - 1e-9, 1 + 1e-9))
-    assert slope_jump(p) == pytest.approx(after - before, abs=1e-6)
-
-
-@pytest.mark.parametrize("name", ["reference", "steel-in-water"])
-def test_mean_slope(name: str) -> None:
+def test_jump_and_mean_of_the_slope() -> None:
     """The mean of the slope, integrated over omega_0: evenly spread midpoints err by the square of their distance."""
-    p = Parameters.named(name)
-    t, n = thresholds(p), 100
-    flows = t.omega_01 + (t.omega_02 - t.omega_01) * (np.arange(n) + 0.5) / n
-    slopes = [characteristic_slope(p.replace(omega_0=float(w)), Case.SS) for w in flows]
-    assert mean_slope(p) == pytest.approx(np.mean(slopes), rel=10 / n**2)
-
-
-def test_mean_slope_without_a_fold() -> None:
-    """Below eta_cr SS gains on the fluid again until it meets SR at omega_02."""
+    for name in ("reference", "steel-in-water", "air"):
+        p = Parameters.named(name)
+        edge = thresholds(p).omega_01  # where the slope falls from 1 to next to nothing
+        before, after = (characteristic_slope(p.replace(omega_0=edge * f)) for f in (1 - 1e-9, 1 + 1e-9))
+        assert slope_jump(p) == pytest.approx(after - before, abs=1e-6)
+    for name in ("reference", "steel-in-water"):
+        p = Parameters.named(name)
+        t, n = thresholds(p), 100
+        flows = t.omega_01 + (t.omega_02 - t.omega_01) * (np.arange(n) + 0.5) / n
+        slopes = [characteristic_slope(p.replace(omega_0=float(w)), Case.SS) for w in flows]
+        assert mean_slope(p) == pytest.approx(np.mean(slopes), rel=10 / n**2)
+    # Below eta_cr SS gains on the fluid again until it meets SR at omega_02.
     p = P.replace(eta=0.5 * thresholds(P).eta_cr)
     t = thresholds(p)
     near = solution(p.replace(omega_0=t.omega_02 * (1 - 1e-10)), Case.SS).state.omega_c
     assert mean_slope(p) == pytest.approx((near - t.omega_01) / (t.omega_02 - t.omega_01), rel=1e-9)
     with pytest.raises(InputError, match=r"eta = 0\.6 is out of range"):
         mean_slope(ROUGH)
+
+
+# --- linear response and ramps against the event-driven simulator, which knows nothing of either -------------
+
+
+SLIPPING = P.replace(omega_0=25.0)
+
+
+def pulsating(p: Parameters, case: Case, amplitude: float, frequency: float):
+    """Mean shift of omega_c over a period, and omega_c over omega_0 at the frequency, once settled."""
+    x = analytic.solution(p, case).x
+    slowest = analytic.slowest_time_constant(analytic.solution(p, case))
+    count, each = 1 + int(np.ceil(20 * slowest * frequency)), 64
+    flow = Flow.sine(p.omega_0, amplitude, frequency)
+    run = analytic.simulate(p, x, count / frequency, flow, sample_interval=1 / (each * frequency))
+    shift = float(run.theta[-1] - run.theta[-1 - each]) * frequency - x[2]
+    wave = np.exp(-2j * np.pi * frequency * run.time[-each:])
+    return shift, 2j * np.mean(run.omega_c[-each:] * wave) / amplitude
+
+
+@pytest.mark.parametrize("frequency", [0.03, 0.3, 3.0])
+def test_rolling_is_a_first_order_lag_at_any_amplitude(frequency: float) -> None:
+    k = P.c / (1 + 2 * P.j)
+    expected = 1 / (1 + 2j * np.pi * frequency / k)
+    shift, ratio = pulsating(P, Case.RR, 1.4, frequency)
+    assert response.transfer(P, Case.RR, frequency) == pytest.approx(expected, rel=1e-14)
+    assert ratio == pytest.approx(expected, rel=1e-7)
+    assert abs(shift) < 1e-8
+    t = np.array([0.0, 0.1, 1.0, 30.0])
+    np.testing.assert_allclose(response.step_response(P, Case.RR, t), -np.expm1(-k * t), rtol=1e-14)
+    assert response.peak(P, Case.RR) == (np.inf, 1.0)
+
+
+@pytest.mark.parametrize("frequency", [0.3, 1.1, 3.0])
+def test_slipping_follows_by_its_jacobian(frequency: float) -> None:
+    """What the linear theory leaves out goes with the square of the amplitude, and so does the shift of the mean."""
+    transfer = response.transfer(SLIPPING, Case.SS, frequency)
+    (much, high), (little, low) = (pulsating(SLIPPING, Case.SS, amplitude, frequency) for amplitude in (0.5, 0.25))
+    assert abs(low / transfer - 1) < max(0.4 * abs(high / transfer - 1), 1e-6)
+    assert little / much == pytest.approx(0.25, rel=1e-2)
+
+
+def test_slow_pulsations_follow_the_characteristic() -> None:
+    def slope(omega_0: float) -> float:
+        return analytic.characteristic_slope(P.replace(omega_0=omega_0), Case.SS)
+
+    assert response.transfer(SLIPPING, Case.SS, 0.0) == pytest.approx(slope(25.0), rel=1e-7)
+
+
+@pytest.mark.parametrize("omega_0", [18.0, 25.0, 35.0])
+def test_a_jump(omega_0: float) -> None:
+    """The odd part of two small jumps, up and down; its highest point."""
+    p, size = P.replace(omega_0=omega_0), 1e-3
+    x = analytic.solution(p, Case.SS).x
+    up, down = (analytic.simulate(p.replace(omega_0=omega_0 + s), x, 4.0) for s in (size, -size))
+    odd = (up.omega_c - down.omega_c) / (2 * size)
+    expected = response.step_response(p, Case.SS, up.time)
+    np.testing.assert_allclose(odd, expected, atol=1e-3 * np.abs(expected).max())
+    time, height = response.peak(p, Case.SS)
+    slope = analytic.characteristic_slope(p, Case.SS)
+    if np.isinf(time):
+        assert height == 1
+        assert np.all(odd < 1.001 * slope)
+    else:
+        assert odd.max() / slope == pytest.approx(height, rel=1e-3)
+        assert up.time[odd.argmax()] == pytest.approx(time, abs=0.01)
+
+
+def test_a_ramp_passes_the_fold_by_the_two_thirds_power_of_its_rate() -> None:
+    """Beyond the local law K rate^(2/3) the overshoot has terms rate ln(rate) and rate: three rates show all three."""
+    fold, K = analytic.thresholds(P).omega_04, response.ramp_coefficient(P)
+    rates = np.array([0.003, 0.01, 0.03])
+    passed = []
+    for rate in rates:
+        before, after = 10 * K * rate ** (2 / 3) / rate, 2 * K * rate ** (2 / 3) / rate
+        start, t_end = fold - rate * before, before + after
+        x = analytic.solution(P.replace(omega_0=start), Case.SS).x
+        run = analytic.simulate(P, x, t_end, Flow.ramp(start, start + rate * t_end, t_end))
+        lift = next(t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is Contact.N)
+        passed.append(start + rate * lift - fold)
+    terms = np.stack([rates ** (2 / 3), rates * np.log(rates), rates], axis=-1)
+    assert np.linalg.solve(terms, passed)[0] == pytest.approx(K, rel=0.005)
+
+
+def test_what_there_is_not() -> None:
+    with pytest.raises(InputError, match="there is no fold"):
+        response.ramp_coefficient(P.replace(eta=0.02))
+    with pytest.raises(InputError, match="case SS has no stable"):
+        response.transfer(P, Case.SS, 1.0)
+
+
+def test_rolling_reads_the_mean_of_a_sine_with_any_law_of_drag_but_not_of_every_wave() -> None:
+    """Half a period later a sine is mirrored, and so is the motion; a wave with its second harmonic isn't."""
+    p = P.replace(nu_f=1e-5, drag="schiller-naumann")
+    errors = []
+    for waves in ([(1.2, 0.5, 0.0)], [(1.2, 0.5, 0.0), (0.6, 1.0, 0.0)]):
+        run = analytic.simulate(p, [0, 0, 12.0, 0, 0, 0], 40.0, Flow.sines(12.0, waves), sample_interval=2.0)
+        assert set(run.cases) == {Case.RR}
+        errors.append((run.theta[-1] - run.theta[-2]) / 2.0 - 12.0)
+    assert abs(errors[0]) < 1e-6
+    assert abs(errors[1]) > 1e-3
+
+
+# --- slip under pulsation against the event-driven simulator, and its limits in closed form ------------------
+
+
+PULSATING = {
+    "slips at both": P.replace(omega_0=12.0),
+    "slow": P.replace(omega_0=4.0),
+    "slips at the floor": Parameters.named("high-wall-friction").replace(omega_0=20.0),
+    "wake": P.replace(omega_0=11.0, nu_f=5e-5, drag="schiller-naumann"),
+    "quadratic": P.replace(omega_0=11.0, nu_f=2e-5, drag="quadratic"),
+}
+
+
+def rolling_rate(p: Parameters) -> float:
+    """With Stokes' law; some rate of this order with others."""
+    return p.c / (1 + 2 * p.j)
+
+
+def slips(p: Parameters, amplitude: float, frequency: float) -> bool:
+    """Whether the ball, rolling in the rhythm of the flow, slips within a period."""
+    x0 = [0, 0, float(pulsation.swing(p, amplitude, frequency, 0.0)[0]), 0, 0, 0]
+    run = simulate(p, x0, 1.1 / frequency, Flow.sine(p.omega_0, amplitude, frequency))
+    return any(Case(to) is not Case.RR for to in run.events.to_case)
+
+
+@pytest.mark.parametrize("p", PULSATING.values(), ids=PULSATING)
+@pytest.mark.parametrize("pace", [0.3, 2.0, 10.0, 60.0])
+def test_onset(p: Parameters, pace: float) -> None:
+    """Found again by simulations that stop at the end of RR, to a part of ten thousand."""
+    frequency = pace * rolling_rate(p) / (2 * math.pi)
+    onset = pulsation.slip_onset(p, frequency)
+    assert not slips(p, 0.9999 * onset, frequency)
+    assert slips(p, 1.0003 * onset, frequency)  # the simulator looks 256 times a period
+
+
+def test_forces_may_allow_more_on_a_rough_floor() -> None:
+    """Between (73) and the cone of the floor, see docs/theory.md, section 7; elsewhere both ends of RR are one."""
+    p = PULSATING["slips at both"]
+    assert pulsation.slip_onset(p, 1.0, "infeasible") == pytest.approx(pulsation.slip_onset(p, 1.0), rel=1e-9)
+    rough = p.replace(mu=0.92, eta=0.4, j=0.66)
+    assert pulsation.slip_onset(rough, 100.0, "infeasible") > 1.05 * pulsation.slip_onset(rough, 100.0)
+    # No pulsation ends rolling without drag, any does beyond omega_01 and from rest.
+    for changes, onset in (({"c": 0.0}, math.inf), ({"omega_0": 14.0}, 0.0), ({"omega_0": 0.0}, 0.0)):
+        assert pulsation.slip_onset(P.replace(**changes), 1.0) == onset
+
+
+@pytest.mark.parametrize("frequency", [0.1, 1.0])
+@pytest.mark.parametrize("name", ["slips at both", "wake", "quadratic"])
+def test_the_first_harmonic_is_that_of_the_simulation(name: str, frequency: float) -> None:
+    p, amplitude = PULSATING[name], 0.8 * pulsation.slip_onset(PULSATING[name], frequency)
+    x0 = [0, 0, float(pulsation.swing(p, amplitude, frequency, 0.0)[0]), 0, 0, 0]
+    flow = Flow.sine(p.omega_0, amplitude, frequency)
+    run = simulate(p, x0, 1 / frequency, flow, sample_interval=1 / (256 * frequency))
+    ratio = 2j * np.mean((run.omega_c * np.exp(-2j * np.pi * frequency * run.time))[:-1]) / amplitude
+    assert pulsation.first_harmonic(p, amplitude, frequency) == pytest.approx(ratio, rel=1e-5)
+    if name == "slips at both":
+        assert ratio == pytest.approx(response.transfer(p, Case.RR, frequency), rel=1e-7)
+    else:  # the stronger the pulsation, the more closely it is followed
+        assert abs(ratio / pulsation.first_harmonic(p, amplitude / 2, frequency)) > 1.02
+
+
+@pytest.mark.parametrize("p", PULSATING.values(), ids=PULSATING)
+def test_limits_of_the_onset(p: Parameters) -> None:
+    k = rolling_rate(p)
+    assert pulsation.slip_onset(p, 1e5 * k) == pytest.approx(pulsation.fast_onset(p), rel=1e-6)
+    slow = [abs(pulsation.slip_onset(p, f * k) / pulsation.slow_onset(p) - 1) for f in (1e-4, 1e-5)]
+    assert slow[1] < 0.5 * slow[0] or slow[1] < 1e-8
+    assert slow[1] < 1e-3
+
+
+@pytest.mark.parametrize("name", ["slips at both", "wake", "quadratic"])
+def test_finer_predictions_are_the_same(name: str) -> None:
+    """Twice as many harmonics, and a motion that is integrated and repeats itself more exactly, change little."""
+    p, frequency = PULSATING[name], 1.0
+    amplitude = 1.5 * pulsation.slip_onset(p, frequency)
+    exact = 1 + 1j * pulsation.lag_harmonics(p, amplitude, frequency, 2 * pulsation.FINE)[0] / amplitude
+    assert pulsation.first_harmonic(p, amplitude, frequency) == pytest.approx(exact, rel=1e-6)
+    exact = pulsation.mean_error(p, amplitude, frequency, settled=1e-9, rtol=1e-10)
+    assert pulsation.mean_error(p, amplitude, frequency) == pytest.approx(exact, rel=2e-5)
+
+
+def test_mean_error_of_fast_pulsations() -> None:
+    """None as long as the ball rolls; beyond, as Moreau's time stepping has it, which knows no cases."""
+    p, frequency = PULSATING["slips at both"], 1.5
+    onset = pulsation.slip_onset(p, frequency)
+    assert pulsation.mean_error(p, 0.99 * onset, frequency) == 0.0
+    expected = pulsation.mean_error(p, 1.5 * onset, frequency)
+    x0, flow = [0, 0, p.omega_0 + expected, 0, 0, 0], Flow.sine(p.omega_0, 1.5 * onset, frequency)
+    run = simulate(p, x0, 20 / frequency, flow, method="time-stepping", timestep=1e-3, sample_interval=1 / frequency)
+    assert expected < -0.1
+    assert (run.theta[-1] - run.theta[-2]) * frequency - p.omega_0 == pytest.approx(expected, rel=0.01)
+
+
+def test_a_ball_may_slip_all_the_time() -> None:
+    """In SS throughout, with no change of case, the mean is that of the characteristic as long as it is straight."""
+    p = PULSATING["slips at both"].replace(omega_0=25.0)
+    assert pulsation.mean_error(p, 1e-3, 1.0) == pytest.approx(solution(p, Case.SS).x[2] - 25.0, rel=1e-5)
+
+
+def test_mean_error_of_slow_pulsations() -> None:
+    """They tend to the mean of the characteristic along the wave, of which SS has the part beyond omega_01."""
+    p = PULSATING["slips at both"]
+    flows = p.omega_0 + 3.0 * np.sin(np.pi * (np.arange(500) + 0.5) / 500)  # what is below the mean reads the flow
+    beyond = flows[flows > thresholds(p).omega_01].tolist()
+    limit = sum(solution(p.replace(omega_0=w), Case.SS).state.omega_c - w for w in beyond) / 1000
+    near, far = (abs(pulsation.mean_error(p, 3.0, f * rolling_rate(p)) - limit) for f in (1e-2, 4e-2))
+    assert near < 0.3 * far
+    assert near < 1e-2 * abs(limit)
+
+
+def test_both_witnesses_of_the_azimuth() -> None:
+    """The mean of omega_c, sampled densely, is what the azimuth says."""
+    p, amplitude, frequency = PULSATING["slips at both"], 8.0, 0.5
+    x0 = [0, 0, float(pulsation.swing(p, amplitude, frequency, 0.0)[0]), 0, 0, 0]
+    run = simulate(p, x0, 40.0, Flow.sine(p.omega_0, amplitude, frequency), sample_interval=2e-3)
+    last = run.time >= 38.0
+    mean = np.trapezoid(run.omega_c[last], run.time[last]) / 2.0
+    assert mean - p.omega_0 == pytest.approx(pulsation.mean_error(p, amplitude, frequency), rel=1e-4)

@@ -1,7 +1,5 @@
 """The one-parameter family of forces in RR against brute force over its parameter, and against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -33,8 +31,8 @@ def test_every_member_gives_the_same_motion() -> None:
 
 
 @pytest.mark.parametrize(("mu", "eta"), FRICTION)
-def test_least_utilisation_is_the_least(mu: float, eta: float) -> None:
-    """No B_y of a dense scan does better, and the member itself attains what is claimed."""
+def test_least_utilisation_interval_and_margin_agree(mu: float, eta: float) -> None:
+    """No B_y of a dense scan does better, the member itself attains what is claimed, and the ends of the interval 1."""
     p = P.replace(mu=mu, eta=eta)
     best = rolling_forces.least_utilisation(OMEGA_C, p, OMEGA_0)
     scan = p.m * p.g * (1 - np.geomspace(1e-4, 1e4, 4000))
@@ -45,19 +43,12 @@ def test_least_utilisation_is_the_least(mu: float, eta: float) -> None:
     attained = utilisation(OMEGA_C, p, OMEGA_0, best.B_y)[finite]
     # The root of the crossing is known to round-off of q, which the steepest utilisation amplifies.
     np.testing.assert_allclose(attained, best.utilisation[finite], rtol=1e-10)
-
-
-@pytest.mark.parametrize(("mu", "eta"), FRICTION)
-def test_interval_margin_and_utilisation_agree(mu: float, eta: float) -> None:
-    p = P.replace(mu=mu, eta=eta)
     least, greatest = rolling_forces.admissible_interval(OMEGA_C, p, OMEGA_0)
-    best = rolling_forces.least_utilisation(OMEGA_C, p, OMEGA_0)
     holds = np.isfinite(greatest)
     assert holds.any()
     assert holds.all() == (min(mu, eta) > 1), "only between two contacts rougher than 1 is there always a force"
     np.testing.assert_array_equal(rolling_forces.margin(OMEGA_C, p, OMEGA_0) >= 0, holds)
-    attained = np.isfinite(best.B_y)
-    np.testing.assert_array_equal((best.utilisation <= 1)[attained], holds[attained])
+    np.testing.assert_array_equal((best.utilisation <= 1)[finite], holds[finite])
     for ends in (least, greatest):
         end = holds & np.isfinite(ends)
         np.testing.assert_allclose(utilisation(OMEGA_C, p, OMEGA_0, ends)[end], 1, rtol=1e-9)
@@ -106,11 +97,19 @@ def test_margin_is_continuous_through_its_zero() -> None:
     assert np.abs(np.diff(margin)).max() < 1e-3 * np.ptp(margin)
 
 
-def test_a_ball_at_rest_in_a_driving_flow_cannot_start_in_rolling() -> None:
-    """B_x = 0 at omega_c = 0: spin-up begins in RS (eta <= 1)."""
+def test_at_rest_and_without_friction() -> None:
+    """B_x = 0 at omega_c = 0: in a driving flow spin-up begins in RS (eta <= 1)."""
     assert rolling_forces.margin(0.0, P, 1.0) < 0
     assert rolling_forces.margin(0.0, P, 0.0) >= 0
     assert rolling_forces.least_utilisation(0.0, P, 0.0).utilisation == 0
+    for mu, eta, holds in (
+        (0.0, 0.6, True),  # B_y alone keeps the spin axis turning: eta (1 + j - j) >= j
+        (0.0, 0.3, False),
+        (0.2, 0.0, True),  # A_x alone does, up to omega_0^2 = mu g/(j R)
+        (0.0, 0.0, False),
+    ):
+        p = P.replace(mu=mu, eta=eta)
+        assert (rolling_forces.least_utilisation(8.0, p, 8.0).utilisation <= 1) == holds
 
 
 def test_public_forces_are_the_member_of_least_utilisation() -> None:
@@ -121,24 +120,7 @@ def test_public_forces_are_the_member_of_least_utilisation() -> None:
     need_A = np.hypot(F_A[:, 0], F_A[:, 2]) / (P.mu * F_A[:, 1])
     need_B = np.hypot(F_B[:, 1], F_B[:, 2]) / (P.eta * F_B[:, 0])
     np.testing.assert_allclose(np.maximum(need_A, need_B), best.utilisation, rtol=1e-10)
-
-
-def test_forces_that_do_not_exist_are_refused() -> None:
     with pytest.raises(
         InputError, match=r"omega_c = 20 rad s-1 cannot be rolled at both points: it takes .* the limit is 1"
     ):
         contact_forces(Case.RR, [[0, 0, 5.0, 0, 0, 0], [0, 0, 20.0, 0, 0, 0]], P, [5.0, 20.0])
-
-
-@pytest.mark.parametrize(
-    ("friction", "holds"),
-    [
-        ({"mu": 0.0, "eta": 0.6}, True),  # B_y alone keeps the spin axis turning: eta (1 + j - j) >= j
-        ({"mu": 0.0, "eta": 0.3}, False),
-        ({"mu": 0.2, "eta": 0.0}, True),  # A_x alone does, up to omega_0^2 = mu g/(j R)
-        ({"mu": 0.0, "eta": 0.0}, False),
-    ],
-)
-def test_one_frictionless_contact(friction: dict[str, float], holds: bool) -> None:
-    p = P.replace(**friction)
-    assert (rolling_forces.least_utilisation(8.0, p, 8.0).utilisation <= 1) == holds

@@ -1,7 +1,5 @@
 """Both simulators through their common door: laws that hold at every sample, input that is refused, interruption."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import math
@@ -15,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from analytic import Settings, contact_forces, simulate
-from model import Case, Contact, Flow, InputError, Parameters
+from model import Case, Contact, InputError, Parameters
 
 P = Parameters.named("reference")
 METHODS = ("event", "time-stepping")
@@ -64,25 +62,22 @@ def assert_lawful(run, tolerance):
     assert run.header.settings["energy_residual"] <= tolerance * (run.header.settings["energy_scale"] + p.m * p.g * p.R)
 
 
-@pytest.mark.parametrize("seed", range(200))
-def test_random_states_end_lawfully(seed):
-    """Part of the robustness run (below, slow): no exception, no stall, no law violated."""
-    p, x = random_run(seed)
-    run = simulate(p, x, 0.5, initial_impact=True, sample_interval=0.01)
-    assert run.complete
-    assert_lawful(run, 100 * RTOL)
-
-
-def fault(seed):
+def fault(seed, t_end=5.0):
     """What is wrong with a run of the robustness test; empty if nothing is."""
     p, x = random_run(seed)
     try:
-        run = simulate(p, x, 5.0, initial_impact=True, sample_interval=0.01)
+        run = simulate(p, x, t_end, initial_impact=True, sample_interval=0.01)
         assert run.complete, run.header.failure
         assert_lawful(run, 100 * RTOL)
     except Exception as error:  # whatever it is, the other seeds are to run
         return f"seed {seed}: {type(error).__name__}: {error}"
     return ""
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_random_states_end_lawfully(seed):
+    """Part of the robustness run (below, slow): no exception, no stall, no law violated."""
+    assert not fault(seed, 0.5)
 
 
 @pytest.mark.slow
@@ -143,7 +138,8 @@ def test_sliding_at_both_points_under_more_friction_than_weight():
 @pytest.mark.parametrize("method", METHODS)
 def test_trajectory_describes_itself(method):
     x0 = [0.02, 0.0, 8.0, 1.0, 2.0, 3.0, 0.01, -0.2]
-    run = simulate(P, x0, 0.3, method=method, restitution=0.3, sample_interval=0.04, theta_0=2.0)
+    chosen = {"method": method, "timestep": 1e-3, "rtol": 1e-7, "restitution": 0.3}
+    run = simulate(P, x0, 0.3, **chosen, sample_interval=0.04, theta_0=2.0)
     assert run.header.engine == method
     np.testing.assert_allclose(run.time, [0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.24, 0.28, 0.3], rtol=1e-14)
     np.testing.assert_allclose(run.x[0], x0, rtol=1e-13)
@@ -154,6 +150,9 @@ def test_trajectory_describes_itself(method):
     assert shown["energy_residual"] >= 0
     assert np.any(run.events.impulse_A != 0)
     assert Case(run.events.from_case[0]) is run.cases[0]
+    np.testing.assert_array_equal(
+        simulate(P, x0, 0.3, settings=Settings(**chosen), sample_interval=0.04, theta_0=2.0).x, run.x
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -181,28 +180,17 @@ def test_progress_within_a_long_stretch(method, monkeypatch):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_settings_object_and_keywords_agree(method):
-    x0 = [0, 0, 10, 1, 2, 3]
-    one = simulate(P, x0, 0.1, settings=Settings(method=method, timestep=1e-3, rtol=1e-7), sample_interval=0.01)
-    two = simulate(P, x0, 0.1, method=method, timestep=1e-3, rtol=1e-7, sample_interval=0.01)
-    np.testing.assert_array_equal(one.x, two.x)
-
-
-@pytest.mark.parametrize("method", METHODS)
 def test_a_speed_into_a_closed_contact(method):
+    """A collision at the very start changes the state before the first sample, and is an event."""
     x0 = [0, -0.1, 10, 0, 0, 0]
     with pytest.raises(InputError, match=r"v_y = -0.1 m s-1 .* floor .* initial_impact"):
         simulate(P, x0, 0.1, method=method)
     run = simulate(P, x0, 0.1, method=method, initial_impact=True, restitution=0.5, timestep=1e-4)
     assert run.v_y[1] > 0 or run.cases[1].A is not Contact.N
-
-
-def test_the_first_impact_is_an_event():
-    """A collision at the very start changes the state before the first sample, and is written down."""
-    run = simulate(P, [0, -0.1, 10, 0, 0, 0], 0.1, initial_impact=True, restitution=0.5)
-    assert run.events.time[0] == 0.0
-    assert run.events.impulse_A[0, 1] == pytest.approx(1.5 * P.m * 0.1, rel=1e-9)
-    assert_lawful(run, 100 * RTOL)
+    if method == "event":
+        assert run.events.time[0] == 0.0
+        assert run.events.impulse_A[0, 1] == pytest.approx(1.5 * P.m * 0.1, rel=1e-9)
+        assert_lawful(run, 100 * RTOL)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -246,11 +234,6 @@ def test_bad_input_is_refused(arguments, message):
     good = {"x0": [0, 0, 10.0, 0, 0, 0], "t_end": 0.1}
     with pytest.raises(InputError, match=message):
         simulate(P, **(good | arguments))
-
-
-def test_flow_with_a_sample_that_is_not_finite_is_refused():
-    with pytest.raises(InputError, match="omega_0 of flow sample 1 = nan"):
-        simulate(P, np.zeros(6), 1.0, Flow.sampled([0, 1], [1.0, math.nan]))
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -1,7 +1,5 @@
 """The slip bounds of sections 3.2 and 4: as printed, from Newton and Euler by algebra, and at random sets by gamma."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -14,16 +12,10 @@ from analytic.mechanics.rigid_body import Forces
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
 from model import Case, InputError, Parameters, State
+from tests.analytic import newton_euler as ne
 
 P = Parameters.named("reference")
-j, mu, eta, c, g, R, r, w, omega_0 = sp.symbols("j mu eta c g R r w omega_0", positive=True)
-
-
-class Symbols:
-    """Stands for `Parameters`: the bounds are plain arithmetic."""
-
-    m, drag = sp.Integer(1), "stokes"
-    j, mu, eta, c, g, R, r = j, mu, eta, c, g, R, r
+w = sp.Symbol("w", positive=True)
 
 
 def random_sets(count: int, top: float = 1.0) -> list[Parameters]:
@@ -38,10 +30,6 @@ def random_sets(count: int, top: float = 1.0) -> list[Parameters]:
     return sets
 
 
-def rolling(omega_c: float) -> State:
-    return State(omega_c=omega_c)
-
-
 # --- as printed ------------------------------------------------------------------------------------------------
 
 
@@ -50,33 +38,25 @@ def equal(left: Any, right: Any) -> bool:
 
 
 def test_zeros_as_printed() -> None:
-    """(61), (66) with eta, (67), (73), (74), (82), (83)."""
-    p: Any = Symbols()
-    assert equal(slip_bounds.nr_to_ns(p).zero, g / (eta * R))
+    """(61), (67), (74), (82), (83); those of a lag, (66) with eta and (73), are below."""
+    p: Any = ne.PARAMETERS
+    j, mu, eta, square = p.j, p.mu, p.eta, p.g / (p.eta * p.R)
+    assert equal(slip_bounds.nr_to_ns(p).zero, square)
     assert slip_bounds.rr_to_rs_stationary(p).zero == 0
-    assert equal(slip_bounds.rr_to_sr_stationary(p).zero, g / (j * R))
-    assert equal(slip_bounds.rr_to_ss(p).zero, g / (eta * R) * mu * eta * (eta + 1) / (mu * eta * (1 + j) + j - eta))
-    assert equal(
-        slip_bounds.rr_to_ss(p, -1).zero, g / (eta * R) * mu * eta * (eta - 1) / (mu * eta * (1 + j) + j + eta)
-    )
-
-
-@pytest.mark.parametrize("side", [1, -1])
-def test_zeros_of_lag_as_printed(side: int) -> None:
-    """(66) with eta, (73)."""
-    for p in random_sets(50):
-        w = p.omega_0
-        lag = p.eta / (p.j * p.c) * (1 + p.j) * (1 + 2 * p.j) * w**2
-        assert slip_bounds.rr_to_rs(p, w, side).zero == pytest.approx(w + side * lag, rel=1e-14, abs=1e-14 * lag)
-        lag = (1 + 2 * p.j) * p.mu / (p.j * p.R * p.c) * (p.g - p.j * p.R * w**2)
-        assert slip_bounds.rr_to_sr(p, w, side).zero == pytest.approx(w - side * lag, rel=1e-14, abs=1e-14 * abs(lag))
+    assert equal(slip_bounds.rr_to_sr_stationary(p).zero, p.g / (j * p.R))
+    assert equal(slip_bounds.rr_to_ss(p).zero, square * mu * eta * (eta + 1) / (mu * eta * (1 + j) + j - eta))
+    assert equal(slip_bounds.rr_to_ss(p, -1).zero, square * mu * eta * (eta - 1) / (mu * eta * (1 + j) + j + eta))
+    assert SlipBound(3.0, -2.0).zero == 1.5
+    assert SlipBound(3.0, 0.0).zero == np.inf
+    assert HeldBound(P.replace(c=0.0), 1.0, 1, 1.0).zero == np.inf
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_from_newton_and_euler(side: int) -> None:
     """gamma of every bound is the rate of the slip itself, with the forces of the case it leads to."""
-    p: Any = Symbols()
-    spin = g / (j * omega_0 * r) - omega_0 * R / r
+    p: Any = ne.PARAMETERS
+    omega_0 = ne.omega_0
+    spin = p.g / (p.j * omega_0 * p.r) - omega_0 * p.R / p.r
     table: list[tuple[SlipBound | HeldBound, Case, Any, Any, int, list[tuple[Any, Any]]]] = [
         (slip_bounds.rr_to_rs(p, w, side), Case.RS, w, 0, 4, [(side, 0)]),
         (slip_bounds.rr_to_rs_stationary(p), Case.RS, omega_0, 0, 4, [(side, 0)]),
@@ -89,7 +69,7 @@ def test_from_newton_and_euler(side: int) -> None:
         x = [0, 0, omega_c, slip_x, 0, 0, 0, 0]
         rate = dynamics.newton_euler(outer, x, dynamics.FORCES[outer](x, p, omega_0, *directions), p, omega_0)[row]
         if isinstance(bound, HeldBound):
-            gamma = bound.side * c * R * (omega_0 - w) / ((1 + j) * r) - bound.hold
+            gamma = bound.side * p.c * p.R * (omega_0 - w) / ((1 + p.j) * p.r) - bound.hold
         else:
             gamma = bound.offset + bound.slope * omega_0**2
         assert equal(gamma, side * rate), outer
@@ -99,10 +79,15 @@ def test_from_newton_and_euler(side: int) -> None:
 
 
 def test_bounds_at_random_sets() -> None:
-    """Zero and slope against (53), from the vector fields, at flows on both sides."""
+    """Zero and slope against (53), from the vector fields, at flows on both sides; (66) with eta, (73) as printed."""
     for p in random_sets(50):
         omega_c = 0.7 * p.omega_0
+        at_B = p.eta / (p.j * p.c) * (1 + p.j) * (1 + 2 * p.j) * p.omega_0**2
+        at_A = (1 + 2 * p.j) * p.mu / (p.j * p.R * p.c) * (p.g - p.j * p.R * p.omega_0**2)
         for side in (1, -1):
+            for bound_of, lag in ((slip_bounds.rr_to_rs, at_B), (slip_bounds.rr_to_sr, -at_A)):
+                zero = bound_of(p, p.omega_0, side).zero
+                assert zero == pytest.approx(p.omega_0 + side * lag, rel=1e-14, abs=1e-14 * abs(lag))
             table = [
                 (slip_bounds.rr_to_rs(p, omega_c, side), Case.RS, omega_c, [side]),
                 (slip_bounds.rr_to_rs_stationary(p), Case.RS, None, [side]),
@@ -112,23 +97,11 @@ def test_bounds_at_random_sets() -> None:
             ]
             for bound, outer, w, n in table:
                 flows = np.array([-1.3, 0.4, 2.1]) * abs(p.omega_0)
-                growth = [
-                    float(
-                        slip_stability.gamma(
-                            Case.RR, outer, rolling(flow if w is None else w), n, p.replace(omega_0=flow)
-                        )
-                    )
-                    for flow in flows.tolist()
-                ]
+                states = [(State(omega_c=flow if w is None else w), p.replace(omega_0=flow)) for flow in flows.tolist()]
+                growth = [float(slip_stability.gamma(Case.RR, outer, x, n, q)) for x, q in states]
                 other = bound.slope * flows**2 if isinstance(bound, SlipBound) else bound.slope * (flows - omega_c)
                 scale = np.abs(bound.gamma(flows)) + np.abs(other)
                 assert np.all(np.abs(bound.gamma(flows) - growth) <= 1e-13 * scale)
-
-
-def test_zero_of_a_bound() -> None:
-    assert SlipBound(3.0, -2.0).zero == 1.5
-    assert SlipBound(3.0, 0.0).zero == np.inf
-    assert HeldBound(P.replace(c=0.0), 1.0, 1, 1.0).zero == np.inf
 
 
 def forces_at_onset(p: Parameters, omega_0: np.ndarray, side: int) -> Forces:
@@ -185,9 +158,6 @@ def test_56_at_any_state() -> None:
             orbit, spin = abs(State.of(x).omega_c), abs(State.of(x).slip_x)
             scale = np.abs(slip_bounds.gamma_nr(beta, x, p)).max() + p.g / p.r + orbit * (spin + p.R / p.r * orbit)
             assert np.all(np.abs(slip_bounds.gamma_nr(beta, x, p) - growth) <= 1e-12 * scale / p.j)
-
-
-def test_56_takes_many_states() -> None:
     x, beta = states_of_nr(P, 5), np.linspace(0, 6, 7)
     values = slip_bounds.gamma_nr(beta[:, None], x, P)
     assert values.shape == (7, 5)
@@ -227,27 +197,23 @@ def test_69() -> None:
     for p in random_sets(200):
         for outer, row in ((Case.RS, 4), (Case.SR, 3)):
             for omega_c in (0.9 * p.omega_0, 0.2 * p.omega_0):
+                x = State(omega_c=omega_c)
                 delta = slip_bounds.filippov_share(outer, omega_c, p)
                 sides = []
                 for side in (-1.0, 1.0):
-                    x = np.array(rolling(omega_c))
-                    x[row] = side * 1e-14 * abs(omega_c)  # (68): a slip that vanishes in round-off
-                    sides.append(vector_field(outer, x, p))
+                    near = np.array(x)
+                    near[row] = side * 1e-14 * abs(omega_c)  # (68): a slip that vanishes in round-off
+                    sides.append(vector_field(outer, near, p))
                 mixed = delta * sides[0] + (1 - delta) * sides[1]
                 scale = (abs(delta) + abs(1 - delta)) * np.abs(sides).max()
-                expected = vector_field(Case.RR, rolling(omega_c), p)
+                expected = vector_field(Case.RR, x, p)
                 np.testing.assert_allclose(mixed, expected, atol=1e-12 * scale)
-                growth = [
-                    float(slip_stability.gamma(Case.RR, outer, rolling(omega_c), [side], p)) for side in (-1.0, 1.0)
-                ]
+                growth = [float(slip_stability.gamma(Case.RR, outer, x, [side], p)) for side in (-1.0, 1.0)]
                 both_die, both_grow = max(growth) < 0, min(growth) > 0
                 assert (0 < delta < 1) == (both_die or both_grow)
                 assert not both_grow or (outer is Case.SR and p.j * p.R * omega_c**2 > p.g)
                 inside.append(0 < delta < 1)
     assert min(sum(inside), len(inside) - sum(inside)) > 50
-
-
-def test_69_is_for_codimension_1() -> None:
     with pytest.raises(InputError, match="case SS: RR divides the states of RS and SR only"):
         slip_bounds.filippov_share(Case.SS, 10.0, P)
     assert slip_bounds.filippov_share(Case.RS, 10.0, P.replace(eta=0.0, omega_0=12.0)) == np.inf

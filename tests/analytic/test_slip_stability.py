@@ -1,9 +1,6 @@
 """Stability with respect to slipping: the paper's formulas, the other two routes, and where the paper's claim fails."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,10 +27,6 @@ def direction(alpha: npt.ArrayLike, beta: npt.ArrayLike) -> npt.NDArray[np.float
     n = np.stack(np.broadcast_arrays(np.tan(alpha), np.tan(beta), 1.0), axis=-1)
     sign = np.sign(np.pi / 2 - np.asarray(alpha, dtype=float))
     return sign[..., None] * n / np.linalg.norm(n, axis=-1, keepdims=True)
-
-
-def rolling(omega_c: float) -> State:
-    return State(omega_c=omega_c)
 
 
 def holds_by_force(case: Case, x: npt.ArrayLike, p: Parameters) -> bool:
@@ -66,13 +59,6 @@ def growth_of_energy(inner: Case, outer: Case, x: npt.ArrayLike, n: np.ndarray, 
     return np.sum(n @ M * rates, axis=-1) / np.sqrt(np.sum(n @ M * n, axis=-1))
 
 
-class Push(NamedTuple):
-    """A direction of slip, a unit vector over `slip.normals`, and how slip grows along it."""
-
-    n: np.ndarray
-    gamma: float
-
-
 def extreme(
     side: int,
     inner: Case,
@@ -81,8 +67,8 @@ def extreme(
     p: Parameters,
     gamma: Callable[..., np.ndarray] = slip.gamma,
     closed: bool = False,
-) -> Push:
-    """The direction of greatest (side 1) or least (side -1) gamma of all: the best of a grid, polished.
+) -> tuple[np.ndarray, float]:
+    """The direction of greatest (side 1) or least (side -1) gamma of all, and that: the best of a grid, polished.
 
     With `closed` only of those along which both contacts press: elsewhere the ball would lift instead of slipping.
     """
@@ -102,7 +88,7 @@ def extreme(
         polished = minimize(lambda n: -float(growth(n)) / scale, best, method="BFGS", options={"gtol": 1e-9}).x
         if growth(polished) > value and allowed(polished):
             best, value = polished, float(growth(polished))
-    return Push(best / np.linalg.norm(best), side * float(value))
+    return best / np.linalg.norm(best), side * float(value)
 
 
 def directions(dimension: int) -> np.ndarray:
@@ -124,16 +110,15 @@ def test_limit_is_the_limit() -> None:
     """(53) as printed: f_Z at x* + eps n for shrinking eps tends to the value taken at once."""
     p = P.replace(omega_0=10.0)
     n = direction(0.4, -0.7)
-    rates, A_y, B_x = slip.slip_rates(Case.RR, Case.SS, rolling(9.0), n, p)
+    rates, A_y, B_x = slip.slip_rates(Case.RR, Case.SS, State(omega_c=9.0), n, p)
     errors = []
     for eps in (1e-2, 1e-4, 1e-6):
-        x_slip, y_slip, z_slip = eps * n
-        x = State(omega_c=9.0, slip_x=x_slip, slip_y=y_slip, slip_z=z_slip)
-        change = State.of(vector_field(Case.SS, x, p))
-        errors.append(np.abs([change.slip_x, change.slip_y, change.slip_z] - rates).max())
+        x = np.array([0, 0, 9.0, *(eps * n), 0, 0])
+        errors.append(np.abs(vector_field(Case.SS, x, p)[3:6] - rates).max())
     np.testing.assert_allclose(np.array(errors[:2]) / errors[1:], 100, rtol=1e-3)
-    assert A_y > 0
-    assert B_x > 0
+    assert min(A_y, B_x) > 0
+    with pytest.raises(InputError, match="slip_x = 1 rad s-1 must be 0 in case RR"):
+        slip.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P)
 
 
 INNER = {
@@ -161,14 +146,11 @@ def test_gamma_of_every_arrow(inner: Case, outer: Case) -> None:
 
 
 def test_slip_mass() -> None:
+    """In closed form, and as the least kinetic energy of a ball with given slip over what else moves, minimised."""
     j = P.j
     expected = j / (1 + 2 * j) * np.array([[1 + j, j, 0], [j, 1 + j, 0], [0, 0, 1 + 2 * j]])
     np.testing.assert_allclose(slip_mass(Case.RR, Case.SS, P), expected, atol=1e-16)
     np.testing.assert_allclose(slip_mass(Case.NR, Case.NS, P), j / (1 + j) * np.eye(2), atol=1e-16)
-
-
-def test_slip_mass_is_the_reduced_energy() -> None:
-    """Least kinetic energy, over what else moves, of a ball with given slip: by brute minimisation."""
     for inner, outer, free in (
         (Case.RR, Case.SR, ["omega_c"]),
         (Case.RS, Case.SS, ["omega_c", "slip_y"]),
@@ -194,12 +176,12 @@ def test_energy_and_forces_agree_on_omega_01(mu: float, eta: float) -> None:
     for factor, holds in ((0.05, True), (0.5, True), (1 - 1e-6, True), (1 + 1e-6, False)):
         omega = factor * omega_01
         q = p.replace(omega_0=omega)
-        greatest = extreme(1, Case.RR, Case.SS, rolling(omega), q, growth_of_energy, closed=True)
-        assert (greatest.gamma < 0) == holds
-        assert holds_by_force(Case.RR, rolling(omega), q) == holds
+        n, greatest = extreme(1, Case.RR, Case.SS, State(omega_c=omega), q, growth_of_energy, closed=True)
+        assert (greatest < 0) == holds
+        assert holds_by_force(Case.RR, State(omega_c=omega), q) == holds
         assert (slip.stability(Case.RR, q) is slip.SlipStability.STABLE) == holds
         if factor > 0.9:  # the direction in which it ends
-            np.testing.assert_allclose(np.abs(greatest.n / np.linalg.norm(greatest.n)), [0, 0, 1], atol=1e-3)
+            np.testing.assert_allclose(np.abs(n), [0, 0, 1], atol=1e-3)
 
 
 @pytest.mark.parametrize("eta", [0.45, 0.8])
@@ -209,11 +191,11 @@ def test_gamma_and_forces_agree_on_omega_03(eta: float) -> None:
     for factor, holds in ((0.5, True), (1 - 1e-9, True), (1 + 1e-9, False)):
         omega = factor * thresholds(p).omega_03
         q = p.replace(omega_0=omega)
-        assert (extreme(1, Case.RR, Case.SR, rolling(omega), q).gamma < 0) == holds
-        assert holds_by_force(Case.RR, rolling(omega), q) == holds
+        assert (extreme(1, Case.RR, Case.SR, State(omega_c=omega), q)[1] < 0) == holds
+        assert holds_by_force(Case.RR, State(omega_c=omega), q) == holds
         assert (slip.stability(Case.RR, q) is slip.SlipStability.STABLE) == holds
         if omega < thresholds(p).omega_02:
-            assert extreme(1, Case.RR, Case.SS, rolling(omega), q, growth_of_energy, closed=True).gamma < 0
+            assert extreme(1, Case.RR, Case.SS, State(omega_c=omega), q, growth_of_energy, closed=True)[1] < 0
 
 
 @pytest.mark.parametrize("case", [Case.SR, Case.NR])
@@ -225,7 +207,7 @@ def test_three_routes_agree_on_omega_02(case: Case) -> None:
         assert (slip.stability(case, p) is slip.SlipStability.STABLE) == holds
         if case is Case.NR:
             for gamma in (slip.gamma, growth_of_energy):
-                assert (extreme(1, case, Case.NS, x, p, gamma).gamma < 0) == holds
+                assert (extreme(1, case, Case.NS, x, p, gamma)[1] < 0) == holds
 
 
 # --- where the paper's Euclidean claim fails -------------------------------------------------------------------
@@ -239,13 +221,13 @@ def test_counter_example_to_the_claim_after_80() -> None:
     """
     omega = 0.5 * thresholds(P).omega_01
     p = P.replace(omega_0=omega)
-    at_zero = float(slip.gamma(Case.RR, Case.SS, rolling(omega), direction(0.0, 0.0), p))
-    greatest = extreme(1, Case.RR, Case.SS, rolling(omega), p)
-    assert at_zero < 0 < greatest.gamma
-    assert extreme(1, Case.RR, Case.SS, rolling(omega), p, growth_of_energy, closed=True).gamma < 0
+    at_zero = float(slip.gamma(Case.RR, Case.SS, State(omega_c=omega), direction(0.0, 0.0), p))
+    n, greatest = extreme(1, Case.RR, Case.SS, State(omega_c=omega), p)
+    assert at_zero < 0 < greatest
+    assert extreme(1, Case.RR, Case.SS, State(omega_c=omega), p, growth_of_energy, closed=True)[1] < 0
     assert rolling_forces.margin(omega, p, omega) > 0
     # The direction of growth keeps both contacts closed: it isn't excluded by (12).
-    _, A_y, B_x = slip.slip_rates(Case.RR, Case.SS, rolling(omega), greatest.n, p)
+    _, A_y, B_x = slip.slip_rates(Case.RR, Case.SS, State(omega_c=omega), n, p)
     assert A_y > 0
     assert B_x > 0
 
@@ -256,7 +238,7 @@ def test_range_of_the_counter_example() -> None:
 
     def greatest(factor: float) -> float:
         omega = factor * omega_01
-        return extreme(1, Case.RR, Case.SS, rolling(omega), P.replace(omega_0=omega)).gamma
+        return extreme(1, Case.RR, Case.SS, State(omega_c=omega), P.replace(omega_0=omega))[1]
 
     assert abs(brentq(greatest, 0.4, 0.8, xtol=1e-4) - 0.61) < 0.005
 
@@ -265,8 +247,8 @@ def test_a_perturbed_ball_returns_all_the_same() -> None:
     """The slip pushed along the growing direction turns and dies out: the vector field of SS leads back to RR."""
     omega = 0.5 * thresholds(P).omega_01
     p = P.replace(omega_0=omega)
-    greatest = extreme(1, Case.RR, Case.SS, rolling(omega), p)
-    slip_x, slip_y, slip_z = 1e-3 * greatest.n
+    n, _ = extreme(1, Case.RR, Case.SS, State(omega_c=omega), p)
+    slip_x, slip_y, slip_z = 1e-3 * n
     start = State(omega_c=omega, slip_x=slip_x, slip_y=slip_y, slip_z=slip_z)
 
     def slips(x: State) -> np.ndarray:
@@ -275,7 +257,7 @@ def test_a_perturbed_ball_returns_all_the_same() -> None:
     def field(t: float, x: np.ndarray) -> State:
         return dynamics.rates(Case.SS, State.of(x), p, omega)
 
-    assert slips(field(0.0, start)) @ greatest.n > 0, "it grows at first"
+    assert slips(field(0.0, start)) @ n > 0, "it grows at first"
 
     def gone(t: float, x: np.ndarray) -> float:
         return float(np.linalg.norm(slips(State.of(x))) - 1e-4)
@@ -298,10 +280,13 @@ def test_arrows_of_figure_6() -> None:
 
 
 def test_lift_conditions() -> None:
-    """RR and SR lift when j R omega_c^2 + j r omega_c slip_x > g, SS when eta R omega_c^2 cos beta > g, RS never."""
+    """RR and SR lift when j R omega_c^2 + j r omega_c slip_x > g, SS when eta R omega_c^2 cos beta > g, RS never.
+
+    There A_y of SR and SS vanishes; out of RR it is omega_03.
+    """
     edge = np.sqrt(P.g / (P.j * P.R))
     for factor, lifts in ((1 - 1e-9, False), (1 + 1e-9, True)):
-        assert (slip.lift_acceleration(Case.RR, Case.NR, rolling(factor * edge), P) > 0) == lifts
+        assert (slip.lift_acceleration(Case.RR, Case.NR, State(omega_c=factor * edge), P) > 0) == lifts
         w_x = factor * (P.g / (P.j * P.r * 10.0) - 10.0 * P.R / P.r)
         assert (slip.lift_acceleration(Case.SR, Case.NR, [0, 0, 10.0, w_x, 0, 0], P) > 0) == lifts
         omega = factor * np.sqrt(P.g / (P.eta * P.R * np.cos(0.3)))
@@ -309,11 +294,20 @@ def test_lift_conditions() -> None:
         assert (slip.lift_acceleration(Case.SS, Case.NS, x, P) > 0) == lifts
     for omega in (1.0, 100.0):
         assert slip.lift_acceleration(Case.RS, Case.NS, [0, 0, omega, 0, 1.0, 0], P) == pytest.approx(-P.g)
+    for inner, outer, state in (
+        (Case.SR, Case.NR, State(omega_c=30.0, slip_x=-90.0)),
+        (Case.SS, Case.NS, State(omega_c=30.0, slip_x=20.0, slip_y=5.0, slip_z=50.0)),
+    ):
+        onset = slip.lift_onset(inner, outer, state, P)
+        (_, A_y, _), _ = contact_forces(inner, state._replace(omega_c=onset), P.replace(omega_0=onset))
+        assert abs(A_y) < 1e-12 * P.m * P.g
+    assert slip.lift_onset(Case.RR, Case.NR, State(omega_c=15.0), P) == pytest.approx(thresholds(P).omega_03, 1e-14)
+    assert np.isnan(slip.lift_onset(Case.RS, Case.NS, State(omega_c=15.0, slip_y=40.0), P))
 
 
 @pytest.mark.parametrize("eta", [0.2, 0.6])
 def test_definition_3(eta: float) -> None:
-    """Neutral on the thresholds (67), (74), (82), (61) and nowhere near them; and where there is no friction."""
+    """Neutral on the thresholds (67), (74), (82), (61), found from wherever near, and where there is no friction."""
     p = P.replace(eta=eta)
     t, SlipStability = thresholds(p), slip.SlipStability
     edge = t.omega_01 if eta < p.j else t.omega_03
@@ -323,8 +317,15 @@ def test_definition_3(eta: float) -> None:
         (Case.SR, t.omega_02, SlipStability.UNSTABLE, SlipStability.STABLE),
     ):
         for factor, expected in ((1 - 1e-12, below), (1.0, SlipStability.NEUTRAL), (1 + 1e-12, above)):
-            assert slip.stability(case, p.replace(omega_0=factor * value)) is expected
+            q = p.replace(omega_0=factor * value)
+            assert slip.stability(case, q) is expected
+            (s,) = (s for s in stationary_solutions(q) if s.case is case)
+            assert (s.slip_stability, s.slip_stable) == (expected, expected is not SlipStability.UNSTABLE)
+        for factor in (0.95, 1.05):
+            assert slip.neutral_flow(case, p.replace(omega_0=factor * value)) == pytest.approx(value, 1e-14)
+        assert np.isnan(slip.neutral_flow(case, p.replace(omega_0=0.5 * value)))
     assert slip.stability(Case.RR, p.replace(omega_0=0.0)) is SlipStability.NEUTRAL
+    assert stationary_solutions(p.replace(omega_0=0.0))[0].slip_stability is SlipStability.NEUTRAL
     assert slip.stability(Case.RR, p.replace(omega_0=5.0, eta=0.0)) is SlipStability.NEUTRAL
     assert slip.stability(Case.RR, p.replace(omega_0=5.0, eta=0.6, mu=0.0)) is SlipStability.NEUTRAL
     assert slip.stability(Case.RS, p.replace(omega_0=0.0)) is SlipStability.STABLE
@@ -350,37 +351,5 @@ def test_both_consistent_between_73_and_the_cone() -> None:
     lag = T * (1 + 2 * p.j) * p.g / (p.j * p.c * p.R)
     for factor, slips, sticks in ((0.99, False, True), (1.01, True, True), (1.01 / np.sqrt(1 - p.mu**2), True, False)):
         q = p.replace(omega_0=omega_c + factor * lag)
-        assert (extreme(1, Case.RR, Case.SR, rolling(omega_c), q).gamma > 0) == slips
+        assert (extreme(1, Case.RR, Case.SR, State(omega_c=omega_c), q)[1] > 0) == slips
         assert (rolling_forces.margin(omega_c, q) >= 0) == sticks
-
-
-def test_a_state_of_another_case_is_refused() -> None:
-    with pytest.raises(InputError, match="slip_x = 1 rad s-1 must be 0 in case RR"):
-        slip.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P)
-
-
-@pytest.mark.parametrize(
-    ("case", "eta", "name"),
-    [(Case.RR, 0.2, "omega_01"), (Case.RR, 0.6, "omega_03"), (Case.NR, 0.2, "omega_02"), (Case.SR, 0.6, "omega_02")],
-)
-def test_neutral_between_stable_and_unstable(case: Case, eta: float, name: str) -> None:
-    """Definition 3 at the thresholds of (82), (74) and (61), from wherever it is looked for."""
-    threshold = getattr(thresholds(P.replace(eta=eta)), name)
-    for factor in (0.95, 1.05):
-        assert slip.neutral_flow(case, P.replace(eta=eta, omega_0=factor * threshold)) == pytest.approx(
-            threshold, 1e-14
-        )
-    assert np.isnan(slip.neutral_flow(case, P.replace(eta=eta, omega_0=0.5 * threshold)))
-
-
-def test_lift_begins_where_the_normal_force_of_the_floor_ends() -> None:
-    """A_y of SR and SS vanishes there; out of RR it is omega_03; out of RS the ball never lifts."""
-    for inner, outer, x in (
-        (Case.SR, Case.NR, State(omega_c=30.0, slip_x=-90.0)),
-        (Case.SS, Case.NS, State(omega_c=30.0, slip_x=20.0, slip_y=5.0, slip_z=50.0)),
-    ):
-        onset = slip.lift_onset(inner, outer, x, P)
-        (_, A_y, _), _ = contact_forces(inner, x._replace(omega_c=onset), P.replace(omega_0=onset))
-        assert abs(A_y) < 1e-12 * P.m * P.g
-    assert slip.lift_onset(Case.RR, Case.NR, rolling(15.0), P) == pytest.approx(thresholds(P).omega_03, 1e-14)
-    assert np.isnan(slip.lift_onset(Case.RS, Case.NS, State(omega_c=15.0, slip_y=40.0), P))

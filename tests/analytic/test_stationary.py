@@ -1,17 +1,17 @@
 """Stationary solutions: zeros of the vector fields, the formulas of Propositions 1-6, eigenvalues by differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
+import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analytic import (
-    SlipStability,
     Stability,
     StationarySolution,
     contact_forces,
+    leaning_modes,
+    simulate,
     slowest_time_constant,
     solution,
     stable_solutions,
@@ -19,53 +19,30 @@ from analytic import (
     thresholds,
     vector_field,
 )
+from analytic.mechanics import dynamics
 from analytic.mechanics.jacobian import jacobian
 from analytic.stationary import branch_stability as stability
 from analytic.stationary.slipping_branch import branch, fold, points_at
 from model import Case, InputError, Parameters, State
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, slip_speeds
+from tests.analytic import newton_euler as ne
 from tests.directions import slip_directions
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps
-FLOWS = [1.0, 8.0, 13.0, 14.0, 22.0, 28.0, 33.0, 41.0, 60.0]
 
 
 def of_case(p: Parameters, case: Case) -> list[StationarySolution]:
     return [s for s in stationary_solutions(p) if s.case is case]
 
 
-@pytest.mark.parametrize("eta", [0.02, 0.2, 0.39, 0.6])
-@pytest.mark.parametrize("omega_0", FLOWS)
-def test_solutions_are_zeros_of_the_fields(omega_0: float, eta: float) -> None:
-    """Round-off of the largest acceleration is all that may be left; NS sinks, which is its only rate (48)."""
-    p = P.replace(omega_0=omega_0, eta=eta)
-    scale = (p.g + p.R * (omega_0**2 + p.c * omega_0)) / (p.j * p.r)
-    for s in stationary_solutions(p):
-        rate = State.of(vector_field(s.case, s.x, p))
-        if s.case is Case.NS:
-            assert s.moves
-            assert rate.y == s.state.v_y < 0
-            rate = rate._replace(y=0.0)
-        assert np.abs(rate).max() <= 100 * EPS * scale, s
-        if s.case is not Case.RR:
-            force = contact_forces(s.case, s.x, p)
-            np.testing.assert_array_equal([s.force_A, s.force_B], force)
-
-
-@pytest.mark.parametrize("omega_0", [1.0, 8.0, 13.0])
-def test_proposition_1(omega_0: float) -> None:
-    p = P.replace(omega_0=omega_0)
-    (s,) = of_case(p, Case.RR)
-    assert s.exists
-    assert s.stability is Stability.ASYMPTOTIC
-    assert s.state.omega_c == omega_0
-    assert s.force_A[2] == 0
-    np.testing.assert_allclose(s.eigenvalues, [-p.c / (1 + 2 * p.j)], rtol=1e-14)
-
-
-def test_proposition_2() -> None:
+def test_propositions_1_and_2() -> None:
+    for omega_0 in (1.0, 8.0, 13.0):
+        p = P.replace(omega_0=omega_0)
+        (s,) = of_case(p, Case.RR)
+        assert (s.exists, s.stability, s.state.omega_c, s.force_A[2]) == (True, Stability.ASYMPTOTIC, omega_0, 0)
+        np.testing.assert_allclose(s.eigenvalues, [-p.c / (1 + 2 * p.j)], rtol=1e-14)
     (s,) = of_case(P.replace(omega_0=0.0), Case.RS)
     assert (s.family, s.stability) == (("slip_y",), Stability.NEUTRAL)
     np.testing.assert_allclose(s.force_A, [0, P.m * P.g, 0], atol=1e-18)
@@ -174,18 +151,12 @@ def test_stable_solutions(eta: float, omega_0: float, expected: set[Case]) -> No
     assert len(attracting) == len(expected)
 
 
-def test_slowest_time_constant() -> None:
-    """The groups of time in theory.md: RR, NR's swing; inf where nothing decays."""
-    p = P.replace(omega_0=9.0)
-    assert slowest_time_constant(solution(p, Case.RR)) == pytest.approx((1 + 2 * p.j) / p.c)
-    fast = P.replace(omega_0=45.0)
-    assert slowest_time_constant(solution(fast, Case.NR)) == pytest.approx(2 * (1 + p.j) / p.c)
-    assert slowest_time_constant(solution(P.replace(c=0.0), Case.RR)) == np.inf
-
-
 @pytest.mark.parametrize(("omega_0", "c"), [(3.0, 0.1), (9.0, 1.0), (20.0, 4.0), (30.0, 1.0)])
-def test_time_constants_of_ns(omega_0: float, c: float) -> None:
-    """c, and the roots of x^2 - (1 + q (1+j)/j) x + q/j in units of c: the slower one is that of the spin slip_y."""
+def test_slowest_time_constant(omega_0: float, c: float) -> None:
+    """In NS c, and the roots of x^2 - (1 + q (1+j)/j) x + q/j in units of c: the slower one is that of the spin slip_y.
+
+    The groups of time in theory.md in RR and of NR's swing; inf where nothing decays.
+    """
     p = P.replace(omega_0=omega_0, c=c)
     q = p.eta * p.Omega_0**2 / (1 - p.eta * p.Omega_0**2)
     expected = np.sort([1.0, *np.roots([1.0, -(1 + q * (1 + p.j) / p.j), q / p.j])])
@@ -193,18 +164,10 @@ def test_time_constants_of_ns(omega_0: float, c: float) -> None:
     decaying = -s.eigenvalues.real[np.abs(s.eigenvalues.imag) < 0.5 * omega_0] / c
     np.testing.assert_allclose(decaying, expected, rtol=1e-10)
     assert slowest_time_constant(s) == pytest.approx(1 / (c * expected[0]), rel=1e-10)
-
-
-def test_neutral_with_respect_to_slipping() -> None:
-    """Definition 3: a ball at rest that rolls may as well spin; and the end of rolling, to round-off."""
-    (s,) = of_case(P.replace(omega_0=0.0), Case.RR)
-    assert s.slip_stability is SlipStability.NEUTRAL
-    (s,) = of_case(P.replace(omega_0=thresholds(P).omega_01), Case.RR)
-    assert s.slip_stability is SlipStability.NEUTRAL
-    assert s.slip_stable
-    (s,) = of_case(P.replace(omega_0=14.0), Case.RR)
-    assert s.slip_stability is SlipStability.UNSTABLE
-    assert not s.slip_stable
+    p = P.replace(omega_0=9.0, c=c)
+    assert slowest_time_constant(solution(p, Case.RR)) == pytest.approx((1 + 2 * p.j) / c)
+    assert slowest_time_constant(solution(p.replace(omega_0=45.0), Case.NR)) == pytest.approx(2 * (1 + p.j) / c)
+    assert slowest_time_constant(solution(p.replace(c=0.0), Case.RR)) == np.inf
 
 
 # --- eigenvalues -----------------------------------------------------------------------------------------------
@@ -212,36 +175,22 @@ def test_neutral_with_respect_to_slipping() -> None:
 
 @pytest.mark.parametrize("omega_0", [14.0, 33.0, 41.0])
 def test_jacobian_against_differences(omega_0: float) -> None:
-    """Central differences err by round-off/step + step^2: with the step 1e-5 of the slip about 1e-9 of the size."""
+    """Of stationary solutions, and in RN, where slip_z goes with v_h.
+
+    Central differences err by round-off/step + step^2: with the step 1e-5 of the slip about 1e-9 of the size.
+    """
     p = P.replace(omega_0=omega_0)
-    for s in stationary_solutions(p):
-        active = [VARIABLES.index(name) for name in TRAITS[s.case].active]
-        exact = jacobian(s.case, s.x, p)
-        _, _, _, *slips, _, _ = s.x
-        step = 1e-5 * max(min((abs(slip) for slip in slips if slip), default=1.0), 1e-2)
-        x = np.array(s.state._replace(y=0.1 if s.case in (Case.NR, Case.NS) else 0.0))
-        numeric = np.stack(
-            [
-                (vector_field(s.case, x + step * e, p) - vector_field(s.case, x - step * e, p))[active] / (2 * step)
-                for e in np.eye(8)[active]
-            ],
-            axis=-1,
-        )
-        assert np.abs(numeric - exact).max() <= 1e-7 * np.abs(exact).max(), s.case
-
-
-def test_jacobian_of_cases_without_stationary_solutions() -> None:
-    """RN, SN, NN by differences too; in RN slip_z goes with v_h."""
-    x = np.array([0, 0, 9.0, 0, 2.0, -0.3 / P.r, 0.01, 0.3])
-    exact = jacobian(Case.RN, x, P)
-    names = TRAITS[Case.RN].active
-    for column, name in enumerate(names):
-        e = np.eye(8)[VARIABLES.index(name)] * 1e-6
-        if name == "v_h":
-            e = e + np.eye(8)[5] * (-1e-6 / P.r)
-        difference = (vector_field(Case.RN, x + e, P) - vector_field(Case.RN, x - e, P)) / 2e-6
-        rows = [VARIABLES.index(n) for n in names]
-        np.testing.assert_allclose(exact[:, column], difference[rows], atol=1e-6 * np.abs(exact).max())
+    states = [
+        (s.case, s.state._replace(y=0.1 if s.case in (Case.NR, Case.NS) else 0.0)) for s in stationary_solutions(p)
+    ]
+    for case, x in (*states, (Case.RN, State(omega_c=9.0, slip_y=2.0, slip_z=-0.3 / P.r, h=0.01, v_h=0.3))):
+        active = [VARIABLES.index(name) for name in TRAITS[case].active]
+        exact, directions = jacobian(case, np.array(x), p), np.eye(8)[active]
+        step = 1e-5 * max(min((abs(slip) for slip in x[3:6] if slip), default=1.0), 1e-2)
+        if case is Case.RN:
+            directions[:, 5], step = -directions[:, 7] / p.r, 1e-6
+        numeric = [vector_field(case, x + step * e, p) - vector_field(case, x - step * e, p) for e in directions]
+        assert np.abs(np.array(numeric)[:, active].T / (2 * step) - exact).max() <= 1e-7 * np.abs(exact).max(), case
 
 
 def test_eigenvalues_of_the_branch_in_both_coordinates() -> None:
@@ -258,26 +207,6 @@ def test_eigenvalues_of_the_branch_in_both_coordinates() -> None:
             assert np.abs(values - value).min() <= tolerance
 
 
-@pytest.mark.parametrize(("mu", "eta", "c"), [(0.2, 0.2, 1.0), (0.2, 0.02, 1.0), (0.7, 0.35, 0.01), (1.5, 0.1, 5.0)])
-def test_ends_of_the_branch(mu: float, eta: float, c: float) -> None:
-    """The finite eigenvalues tend to closed forms linearly in the distance exp(-|s|) from the end.
-
-    In RR (omega_01) lambda^2 + c lambda/(1+2j) + 2 (g/R) mu (1+eta)/((1+mu eta)(1+2j)) = 0; in SR (omega_02)
-    (2 mu eta omega_02 - c)/(1+j), which is positive exactly if there is a fold (87), and +-i omega_02.
-    """
-    p = P.replace(mu=mu, eta=eta, c=c)
-    stiffness = 2 * p.g / p.R * mu * (1 + eta) / ((1 + mu * eta) * (1 + 2 * p.j))
-    omega_02 = np.sqrt(p.g / (eta * p.R))
-    at_rr = np.roots([1.0, c / (1 + 2 * p.j), stiffness])
-    at_sr = np.array([(2 * mu * eta * omega_02 - c) / (1 + p.j), 1j * omega_02, -1j * omega_02])
-    for expected, sign in ((at_rr, -1), (at_sr, 1)):
-        for distance in (18.0, 25.0):
-            values = stability.eigenvalues_at(sign * distance, p)
-            for value in expected:
-                assert np.abs(values - value).min() <= 1e4 * np.exp(-distance) * max(np.abs(expected).max(), 1)
-    assert (at_sr[0].real > 0) == (eta > c**2 * p.R / (4 * p.g * mu**2))
-
-
 @pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("eta", [0.05, 0.2, 0.39])
 def test_the_branch_is_stable_before_the_fold_and_has_one_unstable_direction_after(mu: float, eta: float) -> None:
@@ -291,6 +220,7 @@ def test_the_branch_is_stable_before_the_fold_and_has_one_unstable_direction_aft
 
 
 def test_hopf_points_exist_for_rough_floors_only() -> None:
+    """And with (12) released, Fig. 12: where a pair crosses the number of unstable directions changes by two."""
     assert stability.hopf_places(P) == []
     p = P.replace(mu=3.0, eta=0.35)
     places = stability.hopf_places(p)
@@ -301,10 +231,6 @@ def test_hopf_points_exist_for_rough_floors_only() -> None:
         assert np.abs(pair.real).max() <= 1e-9 * np.abs(pair).max()
     between = stability.eigenvalues_at(np.mean(places), p)
     assert np.sum(between.real > 0) == 2
-
-
-def test_hopf_point_of_figure_12() -> None:
-    """With (12) released: one pair crosses, so that the number of unstable directions changes by two there."""
     p = P.replace(eta=0.43)
     (place,) = stability.hopf_places(p)
     before, after = (np.sum(stability.eigenvalues_at(place + d, p).real > 0) for d in (-0.01, 0.01))
@@ -351,7 +277,7 @@ def test_just_beyond_the_end_of_rolling(excess: float) -> None:
 # --- mirror images and vanishing parameters --------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("omega_0", FLOWS)
+@pytest.mark.parametrize("omega_0", [1.0, 8.0, 13.0, 14.0, 22.0, 28.0, 33.0, 41.0, 60.0])
 def test_mirror_image(omega_0: float) -> None:
     """Backwards flow: the reflected solutions, which solve the equations, with the same eigenvalues."""
     p = P.replace(omega_0=-omega_0)
@@ -414,3 +340,55 @@ def test_vanishing_parameters(change: dict[str, float], expected: dict[str, obje
     if p.mu == p.eta == 0:
         for s in solutions:
             assert np.abs(vector_field(s.case, s.x, p)[1:]).max() <= 1e-11
+
+
+# --- SR at the border to NR: the modes of a ball that leans on the floor -------------------------------------
+
+
+ROUGH = Parameters.named("high-wall-friction")
+
+
+def test_modes_in_closed_form() -> None:
+    """Trace and determinant of the Jacobian of f_SR, by computer algebra from Newton and Euler."""
+    p, w, sign, omega_c, slip = ne.PARAMETERS, *sp.symbols("w s omega_c slip")
+    x = State(omega_c=omega_c, slip_x=slip)
+    rates = dynamics.newton_euler(Case.SR, x, dynamics.FORCES[Case.SR](x, p, w, (sign, 0)), p, w)
+    at = {omega_c: w, slip: p.g / (p.j * w * p.r) - w * p.R / p.r}
+    J = sp.Matrix([rates.omega_c, rates.slip_x]).jacobian([omega_c, slip]).subs(at)
+    trace = -(p.c + p.mu * sign * (p.g / (p.R * w) - (1 + p.j) * w)) / (1 + p.j)
+    assert sp.simplify(J.trace() - trace) == 0
+    assert sp.simplify(J.det() + p.mu * sign * p.c * w / (1 + p.j)) == 0
+
+
+@pytest.mark.parametrize("omega_0", [20.0, 25.0, 40.0, -20.0, -30.0])
+def test_modes(omega_0: float) -> None:
+    """Sum and product as the docstring has them; leaning grows below omega_03; the vectors lead onto the floor."""
+    p = ROUGH.replace(omega_0=omega_0)
+    values, vectors = leaning_modes(p)
+    x = solution(p, Case.SR, stable=omega_0**2 > p.g / (p.j * p.R)).state
+    drive = p.mu * np.sign(x.slip_x * omega_0) * abs(omega_0)
+    total = -(p.c + drive * (p.g / (p.R * omega_0**2) - (1 + p.j))) / (1 + p.j)
+    np.testing.assert_allclose(values.sum(), total, rtol=1e-12)
+    np.testing.assert_allclose(values.prod(), -drive * p.c / (1 + p.j), rtol=1e-12)
+    assert (values[0].real > 0) == (omega_0**2 < p.g / (p.j * p.R))
+    for along_omega_c, along_slip_x in 1e-6 * vectors.real:
+        near = x._replace(omega_c=x.omega_c + along_omega_c, slip_x=x.slip_x + along_slip_x)
+        assert contact_forces(Case.SR, near, p)[0][1] > 0
+
+
+@pytest.mark.parametrize("omega_0", [20.0, 30.0])
+def test_a_leaning_ball_moves_at_that_rate(omega_0: float) -> None:
+    """The event-driven simulation from a push of 1e-5 along the vector: the rate is off by the push at most."""
+    p = ROUGH.replace(omega_0=omega_0)
+    values, vectors = leaning_modes(p)
+    x = solution(p, Case.SR, stable=omega_0 > 22.5).state
+    size = 1e-5 * abs(x.slip_x)
+    by_omega_c, by_slip_x = size * vectors[0].real
+    start = x._replace(omega_c=x.omega_c + by_omega_c, slip_x=x.slip_x + by_slip_x)
+    run = simulate(p, start, 1.0 / abs(values[0]), rtol=1e-12)
+    assert set(run.cases) == {Case.SR}
+    lean = run.force_A[:, 1]
+    assert np.log(lean[-1] / lean[0]) / run.time[-1] == pytest.approx(values[0].real, rel=1e-3)
+    for change in ({"omega_0": 0.0}, {"mu": 0.0}):
+        with pytest.raises(InputError, match="SR has no stationary solution that leans"):
+            leaning_modes(ROUGH.replace(**change))

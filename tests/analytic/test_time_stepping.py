@@ -1,13 +1,15 @@
-"""Time stepping: exact where it should be, of second order between events, and in the end the event-driven result."""
-
-from __future__ import annotations
+"""Time stepping: exact where it should be, of second order between events, one run and many at once."""
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
-from analytic import Settings, simulate, stationary_solutions, thresholds
+from analytic import Settings, simulate, simulate_many, stationary_solutions, thresholds
+from analytic.simulation.compiling import compiled, forget_stale
 from analytic.simulation.stepping import TOLERANCE, step
 from analytic.simulation.time_stepping import prepared
 from model import Case, Flow, InputError, Parameters, SimulationError, State
@@ -23,26 +25,11 @@ def order(steps, errors):
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
-@pytest.mark.parametrize(
-    ("name", "omega_0", "case"),
-    [
-        ("reference", 12.0, Case.RR),
-        ("reference", 20.0, Case.SS),
-        ("reference", 25.0, Case.SS),
-        ("high-wall-friction", 25.0, Case.NR),
-    ],
-)
-def test_stationary_orbits_are_exact_at_large_steps(name, omega_0, case):
-    """Axes that turn with the ball make a stationary orbit a fixed point of the scheme, to what the solver leaves."""
-    p = Parameters.named(name).replace(omega_0=omega_0)
-    (solution,) = [s for s in stationary_solutions(p) if s.case is case and s.exists]
-    x0 = np.asarray(solution.x)[:6].copy()
-    x0[0] = 0.01 if case is Case.NR else 0.0
-    run = simulate(p, x0, 0.5, method="time-stepping", timestep=2e-3)
-    # 24 TOLERANCE an iteration and step; slow modes amplify by their number, stiff ones not.
-    np.testing.assert_allclose(run.x[:, :6], np.tile(x0, (len(run.time), 1)), atol=1e-9)
-    assert set(run.cases) == {case}
-    np.testing.assert_allclose(run.force_A[-1], solution.force_A, atol=1e-8 * p.m * p.g) if case is Case.SS else None
+def deviations(p, x0, t_end, steps, flow=None, **given):
+    """The event-driven run, and mean errors of time stepping against it with these steps, in natural sizes."""
+    exact = simulate(p, x0, t_end, flow, rtol=1e-11, **given)
+    runs = [simulate(p, x0, t_end, flow, method="time-stepping", timestep=s, **given) for s in steps]
+    return exact, [np.mean(np.abs(run.x[1:] - exact.x[1:]) / SCALE) for run in runs]
 
 
 def test_no_drift_at_the_wall():
@@ -50,16 +37,6 @@ def test_no_drift_at_the_wall():
     run = simulate(P.replace(omega_0=14.0), [0, 0, 10.0, 20, 30, 10], 1.0, method="time-stepping", timestep=5e-3)
     assert np.all(run.h == 0.0)
     assert np.all(run.y >= 0.0)
-
-
-def test_sliding_ball_on_the_floor():
-    """Rolls with v/(1+j) after the exact time, to within a step."""
-    p, v, h, dt = P.replace(c=0.0), 0.05, 0.03, 1e-4
-    x0 = [0, 0, v / (p.R - h), -v / p.r, v / p.r, 0, h, 0]
-    run = simulate(p, x0, 0.1, method="time-stepping", timestep=dt, sample_interval=1e-3)
-    speed = np.hypot((p.R - run.h) * run.omega_c, run.v_h)
-    np.testing.assert_allclose(speed[-1], v / (1 + p.j), rtol=1e-11)
-    assert run.events.time[0] == pytest.approx(v / (p.mu * p.g * (1 + 1 / p.j)), abs=1.01 * dt)
 
 
 def test_flight_is_of_second_order():
@@ -74,12 +51,9 @@ def test_flight_is_of_second_order():
 @pytest.mark.parametrize("x0", [[0, 0, 9, 30, 60, -40], [0, 0, 20, 100, 150, -200]])
 def test_sliding_is_of_second_order(x0):
     """Friction opposes the mean slip: against the event-driven result while both contacts slide."""
-    p, t = P.replace(omega_0=25.0), 0.1
-    exact = simulate(p, x0, t, rtol=1e-11, sample_interval=t)
+    steps = [1e-3, 5e-4, 2.5e-4]
+    exact, errors = deviations(P.replace(omega_0=25.0), x0, 0.1, steps, sample_interval=0.1)
     assert exact.cases == [Case.SS, Case.SS]
-    steps = np.array([1e-3, 5e-4, 2.5e-4])
-    runs = [simulate(p, x0, t, method="time-stepping", timestep=s, sample_interval=t) for s in steps]
-    errors = [np.max(np.abs(run.x[-1] - exact.x[-1]) / SCALE) for run in runs]
     assert order(steps, errors) == pytest.approx(2.0, abs=0.1)
 
 
@@ -130,35 +104,21 @@ ALL_NINE = [
 ]
 
 
-def test_the_sequences_below_visit_all_nine_cases():
-    assert {name for _, _, visited in ALL_NINE for name in visited} == {case.name for case in Case}
-
-
 @pytest.mark.parametrize(("omega_0", "x0", "visited"), ALL_NINE)
 def test_converges_to_the_event_driven_result(omega_0, x0, visited):
     """First order in the step, in the mean over the run, through every kind of transition and impact."""
-    p = P.replace(omega_0=omega_0, eta=0.6)
-    events = simulate(p, x0, 0.4, sample_interval=2e-3)
-    seen = {Case(code).name for code in (*events.events.from_case, *events.events.to_case)}
-    assert seen >= set(visited)
-    steps = np.array([4e-4, 2e-4, 1e-4, 5e-5])
-    errors = []
-    for s in steps:
-        run = simulate(p, x0, 0.4, method="time-stepping", timestep=s, sample_interval=2e-3)
-        errors.append(np.mean(np.abs(run.x - events.x) / SCALE))
+    assert {name for *_, names in ALL_NINE for name in names} == {case.name for case in Case}
+    steps = [4e-4, 2e-4, 1e-4, 5e-5]
+    exact, errors = deviations(P.replace(omega_0=omega_0, eta=0.6), x0, 0.4, steps, sample_interval=2e-3)
+    assert {Case(code).name for code in (*exact.events.from_case, *exact.events.to_case)} >= set(visited)
     # Single steps may be lucky or not with the moment of an impact within them.
     assert order(steps, errors) > 0.8
     assert errors[-1] < steps[-1] * SPEED / P.R * 0.1
 
 
 def test_converges_through_bounces_and_a_ramp():
-    p, flow = P.replace(c=2.0), Flow.ramp(5.0, 25.0, 0.2, 0.1)
-    x0, t_end = [0.01, 0.1, 8.0, 1.0, 2.0, 30.0, 0.01, 0.0], 0.4
-    events = simulate(p, x0, t_end, flow, restitution=0.5, sample_interval=4e-3)
-    steps, errors = np.array([4e-4, 2e-4, 1e-4]), []
-    for s in steps:
-        run = simulate(p, x0, t_end, flow, method="time-stepping", timestep=s, restitution=0.5, sample_interval=4e-3)
-        errors.append(np.mean(np.abs(run.x - events.x) / SCALE))
+    x0, flow, steps = [0.01, 0.1, 8.0, 1.0, 2.0, 30.0, 0.01, 0.0], Flow.ramp(5.0, 25.0, 0.2, 0.1), [4e-4, 2e-4, 1e-4]
+    _, errors = deviations(P.replace(c=2.0), x0, 0.4, steps, flow, restitution=0.5, sample_interval=4e-3)
     assert order(steps, errors) > 0.7
     assert errors[-1] < 1e-3
 
@@ -205,6 +165,13 @@ def test_no_convergence_keeps_the_samples():
     assert not kept.complete
     assert len(kept.time) > 1
     assert np.all(np.isfinite(kept.x))
+    # Among many at once it leaves the others alone.
+    x0, settings = State(y=1.0, h=P.R / 2), Settings(timestep=dt)
+    many = simulate_many([P, p], x0, 0.2, settings=settings, sample_interval=0.1)
+    assert many.failure[0] == ""
+    assert "a shorter step" in many.failure[1]
+    assert np.all(np.isfinite(many.x[0]))
+    assert np.all(np.isnan(many.x[1, 1:]))
 
 
 def test_where_no_step_is_given_it_fits_the_problem():
@@ -228,3 +195,119 @@ def test_one_step_of_free_rolling_by_hand():
     assert B_y - A_x == pytest.approx(p.j * u, rel=1e-9)
     assert A_z == pytest.approx(0, abs=1e-9)
     assert B_z == pytest.approx(0, abs=1e-9)
+
+
+# --- many runs at once are the same runs one by one; the step settles and chooses where it once did not ------
+
+
+STEPPING = Settings(method="time-stepping", timestep=1e-3)
+
+
+def groups(mu: float, eta: float, j: float, kappa: float, Omega_0: float) -> Parameters:
+    unit = math.sqrt(P.R / P.g)
+    return P.replace(mu=mu, eta=eta, j=j, c=kappa / unit, omega_0=Omega_0 / unit)
+
+
+def test_the_same_runs_as_one_by_one():
+    """To the bit: one step serves both."""
+    sets = [P.replace(omega_0=omega_0) for omega_0 in (12.0, 25.0, 35.0)]
+    x0s = np.array([[0.0, 0, 9, 1, 2, 3, 0, 0], [0.01, 0, 30, 1, 2, 3, 0.02, 0], [0.02, 0.1, 5, 0, 0, 0, 0, 0]])
+    flows = [Flow.steady(12.0), Flow.ramp(25.0, 15.0, 0.1, 0.1), Flow.staircase([35.0, 20.0], 0.15)]
+    many = simulate_many(sets, x0s, 0.3, flows, STEPPING, sample_interval=0.1, threads=2)
+    assert many.failure == ("", "", "")
+    for k, (p, x0, flow) in enumerate(zip(sets, x0s, flows, strict=True)):
+        # At the ends of the flow's pieces a step ends, too.
+        one = simulate(p, x0, 0.3, flow, STEPPING, sample_interval=0.1)
+        np.testing.assert_array_equal(many.time, one.time)
+        np.testing.assert_array_equal(many.x[k], one.x)
+        np.testing.assert_array_equal(many.case[k, 1:], one.case[1:])
+
+
+def test_landings_and_quiet():
+    """A ball that falls once has landed once, and a run ends when nothing has landed for the time asked for."""
+    p = P.replace(omega_0=0.0, c=0.0)
+    fall = math.sqrt(2 * 0.01 / p.g)
+    many = simulate_many(p, [0.01, 0, 0, 0, 0, 0, 0.02, 0], 1.0, settings=STEPPING, sample_interval=0.1, quiet=0.25)
+    assert many.landings.tolist() == [[0, 1, *[0] * 9]]
+    assert fall + 0.25 < many.end[0] <= fall + 0.25 + 0.1
+    np.testing.assert_array_equal(many.x[0, -1], many.x[0, 4])
+
+
+@pytest.mark.parametrize(
+    ("sets", "x0s", "message"),
+    [
+        ([P, P], np.zeros((3, 6)), "2 parameter sets, 3 starts"),
+        ([P], [[-0.01, 0, 0, 0, 0, 0]], "y = -0.01 m"),
+        ([P], [[0, 0, 0, 0, 0, 0, 0.06, 0]], "h = 0.06 m"),
+    ],
+)
+def test_bad_input(sets, x0s, message):
+    with pytest.raises(InputError, match=message):
+        simulate_many(sets, x0s, 0.1)
+
+
+JAMMED = [
+    groups(1.23, 0.17, 0.61, 0.12, 2.1),
+    groups(1.2277, 0.1721, 0.611, 0.1198, 2.099),
+    groups(1.7222, 0.0388, 0.482, 0.1099, 2.635),
+]
+
+
+@pytest.mark.parametrize("p", JAMMED)
+def test_settles_where_rolling_can_jam(p):
+    """mu > 1, above omega_01, at the default step: forces could hold RR for longer, but the ball comes to SS."""
+    (slipping,) = [s for s in stationary_solutions(p) if s.case is Case.SS and s.exists and s.stable]
+    x0s = np.zeros((4, 8))
+    x0s[:, 2] = p.omega_0 * np.array([-0.5, 0.3, 0.9, 1.5])
+    x0s[::2, 3:6] = p.omega_0
+    x0s[2:, 0] = 0.01
+    many = simulate_many(p, x0s, 80 / p.c, sample_interval=80 / p.c)
+    assert many.failure == ("",) * 4
+    assert set(many.case[:, -1]) == {Case.SS}
+    # 80/c of settling at a rate of c/(2 (1 + 2j)) leave exp(-17).
+    np.testing.assert_allclose(many.x[:, -1, 2], slipping.x[2], rtol=1e-6)
+
+
+def test_settles_on_random_sets():
+    """Friction up to 3, any drag and inertia: every step of 200 runs converges."""
+    rng = np.random.default_rng(5)
+    low, high = np.log([0.03, 0.03, 0.1, 0.01, 0.3]), np.log([3.0, 2.0, 2 / 3, 3.0, 6.0])
+    sets = [groups(*each) for each in np.exp(rng.uniform(low, high, (200, 5)))]
+    x0s = np.zeros((200, 8))
+    x0s[:, 0] = rng.uniform(0, P.R, 200) * rng.integers(0, 2, 200)
+    x0s[:, 2] = [p.omega_0 * rng.uniform(-2, 2) for p in sets]
+    x0s[:, 3:6] = [p.omega_0 * p.R / p.r * rng.uniform(-2, 2, 3) for p in sets]
+    many = simulate_many(sets, x0s, 0.5, sample_interval=0.5)
+    assert many.failure == ("",) * 200
+
+
+SCRIPT = """
+import sys, numpy as np
+from analytic import Settings, simulate_many
+from model import Parameters
+p = Parameters.named("reference")
+sets = [p.replace(omega_0=12.0), p.replace(omega_0=25.0, eta=0.6), p.replace(mu=1.5, omega_0=40.0)]
+x0 = [0.005, 0, 20, 10, 20, 30, 0.001, 0]
+np.save(sys.argv[1], simulate_many(sets, x0, 0.05, settings=Settings(timestep=2e-4), sample_interval=0.05).x)
+"""
+
+
+def test_compiled_and_not_are_the_same(tmp_path):
+    """Without numba the source itself runs; results may differ by rounding only."""
+    assert compiled(lambda x: x + 1)(1) == 2
+    pytest.importorskip("numba")
+    results = []
+    for switch in ("0", "1"):
+        file = tmp_path / f"{switch}.npy"
+        subprocess.run([sys.executable, "-c", SCRIPT, file], check=True, env=os.environ | {"NUMBA_DISABLE_JIT": switch})
+        results.append(np.load(file))
+    np.testing.assert_allclose(results[0], results[1], rtol=1e-9, atol=1e-12)
+
+
+def test_what_was_compiled_from_other_sources_is_deleted(tmp_path):
+    source, kept = tmp_path / "called.py", tmp_path / "stepping.step-1.py311.nbi"
+    for text, compiles_again in (("a", True), ("a", False), ("b", True)):
+        source.write_text(text)
+        kept.write_text("")
+        forget_stale(tmp_path, [str(source)])
+        assert kept.exists() is not compiles_again

@@ -1,7 +1,5 @@
 """Throughput of campaigns, and what they take beside simulating and storing."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import os

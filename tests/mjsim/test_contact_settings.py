@@ -26,6 +26,11 @@ P = Parameters.named("reference")
         ({"cone": "pyramidal"}, r"memory needs the elliptic cone, not cone = 'pyramidal'"),
         ({"order": 3}, r"order = 3 must be 1 or 2"),
         ({"servo": float("nan")}, r"servo = nan s must be finite"),
+        ({"coordinates": "free"}, "needs memory = False and order = 1"),
+        ({"wall": "prism"}, "needs coordinates = 'free'"),
+        ({"coordinates": "free", "memory": False, "order": 1, "wall": "prism"}, "needs servo = 0"),
+        ({"coordinates": "cartesian"}, "must be one of polar, free"),
+        ({"facets": 2}, "facets = 2"),
     ],
 )
 def test_refused(changes, words) -> None:

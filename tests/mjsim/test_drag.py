@@ -1,7 +1,5 @@
 """MuJoCo under each law of drag: the force itself, known motions, and the event-driven simulation beside it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,13 +1,15 @@
-"""The engine against motions whose exact form is short enough to stand in the test."""
+"""The engine against motions whose exact form is short enough to stand in the test, and itself compiled."""
 
 from itertools import pairwise
 
+import mujoco
 import numpy as np
 import pytest
 
 import mjsim
-from mjsim import ContactSettings, recorder
+from mjsim import ContactSettings, backend, recorder, scene
 from model import Flow, InputError, Parameters, SimulationError
+from model.drag import LAWS
 
 P = Parameters.named("reference")
 
@@ -41,41 +43,40 @@ def test_falls_freely_through_the_fluid(order) -> None:
 
 
 def test_batch_is_the_single_run() -> None:
-    sets = [P.replace(omega_0=25.0), Parameters.named("high-wall-friction").replace(omega_0=20.0, r=0.02, m=0.1)]
-    x0 = [0, 0, 12.0, -2, 1, 6]
-    ramp = Flow.ramp(20.0, 25.0, 0.2)
-    settings = ContactSettings()
-    many = mjsim.simulate_many(sets, [x0, x0], 0.3, ramp, settings, sample_interval=0.01)
-    for p, run in zip(sets, many, strict=True):
-        alone = mjsim.simulate(p, x0, 0.3, ramp, settings, sample_interval=0.01)
-        np.testing.assert_allclose(run.x, alone.x, rtol=0, atol=1e-9)
-        np.testing.assert_array_equal(run.case, alone.case)
-
-
-def test_a_run_does_not_depend_on_how_many_share_its_batch() -> None:
-    p, x0 = P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6]
-    counts = [
-        mjsim.simulate_many([p] * runs, [x0] * runs, 0.2, settings=ContactSettings(), sample_interval=0.01)
+    """To the bit however many share the batch; slipping along a ramp, and through landings of both kinds."""
+    rough = Parameters.named("high-wall-friction").replace(omega_0=20.0)
+    p, slips, settings = P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6], ContactSettings()
+    landings = [0.02, -0.2, 12.0, 30, -10, 20, 0, 0], [0.01, 0, 10.0, 1, 2, 3, 0.002, -0.3]
+    for sets, x0s, flow, t_end, tolerance in (
+        ([p, rough.replace(r=0.02, m=0.1)], [slips, slips], Flow.ramp(20.0, 25.0, 0.2), 0.3, 1e-9),
+        ([P.replace(omega_0=12.0), rough], landings, None, 0.1, 1e-7),
+    ):
+        many = mjsim.simulate_many(sets, x0s, t_end, flow, settings, sample_interval=1e-3)
+        for q, x0, run in zip(sets, x0s, many, strict=True):
+            alone = mjsim.simulate(q, x0, t_end, flow, settings, sample_interval=1e-3)
+            assert np.any(alone.force_A[:, 1] > 0)
+            np.testing.assert_allclose(run.x, alone.x, rtol=0, atol=tolerance)
+            if flow:
+                np.testing.assert_array_equal(run.case, alone.case)
+    (first,), *counts = (
+        mjsim.simulate_many([p] * runs, [slips] * runs, 0.2, settings=settings, sample_interval=0.01)
         for runs in (1, 2, 13)
-    ]
-    for runs in counts[1:]:
-        for run in runs:
-            np.testing.assert_array_equal(run.x, counts[0][0].x)
-            np.testing.assert_array_equal(run.force_B, counts[0][0].force_B)
+    )
+    for run in (run for runs in counts for run in runs):
+        np.testing.assert_array_equal(run.x, first.x)
+        np.testing.assert_array_equal(run.force_B, first.force_B)
 
 
-def test_contact_force_is_the_weight_at_rest() -> None:
-    """At rest in still fluid away from the wall, the floor carries m g and nothing else acts."""
-    run = mjsim.simulate(P.replace(omega_0=0.0), [0, 0, 0, 0, 0, 0, 0.01, 0], 1.0)
-    np.testing.assert_allclose(run.force_A[-1], [0, P.m * P.g, 0], atol=1e-9 * P.m * P.g)
-    assert abs(run.gap_A[-1]) < 1e-12
+def test_forces_of_a_single_contact() -> None:
+    """At rest in still fluid away from the wall, the floor carries m g and nothing else acts.
 
-
-def test_forces_of_rolling_on_the_wall_alone() -> None:
-    """Carried by the wall alone at the fluid's speed: it turns the path, B_x = m R omega_0^2, and bears the weight.
+    Carried by the wall alone at the fluid's speed: it turns the path, B_x = m R omega_0^2, and bears the weight.
 
     The axial oscillation about that state decays with 2(1 + j)/c = 2.8 s, so that 1e-9 is left of it after 60 s.
     """
+    run = mjsim.simulate(P.replace(omega_0=0.0), [0, 0, 0, 0, 0, 0, 0.01, 0], 1.0)
+    np.testing.assert_allclose(run.force_A[-1], [0, P.m * P.g, 0], atol=1e-9 * P.m * P.g)
+    assert abs(run.gap_A[-1]) < 1e-12
     p = Parameters.named("high-wall-friction").replace(omega_0=25.0)
     settings = ContactSettings.at(4e-3)
     slip_x = (p.g / p.j - p.R * p.omega_0**2) / (p.r * p.omega_0)  # B_y = m g carries no moment about the centre's path
@@ -177,3 +178,39 @@ def test_without_the_servo_sliding_states_are_of_second_order_in_the_step() -> N
     change = abs(coarse - fine) / abs(fine)
     assert 1e-3 < change < 0.1
     assert (coarse - middle) / (middle - fine) == pytest.approx(4, rel=2 * change)
+
+
+# --- the scene file ------------------------------------------------------------------------------------------
+
+
+def test_file_opens_as_it_is_and_holds_the_reference() -> None:
+    model = mujoco.MjModel.from_xml_path(str(scene.SCENE))
+    built, mjcf = scene.build(P, ContactSettings())
+    for name in ("body_mass", "body_inertia", "body_pos", "jnt_pos", "geom_size", "geom_pos", "pair_solref"):
+        assert getattr(built, name) == pytest.approx(getattr(model, name)), name
+        assert getattr(mujoco.MjModel.from_xml_string(mjcf), name) == pytest.approx(getattr(model, name)), name
+
+
+# --- the compiled corrections are those of the source, whatever a run goes through ---------------------------
+
+
+SETS = [P.replace(omega_0=12.0, drag=law, nu_f=1e-4) for law in LAWS]
+STARTS = [[0.02, -0.2, 12.0, 30, -10, 20, 0, 0], [0, 0, 12.0, -2, 1, 6, 0, 0], [0.01, 0, 10.0, 1, 2, 3, 0.002, -0.3]]
+"""A landing, slip at both contacts, and a landing on the wall."""
+
+
+@pytest.mark.parametrize("changes", [{}, {"servo": 0.0}, {"memory": False, "order": 1}])
+def test_compiled_gives_the_same_run(monkeypatch: pytest.MonkeyPatch, changes: dict[str, object]) -> None:
+    """For all laws of drag in one batch; not to the bit everywhere: numpy and numba may round a cosine in two ways."""
+    pytest.importorskip("numba")
+    settings, flow = ContactSettings.at(1e-3, **changes), Flow.ramp(12.0, 25.0, 0.2)
+
+    def runs() -> list[np.ndarray]:
+        together = mjsim.simulate_many(SETS, STARTS, 0.3, flow, settings, sample_interval=2e-3)
+        alone = [mjsim.simulate(p, x0, 0.3, flow, settings) for p, x0 in zip(SETS, STARTS, strict=True)]
+        return [run.x for run in (*together, *alone)]
+
+    fast = runs()
+    monkeypatch.setattr(backend, "compiled", lambda: None)
+    for x, exact in zip(fast, runs(), strict=True):
+        np.testing.assert_allclose(x, exact, rtol=0, atol=1e-9)

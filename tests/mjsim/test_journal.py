@@ -1,7 +1,5 @@
 """A run that is taken up again gives the bits of one that was never interrupted."""
 
-from __future__ import annotations
-
 from itertools import islice
 from pathlib import Path
 
@@ -46,9 +44,5 @@ def test_a_damaged_journal_says_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "journal" / "000000.h5").write_bytes(b"no HDF5")
     with pytest.raises(StorageError, match=r"remove .*journal to start anew"):
         joined(run(tmp_path / "journal"))
-
-
-def test_it_is_gone_when_it_is_discarded(tmp_path: Path) -> None:
-    journal = Journal(tmp_path / "journal")
-    journal.discard()
+    Journal(tmp_path / "journal").discard()
     assert not (tmp_path / "journal").exists()

@@ -1,6 +1,4 @@
-"""Landings within a step: motions through impacts converge at second order, on a ball that hops for ever."""
-
-from __future__ import annotations
+"""Landings within a step: what they leave, and second order through impacts on a ball that hops for ever."""
 
 from itertools import islice
 from pathlib import Path
@@ -27,26 +25,19 @@ LASTS = 0.6
 """Three landings: at 0.15, 0.37 and 0.60 s; the last one is just ahead of the end."""
 
 
-def deviations(steps: tuple[float, ...], batched: bool = False) -> list[float]:
-    """Largest error of height (relative to its range) and omega_c (relative) between the landings."""
-    exact = analytic.simulate(HOPS, START, LASTS, sample_interval=0.02)
-    errors = []
-    for step in steps:
-        settings = ContactSettings.for_problem(HOPS, step)
-        if batched:
-            (run,) = mjsim.simulate_many([HOPS], [START], LASTS, settings=settings, sample_interval=0.02)
-        else:
-            run = mjsim.simulate(HOPS, START, LASTS, settings=settings, sample_interval=0.02)
-        errors.append(
-            max(np.abs(run.y - exact.y).max() / np.ptp(exact.y), np.abs(run.omega_c / exact.omega_c - 1).max())
-        )
-    return errors
-
-
 @pytest.mark.parametrize("batched", [False, True])
 def test_motions_through_landings_are_of_second_order(batched: bool) -> None:
-    steps = (1e-3, 5e-4, 2.5e-4)
-    errors = deviations(steps, batched)
+    """Largest error of height (relative to its range) and omega_c (relative) between the landings."""
+    exact = analytic.simulate(HOPS, START, LASTS, sample_interval=0.02)
+    steps, errors = (1e-3, 5e-4, 2.5e-4), []
+    for step in steps:
+        given = {"settings": ContactSettings.for_problem(HOPS, step), "sample_interval": 0.02}
+        if batched:
+            (run,) = mjsim.simulate_many([HOPS], [START], LASTS, **given)
+        else:
+            run = mjsim.simulate(HOPS, START, LASTS, **given)
+        height = np.abs(run.y - exact.y).max() / np.ptp(exact.y)
+        errors.append(max(height, np.abs(run.omega_c / exact.omega_c - 1).max()))
     order = np.log(errors[0] / errors[-1]) / np.log(steps[0] / steps[-1])
     assert order > 1.8
     # A second-order method makes errors of (omega_c h)^2 and the like in smooth motion; landings add nothing to that.
@@ -123,3 +114,51 @@ def test_landings_do_not_depend_on_those_of_others_in_a_batch() -> None:
         for x0s in ([START], [START, higher])
     )
     np.testing.assert_array_equal(beside[0].x, alone[0].x)
+
+
+# --- what a landing leaves, all within its step --------------------------------------------------------------
+
+
+FALLING = Parameters.named("reference").replace(omega_0=0.0, c=0.0)
+STILL = Flow.steady(0.0)
+HEIGHTS = 0.02 * np.linspace(1.0, 1.05, 8)
+"""Falls that end at all phases of a time step."""
+
+
+def after_landing(x0: list[float], timestep: float) -> tuple[float, np.ndarray]:
+    """Speed at which the floor is hit from x0, by energy, and the states from a step after that on."""
+    speed = np.sqrt(2 * FALLING.g * x0[0] + x0[1] ** 2)
+    lands = (speed + x0[1]) / FALLING.g
+    run = mjsim.simulate(FALLING, x0, lands + 0.02, STILL, ContactSettings.at(timestep), sample_interval=timestep)
+    return float(speed), run.x[run.time > lands + 1.5 * timestep]
+
+
+@pytest.mark.parametrize("timestep", [1e-3, 2.5e-4])
+@pytest.mark.parametrize("height", HEIGHTS)
+def test_a_ball_that_falls_on_the_floor_stays_there(height: float, timestep: float) -> None:
+    _, x = after_landing([height, 0, 0, 0, 0, 0, 0.02, 0], timestep)
+    assert np.abs(x[:, 1]).max() < FALLING.g * timestep  # m s-1: what gravity does in a step
+    assert np.abs(x[:, 0]).max() < FALLING.g * timestep**2
+
+
+@pytest.mark.parametrize("height", HEIGHTS)
+def test_friction_takes_its_share_of_the_impulse(height: float) -> None:
+    """A spin too fast to be stopped: mu times the normal impulse pushes the ball and brakes the spin by 1/j as much."""
+    timestep = 1e-3
+    spin = 400.0
+    speed, x = after_landing([height, 0, 0, 0, 0, spin, 0.02, 0], timestep)
+    # Since the landing friction has acted for up to three steps, and the impulse is known to a step of gravity.
+    slack = 4 * FALLING.mu * FALLING.g * timestep
+    assert x[0, 7] == pytest.approx(-FALLING.mu * speed, abs=slack)
+    assert FALLING.r * x[0, 5] == pytest.approx(
+        FALLING.r * spin - FALLING.mu * speed / FALLING.j, abs=slack / FALLING.j
+    )
+
+
+@pytest.mark.parametrize("height", HEIGHTS)
+def test_the_wall_answers_in_the_same_step(height: float) -> None:
+    """Friction of the landing drives the ball into the wall, which it touches: no speed is left at either contact."""
+    timestep = 1e-3
+    speed, x = after_landing([height, 0, 0, 0, 0, 100.0, 0.0, 0], timestep)
+    assert FALLING.mu * speed > 0.1  # m s-1: what the wall would see a step late
+    assert np.abs(x[:, [1, 7]]).max() < 2 * FALLING.g * timestep

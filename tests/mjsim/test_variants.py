@@ -5,7 +5,7 @@ import pytest
 
 import mjsim
 from mjsim import ContactSettings
-from model import InputError, Parameters, SimulationError, State
+from model import Parameters, SimulationError, State
 
 P = Parameters.named("reference").replace(omega_0=12.0)
 ROLLING = [0, 0, 12.0, 0, 0, 0]
@@ -44,18 +44,3 @@ def test_prism_judders() -> None:
     run = mjsim.simulate(P, ROLLING, 3.0, settings=free(wall="prism", facets=36, servo=0.0))
     assert np.mean(run.force_B[:, 0] > 0) < 0.9
     assert abs(run.omega_c[-100:].mean() / 12.0 - 1) > 0.1
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"coordinates": "free"}, "needs memory = False and order = 1"),
-        ({"wall": "prism"}, "needs coordinates = 'free'"),
-        ({"coordinates": "free", "memory": False, "order": 1, "wall": "prism"}, "needs servo = 0"),
-        ({"coordinates": "cartesian"}, "must be one of polar, free"),
-        ({"facets": 2}, "facets = 2"),
-    ],
-)
-def test_refused(changes, words) -> None:
-    with pytest.raises(InputError, match=words):
-        ContactSettings(**changes)

@@ -1,10 +1,14 @@
+"""Flows, and the longest step of a problem."""
+
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from model import Flow, InputError, StorageError
+from model import Flow, InputError, Parameters, StorageError
+from model.time_scales import check_timestep
 
 FLOWS = [
     Flow.steady(-3.0),
@@ -38,6 +42,8 @@ def test_a_mapping_holds_all_of_it(flow: Flow) -> None:
     t = np.linspace(0, 10, 101)
     np.testing.assert_array_equal(back(t), flow(t))
     assert back.kind == flow.kind
+    older = Flow.from_mapping({"kind": "steady", "start": [0], "value": [1], "slope": [0]})  # without waves
+    assert older.is_steady
 
 
 @pytest.mark.parametrize(
@@ -53,6 +59,7 @@ def test_a_mapping_holds_all_of_it(flow: Flow) -> None:
         (lambda: Flow.sampled([0, 1, 1], [1, 2, 3]), "times must increase, but sample 2 is at 1 s"),
         (lambda: Flow.sampled([0, math.nan], [1, 2]), "time of flow sample 1"),
         (lambda: Flow.sampled([0, 1], [1, "two"]), "omega_0"),
+        (lambda: Flow.sampled([0, 1], [1.0, math.nan]), "omega_0 of flow sample 1 = nan"),
         (lambda: Flow.sine(math.inf, 1, 1), "omega_0 of flow sample 0"),
         (lambda: Flow.sine(1, 1, 0), "frequency of wave 0 = 0 Hz is out of range: must be > 0"),
         (lambda: Flow.sines(1, [(1, 1, 0), (math.nan, 1, 0)]), "amplitude of wave 1 = nan"),
@@ -67,10 +74,6 @@ def test_a_mapping_holds_all_of_it(flow: Flow) -> None:
 def test_bad_flows(make, says: str) -> None:
     with pytest.raises(InputError, match=says):
         make()
-
-
-def test_flow_of_an_older_file() -> None:
-    assert Flow.from_mapping({"kind": "steady", "start": [0], "value": [1], "slope": [0]}).is_steady
 
 
 @pytest.mark.parametrize(
@@ -132,3 +135,36 @@ def test_unreadable_measurements(tmp_path: Path) -> None:
     (tmp_path / "flow.csv").write_bytes(b"\xff\x00\x01")
     with pytest.raises(InputError, match="not a text file"):
         Flow.from_csv(tmp_path / "flow.csv")
+
+
+# --- the longest step of a problem ---------------------------------------------------------------------------
+
+
+P = Parameters.named("reference")
+SLOW: dict[str, Any] = {"omega_0": 1.0, "c": 1.0}
+QUADRATIC: dict[str, Any] = {"drag": "quadratic", "nu_f": 1e-6}
+
+
+@pytest.mark.parametrize(
+    ("changes", "flow", "shortest", "name"),
+    [
+        (SLOW, None, np.sqrt(P.R / P.g), r"sqrt\(R/g\)"),
+        (SLOW | {"omega_0": -25.0}, None, 1 / 25, "1/omega_0"),
+        (SLOW, Flow.ramp(1.0, 50.0, 0.05), 1 / 50, "1/omega_0"),
+        (SLOW, Flow.ramp(1.0, 50.0, 0.05, t_start=0.1), np.sqrt(P.R / P.g), r"sqrt\(R/g\)"),
+        (SLOW, Flow.sine(10.0, 40.0, 1.0), 1 / 50, "1/omega_0"),
+        (SLOW, Flow.sine(1.0, 1.0, 20.0), 1 / (40 * np.pi), r"1/\(2 pi f\)"),
+        (SLOW | {"c": 100.0}, None, 1 / 100, "1/c"),
+        (SLOW | {"c": 0.0}, None, np.sqrt(P.R / P.g), r"sqrt\(R/g\)"),
+        (SLOW | QUADRATIC, None, 1 / (2 * 700 * P.R), r"1/\(2 c\(R omega_0\)\)"),
+    ],
+)
+def test_a_step_too_large_for_the_problem_is_refused(
+    changes: dict[str, Any], flow: Flow | None, shortest: float, name: str
+) -> None:
+    p = P.replace(**changes)
+    problem = p, flow or Flow.steady(p.omega_0), 0.1, lambda speed: 700 * speed
+    words = rf"timestep = .* s is out of range: must be <= .* s, half of {name}, the shortest time of the problem"
+    with pytest.raises(InputError, match=words):
+        check_timestep(0.501 * shortest, *problem)
+    check_timestep(0.499 * shortest, *problem)

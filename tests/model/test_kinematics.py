@@ -1,4 +1,4 @@
-"""Round trips between the paper's coordinates and the world's are exact to round-off."""
+"""Round trips between the paper's coordinates and the world's; Tables 3 and 4 as the paper prints them."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from model import InputError, Parameters, State
+from model import Case, Contact, InputError, Parameters, State
+from model.cases import TRAITS
 from model.kinematics import (
     angular_velocity,
     frame,
@@ -67,23 +68,14 @@ def test_the_frame_is_right_handed_and_points_inwards(theta: float) -> None:
     np.testing.assert_array_equal(j, [0, 0, 1])
 
 
-def test_pure_rolling_is_the_state_without_slip() -> None:
-    x = np.array([0, 0, 7.0, 0, 0, 0])
-    v_A, v_B = slip_velocities(x, P)
-    assert not v_A.any()
-    assert not v_B.any()
-    # (4): the ball turns against its orbit, R/r times as fast, about i and j.
-    np.testing.assert_allclose(angular_velocity(x, P), [P.R / P.r * 7, -P.R / P.r * 7, 0])
-
-
 def test_slip_speeds_and_directions_are_7_and_8() -> None:
     x = np.array([0, 0, 5.0, 3.0, -2.0, 4.0])
-    v_A, v_B = slip_speeds(x, P)
-    assert v_A == pytest.approx(P.r * 5)
-    assert v_B == pytest.approx(P.r * np.sqrt(20))
-    alpha, beta = slip_directions(x, P)
-    assert alpha == pytest.approx(np.arctan2(3, 4))
-    assert beta == pytest.approx(np.arctan2(-2, 4))
+    assert slip_speeds(x, P) == pytest.approx((P.r * 5, P.r * np.sqrt(20)))
+    assert slip_directions(x, P) == pytest.approx((np.arctan2(3, 4), np.arctan2(-2, 4)))
+    # (4): without slip the ball turns against its orbit, R/r times as fast, about i and j.
+    x = np.array([0, 0, 7.0, 0, 0, 0])
+    assert not np.any(slip_velocities(x, P))
+    np.testing.assert_allclose(angular_velocity(x, P), [P.R / P.r * 7, -P.R / P.r * 7, 0])
 
 
 def test_arrays_of_states_are_the_states_one_by_one() -> None:
@@ -94,9 +86,7 @@ def test_arrays_of_states_are_the_states_one_by_one() -> None:
         one, one_angle = from_world(to_world(x[index], theta[index], P), P)
         np.testing.assert_array_equal(many.stacked()[index], one)
         assert angle[index] == one_angle
-
-
-def test_on_the_axis_the_orbit_has_no_angular_velocity() -> None:
+    # On the axis the orbit has no angular velocity.
     world = to_world(np.array([0, 0, 3.0, 0, 0, 0, P.R, -1.0]), 0.0, P)
     x, theta = from_world(world, P)
     assert np.isnan(x.omega_c)
@@ -125,3 +115,28 @@ def test_a_state_of_many_keeps_its_columns() -> None:
         State.one(columns.stacked())
     with pytest.raises(InputError, match="omega_c = nan rad s-1 must be finite"):
         State.one(State(omega_c=np.nan))
+
+
+# --- cases ---------------------------------------------------------------------------------------------------
+
+
+# Table 4 (with y and v_y as free variables where A is open), and the dimensions of Fig. 2.
+TABLE_4 = {
+    Case.RR: {"omega_c"},
+    Case.RS: {"omega_c", "slip_y"},  # the printed table swaps the slip of RS and SR
+    Case.SR: {"omega_c", "slip_x"},
+    Case.SS: {"omega_c", "slip_x", "slip_y", "slip_z"},
+    Case.NR: {"y", "v_y", "omega_c", "slip_x"},
+    Case.NS: {"y", "v_y", "omega_c", "slip_x", "slip_y", "slip_z"},
+}
+
+
+def test_cases() -> None:
+    """Active variables and constraints fill the state space; a case is its two contacts."""
+    for case, active in TABLE_4.items():
+        assert set(TRAITS[case].active) == active
+    assert len(Case) == 9
+    for case in Case:
+        assert len(TRAITS[case].constraints) + TRAITS[case].dimension == 8
+        assert Case.of(case.A, case.B) is case
+    assert (Case.NS.A, Case.NS.B) == (Contact.N, Contact.S)

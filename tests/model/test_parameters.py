@@ -1,5 +1,6 @@
 import dataclasses
 import math
+import tempfile
 import tomllib
 from pathlib import Path
 
@@ -31,20 +32,13 @@ valid = st.builds(
 )
 
 
-@pytest.mark.parametrize("name", Parameters.names())
-def test_every_named_set_loads(name: str) -> None:
-    assert Parameters.named(name).m > 0
-
-
-def test_the_reference_sets_are_those_of_the_study() -> None:
+def test_named_sets() -> None:
+    """All load; the reference sets are those of the study; steel in water has the drag that the paper names."""
+    assert all(Parameters.named(name).m > 0 for name in Parameters.names())
     expected = {"R": 0.05, "r": 0.01, "j": 0.4, "m": 0.03, "g": 9.81, "mu": 0.2, "eta": 0.2, "c": 1.0}
-    reference = dataclasses.asdict(Parameters.named("reference"))
-    assert {k: reference[k] for k in expected} == expected
-    rough = dataclasses.asdict(Parameters.named("high-wall-friction"))
-    assert {k: rough[k] for k in expected} == expected | {"eta": 0.6}
-
-
-def test_steel_in_water_has_the_drag_the_paper_names() -> None:
+    for name, changes in (("reference", {}), ("high-wall-friction", {"eta": 0.6})):
+        values = dataclasses.asdict(Parameters.named(name))
+        assert {k: values[k] for k in expected} == expected | changes
     # After (10): for a steel ball of some millimetres in water c is of the order of 1e-2 1/s.
     assert 1e-2 <= Parameters.named("steel-in-water").c < 1e-1
 
@@ -86,12 +80,12 @@ def test_drag_and_gravity_follow_from_the_fluid() -> None:
 
 @given(valid)
 def test_toml_keeps_every_digit(p: Parameters) -> None:
-    import tempfile
-
+    """In a plain file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "p.toml"
         p.save(path)
         assert Parameters.load(path) == p
+        assert tomllib.loads(path.read_text()) == dataclasses.asdict(p)
 
 
 @given(valid, st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
@@ -158,9 +152,6 @@ def test_ranges(allowed: Range, inside: list[float], outside: list[float], words
         assert str(caught.value) == f"x = {number:g} m is out of range: length of the rod must be {words}"
         with pytest.raises(InputError, match=r"^x = .* m is out of range: must be "):
             parse_number("x", repr(number), "m", allowed)
-
-
-def test_text_that_is_no_number() -> None:
     with pytest.raises(InputError, match=r"^x = '5 cm' must be a number in m$"):
         parse_number("x", "5 cm", "m")
 
@@ -202,15 +193,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path, reference: Paramet
         Parameters.load(tmp_path / "binary.toml")
     with pytest.raises(StorageError, match="cannot write"):
         reference.save(tmp_path / "absent" / "p.toml")
-
-
-def test_an_unknown_name_gets_a_suggestion(reference: Parameters) -> None:
     with pytest.raises(InputError, match=r"did you mean 'reference'"):
         Parameters.named("referense")
     with pytest.raises(InputError, match=r"did you mean 'omega_0'"):
         reference.replace(omega0=3.0)
-
-
-def test_the_saved_file_is_plain_toml(tmp_path: Path, reference: Parameters) -> None:
-    reference.save(tmp_path / "p.toml")
-    assert tomllib.loads((tmp_path / "p.toml").read_text()) == dataclasses.asdict(reference)
