@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from analytic.mechanics import drag, dynamics, flight
+from analytic.mechanics import drag, dynamics
 from analytic.mechanics.rigid_body import Velocities, state, velocities
 from analytic.simulation.motion import Chart, Fluid, Moment, Path, natural_units
 from model import Case, Parameters, State
@@ -208,7 +208,7 @@ def _sn(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
 
 
 def _nn(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """NN, where the whole spin rests: (Z, dZ/dt, work) with Stokes' drag, where height and fall are known (`flight`).
+    """NN, where the whole spin rests: (Z, dZ/dt, work) with Stokes' drag, where the fall is known (`drag.fall`).
 
     Else c depends on all components of the velocity: (Z, dZ/dt, y, v_y, work).
     """
@@ -217,7 +217,7 @@ def _nn(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         Z, V = _centre(z)
-        rise = flight.speed(t - at.time, v_y, p) if known else z[5]
+        rise = drag.fall_speed(t - at.time, v_y, p) if known else z[5]
         lag, c, power = _drag(Z, V, omega_0(t), p, rise)
         fall = [] if known else [rise, -p.g - c * rise]
         return [V.real, V.imag, -c * lag.real, -c * lag.imag, *fall, power]
@@ -227,11 +227,11 @@ def _nn(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
         return (gap,) if known else (gap, z[4] / p.R)
 
     def path(t: Array, z: Array) -> Path:
-        fall = flight.fall(t - at.time, y, v_y, p) if known else (z[4], z[5])
+        fall = drag.fall(t - at.time, y, v_y, p) if known else (z[4], z[5])
         return _path(t, z, at, p, upright, np.full(len(t), spin), fall)
 
     if known:
-        landing, more, scale = at.time + flight.fall_time(y, v_y, p), [at.work], [energy]
+        landing, more, scale = at.time + drag.fall_time(y, v_y, p), [at.work], [energy]
     else:
         landing, more, scale = math.inf, [y, v_y, at.work], [p.R, v, energy]
     ends = ("B lands",) if known else ("B lands", "A lands")

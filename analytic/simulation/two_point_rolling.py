@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic.mechanics import drag, dynamics, flight, rolling_forces
+from analytic.mechanics import drag, dynamics, rolling_forces
 from analytic.mechanics.rigid_body import Forces
 from analytic.simulation.motion import Chart, Fluid, Moment, Path, natural_units
 from model import Case, Parameters, State
@@ -36,7 +36,7 @@ def omega_c(t: npt.ArrayLike, at: Moment, p: Parameters, omega_0: Fluid) -> Arra
     a, b = omega_0.value + omega_0.slope * (at.time - omega_0.start), omega_0.slope
     start = at.x.omega_c - float(_forced(at.time, k, omega_0))
     # k tau^2 (1 - tau k/3 + …): the lag behind a ramp, without the cancellation of tau - (1 - exp(-k tau))/k.
-    line = start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * flight.second(k * tau)
+    line = start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * drag.ramp_lag(k * tau)
     return np.asarray(line + _forced(t, k, omega_0))
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analytic.simulation import scenarios
+from analytic.simulation import simulator
 from model import Case, Parameters
 
 ROUGH = Parameters.named("high-wall-friction")
@@ -16,7 +16,7 @@ LIMIT = math.sqrt(ROUGH.g / (ROUGH.eta * ROUGH.R))
 
 
 def test_figure_4_slip_dies_out():
-    run = scenarios.slip_perturbation(ROUGH.replace(omega_0=1.2 * LIMIT), 1.0, 0.9, 0.1)
+    run = simulator.slip_perturbation(ROUGH.replace(omega_0=1.2 * LIMIT), 1.0, 0.9, 0.1)
     assert [Case(code) for code in run.events.to_case] == [Case.NR]
     assert run.cases[0] is Case.NS
     # (60): the slowest direction loses slip at (1+j)/(r j) (eta R omega_0^2 - g).
@@ -25,13 +25,13 @@ def test_figure_4_slip_dies_out():
 
 
 def test_figure_5_slip_grows():
-    run = scenarios.slip_perturbation(ROUGH.replace(omega_0=0.9 * LIMIT), 1.0, 0.9, 0.1)
+    run = simulator.slip_perturbation(ROUGH.replace(omega_0=0.9 * LIMIT), 1.0, 0.9, 0.1)
     assert set(run.cases) == {Case.NS}
     assert np.all(np.diff(run.slip_speed_B[len(run.time) // 2 :]) > 0)
 
 
 def test_unloading_ends_in_two_point_rolling_after_impacts():
-    run = scenarios.unloading(ROUGH, hold=20.0)
+    run = simulator.unloading(ROUGH, hold=20.0)
     visited = [Case(code) for code in run.events.to_case]
     assert visited[0] is Case.NS
     assert visited[-1] is Case.RR

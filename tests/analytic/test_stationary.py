@@ -19,8 +19,8 @@ from analytic import (
     thresholds,
     vector_field,
 )
-from analytic.mechanics.jacobian import jacobian
-from analytic.stationary import branch_stability as stability
+from analytic.mechanics.dynamics import jacobian
+from analytic.stationary import slipping_branch as stability
 from analytic.stationary.slipping_branch import branch, fold, points_at
 from model import Case, InputError, Parameters, State
 from model.cases import TRAITS

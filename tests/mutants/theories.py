@@ -134,9 +134,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "stationary._lifting_spin": {"spin of SR and NR with 1 % more weight": given(other(g=1.01))},
     "stationary._wall_carries": {"(35) with the sign as printed": answer(lambda carries: not carries)},
     "stationary.stable_solutions": {"a ball on the wall is no attractor": _of(Case.NR, _gone)},
-    "branch_stability.eigenvalues_at": {"eigenvalues of SS 3 % large": scaled(1.03)},
-    "jacobian.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
-    "leaning.leaning_modes": {"leaning rate of SR 5 % large": scaled(1.05, 0)},
+    "slipping_branch.eigenvalues_at": {"eigenvalues of SS 3 % large": scaled(1.03)},
+    "dynamics.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
+    "stationary.leaning_modes": {"leaning rate of SR 5 % large": scaled(1.05, 0)},
     # Bifurcations, (84)-(90)
     "bifurcation.threshold_curves": {
         "ω₀₁ with 1 + μ for 1 + η": _mu_for_eta,
@@ -174,7 +174,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "slip_bounds.filippov_share": {"share of the sheets in (69) 5 % large": scaled(1.05)},
     "slip_bounds.rr_to_ss": {"(82), (83) with μ and η exchanged": given(swapped)},
     # Laws of drag
-    "stokes.sinking_speed": {"(10) 1 % large": scaled(1.01)},
+    "drag.sinking_speed": {"(10) 1 % large": scaled(1.01)},
     "drag.of_velocity": {"the drag's slope left out of the eigenvalues": answer(np.real)},
     "drag.law": {
         "Schiller and Naumann's wake 5 % strong": answer(fields(wake=times(1.05))),
