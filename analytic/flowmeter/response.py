@@ -55,7 +55,7 @@ def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
 
 
 def peak(p: Parameters, case: Case) -> tuple[float, float]:
-    """Time in s and height of the top of the `step_response`, divided by its end value; inf, 1 if it creeps."""
+    """Time in s and height of the top of the `step_response`, relative to its end value; inf, 1 without overshoot."""
     slowest = 1 / np.abs(np.linalg.eigvals(_linear(p, case)[0]).real).min()
     t = np.linspace(0.0, 8 * slowest, _GRID)
     y = step_response(p, case, t) / np.real(transfer(p, case, 0.0))

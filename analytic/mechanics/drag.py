@@ -1,7 +1,7 @@
 """The drag -m c(|w|) w of each law of `model.drag`, |w| the speed relative to the fluid, and fall under it alone.
 
 With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^0.687, blunt |w|): Stokes' has the first
-term alone, the quadratic one the last. So c never falls as |w| grows, and a drag force belongs to one speed.
+term alone, the quadratic one the last. So c never decreases with |w|, and a drag force determines the speed.
 
 The laws take floats or arrays, and complex ones for derivatives by complex steps. `simulation.stepping` compiles
 `rate`.
@@ -22,9 +22,9 @@ from model.drag import QUADRATIC, REYNOLDS, SCHILLER_NAUMANN, STOKES
 EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
 """Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
 SPEED_STEPS = 8
-"""Steps to the last digit from a speed less than twice too high: 6, and 2 to spare for the corner of `Law`."""
+"""Steps of Newton's method from less than twice the root to round-off: 6, and 2 more for the corner of `Law`."""
 POWERS = (1.0, 1.0 + EXPONENT, 2.0)
-"""How the force of each term of `Law` grows with the speed."""
+"""Exponents of the speed in the force of each term of `Law`."""
 
 
 class Law(NamedTuple):
@@ -104,7 +104,7 @@ def reynolds_of(x: State, p: Parameters) -> float:
 
 
 def covers(Re: float, law: str) -> bool:
-    """Whether a law is meant for a Reynolds number; no law has anything to say where the ball goes with the fluid."""
+    """Whether a Reynolds number is within the range of a law; 0, at which there is no drag, always is."""
     low, high = REYNOLDS[law]
     return Re == 0 or low <= Re <= high
 

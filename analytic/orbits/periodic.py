@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 from analytic.mechanics import dynamics
 from analytic.simulation.motion import natural_units
 from analytic.simulation.simulator import simulate
-from model import Case, InputError, Parameters, SimulationError, State, Trajectory
+from model import Case, Contact, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -42,6 +42,11 @@ ORBIT_SAMPLES = 4000
 
 Changes = tuple[tuple[Case, Case], ...]
 """Changes of case in order, (before, after)."""
+
+
+def lands(before: int, after: int) -> bool:
+    """Whether a change of case, by the cases or their codes, is a landing on the floor."""
+    return Case(before).A is Contact.N is not Case(after).A
 
 
 class NoOrbitError(ArithmeticError):

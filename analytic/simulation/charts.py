@@ -3,13 +3,13 @@
 On the wall these are the active variables of the case (Table 4), except that a slip with two components is given by
 its speed q and direction (alpha at A, beta at B): the friction depends on the direction alone, so that the rates have
 limits as the slip vanishes and q simply crosses zero. In SS both pairs are kept, although they share
-slip_z = q_A cos alpha = q_B cos beta; what integration errors make of that bond is damped. The equations are those of
-`dynamics`; only rates are converted here.
+slip_z = q_A cos alpha = q_B cos beta; deviations from that relation by integration errors are damped. The equations are
+those of `dynamics`; only rates are converted here.
 
-Away from the wall (RN, SN, NN) the frame rests, and the vessel's axis is a place like any other. The horizontal motion
+Away from the wall (RN, SN, NN) the frame rests, so that the vessel's axis is no singular point. The horizontal motion
 is kept in complex numbers: position Z = rho e^(i theta), and (a, b) along the paper's i, k becomes
 e^(i theta)(-a + i b); coordinates are their real and imaginary parts. The spin about the vertical never changes. The
-equations are those of `dynamics`, written anew for this frame; test_charts holds one against the other.
+equations are those of `dynamics`, written anew for this frame; test_charts compares the two.
 
 The first coordinate is the azimuth, or Z, the last one the work of drag and friction, J. RR is in `two_point_rolling`.
 """

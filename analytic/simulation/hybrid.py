@@ -24,7 +24,7 @@ from model.arrays import Array
 from model.drag import STOKES
 
 _LEAST_JUMP = 1e-12
-"""Part of the flow by which it may differ before and after a knot without a jump."""
+"""Change of the flow at a knot, relative to the largest flow, above which it is a jump."""
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
 

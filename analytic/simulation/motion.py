@@ -55,13 +55,13 @@ class Fluid:
 
 
 class Moment(NamedTuple):
-    """A state together with what the state alone does not tell."""
+    """A state with its time and azimuth, the directions of slip, and the work done so far."""
 
     time: float
     theta: float
     x: State
     alpha: float = math.nan
-    """Direction of slip at A (8), rad, where it slips: the state doesn't tell at the very onset."""
+    """Direction of slip at A (8), rad, where it slips; at the very onset the state doesn't determine it."""
     beta: float = math.nan
     """Direction of slip at B (8), rad."""
     work: float = 0.0

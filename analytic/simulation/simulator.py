@@ -21,10 +21,6 @@ from model.arrays import Array
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
 
 MAX_SAMPLES = 5e7
-HIGH = 1.0
-"""Height of a pushed ball, m: clear of the floor, which Figs. 4 and 5 leave out."""
-LOW = 0.02
-"""Height of a ball from which the flow is taken, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +161,8 @@ def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> 
     For omega_0 > sqrt(g/(eta R)) (61) slip dies out and the ball returns to NR (Fig. 4), else it grows (Fig. 5).
     """
     orbit = stationary.solution(p, Case.NR, formal=True).state
-    x = orbit._replace(y=HIGH, slip_y=slip * math.sin(beta), slip_z=slip * math.cos(beta))
+    clear = 1.0  # height in m: Figs. 4 and 5 leave the floor out
+    x = orbit._replace(y=clear, slip_y=slip * math.sin(beta), slip_z=slip * math.cos(beta))
     return simulate(p, x, t_end, sample_interval=t_end / 10_000)
 
 
@@ -176,6 +173,6 @@ def unloading(p: Parameters, hold: float) -> Trajectory:
     """
     limit = bifurcation.thresholds(p).omega_02
     levels = limit * np.array([1.2, 1.1, 1.02, 0.98])
-    riding = stationary.solution(p.replace(omega_0=float(levels[0])), Case.NR).state
+    start = stationary.solution(p.replace(omega_0=float(levels[0])), Case.NR).state._replace(y=0.02)
     flow = Flow.staircase(levels.tolist(), hold)
-    return simulate(p, riding._replace(y=LOW), hold * len(levels), flow, sample_interval=hold / 4000)
+    return simulate(p, start, hold * len(levels), flow, sample_interval=hold / 4000)

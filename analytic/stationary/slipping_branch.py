@@ -1,4 +1,4 @@
-"""The branch of stationary solutions in which the ball slips at both points (SS): (37)-(42), and its fold (87)-(90).
+"""The branch of stationary solutions that slip at both points (SS): (37)-(42), its fold (87)-(90), its stability.
 
 The branch is given in the groups of the model: Omega = omega sqrt(R/g), kappa = c sqrt(R/g), forces in units of m g,
 speeds in units of sqrt(g R). A point on it is given by ``s = ln|tan alpha|``, from -inf where the slip ends in RR
@@ -132,7 +132,7 @@ def fold(
         exists = exists | (eta > p.j) & (mu > 0) & (p.c > 0) & (_denominator(lowest, p.j, mu, eta) > 0)
     if not np.any(exists):
         return np.full(mu.shape, np.nan)
-    # Any valid numbers where there is no fold: the root there is thrown away.
+    # Valid numbers where there is no fold; the root there is discarded.
     safe_mu, safe_eta = np.where(exists, mu, 1.0), np.where(exists, eta, p.j / 2)
     places = roots.bisected(lambda s: slope(s, p, safe_mu, safe_eta), -END, END)
     return np.where(exists, places, np.nan)
@@ -193,7 +193,7 @@ def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128
         x = State(omega_c=omega_c + d_omega, slip_x=slip_x, slip_y=d_t * slip_z, slip_z=slip_z)
         force = dynamics.forces(Case.SS, x, p, fluid, (sine, cosine), (d_t, 1.0))
         _, _, orbit, f_x, f_y, f_z, _, _ = dynamics.newton_euler(Case.SS, x, force, p, fluid)
-        # At the solution itself all rates vanish, so that the frame may be held fixed.
+        # At the solution itself all rates vanish, so that the directions may be held fixed.
         rates = (orbit, sin * f_x + cos * f_z, (cos * f_x - sin * f_z) / q, f_y / (q * cos))
         columns.append(np.stack([np.imag(rate) / dynamics.STEP for rate in rates], axis=-1))
     return dynamics.eigenvalues(np.stack(columns, axis=-1))

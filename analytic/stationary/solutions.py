@@ -161,7 +161,7 @@ def _solution(
         values = dynamics.eigenvalues(dynamics.jacobian(case, x, p))
     stability = _stability(values, zeros, bool(family) or case is Case.NS)
     if p.drag == QUADRATIC and p.c > 0 and case not in (Case.SS, Case.NS):
-        # No lag, so no drag to first order. The eigenvalues that it leaves at zero go where any little drag sends them.
+        # No lag, so no drag to first order: any small linear drag decides the eigenvalues that are left at zero.
         damped = dynamics.eigenvalues(dynamics.jacobian(case, x, p.replace(drag=STOKES)))
         stability = _stability(damped, zeros, bool(family))
         stability = Stability.ALGEBRAIC if stability is Stability.ASYMPTOTIC else stability
@@ -261,8 +261,9 @@ def _wall_carries(p: Parameters) -> bool:
 def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
     """Eigenvalues (2,) in rad s-1 of f_SR at its stationary solution, and unit vectors (2, 2), one a row.
 
-    The first is that of leaning on the floor, which decays for omega_0 > omega_03 and grows below; the second that
-    of the orbit, the one closer to -c/(1+j). Vectors are over (omega_c, slip_x) and lead to A_y > 0. With s the sign
+    There A_y = 0, the border to NR (Proposition 3): the eigenvalues show on the side A_y > 0 only, where the ball leans
+    on the floor; on the other it lifts off. The first is that of leaning, which decays for omega_0 > omega_03 and grows
+    below; the second that of the orbit, the one closer to -c/(1+j). Vectors are over (omega_c, slip_x) and lead to A_y > 0. With s the sign
     of slip_x the sum of the two is -(c + mu s (g/(R omega_0) - (1+j) omega_0))/(1+j), their product
     -mu s c omega_0/(1+j), where c is that of a vanishing lag.
 
