@@ -263,9 +263,9 @@ def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArra
 
     There A_y = 0, the border to NR (Proposition 3): the eigenvalues show on the side A_y > 0 only, where the ball leans
     on the floor; on the other it lifts off. The first is that of leaning, which decays for omega_0 > omega_03 and grows
-    below; the second that of the orbit, the one closer to -c/(1+j). Vectors are over (omega_c, slip_x) and lead to A_y > 0. With s the sign
-    of slip_x the sum of the two is -(c + mu s (g/(R omega_0) - (1+j) omega_0))/(1+j), their product
-    -mu s c omega_0/(1+j), where c is that of a vanishing lag.
+    below; the second that of the orbit, the one closer to -c/(1+j). Vectors are over (omega_c, slip_x) and lead to
+    A_y > 0. With s the sign of slip_x the sum of the two is -(c + mu s (g/(R omega_0) - (1+j) omega_0))/(1+j), their
+    product -mu s c omega_0/(1+j), where c is that of a vanishing lag.
 
     Raises `InputError` if SR has no stationary solution that leans: for mu = 0, omega_0 = 0, and at omega_03, where
     slip_x = 0.
