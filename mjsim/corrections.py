@@ -21,7 +21,7 @@ Quantity = Any
 """A float, or an array with an entry for each run."""
 
 _SLIDES = 9.0
-"""A contact slides if its speed squared exceeds this times that of its change in a step; slip that ends changes faster."""
+"""A contact slides if its speed squared exceeds this times that of its change in a step; ending slip changes faster."""
 _FEW = 16.0
 """A hovering contact lands from the speed that its load gives it in so many steps; one that only hovers reaches 1.2."""
 

@@ -229,13 +229,9 @@ def _landings(changes: Changes) -> int:
     return sum(lands(before, after) for before, after in changes)
 
 
-def _reals(multipliers: npt.NDArray[np.complex128]) -> Array:
-    return np.real(multipliers[np.isreal(multipliers)])
-
-
 _TESTS: dict[Bifurcation, Callable[[npt.NDArray[np.complex128]], float]] = {
-    Bifurcation.FOLD: lambda m: -float(np.prod(1 - _reals(m))),
-    Bifurcation.DOUBLING: lambda m: -float(np.prod(1 + _reals(m))),
+    Bifurcation.FOLD: lambda m: -float(np.prod(1 - m[np.isreal(m)].real)),
+    Bifurcation.DOUBLING: lambda m: -float(np.prod(1 + m[np.isreal(m)].real)),
     Bifurcation.TORUS: lambda m: float(np.abs(m[np.imag(m) != 0]).max(initial=0.0)) - 1,
 }
 """Functions of the multipliers: positive if an odd number is real and beyond 1 (-1), or a pair outside the circle."""

@@ -242,7 +242,7 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     at, P, impact, case, work, landings, residual = ball.at, nothing, nothing, ball.case, ball.work, ball.landings, 0.0
     q, b = ball.P, ball.impact  # first guess: the impulses of the last step but those of landings
     start = Forces(q.A_x - b.A_x, q.A_y - b.A_y, q.A_z - b.A_z, q.B_x - b.B_x, q.B_y - b.B_y, q.B_z - b.B_z)
-    left, count = dt, 0
+    left, count, still = dt, 0, ZERO_SLIP * math.sqrt(p.g * p.R)
     while left > 0 and residual == 0:
         in_A, in_B = at.y <= 0 and at.u.v_y <= 0, at.h <= 0 and at.u.v_h <= 0
         speed = max(-at.u.v_y if in_A else 0.0, -at.u.v_h if in_B else 0.0)
@@ -266,7 +266,14 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
             after = _moved(at, left, s, in_A, in_B, p.R)
             at = At(after.theta, max(after.y, 0.0), max(after.h, 0.0), after.u)
         P, work, residual = _sum(P, s.P), work + s.work, _worse(s.residual, residual)
-        case, left, count = _case(in_A, in_B, s, p), left - time, count + 1
+        left, count = left - time, count + 1
+        # What the solution says of the contacts: open if it leaves with a velocity, rolling if nothing slides.
+        (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, OPEN, OPEN
+        if in_A and (s.P.A_y > 0 or v_y <= 0):
+            A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
+        if in_B and (s.P.B_x > 0 or v_h <= 0):
+            B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
+        case = 3 * A + B
     return Ball(at, P, impact, case, work, landings, residual)
 
 
@@ -274,17 +281,6 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
 def _worse(new: float, residual: float) -> float:
     """The larger one, or nan."""
     return new if new > residual or math.isnan(new) else residual
-
-
-@compiled
-def _case(in_A: bool, in_B: bool, s: Solved, p: Constants) -> int:
-    """What the solution says of the contacts: open if it leaves with a velocity, rolling if nothing slides."""
-    (v_h, v_y, v_k, o_x, o_y, o_z), still, A, B = s.new, ZERO_SLIP * math.sqrt(p.g * p.R), OPEN, OPEN
-    if in_A and (s.P.A_y > 0 or v_y <= 0):
-        A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
-    if in_B and (s.P.B_x > 0 or v_h <= 0):
-        B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
-    return 3 * A + B
 
 
 @compiled
