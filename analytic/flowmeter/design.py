@@ -19,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.bifurcation import diagram as bifurcation
-from analytic.bifurcation import fluid_inertia
 from analytic.bifurcation.diagram import Thresholds
 from analytic.flowmeter import characteristic as flowmeter
 from analytic.flowmeter.characteristic import OperatingLimit
@@ -244,7 +243,8 @@ class Design:
     sensitivities: dict[str, dict[str, Sensitivity]]
     curve: Curve
     with_inertia: float
-    """The worst limit, rad s-1, if the fluid had inertia, which the model leaves out: see `fluid_inertia`."""
+    """The worst limit, rad s-1, if the fluid had inertia, which the model leaves out: see
+    `bifurcation.thresholds_with_inertia`."""
 
     @property
     def choice(self) -> Choice:
@@ -268,7 +268,7 @@ def design(request: Request, seed: int = 0) -> Design:
     chosen = choices[material]
     meters = [chosen.p, *corners(request.make, chosen.values, request.tolerances)]
     at = {name: x for name, x in {**request.fluid, **chosen.values}.items() if name != "drag"}
-    with_inertia = map(fluid_inertia.thresholds, meters)
+    with_inertia = map(bifurcation.thresholds_with_inertia, meters)
     return Design(
         request=request,
         material=material,

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic.orbits.periodic import Changes, Loop, NoOrbitError, Orbit, close, closed, extent, jacobian, lands
+from analytic.orbits.periodic import Changes, Loop, NoOrbitError, Orbit, close, closed, defect_jacobian, extent, lands
 from model import InputError, Parameters, State
 from model.arrays import Array
 from model.parameters import check_names, check_number
@@ -117,7 +117,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
     along = np.append(np.zeros(len(start.loop.free)), sign)
     for _ in range(most):
         try:
-            matrix = jacobian(here.loop, here.derivative, name)
+            matrix = defect_jacobian(here.loop, here.derivative, name)
         except NoOrbitError as error:
             yield Place(Bifurcation.LOST, getattr(here.p, name), here, str(error))
             return

@@ -14,7 +14,7 @@ from rich.table import Table
 
 import analytic
 from analytic import StationarySolution
-from analytic.bifurcation import fluid_inertia
+from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import drag
 from compare.commands import options
 from compare.kit.pages import readable
@@ -72,7 +72,7 @@ def described(p: Parameters) -> dict[str, Any]:
         "operating_range_ends": {"by": limit.end.name, "because": limit.end.value},
         "reading_range": analytic.reading_range(p),
         "reading": reading(p),
-        "fluid_inertia": fluid_inertia.shifts(p) if p.density_ratio else None,
+        "fluid_inertia": bifurcation.inertia_shifts(p) if p.density_ratio else None,
         "solutions": solutions,
     }
 
@@ -129,7 +129,7 @@ def tables(p: Parameters) -> list[Table | str]:
         shifts = ", ".join(
             f"{QUANTITIES[name].symbol if name in QUANTITIES else 'the rate at which rolling follows the flow'} "
             f"by {100 * shift:+.2g} %"
-            for name, shift in fluid_inertia.shifts(p).items()
+            for name, shift in bifurcation.inertia_shifts(p).items()
             if math.isfinite(shift)
         )
         remarks.append(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analytic.bifurcation import fluid_inertia
+from analytic.bifurcation import diagram as bifurcation
 from model import Parameters
 
 BALL = Parameters.named("steel-in-water")
@@ -33,7 +33,7 @@ def rolls(p: Parameters, omega: float) -> bool:
 @pytest.mark.parametrize(("mu", "eta"), [(0.2, 0.2), (0.05, 0.3), (0.5, 0.1)])
 def test_rolling_ends_where_no_forces_hold_it(s, mu, eta):
     p = BALL.replace(mu=mu, eta=eta, density_ratio=s)
-    omega_01 = fluid_inertia.thresholds(p)["omega_01"]
+    omega_01 = bifurcation.thresholds_with_inertia(p)["omega_01"]
     # B_y is tried in 2e5 parts of m g: relative changes of omega_01 that matter are far above their size.
     assert rolls(p, omega_01 * (1 - 1e-4))
     assert not rolls(p, omega_01 * (1 + 1e-4))
@@ -42,7 +42,7 @@ def test_rolling_ends_where_no_forces_hold_it(s, mu, eta):
 @pytest.mark.parametrize("s", RATIOS)
 def test_the_wall_carries_the_ball(s):
     p = BALL.replace(density_ratio=s)
-    changed = fluid_inertia.thresholds(p)
+    changed = bifurcation.thresholds_with_inertia(p)
     weight = p.m * p.g
     load = (1 + s / 2) * p.m * p.R * changed["omega_02"] ** 2 - 1.5 * s * p.m * p.R * changed["omega_02"] ** 2
     assert p.eta * load == pytest.approx(weight, rel=1e-12)
@@ -50,10 +50,12 @@ def test_the_wall_carries_the_ball(s):
 
 def test_shifts():
     p = BALL.replace(density_ratio=0.4)
-    by = fluid_inertia.shifts(p)
+    by = bifurcation.inertia_shifts(p)
     assert by["omega_02"] == pytest.approx(1 / math.sqrt(0.6) - 1, rel=1e-12)
     assert by["rolling_rate"] == pytest.approx(1.8 / 2.0 - 1, rel=1e-12)
-    assert all(shift == 0.0 for shift in fluid_inertia.shifts(p.replace(density_ratio=0.0)).values())
-    assert math.isnan(fluid_inertia.shifts(p.replace(eta=0.5))["omega_01"])  # there is none without it
-    assert math.isfinite(fluid_inertia.thresholds(p.replace(eta=0.5))["omega_01"])  # but eta < j/(1 - s) is enough
-    assert "omega_01" not in fluid_inertia.shifts(p.replace(mu=0.0))
+    assert all(shift == 0.0 for shift in bifurcation.inertia_shifts(p.replace(density_ratio=0.0)).values())
+    assert math.isnan(bifurcation.inertia_shifts(p.replace(eta=0.5))["omega_01"])  # there is none without it
+    assert math.isfinite(
+        bifurcation.thresholds_with_inertia(p.replace(eta=0.5))["omega_01"]
+    )  # but eta < j/(1 - s) is enough
+    assert "omega_01" not in bifurcation.inertia_shifts(p.replace(mu=0.0))
