@@ -15,13 +15,12 @@ from analytic.flowmeter.characteristic import (
 )
 from analytic.mechanics.dynamics import contact_forces, vector_field
 from analytic.simulation.ensemble import Ensemble, simulate_many
-from analytic.simulation.settings import Settings
-from analytic.simulation.simulator import simulate
+from analytic.simulation.simulator import Settings, simulate
 from analytic.slipping.slip_stability import SlipStability
-from analytic.stationary.leaning import leaning_modes
 from analytic.stationary.solutions import (
     Stability,
     StationarySolution,
+    leaning_modes,
     slowest_time_constant,
     solution,
     stable_solutions,

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
-from analytic.stationary import branch_stability, slipping_branch
+from analytic.stationary import slipping_branch
 from compare.kit import style
 from compare.kit.style import UNSTABLE, Place
 from model import Case, Parameters, State
@@ -36,8 +36,8 @@ def slipping(
 ) -> None:
     """The branch of SS, its line by its eigenvalues; a name at each part that has a place for it."""
     s = np.linspace(-16.0, 16.0, 1601)
-    x, omega_0 = branch_stability.states(s, p)
-    grows = branch_stability.eigenvalues_at(s, p).real.max(axis=-1) > 0
+    x, omega_0 = slipping_branch.states(s, p)
+    grows = slipping_branch.eigenvalues_at(s, p).real.max(axis=-1) > 0
     values = quantity(State.of(x).slip_x, State.of(x).omega_c)
     for part, line, text, place in ((~grows, "-", "SS", stable), (grows, UNSTABLE, "SS, unstable", unstable)):
         if part.any():
@@ -51,4 +51,4 @@ def lifted(omega_0: float, p: Parameters) -> float:
 
 def fold_state(p: Parameters, released: bool = False) -> State:
     """The state of SS at the fold."""
-    return State.of(branch_stability.states(slipping_branch.fold(p, released=released), p)[0])
+    return State.of(slipping_branch.states(slipping_branch.fold(p, released=released), p)[0])

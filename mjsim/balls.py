@@ -31,7 +31,7 @@ _GAIN, _FALL, _MEMORY, _LAG, _HOVER = (
 
 _OUTPUTS = "qfrc_constraint", "sensordata"
 _CONTINUOUS = 0.02
-"""Hover number of contacts in short steps: they open with as much less than the weight."""
+"""Hover number of contacts in short steps: they open below this share of the weight."""
 _LEAST = 1e-9
 """Stands in for zero where a quotient would be infinite."""
 _NONE = np.empty(0, dtype=np.intp)
@@ -117,7 +117,7 @@ class Balls:
         return _rows(self._contact[1])
 
     def drive_all(self, fluid: Array) -> bool:
-        """Set what drives a step of all runs, unless something happens in it that has to be looked at: then False."""
+        """Set what drives a step of all runs; do nothing and return False if a ball lands or reaches the axis."""
         if self._compiled:
             if not self._compiled(False, True, fluid, self.table, self.qvel, *self._contact, *self._written):
                 return False
@@ -131,7 +131,7 @@ class Balls:
     def drive(self, fluid: Array, moving: Runs, watched: bool = True) -> bool:
         """Let the margins of the `moving` runs follow the gaps and set what drives the next step.
 
-        Do nothing and return False if something happens in the step that has to be looked at and is not `watched`.
+        Do nothing and return False if a ball lands in the step or reaches the axis, unless that is `watched`.
         """
         table = self._still
         table[:] = self.table
@@ -186,8 +186,8 @@ class Balls:
     def resize(self, runs: Runs, ticks: npt.NDArray[np.int_]) -> None:
         """Give runs steps of another length, (k,).
 
-        Positions are taken to where they belong with the acceleration of the last step. What is left of the softness of
-        a closed contact goes with the step: stiffness with its inverse square, so that forces stay what they are.
+        Positions are moved to their new lead over the velocities with the acceleration of the last step. The remaining
+        softness of a closed contact is scaled: stiffness with the inverse square of the step, which keeps the forces.
         """
         if len(runs) == 0:
             return

@@ -1,7 +1,7 @@
 """Which kinematic case is it? Detected from slip speed and force over several samples, with hysteresis.
 
 A contact is open where it carries no force. A closed one slips where it uses the whole of the friction and moves faster
-than a dead band; it rolls where either is clearly not so; in between it is what it was. A state counts only if it
+than a dead band; it rolls where either is clearly not so; in between it keeps its state. A state counts only if it
 lasts for `PERSISTENCE` samples: single samples of a contact that hovers or rebounds change nothing.
 """
 
@@ -44,9 +44,9 @@ class Classifier:
         self._p, self._settings = p, settings
         self._samples = np.empty(0, SAMPLE)
         self._waiting = np.empty((2, 0), dtype=np.intp)
-        """Samples that wait, and how A and B look in each of them by itself."""
+        """Samples that wait, and the state of A and B in each of them judged alone."""
         self._shown, self._states = np.array([_R, _R]), np.array([_UNKNOWN, _UNKNOWN])
-        """How they look in the newest sample, and what they are in the newest one that is decided."""
+        """Their state in the newest sample judged alone, and in the newest one that is decided."""
         self._changes: list[tuple[float, int, int]] = []
 
     def add(self, block: npt.NDArray[np.void], last: bool) -> npt.NDArray[np.void]:
@@ -69,7 +69,7 @@ class Classifier:
         return samples[:count]
 
     def _shown_by(self, block: npt.NDArray[np.void]) -> npt.NDArray[np.intp]:
-        """How A and B look in samples by themselves, (2, n); between the bands as in the sample before."""
+        """State of A and B in samples judged alone, (2, n); between the bands that of the sample before."""
         A, B = block["force_A"], block["force_B"]
         normal = np.stack([A[:, 1], B[:, 0]])
         friction = np.stack([np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])])
@@ -108,10 +108,10 @@ class Classifier:
 
 
 def _lasting(contacts: npt.NDArray[np.intp], state: int, last: bool) -> npt.NDArray[np.intp]:
-    """What a contact is in each sample: what doesn't last is replaced by what was before.
+    """State of a contact in each sample; one that doesn't last is replaced by the state before.
 
-    In an unknown state, by what comes first. All samples if they are the `last`, else up to where more may change the
-    answer.
+    An unknown state is replaced by the first one. All samples are decided if they are the `last`, else those that later
+    samples can't change.
     """
     if len(contacts) == 0:
         return contacts

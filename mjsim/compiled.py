@@ -1,6 +1,6 @@
 """The corrections compiled with numba, which the extra `fast` installs: the same source, run by run.
 
-What is done to a ball stands in `mjsim.corrections`; this is only the loop over the runs round it.
+The corrections are in `mjsim.corrections`; this is the loop over the runs.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def _named_after_source(function: Callable[..., Any]) -> Callable[..., Any]:
     """A function whose name contains the digest of `mjsim.corrections`.
 
     Numba keeps what it compiles on disk by name, and compiles it again when the function's own file has changed, but
-    not when that of a function has which it calls.
+    not when the file of a function that it calls has.
     """
     digest = hashlib.sha256(Path(source.__file__).read_bytes()).hexdigest()
     function.__qualname__ += f"_{digest[:16]}"

@@ -50,9 +50,9 @@ _CHOICES = {
     "wall": ("tangent", "prism"),
 }
 _LEFT, _STURDY = 0.95, (3.0, 0.75)
-"""Most that contacts may leave by `contact_decay`; the fastest that are stable for all mu, eta up to 1, in steps."""
+"""Largest `contact_decay` allowed; and `solref` with its time in steps, the fastest that is stable for mu, eta <= 1."""
 _FALL = 0.01
-"""Way in a step from which on it is an impact, in units of the gap that counts as touching."""
+"""Distance fallen in a step from which a contact is an impact, in units of the gap that counts as touching."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,7 +226,7 @@ class ContactSettings:
         return self.memory or self.friction_lag != 0
 
     def contact_decay(self, mu: float, eta: float) -> float:
-        """What is left, at worst, of a small displacement after a step, where a ball slips at both contacts.
+        """Largest factor by which a small displacement changes in a step, where a ball slips at both contacts.
 
         With a low impedance the accelerations are those of springs and dampers, -K (2/tc v + 1/(tc dr)^2 gap), and
         friction turns them against each other: K = [[1, eta], [-mu, 1]], with the eigenvalues 1 +- i sqrt(mu eta).
@@ -243,7 +243,7 @@ class ContactSettings:
     def slowest_fall(self, g: float) -> float:
         """Speed (m s-1) from which on a ball comes down with an impact; below, the contacts stop it softly.
 
-        It takes it a hundredth of the gap that counts as touching in a step. Without servo there are no impacts.
+        In a step it falls by a hundredth of the gap that counts as touching. Without servo there are no impacts.
         """
         return _FALL * self.touching(g) / self.timestep if self.servo else math.inf
 
@@ -279,12 +279,12 @@ class ContactSettings:
     def for_problem(
         cls, p: Parameters, timestep: float = 1e-3, max_slip_speed: float | None = None, **changes: Any
     ) -> Self:
-        """Settings whose sliding contact is continuous with something to spare.
+        """Settings whose sliding contact is continuous, with a reserve.
 
         `max_slip_speed` (m s-1) is the fastest slip to expect under the load of gravity; by default that of the fluid,
         R omega_0. The impedance is lowered, where need be, until the hover number is at most 1/20 (a contact about
         to lift off carries little, and shall lift off on its own), and impratio is raised with the softness, so that
-        friction keeps its own. The engine's least impedance, 1e-4, may stop that short.
+        that of the friction rows stays the same. The engine's least impedance, 1e-4, may stop that short.
         """
         settings = cls.at(timestep, **changes)
         if "solref" not in changes:

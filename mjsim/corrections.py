@@ -21,9 +21,9 @@ Quantity = Any
 """A float, or an array with an entry for each run."""
 
 _SLIDES = 9.0
-"""A contact slides if its speed squared is over this times that of its change in a step; slip that ends dies faster."""
+"""A contact slides if its speed squared exceeds this times that of its change in a step; ending slip changes faster."""
 _FEW = 16.0
-"""Steps in which its load makes the speed from which a hovering contact lands; merely hovering, it closes at 1.2."""
+"""A hovering contact lands from the speed that its load gives it in so many steps; one that only hovers reaches 1.2."""
 
 
 class Ball(NamedTuple):
@@ -129,14 +129,14 @@ def corrections(
         v.o_x - last.o_x, v.o_y - last.o_y, v.o_z - last.o_z,
     )  # fmt: skip
 
-    # Drag (9) at mid step: -m c (v - v_fluid). Of the last step's change as much again lies `ahead` till then.
+    # Drag (9) at mid step: -m c (v - v_fluid). Mid-step values are extrapolated from the last step's change.
     lag, w_h, w_y = v.omega_c + ahead * change.omega_c - omega_0, v.v_h + ahead * change.v_h, v.v_y + ahead * change.v_y
     mc = resistance(rho * lag, w_h, w_y, ball)
     drag_z, drag_h, drag_y = -mc * rho * lag, -mc * w_h, -mc * w_y
 
     # Inertial forces at mid step. In the co-rotating frame they are 2 m omega_c v_h along the orbit and
     # -m rho omega_c^2 inwards, and I omega_c (-o_z, 0, o_x) on the spin. The engine has them with the velocities of the
-    # beginning of the step; what they grow by till its middle is added: as much again as in the last step lies `ahead`.
+    # beginning of the step; their change up to its middle, extrapolated from the last step, is added.
     omega_c = v.omega_c + ahead * change.omega_c
     v_h = v.v_h + ahead * change.v_h
     o_x = v.o_x + ahead * change.o_x
@@ -147,8 +147,8 @@ def corrections(
     moment_z = ball.inertia * (omega_c * o_x - v.omega_c * v.o_x)
 
     # Direction of sliding friction at mid step. The engine opposes friction to the slip that there would be 1/b_f after
-    # the beginning of the step. A surface that moves by what slip changes from the middle till then takes the
-    # difference out; only where a contact truly slides, since a slip that ends must end.
+    # the beginning of the step. A surface velocity equal to the change of slip between the middle and then removes the
+    # difference; only where a contact clearly slides, since a slip that ends must be able to.
     v_Ax, v_Az, v_By, v_Bz = slip(v, rho, ball.r)
     A_x, A_z, B_y, B_z = slip(change, rho, ball.r)
     lag_A = ball.lag_A * (_SLIDES * (A_x * A_x + A_z * A_z) < v_Ax * v_Ax + v_Az * v_Az)

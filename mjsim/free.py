@@ -1,8 +1,8 @@
 """The ball on a free joint, for comparison with the joint chain.
 
 A free ball takes the curve of the wall from the engine: the more independent witness and the less accurate one, since
-MuJoCo leaves the turning of the contact frame out of what drives the contact (J' v). It may cross the axis. Of what is
-done between the steps only drag, the turning of the wall and the servo of the margins apply to it.
+MuJoCo leaves the turning of the contact frame out of what drives the contact (J' v). It may cross the axis. Of the
+corrections between the steps only drag, the turning of the wall and the servo of the margins apply to it.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from model.arrays import Array
 _LANDINGS = 20
 """Most rounds in which a step is halved or a landing is dealt with."""
 _JUDGED = 8
-"""Short steps after which they are judged."""
+"""Short steps after which their length is adapted."""
 _CHANGE = 0.25
 """Most that accelerations may change in a divided step, in units of what gravity and the wall's friction do in a whole
 step as the ball goes round. Four times less brings motions through landings no more than a fifth closer to those of a
@@ -93,7 +93,7 @@ class Polar(Stepper):
             self._steps, row = self._steps + 1, None
 
     def _divided(self, fluid: Array, row: Array | None) -> None:
-        """Take a step in which something happens to some run; the others take it in one."""
+        """Take a step in which some ball lands or reaches the axis; the others take it in one."""
         balls = self._balls
         left, taken = np.full(len(balls.ticks), TICKS), np.zeros(len(balls.ticks), dtype=int)
         before = self._rates(slice(None))

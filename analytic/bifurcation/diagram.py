@@ -178,3 +178,32 @@ def case_map(p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.
 def wall_spin(state: State, p: Parameters) -> Real:
     """omega_x^0 = slip_x + omega_c R/r of (91), rad s-1: the spin on the wall, ordinate of Figs. 9-12."""
     return state.slip_x + p.R / p.r * state.omega_c
+
+
+SHIFTED = ("omega_01", "omega_02")
+"""Thresholds that the fluid's inertia shifts: at omega_03 the spin alone carries the weight, and the fold of SS has no
+closed form any more."""
+
+
+def thresholds_with_inertia(p: Parameters) -> dict[str, float]:
+    """`SHIFTED` with the added mass and the pressure gradient of the swirl, rad s-1, nan for what doesn't exist.
+
+    The paper leaves both out, and so do the simulators. A ball that goes round with the fluid needs a centripetal force
+    of its own mass less that of the fluid it displaces, while its spin is turned as before: (1 - s) m takes the place
+    of m, j/(1 - s) that of j and g/(1 - s) that of g, with s the density ratio. docs/theory.md derives it, and says why
+    it is an estimate beside the model and no part of it.
+    """
+    rest = 1 - p.density_ratio
+    curves = curves_without_drag(p.j / rest, p.mu, p.eta)
+    return {name: float(curves[name] * np.sqrt(p.g / rest / p.R)) for name in SHIFTED}
+
+
+def inertia_shifts(p: Parameters) -> dict[str, float]:
+    """Relative changes of the thresholds by the fluid's inertia, nan for what doesn't exist.
+
+    And of c/(1 + 2j), the rate of RR in (23), which added mass makes c/(1 + 2j + s/2) whatever the law of drag.
+    """
+    before, after = thresholds(p), thresholds_with_inertia(p)
+    changes = {name: after[name] / getattr(before, name) - 1 for name in SHIFTED if getattr(before, name) != 0}
+    rolling = 1 + 2 * p.j
+    return changes | {"rolling_rate": rolling / (rolling + p.density_ratio / 2) - 1}

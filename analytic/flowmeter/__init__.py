@@ -1,0 +1,1 @@
+"""The ball as a flowmeter: characteristic curve and range, response to unsteady flow, design."""

@@ -1,4 +1,4 @@
-"""Design of a flowmeter: how its limits depend on what it is made of, its reading with tolerances, the best choice.
+"""Design of a flowmeter: sensitivity of its limits to its data, its reading with tolerances, the best choice.
 
 Everything rests on `thresholds`, `operating_range` and the branch of SS, whatever the law of drag. A meter is given as
 a function `make` that takes values by name and returns `Parameters`: `p.replace`, or `Parameters.from_fluid` with
@@ -19,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.bifurcation import diagram as bifurcation
-from analytic.bifurcation import fluid_inertia
 from analytic.bifurcation.diagram import Thresholds
 from analytic.flowmeter import characteristic as flowmeter
 from analytic.flowmeter.characteristic import OperatingLimit
@@ -39,7 +38,7 @@ THRESHOLDS = ("omega_01", "omega_02", "omega_03", "omega_04")
 _LOG_STEP = 1e-3
 """Of the differences, in the logarithm of a value."""
 _TIE = 1e-3
-"""What the logarithm of the response time counts beside the margin: it decides where the margin doesn't."""
+"""Weight of the logarithm of the response time relative to the margin: it decides between equal margins."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
 def response_time(p: Parameters) -> float:
     """Time constant (1 + 2j)/c in s with which a rolling ball follows a small change of the flow (docs/theory.md, 9).
 
-    inf for the quadratic law: such drag vanishes faster than the difference that it is to remove.
+    inf for the quadratic law, whose drag has no part linear in the lag.
     """
     return math.inf if p.drag == drag.QUADRATIC or p.c == 0 else (1 + 2 * p.j) / p.c
 
@@ -139,7 +138,7 @@ class Choice:
 
 
 def choice(make: Make, values: Mapping[str, float], tolerances: Mapping[str, float], fastest: float) -> Choice:
-    """What is to be said of a meter that shall measure flows up to `fastest`, rad s-1."""
+    """Limits, margin and response of a meter for flows up to `fastest`, rad s-1."""
     p = make(**values)
     limit = flowmeter.operating_limit(p)
     others = (flowmeter.operating_limit(q) for q in corners(make, values, tolerances))
@@ -159,7 +158,7 @@ def best(
 
     Among all that answer within `slowest_response`, s, the one with the largest margin at the worst corner of the
     tolerances; among equals the quickest. Differential evolution (scipy), as the margin has a ridge at eta = j; the
-    seed settles the result.
+    seed determines the result.
 
     Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one can.
     """
@@ -244,7 +243,8 @@ class Design:
     sensitivities: dict[str, dict[str, Sensitivity]]
     curve: Curve
     with_inertia: float
-    """The worst limit, rad s-1, if the fluid had inertia, which the model leaves out: see `fluid_inertia`."""
+    """The worst limit, rad s-1, if the fluid had inertia, which the model leaves out: see
+    `bifurcation.thresholds_with_inertia`."""
 
     @property
     def choice(self) -> Choice:
@@ -268,7 +268,7 @@ def design(request: Request, seed: int = 0) -> Design:
     chosen = choices[material]
     meters = [chosen.p, *corners(request.make, chosen.values, request.tolerances)]
     at = {name: x for name, x in {**request.fluid, **chosen.values}.items() if name != "drag"}
-    with_inertia = map(fluid_inertia.thresholds, meters)
+    with_inertia = map(bifurcation.thresholds_with_inertia, meters)
     return Design(
         request=request,
         material=material,

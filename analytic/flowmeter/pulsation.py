@@ -16,8 +16,7 @@ from scipy.optimize import brentq
 
 from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import drag
-from analytic.simulation.settings import Settings
-from analytic.simulation.simulator import simulate
+from analytic.simulation.simulator import Settings, simulate
 from analytic.simulation.two_point_rolling import MARGINS
 from analytic.slipping import slip_bounds
 from model import Case, Flow, Parameters, SimulationError, State
@@ -26,14 +25,14 @@ from model.drag import STOKES
 from model.kinematics import TURNING
 
 PHASES, CLOSER = 360, 32
-"""Phases of a period at which slip is looked for, and twice more in the two cells around the least margin."""
+"""Phases of a period at which slip is looked for; and in each of two refinements around the least margin."""
 HARMONICS, FINE = 32, 128
-"""Of the lag: odd ones, as a sine and every law of drag are; those left out are some 10^-6 of it, and 10^-7."""
+"""Odd harmonics of the lag that are computed (drag is an odd function); those left out are some 1e-6 of it, or 1e-7."""
 LAG_STEPS, SOLVED = 50, 1e-9
 """Most steps of Newton's method for it, and the largest residual, divided by the flow's acceleration."""
 ROUNDS, DEPTH, SETTLED, PERIODIC_RTOL = 100, 2, 1e-6, 1e-6
-"""Most periods that `mean_error` simulates; how many differences point to the next; by how much the last may change the
-motion, divided by the flow; and the integrator's rtol. The mean is then known to some 1e-6 of the flow."""
+"""Of `mean_error`: most periods simulated, depth of Anderson's extrapolation, tolerance of the change in a period
+relative to the flow, and the integrator's rtol. The mean is then known to some 1e-6 of the flow."""
 
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
@@ -86,8 +85,8 @@ def _collocation(harmonics: int) -> tuple[Array, npt.NDArray[np.complex128], Arr
 def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stability") -> float:
     """The least amplitude in rad s-1 at which slip begins at some phase of the pulsation, frequency > 0 in Hz.
 
-    By the margin of `Settings.leave_rolling` along `swing`. On rough floors and at high frequencies RR is "infeasible"
-    at a larger amplitude only. 0 where the mean flow alone ends RR, inf without drag.
+    By the margin of `Settings.leave_rolling` along `swing`; on rough floors and at high frequencies "infeasible" gives
+    a larger amplitude. 0 where the mean flow alone ends RR, inf without drag.
     """
     margin = MARGINS[leave_rolling]
     if p.c == 0:
@@ -147,9 +146,9 @@ def mean_error(
 ) -> float:
     """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic; frequency in Hz.
 
-    0 if the ball rolls on; else from the event-driven simulation, by the azimuth that the ball runs through. Each
-    period starts from where the last few point to (Anderson's method), until the motion repeats itself to `settled`
-    times the flow. `rtol` and `leave_rolling` as in `Settings`. Raises `SimulationError` if it never does.
+    0 if the ball rolls on; else from the gain of azimuth in the event-driven simulation. Each period starts from an
+    extrapolation of the last few (Anderson's method), until the motion repeats itself to `settled` times the flow.
+    `rtol` and `leave_rolling` as in `Settings`. Raises `SimulationError` if it never does.
     """
     settings = Settings(rtol=rtol, leave_rolling=leave_rolling)
     flow = Flow.sine(p.omega_0, amplitude, frequency)

@@ -1,8 +1,8 @@
 """How the reading follows a flow that changes: linear response of the stationary motions, and ramps past the fold.
 
-About a stationary motion x' = J x + b (omega_0 - p.omega_0), with J of `jacobian` and b the derivative of the vector
-field by omega_0. In RR this is (23) itself, exact for any amplitude: a first-order lag of rate c/(1+2j). docs/theory.md
-derives all of it. Frequencies are in Hz.
+About a stationary motion x' = J x + b (omega_0 - p.omega_0), with J of `dynamics.jacobian` and b the derivative of the
+vector field by omega_0. In RR this is (23) itself, exact for any amplitude: a first-order lag of rate c/(1+2j).
+docs/theory.md derives all of it. Frequencies are in Hz.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from analytic.mechanics import dynamics, jacobian
-from analytic.stationary import branch_stability, slipping_branch
+from analytic.mechanics import dynamics
+from analytic.stationary import slipping_branch
 from analytic.stationary import solutions as stationary
 from model import Case, InputError, Parameters, State
 from model.arrays import Array
@@ -55,7 +55,7 @@ def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
 
 
 def peak(p: Parameters, case: Case) -> tuple[float, float]:
-    """Time in s and height of the top of the `step_response`, divided by its end value; inf, 1 if it creeps."""
+    """Time in s and height of the top of the `step_response`, relative to its end value; inf, 1 without overshoot."""
     slowest = 1 / np.abs(np.linalg.eigvals(_linear(p, case)[0]).real).min()
     t = np.linspace(0.0, 8 * slowest, _GRID)
     y = step_response(p, case, t) / np.real(transfer(p, case, 0.0))
@@ -74,7 +74,7 @@ def ramp_coefficient(p: Parameters) -> float:
     if np.isnan(s):
         raise InputError(f"there is no fold at eta = {p.eta:g}: the branch of SS doesn't turn back")
     places = s + _BRANCH_STEP * np.array([-1.0, 0.0, 1.0])
-    flows, values = branch_stability.states(places, p)[1], branch_stability.eigenvalues_at(places, p)
+    flows, values = slipping_branch.states(places, p)[1], slipping_branch.eigenvalues_at(places, p)
     slow = np.take_along_axis(values, np.abs(values).argmin(axis=-1)[:, None], axis=-1)[:, 0].real
     slope, curvature = (slow[2] - slow[0]) / (2 * _BRANCH_STEP), (flows[0] - 2 * flows[1] + flows[2]) / _BRANCH_STEP**2
     return float(AIRY_ZERO * (-(slope**2) / (2 * curvature)) ** (-1 / 3))
@@ -84,6 +84,6 @@ def _linear(p: Parameters, case: Case) -> tuple[Array, Array, int]:
     """J (d, d) and b (d,) of the stable motion of a case, and the row of omega_c."""
     x = stationary.solution(p, case).x
     active = TRAITS[case].active
-    rates = dynamics.rates(case, State(*x), p, p.omega_0 + 1j * jacobian.STEP)
-    b = np.array([np.imag(getattr(rates, name)) for name in active]) / jacobian.STEP
-    return jacobian.jacobian(case, x, p), b, active.index("omega_c")
+    rates = dynamics.rates(case, State(*x), p, p.omega_0 + 1j * dynamics.STEP)
+    b = np.array([np.imag(getattr(rates, name)) for name in active]) / dynamics.STEP
+    return dynamics.jacobian(case, x, p), b, active.index("omega_c")

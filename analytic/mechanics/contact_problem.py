@@ -19,11 +19,11 @@ A sweep computes A from B and B from that (projected Gauss-Seidel); what is soug
 reproduces. Newton's method on the change of a sweep settles most problems in one or two steps. While the ball rolls at
 both points B is undetermined along one direction, and a little damping keeps it from drifting there. Where a contact
 begins to stick, slide or open, Newton's method may end in another solution than sweeps do: then, and where sweeps may
-lead away from a solution (mu eta > 1), plain sweeps are taken. Where these approach slowly or swing, B = f(B) is taken
+lead away from a solution (mu eta > 1), plain sweeps are taken. If these are slow or oscillate, B = f(B) is taken
 for the equilibrium of dB/dt = f(B) - B (pseudo-transient continuation, Kelley & Keyes, SIAM J. Numer. Anal. 35 (1998)
 508). Its linearly implicit Euler steps, (1/span + 1 - f') dB = f(B) - B, are damped sweeps for small spans and those of
-the generalised Newton method for large ones: a success lengthens the span, a setback shortens it and makes it grow more
-carefully from then on. Where that fails, it starts again from zero and from damped sweeps.
+the generalised Newton method for large ones: a success lengthens the span, a setback shortens it and reduces its growth
+from then on. Where that fails, it starts again from zero and from damped sweeps.
 
 A solution exists where mu < 1 or eta < 1 (Acary, Cadoux, Lemarechal & Malick, ZAMM 91 (2011) 155: the ball can move so
 that v_n - target > friction * |v_t| at both contacts). Where both are greater, floor and wall can lock the ball in the
@@ -52,15 +52,13 @@ ATTEMPT = 100
 DAMPED = 0.5
 """Share of a sweep that is taken in all attempts but the first, before the continuation."""
 WARY, BOLD = 1.0, 1.3
-"""Factor by which the change may rise from one sweep to the next before it counts as a setback, the two in turns from
-attempt to attempt. Wary where the sweeps swing; bold where impulses that hardly move the ball have to pile up in the
-corner until one of them finds the limit of friction."""
+"""Factor by which the change may rise from one sweep to the next before it counts as a setback, in even and in odd
+attempts: the first suits sweeps that oscillate, the second impulses that build up in the corner until one of them
+reaches the limit of friction."""
 SPAN, GROWTH, LONGEST_SPAN = 1.0, 8.0, 1e8
-"""Length of the first step of the continuation, in sweeps; by which factor steps grow; and the longest, by when a step
-is one of Newton's."""
+"""First step of the continuation, in sweeps; factor by which steps grow; and the longest, which is one of Newton's."""
 SHORTER, CALMER, LEAST_GROWTH = 20.0, 0.7, 1.1
-"""A setback divides the length by the first; the growth is raised to the power of the second, and stays above the
-third."""
+"""A setback divides the length by the first and raises the growth to the power of the second, down to the third."""
 MAX_SWEEPS = 1000
 
 
@@ -185,7 +183,7 @@ def _project_rate(held: Impulse, friction: Friction, by: Impulse) -> Impulse:
 
 
 def _less(a: Impulse, other: Impulse, k: float) -> Impulse:
-    """a - C other: what a contact needs when the other one gives that."""
+    """a - C other: what a contact needs, given the impulse of the other."""
     return Impulse(a.n - other.s, a.s - (1 - k) * other.n + k * other.s, a.t - (1 - k) * other.t)
 
 
@@ -219,7 +217,7 @@ def _continued(
 
 
 def _sense(need: Impulse, given: Impulse) -> int:
-    """0 if a contact that needs an impulse and is given another is open, 1 if it sticks, 2 if it slides."""
+    """State of a contact from the impulse it needs and the one it gets: 0 open, 1 sticking, 2 sliding."""
     if given.n == 0:
         return 0
     return 1 if given.s == need.s and given.t == need.t else 2

@@ -1,16 +1,16 @@
-"""The drag -m c(|w|) w of each law of `model.drag` as a function of the speed |w| relative to the fluid.
+"""The drag -m c(|w|) w of each law of `model.drag`, |w| the speed relative to the fluid, and fall under it alone.
 
 With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^0.687, blunt |w|): Stokes' has the first
-term alone, the quadratic one the last. So c never falls as |w| grows, and a drag force belongs to one speed.
+term alone, the quadratic one the last. So c never decreases with |w|, and a drag force determines the speed.
 
-All take floats or arrays, and complex ones for derivatives by complex steps. `analytic.simulation.stepping` compiles
+The laws take floats or arrays, and complex ones for derivatives by complex steps. `simulation.stepping` compiles
 `rate`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +22,9 @@ from model.drag import QUADRATIC, REYNOLDS, SCHILLER_NAUMANN, STOKES
 EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
 """Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
 SPEED_STEPS = 8
-"""Steps to the last digit from a speed less than twice too high: 6, and 2 to spare for the corner of `Law`."""
+"""Steps of Newton's method from less than twice the root to round-off: 6, and 2 more for the corner of `Law`."""
 POWERS = (1.0, 1.0 + EXPONENT, 2.0)
-"""How the force of each term of `Law` grows with the speed."""
+"""Exponents of the speed in the force of each term of `Law`."""
 
 
 class Law(NamedTuple):
@@ -104,6 +104,58 @@ def reynolds_of(x: State, p: Parameters) -> float:
 
 
 def covers(Re: float, law: str) -> bool:
-    """Whether a law is meant for a Reynolds number; no law has anything to say where the ball goes with the fluid."""
+    """Whether a Reynolds number is within the range of a law; 0, at which there is no drag, always is."""
     low, high = REYNOLDS[law]
     return Re == 0 or low <= Re <= high
+
+
+def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity: float) -> float:
+    """Terminal speed v in m/s of a sphere in a fluid at rest: weight less buoyancy is 6 pi rho_f nu_f r v.
+
+    nu_f : kinematic viscosity of the fluid, m2 s-1; rho_f, rho_b : densities of fluid and sphere, kg m-3;
+    r : radius, m; gravity : m s-2, in vacuum
+    """
+    heavier = 4 / 3 * math.pi * r**3 * (rho_b - rho_f) * gravity
+    return heavier / (6 * math.pi * rho_f * nu_f * r)
+
+
+def fall(t: Any, y: float, v_y: float, p: Parameters) -> tuple[Any, Any]:
+    """Height (m) and vertical velocity (m s-1) after a time t (s, float or array) of flight with Stokes' drag."""
+    return y + v_y * _decay(t, p.c) - p.g * t**2 * ramp_lag(p.c * t), fall_speed(t, v_y, p)
+
+
+def fall_speed(t: Any, v_y: float, p: Parameters) -> Any:
+    """The vertical velocity of `fall` alone."""
+    return v_y - (p.c * v_y + p.g) * _decay(t, p.c)
+
+
+def _decay(t: Any, c: float) -> Any:
+    """(1 - exp(-c t))/c."""
+    if c == 0:
+        return t
+    return -(math.expm1(-c * t) if isinstance(t, float) else np.expm1(-c * t)) / c
+
+
+def fall_time(y: float, v_y: float, p: Parameters) -> float:
+    """Time until a flight with Stokes' drag ends on the floor, s; y >= 0, and v_y > 0 if y = 0."""
+    from scipy.optimize import brentq  # here, because the closed forms don't wait for it to load
+
+    free = (v_y + math.sqrt(v_y**2 + 2 * p.g * y)) / p.g
+    if free == 0:
+        return 0.0
+
+    low, high = 0.0, free
+    if v_y > 0:  # from the top on
+        low = math.log1p(p.c * v_y / p.g) / p.c if p.c > 0 else v_y / p.g
+    while fall(high, y, v_y, p)[0] > 0:
+        low, high = high, 2 * high
+    eps = math.ulp(1.0)
+    return float(brentq(lambda t: float(fall(t, y, v_y, p)[0]), low, high, xtol=4 * eps * high, rtol=4 * eps))
+
+
+def ramp_lag(s: Any) -> Any:
+    """(s - 1 + exp(-s))/s^2, by its series where that cancels: how a ball with linear drag lags behind a ramp."""
+    small = np.abs(s) < 1e-2
+    safe = np.where(small, 1.0, s)
+    series = 1 / 2 - s / 6 * (1 - s / 4 * (1 - s / 5 * (1 - s / 6 * (1 - s / 7))))
+    return np.where(small, series, (safe + np.expm1(-safe)) / safe**2)

@@ -1,9 +1,9 @@
-"""Contact forces and vector fields of the nine kinematic cases: (20)-(29), and RN, SN, NN.
+"""Contact forces, vector fields and Jacobians of the nine kinematic cases: (20)-(29), and RN, SN, NN.
 
 The forces follow from the state, case by case (`forces`); the rates follow from the forces by Newton and Euler (20),
 the same way in every case (`rates`). Both take floats or arrays and check nothing, since an integrator calls them in
 its innermost loop. `contact_forces` and `vector_field` are the public functions: they take arrays of states and check
-them against the case.
+them against the case. Jacobians come from complex steps through the vector fields.
 
 Away from the wall the drag (9) is extended by a radial part -m c rho', and the fluid rotates as one rigid body. c is
 c(|w|), see `analytic.mechanics.drag`.
@@ -24,6 +24,8 @@ from model.arrays import Array, Real
 from model.cases import TRAITS
 from model.kinematics import UNITS, VARIABLES
 
+STEP = 1e-100
+"""Complex step: its square vanishes beside any state, so that the derivative is exact to round-off."""
 Direction = tuple[Real, Real]
 """Sine and cosine of a slip direction (8)."""
 
@@ -274,3 +276,30 @@ def _refuse(wrong: Real, values: Real, name: str, rule: str, unit: str | None = 
         value = np.extract(wrong, values)[0]
         unit = unit or dict(zip(VARIABLES, UNITS, strict=True)).get(name, "m s-1")
         raise InputError(f"{name} = {value:g} {unit} {rule}")
+
+
+def jacobian(case: Case, x: npt.ArrayLike, p: Parameters) -> Array:
+    """Exact Jacobians of the vector field at states x (..., 6 or 8), shape (..., d, d), rad s-1.
+
+    Rows and columns are the active variables of the case, ``TRAITS[case].active``; in RN slip_z moves with v_h.
+    """
+    state = check_state(case, x, p)
+    active = TRAITS[case].active
+    columns = []
+    for name in active:
+        z = State(*(np.asarray(column, dtype=complex) for column in state))
+        z = z._replace(**{name: getattr(z, name) + 1j * STEP})
+        if case is Case.RN:
+            z = z._replace(slip_z=-z.v_h / p.r)
+        dx = rates(case, z, p, p.omega_0)
+        rows = (np.imag(getattr(dx, row)) / STEP for row in active)
+        columns.append(np.stack(np.broadcast_arrays(*rows), axis=-1))
+    return np.stack(np.broadcast_arrays(*columns), axis=-1)
+
+
+def eigenvalues(matrix: Array) -> npt.NDArray[np.complex128]:
+    """Eigenvalues (..., d) of matrices (..., d, d), rightmost first."""
+    # From stiff slip to slow orbit: graded downwards, which keeps the small ones accurate.
+    values: npt.NDArray[np.complex128] = np.linalg.eigvals(matrix[..., ::-1, ::-1].astype(complex))
+    order = np.lexsort((values.imag, -values.real), axis=-1)
+    return np.take_along_axis(values, order, axis=-1)

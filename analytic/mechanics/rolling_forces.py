@@ -67,7 +67,7 @@ def slip_margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | 
 
 
 def last_share(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
-    """B_y in units of m g at which RR gives way: all that the wall's cone has, but not more than turns the spin, j u.
+    """B_y in units of m g at which RR ends: the most that the wall's cone allows, up to j u, which turns the spin axis.
 
     0 where the cone has nothing left, beyond (66).
     """
@@ -88,21 +88,21 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
     q_A = np.where(a > 0, _ratio(a, a + hyp2), np.where(hyp2 > 0, 0.0, 1.0))
     q_B = np.where(k + z > 0, _ratio(k, 2 * k + z**2), 0.5)
 
-    def at_A(q: Array, a: Array, z: Array) -> tuple[Array, Array]:
-        return np.hypot((a + 1) * q - 1, z * q), p.mu * (1 - q)
+    def friction(q: Array) -> tuple[Array, Array, Array, Array]:
+        """Friction at A and its limit, the same at B, in one unit."""
+        at_A, at_B = np.hypot((a + 1) * q - 1, z * q), np.hypot(2 * q - 1, z * q)
+        return at_A, p.mu * (1 - q), at_B, p.eta * np.maximum((k - 2) * q + 1, 0.0)
 
-    def at_B(q: Array, k: Array, z: Array) -> tuple[Array, Array]:
-        return np.hypot(2 * q - 1, z * q), p.eta * np.maximum((k - 2) * q + 1, 0.0)
+    def excess_of_A(q: Array) -> Array:
+        """Positive where the utilisation of A is the larger one."""
+        at_A, limit_A, at_B, limit_B = friction(q)
+        return np.asarray(at_A * limit_B - at_B * limit_A)
 
-    def lead_of_A(q: Array, a: Array, k: Array, z: Array) -> Array:
-        (load_A, hold_A), (load_B, hold_B) = at_A(q, a, z), at_B(q, k, z)
-        return np.asarray(load_A * hold_B - load_B * hold_A)
-
-    A_binds, B_binds = lead_of_A(q_A, a, k, z) >= 0, lead_of_A(q_B, a, k, z) <= 0
-    crossing = roots.bisected(lambda q: lead_of_A(q, a, k, z), q_A, q_B)
-    q = np.where(A_binds, q_A, np.where(B_binds, q_B, crossing))
-    use_A = np.where(A_binds, _least_alone(a, z, p.mu), _ratio(*at_A(q, a, z)))
-    use_B = np.where(B_binds & ~A_binds, _least_alone(k, z, p.eta), _ratio(*at_B(q, k, z)))
+    A_binds, B_binds = excess_of_A(q_A) >= 0, excess_of_A(q_B) <= 0
+    q = np.where(A_binds, q_A, np.where(B_binds, q_B, roots.bisected(excess_of_A, q_A, q_B)))
+    at_A, limit_A, at_B, limit_B = friction(q)
+    use_A = np.where(A_binds, _least_alone(a, z, p.mu), _ratio(at_A, limit_A))
+    use_B = np.where(B_binds & ~A_binds, _least_alone(k, z, p.eta), _ratio(at_B, limit_B))
     with np.errstate(divide="ignore"):
         B_y = p.m * p.g * (2 - 1 / q)
     return LeastUtilisation(B_y, np.maximum(use_A, use_B))
@@ -136,12 +136,12 @@ def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
 
 
 def _least_alone(d: Array, z: Array, friction: float) -> Array:
-    """Least utilisation of one contact if the other asked for nothing."""
+    """Least utilisation of one contact alone over the family."""
     hyp = np.hypot(d, z)
     return _ratio(np.where(d > 0, _ratio(z, hyp), np.where(hyp > 0, 1.0, 0.0)), np.asarray(friction))
 
 
-def _ratio(load: Array, hold: Array) -> Array:
-    """load/hold, 0 for 0/0: a contact that is asked for no friction needs none."""
-    safe = np.where(hold == 0, 1.0, hold)
-    return np.where(load == 0, 0.0, np.where(hold == 0, np.inf, load / safe))
+def _ratio(load: Array, limit: Array) -> Array:
+    """load/limit, 0 for 0/0: a contact without friction force has no utilisation."""
+    safe = np.where(limit == 0, 1.0, limit)
+    return np.where(load == 0, 0.0, np.where(limit == 0, np.inf, load / safe))

@@ -2,11 +2,15 @@
 
 A run is followed window by window until it repeats what it did; any simulator may carry it out. A recurrent motion is
 closed to an orbit by theory (`orbits`). One for which no stable orbit is found is chaotic if neighbours of it part
-exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with what it did last.
+exponentially, else quasi-periodic. A run whose time is over before that stays undecided, with its last window.
+
+Whether a ball hops for ever is decided faster: a screen by time stepping (`screen`), confirmed by the event-driven
+simulation (`confirm`).
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,12 +20,12 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.orbits import periodic as orbits
-from analytic.orbits.periodic import NoOrbitError, Orbit, extent, scale
-from analytic.simulation.ensemble import interval, random_starts
+from analytic.orbits.periodic import NoOrbitError, Orbit, extent, lands, scale
+from analytic.simulation.ensemble import interval, random_starts, simulate_many
 from analytic.simulation.motion import natural_units
-from analytic.simulation.simulator import simulate
+from analytic.simulation.simulator import Settings, fitting_step, simulate
 from analytic.stationary.solutions import StationarySolution, stable_solutions
-from model import InputError, Parameters, SimulationError, Trajectory
+from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, full_state
@@ -41,6 +45,16 @@ GROWING = 400.0
 """Duration over which the Lyapunov exponent is taken, in units of sqrt(R/g)."""
 APART = 1e-6
 """Distance in natural units of the two motions whose growing apart is the Lyapunov exponent."""
+DURATION = 60.0
+"""How long the screen follows a ball, in 1/c: transients decay as exp(-c t) at the slowest, but near folds."""
+QUIET, LOOKS = 3.0, 12
+"""Without a landing for this long, in 1/c, a ball has settled; how often that is looked for in this time."""
+STEPS = 70
+"""Steps of the screen in sqrt(R/g)."""
+SEEN, SEEN_SAMPLES = 25.0, 4000
+"""How long the ball is watched for a period, in sqrt(R/g): twice the longest that is looked for; and samples."""
+CONFIRMING = 12.0
+"""How long a ball with no period is followed, in 1/c, or four times `SEEN`; the last third of it counts."""
 
 Run = Callable[[Parameters, Array, float, float], Trajectory]
 """A simulator: parameters, start (8,), duration in s, sample interval in s. Raises `SimulationError`."""
@@ -193,7 +207,7 @@ def _alike(a: Trajectory, b: Trajectory) -> bool:
 
 
 def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> StationarySolution | None:
-    """The stationary solution at which a motion is, of two in one state that of its own case; free variables aside."""
+    """The stationary solution nearest to the last state, free variables aside; of two in one state that of its case."""
     x, case = last.x[-1], last.cases[-1]
     size = scale(last.header.parameters)
 
@@ -206,11 +220,18 @@ def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> Stati
 
 
 def periodic(last: Trajectory) -> Fate | None:
-    """A recurrent motion that closes: with the stable orbit that theory has near it, or after all that one sees.
+    """A recurrent motion that closes: with the stable orbit that theory has near it, or as the window shows.
 
-    None if it doesn't close.
+    None if it doesn't close. Candidates for the period are the first three good minima of the distance between the last
+    quarter of the window and what was a lag of up to half the window earlier.
     """
-    p, seen = last.header.parameters, _periods(last)
+    p, size = last.header.parameters, extent(last)
+    z, n, interval = last.x / scale(p), len(last.x) // 2, float(last.time[1] - last.time[0])
+    away = np.array([np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)])
+    left = int(np.argmax(away > size / 2))
+    dips = np.array([k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]], dtype=int)
+    good = dips[away[dips] <= 2 * away[dips].min(initial=size) + ALIKE * size]
+    seen = [(float(k * interval), float(away[k])) for k in good[:3]]
     for period, _ in seen:
         try:
             orbit = orbits.refine(p, _state(last), period)
@@ -218,22 +239,8 @@ def periodic(last: Trajectory) -> Fate | None:
             continue
         if orbit.stable and abs(orbit.period / period - 1) < ALIKE:
             return Fate(Kind.PERIODIC, last, period, orbit=orbit)
-    exact = [period for period, defect in seen if defect < STATIONARY_RANGE * extent(last)]
+    exact = [period for period, defect in seen if defect < STATIONARY_RANGE * size]
     return Fate(Kind.PERIODIC, last, exact[0]) if exact else None
-
-
-def _periods(last: Trajectory) -> list[tuple[float, float]]:
-    """Up to three times after which the motion nearly returns, the shortest first, and by how much it misses.
-
-    As far as half the window shows.
-    """
-    z, n = last.x / scale(last.header.parameters), len(last.x) // 2
-    size, interval = extent(last), float(last.time[1] - last.time[0])
-    away = np.array([np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)])
-    left = int(np.argmax(away > size / 2))
-    dips = np.array([k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]], dtype=int)
-    good = dips[away[dips] <= 2 * away[dips].min(initial=size) + ALIKE * size]
-    return [(float(k * interval), float(away[k])) for k in good[:3]]
 
 
 def _state(last: Trajectory) -> Array:
@@ -272,3 +279,58 @@ def lyapunov(
             second, before = first + apart * APART / distance, APART
     parts = np.array([part.mean() for part in np.array_split(np.array(growth), 10)]) / renewed
     return float(np.mean(growth)) / renewed, float(parts.std(ddof=1) / math.sqrt(len(parts)))
+
+
+def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Array, int]:
+    """Which of the starts (n, 8) still hop after 60/c, by time stepping; the states then (n, 8); how many runs failed.
+
+    One thread; p.c must be positive.
+    """
+    lasts, quiet = DURATION / p.c, QUIET / p.c
+    settings = Settings(timestep=fitting_step(STEPS, p, Flow.steady(p.omega_0), lasts))
+    runs = simulate_many(p, x0s, lasts, settings=settings, sample_interval=quiet / LOOKS, quiet=quiet, threads=1)
+    failed = np.array([bool(each) for each in runs.failure])
+    hops = np.any(runs.landings[:, -LOOKS:] > 0, axis=1) & ~failed
+    return hops, runs.x[:, -1], int(failed.sum())
+
+
+@dataclass(frozen=True)
+class Hopping:
+    """A motion that hops on, in natural units."""
+
+    landings: int
+    """Landings on the floor in a period; 0 if no periodic motion was found near it."""
+    period: float
+    """In sqrt(R/g); with no period found the mean time between landings."""
+    omega_c: float
+    """Mean omega_c/omega_0."""
+    height: float
+    """Greatest height y/R."""
+    multiplier: float | None = None
+    """Largest modulus of the Floquet multipliers; None without a period."""
+
+
+def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
+    """The hopping that a state leads to by the event-driven simulation; None if it ends.
+
+    That is a stable periodic motion near it if there is one; else the ball is followed for `CONFIRMING`.
+    Raises `SimulationError` if the simulation can't go on.
+    """
+    unit = math.sqrt(p.R / p.g)
+    seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SEEN_SAMPLES)
+    if not any(map(lands, seen.events.from_case, seen.events.to_case)):
+        return None
+    fate = periodic(seen)
+    if fate and fate.orbit and (landings := sum(itertools.starmap(lands, fate.orbit.changes))):
+        orbit = fate.orbit
+        omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R
+        return Hopping(landings, orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max()))
+    lasts = max(CONFIRMING / p.c, 4 * SEEN * unit)
+    run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SEEN_SAMPLES)
+    last = run.time > run.time[-1] * 2 / 3
+    times = run.events.time[list(map(lands, run.events.from_case, run.events.to_case))]
+    times = times[times > run.time[-1] * 2 / 3]
+    if len(times) < 3 or run.time[-1] - times[-1] > 3 * np.max(np.diff(times)):
+        return None
+    between, omega_c = float(np.mean(np.diff(times))), float(np.mean(run.omega_c[last]))
+    return Hopping(0, between / unit, omega_c / p.omega_0, float(run.y[last].max()) / p.R)

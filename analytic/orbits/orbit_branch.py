@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic.orbits.periodic import Changes, Loop, NoOrbitError, Orbit, close, closed, extent, jacobian
-from model import Contact, InputError, Parameters, State
+from analytic.orbits.periodic import Changes, Loop, NoOrbitError, Orbit, close, closed, defect_jacobian, extent, lands
+from model import InputError, Parameters, State
 from model.arrays import Array
 from model.parameters import check_names, check_number
 
@@ -117,7 +117,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
     along = np.append(np.zeros(len(start.loop.free)), sign)
     for _ in range(most):
         try:
-            matrix = jacobian(here.loop, here.derivative, name)
+            matrix = defect_jacobian(here.loop, here.derivative, name)
         except NoOrbitError as error:
             yield Place(Bifurcation.LOST, getattr(here.p, name), here, str(error))
             return
@@ -135,7 +135,17 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
         met = _between(here, there, step * along, name, matrix)
         yield from (place for place in met if span[0] <= place.value <= span[1])
         if not span[0] <= getattr(there.p, name) <= span[1]:
-            yield from _edge(here, there, name, span)
+            # The orbit where the branch leaves the range, between the last within it and the first outside.
+            inside, outside = getattr(here.p, name), getattr(there.p, name)
+            value = min(max(outside, span[0]), span[1])
+            share = (value - inside) / (outside - inside)
+            x, period = (a + share * (b - a) for a, b in ((here.loop.x, there.loop.x), (here.period, there.period)))
+            try:
+                orbit = close(replace(here.loop, p=here.p.replace(**{name: value}), x=x, period=period))
+            except NoOrbitError as error:
+                yield Place(Bifurcation.LOST, inside, here, str(error))
+            else:
+                yield from (orbit, Place(Bifurcation.RANGE, value, orbit))
             return
         yield there
         step = min(LONGEST_STEP, 1.5 * step if there.steps <= EASY else 0.7 * step)
@@ -166,20 +176,6 @@ def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
     return orbit
 
 
-def _edge(here: Orbit, there: Orbit, name: str, span: tuple[float, float]) -> Iterator[Orbit | Place]:
-    """The orbit where the branch leaves a range, between the last within it and the first outside."""
-    inside, outside = getattr(here.p, name), getattr(there.p, name)
-    value = min(max(outside, span[0]), span[1])
-    share = (value - inside) / (outside - inside)
-    x, period = (a + share * (b - a) for a, b in ((here.loop.x, there.loop.x), (here.period, there.period)))
-    try:
-        orbit = close(replace(here.loop, p=here.p.replace(**{name: value}), x=x, period=period))
-    except NoOrbitError as error:
-        yield Place(Bifurcation.LOST, inside, here, str(error))
-    else:
-        yield from (orbit, Place(Bifurcation.RANGE, value, orbit))
-
-
 def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Iterator[Place]:
     """What happens between an orbit and the next, a step away."""
     for kind, sign in _TESTS.items():
@@ -195,13 +191,11 @@ def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -
         except (NoOrbitError, ValueError):  # where the sequence of cases changes, too, the test may jump
             orbit = there
         yield Place(kind, getattr(orbit.p, name), orbit)
-    if _sequence(here.changes) != _sequence(there.changes):
-        yield _change(here, there, step, name, matrix)
-
-
-def _change(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -> Place:
-    """Where the sequence of cases changes, by halving as far as orbits are found."""
-    low, high, loop, before = 0.0, 1.0, there.loop, _sequence(here.changes)
+    before = _sequence(here.changes)
+    if before == _sequence(there.changes):
+        return
+    # Where the sequence of cases changes, by halving as far as orbits are found.
+    low, high, loop = 0.0, 1.0, there.loop
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         try:
@@ -217,11 +211,11 @@ def _change(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) ->
     except NoOrbitError:  # disturbances there land where others don't
         nearest = there
     kind = Bifurcation.PERSISTENCE if _landings(here.changes) == _landings(there.changes) else Bifurcation.GRAZING
-    return Place(kind, getattr(loop.p, name), nearest)
+    yield Place(kind, getattr(loop.p, name), nearest)
 
 
 def _sequence(changes: Changes) -> Changes:
-    """The changes of case of a period, from wherever it is the least in order."""
+    """The changes of case of a period, rotated so that they come first in order."""
     turns = [changes[k:] + changes[:k] for k in range(len(changes))]
     return min(turns, default=())
 
@@ -232,16 +226,12 @@ def _strays(here: Orbit, by: Array, changes: Changes) -> bool:
 
 
 def _landings(changes: Changes) -> int:
-    return sum(before.A is Contact.N is not after.A for before, after in changes)
-
-
-def _reals(multipliers: npt.NDArray[np.complex128]) -> Array:
-    return np.real(multipliers[np.isreal(multipliers)])
+    return sum(lands(before, after) for before, after in changes)
 
 
 _TESTS: dict[Bifurcation, Callable[[npt.NDArray[np.complex128]], float]] = {
-    Bifurcation.FOLD: lambda m: -float(np.prod(1 - _reals(m))),
-    Bifurcation.DOUBLING: lambda m: -float(np.prod(1 + _reals(m))),
+    Bifurcation.FOLD: lambda m: -float(np.prod(1 - m[np.isreal(m)].real)),
+    Bifurcation.DOUBLING: lambda m: -float(np.prod(1 + m[np.isreal(m)].real)),
     Bifurcation.TORUS: lambda m: float(np.abs(m[np.imag(m) != 0]).max(initial=0.0)) - 1,
 }
-"""What is positive of multipliers of which an odd number is real and beyond 1 or -1, or a pair outside the circle."""
+"""Functions of the multipliers: positive if an odd number is real and beyond 1 (-1), or a pair outside the circle."""

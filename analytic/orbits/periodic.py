@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 from analytic.mechanics import dynamics
 from analytic.simulation.motion import natural_units
 from analytic.simulation.simulator import simulate
-from model import Case, InputError, Parameters, SimulationError, State, Trajectory
+from model import Case, Contact, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -42,6 +42,11 @@ ORBIT_SAMPLES = 4000
 
 Changes = tuple[tuple[Case, Case], ...]
 """Changes of case in order, (before, after)."""
+
+
+def lands(before: int, after: int) -> bool:
+    """Whether a change of case, by the cases or their codes, is a landing on the floor."""
+    return Case(before).A is Contact.N is not Case(after).A
 
 
 class NoOrbitError(ArithmeticError):
@@ -231,7 +236,7 @@ def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None)
     """`refine` from a loop that is nearly closed; a parameter that is `varied` is one more unknown.
 
     There is then one unknown more than equations: the place on a branch. Newton's step is the shortest one (Moore and
-    Penrose), across the branch. The `jacobian` of a neighbour, if given, does until the defect falls slowly.
+    Penrose), across the branch. The `defect_jacobian` of a neighbour, if given, does until the defect falls slowly.
     """
     loop, back, steps = closed(loop, varied, neighbour)
     return Orbit(loop, back.changes, back.turn, steps, loop.derivative())
@@ -250,14 +255,14 @@ def closed(loop: Loop, varied: str | None = None, neighbour: Array | None = None
         if size > before / FAST:
             neighbour = None
         before = size
-        matrix = jacobian(loop, loop.derivative(), varied) if neighbour is None else neighbour
+        matrix = defect_jacobian(loop, loop.derivative(), varied) if neighbour is None else neighbour
         loop = loop.moved(np.asarray(-np.linalg.lstsq(matrix, defect)[0], dtype=float), varied)
     raise NoOrbitError(
         f"after {ITERATIONS} steps an orbit of period {loop.period:g} s is open by {size:.1e} in natural units"
     )
 
 
-def jacobian(loop: Loop, derivative: Array, varied: str | None = None) -> Array:
+def defect_jacobian(loop: Loop, derivative: Array, varied: str | None = None) -> Array:
     """Derivative (d - 1, d - 1) of the defect of a loop; with one more column if a parameter is varied."""
     by_state = derivative - np.eye(len(derivative))
     return np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)]) if varied else by_state

@@ -1,0 +1,1 @@
+"""Simulation across all cases: event-driven, and by Moreau-Jean time stepping."""

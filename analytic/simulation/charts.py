@@ -3,13 +3,13 @@
 On the wall these are the active variables of the case (Table 4), except that a slip with two components is given by
 its speed q and direction (alpha at A, beta at B): the friction depends on the direction alone, so that the rates have
 limits as the slip vanishes and q simply crosses zero. In SS both pairs are kept, although they share
-slip_z = q_A cos alpha = q_B cos beta; what integration errors make of that bond is damped. The equations are those of
-`dynamics`; only rates are converted here.
+slip_z = q_A cos alpha = q_B cos beta; deviations from that relation by integration errors are damped. The equations are
+those of `dynamics`; only rates are converted here.
 
-Away from the wall (RN, SN, NN) the frame rests, and the vessel's axis is a place like any other. The horizontal motion
+Away from the wall (RN, SN, NN) the frame rests, so that the vessel's axis is no singular point. The horizontal motion
 is kept in complex numbers: position Z = rho e^(i theta), and (a, b) along the paper's i, k becomes
 e^(i theta)(-a + i b); coordinates are their real and imaginary parts. The spin about the vertical never changes. The
-equations are those of `dynamics`, written anew for this frame; test_charts holds one against the other.
+equations are those of `dynamics`, written anew for this frame; test_charts compares the two.
 
 The first coordinate is the azimuth, or Z, the last one the work of drag and friction, J. RR is in `two_point_rolling`.
 """
@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from analytic.mechanics import drag, dynamics, flight
+from analytic.mechanics import drag, dynamics
 from analytic.mechanics.rigid_body import Velocities, state, velocities
 from analytic.simulation.motion import Chart, Fluid, Moment, Path, natural_units
 from model import Case, Parameters, State
@@ -208,7 +208,7 @@ def _sn(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
 
 
 def _nn(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> Chart:
-    """NN, where the whole spin rests: (Z, dZ/dt, work) with Stokes' drag, where height and fall are known (`flight`).
+    """NN, where the whole spin rests: (Z, dZ/dt, work) with Stokes' drag, where the fall is known (`drag.fall`).
 
     Else c depends on all components of the velocity: (Z, dZ/dt, y, v_y, work).
     """
@@ -217,7 +217,7 @@ def _nn(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
 
     def rates(t: float, z: Sequence[float]) -> list[float]:
         Z, V = _centre(z)
-        rise = flight.speed(t - at.time, v_y, p) if known else z[5]
+        rise = drag.fall_speed(t - at.time, v_y, p) if known else z[5]
         lag, c, power = _drag(Z, V, omega_0(t), p, rise)
         fall = [] if known else [rise, -p.g - c * rise]
         return [V.real, V.imag, -c * lag.real, -c * lag.imag, *fall, power]
@@ -227,11 +227,11 @@ def _nn(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float) -> 
         return (gap,) if known else (gap, z[4] / p.R)
 
     def path(t: Array, z: Array) -> Path:
-        fall = flight.fall(t - at.time, y, v_y, p) if known else (z[4], z[5])
+        fall = drag.fall(t - at.time, y, v_y, p) if known else (z[4], z[5])
         return _path(t, z, at, p, upright, np.full(len(t), spin), fall)
 
     if known:
-        landing, more, scale = at.time + flight.fall_time(y, v_y, p), [at.work], [energy]
+        landing, more, scale = at.time + drag.fall_time(y, v_y, p), [at.work], [energy]
     else:
         landing, more, scale = math.inf, [y, v_y, at.work], [p.R, v, energy]
     ends = ("B lands",) if known else ("B lands", "A lands")

@@ -12,26 +12,22 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 try:
     import numba
-    from numba.extending import register_jitable
 except ImportError:
+    numba = None
 
-    def compiled(function: F) -> F:
-        """The function itself."""
+
+def compiled(function: F) -> F:
+    """The function, compiled at its first call and kept on disk; threads can run it at once."""
+    if numba is None:
         return function
+    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
 
-    def callable_when_compiled(*functions: Callable[..., Any]) -> None:
-        """Nothing to do."""
 
-else:
-
-    def compiled(function: F) -> F:
-        """The function, compiled at its first call and kept on disk; threads can run it at once."""
-        return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
-
-    def callable_when_compiled(*functions: Callable[..., Any]) -> None:
-        """Let functions `compiled` in this folder call plain ones from elsewhere, which are compiled with them."""
+def callable_when_compiled(*functions: Callable[..., Any]) -> None:
+    """Let functions `compiled` in this folder call plain ones from elsewhere, which are compiled with them."""
+    if numba is not None:
         for each in functions:
-            register_jitable(error_model="numpy")(each)
+            numba.extending.register_jitable(error_model="numpy")(each)
         forget_stale(Path(__file__).with_name("__pycache__"), {each.__code__.co_filename for each in functions})
 
 

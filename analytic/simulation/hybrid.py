@@ -16,16 +16,15 @@ from analytic.mechanics import dynamics, rolling_forces
 from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import charts, transitions, two_point_rolling
 from analytic.simulation.integrator import StalledError, Stretch
-from analytic.simulation.motion import Fluid, Moment, Path, natural_units
-from analytic.simulation.records import REPORT_EVERY, Event, Recorder
-from analytic.simulation.settings import Settings
+from analytic.simulation.motion import REPORT_EVERY, Event, Fluid, Moment, Path, Recorder, natural_units
+from analytic.simulation.simulator import Settings
 from analytic.simulation.transitions import Shortest
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array
 from model.drag import STOKES
 
 _LEAST_JUMP = 1e-12
-"""Part of the flow by which it may differ before and after a knot without a jump."""
+"""Change of the flow at a knot, relative to the largest flow, above which it is a jump."""
 MAX_EVENTS_AT_ONCE = 100
 """Changes of case without any progress in time after which a run is given up."""
 

@@ -1,8 +1,8 @@
 """Steps of the integrator through one chart, up to the first guard that fires.
 
-LSODA does the work, except where a slip sets in, or stays small: its direction is stiff then, which LSODA doesn't
-notice where hardly anything else moves. BDF takes over as long as the slip is small. Where only round-off is left to
-solve, both crawl; the motion then goes on as it is.
+LSODA integrates, except while a slip is small: its direction is stiff then, which LSODA doesn't detect where hardly
+anything else moves, and BDF takes over. Where both need tiny steps because only round-off is left, the motion is
+continued along a straight line.
 """
 
 from __future__ import annotations
@@ -20,10 +20,9 @@ from analytic.simulation.motion import GAPS, Chart
 from model.arrays import Array
 
 ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
-"""Slips, in units of the spin of a ball that rolls at sqrt(g R): one that has just set in, and one whose direction may
-be stiff."""
+"""Slip that has just set in, and slip whose direction may be stiff, relative to the spin of rolling at sqrt(g R)."""
 PATIENCE = 300
-"""Steps of LSODA with a small slip after which it gives way; a slip that dies out takes fewer."""
+"""Steps of LSODA with a small slip after which BDF takes over; a slip that dies out takes fewer."""
 MAX_RESTARTS = 20
 """How often in one stretch a solver may fail; the other one then takes over."""
 EPS = math.ulp(1.0)
@@ -120,7 +119,20 @@ class Stretch:
     ) -> Iterator[Step]:
         """Steps of one solver; its time runs from zero, for directions settle in less than the round-off of `start`."""
         motion, times = self.motion, self.times
-        options: dict[str, Any] = {"jac": _jacobian(motion, start, self.relative)} if method is BDF else {}
+        least = np.array(motion.scale)
+        least[list(motion.slips)] *= self.relative
+
+        def jacobian(t: float, z: Array) -> Array:
+            """By forward differences, small relative to each coordinate or its natural size.
+
+            Relative to a slip itself down to a floor, for its direction may be a steep function of it. (The differences
+            of scipy grow with each call for a coordinate that the rates don't depend on, until they overflow.)
+            """
+            shift = math.sqrt(EPS) * np.maximum(np.abs(z), least)
+            here = np.array(motion.rates(start + t, z.tolist()))
+            beside = [motion.rates(start + t, shifted) for shifted in (z + np.diag(shift)).tolist()]
+            return np.asarray((np.array(beside) - here).T / shift)
+
         solver = method(
             lambda t, z: motion.rates(start + t, z.tolist()),
             0.0,
@@ -129,7 +141,7 @@ class Stretch:
             rtol=LOCAL * self.relative,
             atol=LOCAL * self.absolute * np.array(motion.scale),
             first_step=first_step,
-            **options,
+            **({"jac": jacobian} if method is BDF else {}),
         )
         taken = int(np.searchsorted(times, start, side="right"))
         while solver.status == "running":
@@ -156,7 +168,7 @@ class Stretch:
 
 
 class Watch:
-    """The guards of a case on duty: one fires when it falls below zero.
+    """Watches the guards of a case: one fires when it falls below zero.
 
     A guard that starts at zero, where round-off mustn't end the case, has to rise above `arm` first, or to fall below
     -`slack`; a gap is armed by any height.
@@ -194,22 +206,3 @@ class Watch:
         if value(end) >= 0:
             return end
         return float(brentq(value, start, end, xtol=4 * EPS * end, rtol=4 * EPS))
-
-
-def _jacobian(motion: Chart, origin: float, floor: float) -> Callable[[float, Array], Array]:
-    """Derivative of the rates of a chart by its coordinates, from forward differences.
-
-    They are small compared to each coordinate or its natural size; to a slip itself, of which its direction may be
-    a steep function, down to the floor below which it isn't. (The differences of scipy grow with each call
-    for a coordinate that the rates don't depend on, like the azimuth, until they overflow.)
-    """
-    least = np.array(motion.scale)
-    least[list(motion.slips)] *= floor
-
-    def jacobian(t: float, z: Array) -> Array:
-        shift = math.sqrt(EPS) * np.maximum(np.abs(z), least)
-        here = np.array(motion.rates(origin + t, z.tolist()))
-        beside = [motion.rates(origin + t, shifted) for shifted in (z + np.diag(shift)).tolist()]
-        return np.asarray((np.array(beside) - here).T / shift)
-
-    return jacobian

@@ -1,22 +1,69 @@
-"""Where simulations start: checks of the arguments, choice of the method, header of the result."""
+"""Where simulations start: settings, checks of the arguments, choice of the method; and two motions of the paper."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from analytic.simulation.records import Recorder
-from analytic.simulation.settings import Settings
-from model import Flow, Header, Parameters, SimulationError, State, Trajectory
+from analytic.bifurcation import diagram as bifurcation
+from analytic.mechanics import drag
+from analytic.simulation.motion import Recorder
+from analytic.stationary import solutions as stationary
+from model import Case, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory, time_scales
 from model.arrays import Array
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names, check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
 
 MAX_SAMPLES = 5e7
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How to simulate.
+
+    Raises `InputError` if a value is out of range.
+    """
+
+    method: str = "event"
+    """``event``: integrate case by case and locate every change of case. ``time-stepping``: Moreau-Jean, see there."""
+    rtol: float = 1e-9
+    """Relative tolerance of the integrator (event); the absolute one is a thousandth of it in natural units: lengths in
+    R, times in sqrt(R/g), the ball's spin in that of a ball that rolls at sqrt(g R)."""
+    timestep: float | None = None
+    """Longest time step, s, at most half of `model.time_scales.shortest_time`; `fitting_step` of 500 if None
+    (time-stepping)."""
+    restitution: float = 0.0
+    """Newton's coefficient of restitution e of both contacts, 0 <= e <= 1. A ball that hops in the corner is slow
+    (event): a series of hops on the floor takes about ln(rtol)/ln(e) impacts, of which each takes about a millisecond,
+    and each hit of the wall, itself one of a series, starts another. At e = 0.9 there may be 1e4."""
+    leave_rolling: str = "slip-stability"
+    """When RR ends, whose forces are not determined (event). ``slip-stability``: as soon as a slight slip would last,
+    Definitions 1-3 (docs/theory.md, section 7). ``infeasible``: when no forces within both Coulomb cones hold it. On
+    the stationary orbit both are the same for mu <= 1; on rougher floors, and off it, the second is later."""
+    initial_impact: bool = False
+    """Let a ball that starts with a speed into a closed contact collide at once, instead of refusing it."""
+
+    def __post_init__(self) -> None:
+        check_choice("method", self.method, ("event", "time-stepping"))
+        check_choice("leave_rolling", self.leave_rolling, ("slip-stability", "infeasible"))
+        if not isinstance(self.initial_impact, bool):
+            raise InputError(f"initial_impact = {self.initial_impact!r} must be true or false")
+        check_number("rtol", self.rtol, "1", Range(100 * float(np.finfo(float).eps), 1e-2))
+        check_number("restitution", self.restitution, "1", Range(0.0, 1.0))
+        if self.timestep is not None:
+            check_number("timestep", self.timestep, "s", POSITIVE)
+
+
+def fitting_step(steps: float, p: Parameters, flow: Flow, t_end: float) -> float:
+    """sqrt(R/g)/`steps`, or the longest step that the times of a run of t_end s allow if that is shorter; s."""
+    shortest, _ = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p))
+    return min(math.sqrt(p.R / p.g) / steps, shortest / 2)
 
 
 def simulate(
@@ -106,3 +153,26 @@ def sample_times(t_end: float, interval: float | None) -> Array:
     interval = check_number("sample_interval", interval, "s", Range(t_end / MAX_SAMPLES), meaning)
     count = math.ceil(t_end / interval * (1 - 4 * float(np.finfo(float).eps)))
     return np.append(np.arange(count) * interval, t_end)
+
+
+def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> Trajectory:
+    """The stationary orbit of NR, pushed into NS by a slip of `slip` rad/s along beta: Figs. 4 and 5.
+
+    For omega_0 > sqrt(g/(eta R)) (61) slip dies out and the ball returns to NR (Fig. 4), else it grows (Fig. 5).
+    """
+    orbit = stationary.solution(p, Case.NR, formal=True).state
+    clear = 1.0  # height in m: Figs. 4 and 5 leave the floor out
+    x = orbit._replace(y=clear, slip_y=slip * math.sin(beta), slip_z=slip * math.cos(beta))
+    return simulate(p, x, t_end, sample_interval=t_end / 10_000)
+
+
+def unloading(p: Parameters, hold: float) -> Trajectory:
+    """omega_0 lowered in steps through omega_02 with the ball riding the wall: the black dot of Fig. 13 (eta > j).
+
+    NR is left for NS, the ball falls, hits the floor, and ends in RR: the transients and impacts of section 5.3.
+    """
+    limit = bifurcation.thresholds(p).omega_02
+    levels = limit * np.array([1.2, 1.1, 1.02, 0.98])
+    start = stationary.solution(p.replace(omega_0=float(levels[0])), Case.NR).state._replace(y=0.02)
+    flow = Flow.staircase(levels.tolist(), hold)
+    return simulate(p, start, hold * len(levels), flow, sample_interval=hold / 4000)

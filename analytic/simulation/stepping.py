@@ -15,15 +15,15 @@ from analytic.simulation.compiling import callable_when_compiled, compiled
 from model.arrays import Array
 
 TOLERANCE, BARELY = 1e-14, 1e-11
-"""Change of an impulse per mass in a sweep at which it stops, relative to sqrt(g R) or the fastest velocity; and what
-does where friction only just holds a rolling ball: two solutions meet there, good to the root of it at best."""
+"""Change of an impulse per mass at which sweeps stop, relative to sqrt(g R) or the fastest velocity; and where friction
+only just holds a rolling ball: two solutions meet there, which can be found to the root of round-off only."""
 MAX_ITERATIONS = 100
 ROUGH = 1e-4
 """How well an iteration solves the contacts, relative to the last change of velocities."""
 LOCATING = 10
 """Most solutions of a stretch to locate its landing: the parabola triples the digits with each."""
 LANDINGS = 20
-"""Most landings that are located within a step; of any more, the step's end is taken for the place."""
+"""Most landings that are located within a step; later ones are put at its end."""
 SLIDES = 4.0
 """A contact slides on through a step if it takes more than this many times the load of the step to stop it."""
 ZERO_SLIP = 1e-9
@@ -242,12 +242,17 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
     at, P, impact, case, work, landings, residual = ball.at, nothing, nothing, ball.case, ball.work, ball.landings, 0.0
     q, b = ball.P, ball.impact  # first guess: the impulses of the last step but those of landings
     start = Forces(q.A_x - b.A_x, q.A_y - b.A_y, q.A_z - b.A_z, q.B_x - b.B_x, q.B_y - b.B_y, q.B_z - b.B_z)
-    left, count = dt, 0
+    left, count, still = dt, 0, ZERO_SLIP * math.sqrt(p.g * p.R)
     while left > 0 and residual == 0:
         in_A, in_B = at.y <= 0 and at.u.v_y <= 0, at.h <= 0 and at.u.v_h <= 0
         speed = max(-at.u.v_y if in_A else 0.0, -at.u.v_h if in_B else 0.0)
         if speed > 0:
-            hit = _collided(at, in_A, in_B, dt, p)
+            # Newton's restitution; a rebound that would last less than a hundredth of a step is none.
+            to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > p.g * dt / 200 else 0.0
+            to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > p.g * dt / 200 else 0.0
+            hit = solve(at, 0.0, 0.0, in_A, in_B, to_A, to_B, nothing, p)
+            if hit.residual != 0 and p.mu >= 1 and p.eta >= 1:  # friction may lock the ball in the corner: no rebound
+                hit = solve(at, 0.0, 0.0, in_A, in_B, 0.0, 0.0, nothing, p)
             at, P, impact = At(at.theta, at.y, at.h, hit.new), _sum(P, hit.P), _sum(impact, hit.P)
             work, residual = work + hit.work, _worse(hit.residual, residual)
             landings += speed > LANDED * math.sqrt(p.g * p.R)
@@ -261,7 +266,14 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
             after = _moved(at, left, s, in_A, in_B, p.R)
             at = At(after.theta, max(after.y, 0.0), max(after.h, 0.0), after.u)
         P, work, residual = _sum(P, s.P), work + s.work, _worse(s.residual, residual)
-        case, left, count = _case(in_A, in_B, s, p), left - time, count + 1
+        left, count = left - time, count + 1
+        # What the solution says of the contacts: open if it leaves with a velocity, rolling if nothing slides.
+        (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, OPEN, OPEN
+        if in_A and (s.P.A_y > 0 or v_y <= 0):
+            A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
+        if in_B and (s.P.B_x > 0 or v_h <= 0):
+            B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
+        case = 3 * A + B
     return Ball(at, P, impact, case, work, landings, residual)
 
 
@@ -269,29 +281,6 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
 def _worse(new: float, residual: float) -> float:
     """The larger one, or nan."""
     return new if new > residual or math.isnan(new) else residual
-
-
-@compiled
-def _collided(at: At, in_A: bool, in_B: bool, dt: float, p: Constants) -> Solved:
-    """An impact by Newton's restitution; a rebound that would last less than a hundredth of a step is none."""
-    start, least = Forces(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p.g * dt / 200
-    to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > least else 0.0
-    to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > least else 0.0
-    s = solve(at, 0.0, 0.0, in_A, in_B, to_A, to_B, start, p)
-    if s.residual != 0 and p.mu >= 1 and p.eta >= 1:  # friction may lock the ball in the corner: it can't rebound
-        s = solve(at, 0.0, 0.0, in_A, in_B, 0.0, 0.0, start, p)
-    return s
-
-
-@compiled
-def _case(in_A: bool, in_B: bool, s: Solved, p: Constants) -> int:
-    """What the solution says of the contacts: open if it leaves with a velocity, rolling if nothing slides."""
-    (v_h, v_y, v_k, o_x, o_y, o_z), still, A, B = s.new, ZERO_SLIP * math.sqrt(p.g * p.R), OPEN, OPEN
-    if in_A and (s.P.A_y > 0 or v_y <= 0):
-        A = ROLLS if _size(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
-    if in_B and (s.P.B_x > 0 or v_h <= 0):
-        B = ROLLS if _size(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
-    return 3 * A + B
 
 
 @compiled

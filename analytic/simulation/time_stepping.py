@@ -1,4 +1,4 @@
-"""Moreau-Jean time stepping: the ball as a rigid body that knows Coulomb's law and nothing of cases.
+"""Moreau-Jean time stepping: the ball as a rigid body under Coulomb's law, without cases.
 
 A step changes the velocities by the smooth forces at the mean of old and new velocity (theta = 1/2) and by the
 impulses of the closed contacts, which obey Coulomb's law with the velocities at its end; friction of a contact that
@@ -9,7 +9,7 @@ order between such changes, of first order through them.
 
 While the ball is at the wall, velocities are taken along axes that turn with it, so that the wall's normal is
 constant within the step and a ball that is held at the wall neither drifts off nor into it; a stationary orbit is
-reproduced exactly. Otherwise the axes stand still, and the vessel's axis is a place like any other.
+reproduced exactly. Otherwise the axes stand still, so that the vessel's axis is no singular point.
 
 Steps and loops over them are in `stepping`, which numba compiles where it is installed (the extra `fast`).
 """
@@ -26,8 +26,8 @@ from analytic.mechanics import drag, rigid_body
 from analytic.mechanics.contact_problem import NotConvergedError
 from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import stepping
-from analytic.simulation.records import Event, Recorder
-from analytic.simulation.settings import Settings, fitting_step
+from analytic.simulation.motion import Event, Recorder
+from analytic.simulation.simulator import Settings, fitting_step
 from model import Case, Flow, Parameters, State, time_scales
 from model.arrays import Array
 

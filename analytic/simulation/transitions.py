@@ -1,4 +1,4 @@
-"""Which case comes next: the rules by which the motion goes on from a moment at which a case ends.
+"""Which case comes next where a case ends.
 
 Uniqueness. Where Coulomb's law allows the ball to roll on and to slip or lift away, it rolls on only if every slight
 slip dies out: at two rolling contacts that is `rolling_forces.slip_margin`, at a single one this means that its cone
@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from analytic.mechanics import contact_problem, rigid_body, rolling_forces
+from analytic.mechanics import contact_problem, dynamics, rigid_body, rolling_forces
 from analytic.mechanics.contact_problem import Closed, NotConvergedError
 from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import two_point_rolling
@@ -25,7 +25,7 @@ AT_ONSET = 1e-7
 
 EPS = math.ulp(1.0)
 AT_REST = 1e-12
-"""Slip relative to the speeds before an impact that counts as none after it: the contact problem leaves less."""
+"""Slip after an impact, relative to the speeds before it, that counts as none: the contact problem leaves less."""
 
 
 def choose(at: Moment, p: Parameters, omega_0: float, leave_rolling: str = "slip-stability") -> tuple[Case, Moment]:
@@ -49,13 +49,22 @@ def choose(at: Moment, p: Parameters, omega_0: float, leave_rolling: str = "slip
 def leave(at: Moment, p: Parameters, omega_0: float) -> tuple[Case, Moment]:
     """The case that follows RR where slip or lift lasts, and the moment with its slip directions.
 
+    Friction is full where slip sets in and opposes it: forces and rates pass continuously from rolling to slipping.
     Beyond the onset the contact problem may have a solution that rolls, too: one that moves is reached from the forces
     at which rolling gives way.
     """
-    if rolling_forces.slip_margin(at.x.omega_c, p, omega_0) > -AT_ONSET:
-        return two_point_rolling.onset(at, p, omega_0)
-    start = two_point_rolling.last_forces(at.x.omega_c, p, omega_0)
-    return _by_accelerations(at, Closed(), Closed(), p, omega_0, start)
+    share = float(rolling_forces.last_share(at.x.omega_c, p, omega_0))
+    last = dynamics.rolling_family(at.x.omega_c, p, omega_0, share * p.m * p.g)
+    if rolling_forces.slip_margin(at.x.omega_c, p, omega_0) <= -AT_ONSET:
+        return _by_accelerations(at, Closed(), Closed(), p, omega_0, last)
+    A_x, A_y, A_z, B_x, B_y, B_z = last
+    alpha, beta = math.atan2(A_z, -A_x), math.atan2(-B_z, B_y)
+    wall_alone = p.eta * (B_x + B_y) - abs(B_z)  # what its cone has left where it carries no weight
+    if wall_alone < p.mu * A_y - math.hypot(A_x, A_z):
+        return Case.RS, at._replace(alpha=math.nan, beta=beta)
+    if abs(A_x) <= 16 * EPS * B_y:
+        return Case.SR, at._replace(alpha=alpha, beta=math.nan)
+    return Case.SS, at._replace(alpha=alpha, beta=beta)
 
 
 def _closed(slip: tuple[float, float]) -> Closed:

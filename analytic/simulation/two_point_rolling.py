@@ -15,33 +15,32 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic.mechanics import drag, dynamics, flight, rolling_forces
-from analytic.mechanics.rigid_body import Forces
+from analytic.mechanics import drag, rolling_forces
 from analytic.simulation.motion import Chart, Fluid, Moment, Path, natural_units
 from model import Case, Parameters, State
 from model.arrays import Array
 
 _SCAN = 256
-"""Points at which a stretch of RR, or each period of the fastest wave in it, is looked at for its end: exits that
-close again in between are missed."""
+"""Points in a stretch of RR, or in each period of its waves, at which its end is looked for: margins that are negative
+in between only are missed."""
 MARGINS = {"slip-stability": rolling_forces.slip_margin, "infeasible": rolling_forces.margin}
 """How far RR is from where it is left, >= 0 while it lasts, by `Settings.leave_rolling`."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 def omega_c(t: npt.ArrayLike, at: Moment, p: Parameters, omega_0: Fluid) -> Array:
-    """omega_c at times t of a stretch that starts at a moment, same shape: the lag behind a line and behind waves."""
+    """omega_c at times t of a stretch that starts at a moment, same shape: (23) solved for a line and waves."""
     t = np.asarray(t, dtype=float)
     k, tau = p.c / (1 + 2 * p.j), t - at.time
     a, b = omega_0.value + omega_0.slope * (at.time - omega_0.start), omega_0.slope
     start = at.x.omega_c - float(_forced(at.time, k, omega_0))
     # k tau^2 (1 - tau k/3 + …): the lag behind a ramp, without the cancellation of tau - (1 - exp(-k tau))/k.
-    line = start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * flight.second(k * tau)
+    line = start - (a - start) * np.expm1(-k * tau) + b * k * tau**2 * drag.ramp_lag(k * tau)
     return np.asarray(line + _forced(t, k, omega_0))
 
 
 def _forced(t: npt.ArrayLike, k: float, omega_0: Fluid) -> Array:
-    """What the waves make of omega_c once they have gone on for long: each times k/(k + i omega)."""
+    """The periodic part of omega_c: each wave times k/(k + i omega)."""
     swing = np.zeros_like(t, dtype=float)
     for amplitude, omega, phase in omega_0.waves:
         swing += amplitude * np.imag(k / (k + 1j * omega) * np.exp(1j * (omega * np.asarray(t) + phase)))
@@ -102,24 +101,3 @@ def chart(at: Moment, p: Parameters, omega_0: Fluid, leave_rolling: str) -> Char
 
     start = [at.theta, at.x.omega_c, at.work]
     return Chart(Case.RR, start, [1.0, 1 / T, E], rates, ("RR ends",), guards, lambda t, z: _path(t, *z))
-
-
-def last_forces(omega_c: float, p: Parameters, omega_0: float) -> Forces:
-    """The forces of RR at which it gives way, N (`rolling_forces.last_share`)."""
-    share = float(rolling_forces.last_share(omega_c, p, omega_0))
-    return dynamics.rolling_family(omega_c, p, omega_0, share * p.m * p.g)
-
-
-def onset(at: Moment, p: Parameters, omega_0: float) -> tuple[Case, Moment]:
-    """The case into which RR gives way where its slip margin vanishes, and the moment with the slip directions.
-
-    Friction is full where slip sets in and opposes it: forces and rates pass continuously from rolling to slipping.
-    """
-    A_x, A_y, A_z, B_x, B_y, B_z = last_forces(at.x.omega_c, p, omega_0)
-    alpha, beta = math.atan2(A_z, -A_x), math.atan2(-B_z, B_y)
-    wall_alone = p.eta * (B_x + B_y) - abs(B_z)  # what its cone has left where it carries no weight
-    if wall_alone < p.mu * A_y - math.hypot(A_x, A_z):
-        return Case.RS, at._replace(alpha=math.nan, beta=beta)
-    if abs(A_x) <= 16 * math.ulp(1.0) * B_y:
-        return Case.SR, at._replace(alpha=alpha, beta=math.nan)
-    return Case.SS, at._replace(alpha=alpha, beta=beta)

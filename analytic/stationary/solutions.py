@@ -15,10 +15,10 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from analytic.mechanics import drag, dynamics, jacobian, rolling_forces
+from analytic.mechanics import drag, dynamics, rolling_forces
 from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
-from analytic.stationary import branch_stability, slipping_branch
+from analytic.stationary import slipping_branch
 from model import Case, InputError, Parameters, State
 from model.arrays import Array
 from model.drag import QUADRATIC, STOKES
@@ -156,13 +156,13 @@ def _solution(
         force = dynamics.forces(case, x, p, p.omega_0)
     zeros = len(family)
     if case is Case.NS:  # the reduced field (48), without y
-        values, zeros = jacobian.eigenvalues(jacobian.jacobian(case, x, p)[1:, 1:]), zeros - 1
+        values, zeros = dynamics.eigenvalues(dynamics.jacobian(case, x, p)[1:, 1:]), zeros - 1
     elif values is None:
-        values = jacobian.eigenvalues(jacobian.jacobian(case, x, p))
+        values = dynamics.eigenvalues(dynamics.jacobian(case, x, p))
     stability = _stability(values, zeros, bool(family) or case is Case.NS)
     if p.drag == QUADRATIC and p.c > 0 and case not in (Case.SS, Case.NS):
-        # No lag, so no drag to first order. The eigenvalues that it leaves at zero go where any little drag sends them.
-        damped = jacobian.eigenvalues(jacobian.jacobian(case, x, p.replace(drag=STOKES)))
+        # No lag, so no drag to first order: any small linear drag decides the eigenvalues that are left at zero.
+        damped = dynamics.eigenvalues(dynamics.jacobian(case, x, p.replace(drag=STOKES)))
         stability = _stability(damped, zeros, bool(family))
         stability = Stability.ALGEBRAIC if stability is Stability.ASYMPTOTIC else stability
     return StationarySolution(
@@ -225,8 +225,8 @@ def _ss(p: Parameters) -> list[StationarySolution]:
         return [_solution(Case.SS, p, x, True, family=smooth)]
     solutions = []
     for s in slipping_branch.points_at(p):
-        x, alpha = State.of(branch_stability.states(s, p)[0]), -float(np.arctan(np.exp(s)))
-        solutions.append(_solution(Case.SS, p, x, True, smooth, alpha, branch_stability.eigenvalues_at(s, p)))
+        x, alpha = State.of(slipping_branch.states(s, p)[0]), -float(np.arctan(np.exp(s)))
+        solutions.append(_solution(Case.SS, p, x, True, smooth, alpha, slipping_branch.eigenvalues_at(s, p)))
     return solutions
 
 
@@ -256,3 +256,30 @@ def _lifting_spin(p: Parameters) -> float:
 def _wall_carries(p: Parameters) -> bool:
     """Whether friction at the wall carries the weight: (35), whose sign is misprinted, and (46)."""
     return p.eta * p.Omega_0**2 >= 1
+
+
+def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
+    """Eigenvalues (2,) in rad s-1 of f_SR at its stationary solution, and unit vectors (2, 2), one a row.
+
+    There A_y = 0, the border to NR (Proposition 3): the eigenvalues show on the side A_y > 0 only, where the ball leans
+    on the floor; on the other it lifts off. The first is that of leaning, which decays for omega_0 > omega_03 and grows
+    below; the second that of the orbit, the one closer to -c/(1+j). Vectors are over (omega_c, slip_x) and lead to
+    A_y > 0. With s the sign of slip_x the sum of the two is -(c + mu s (g/(R omega_0) - (1+j) omega_0))/(1+j), their
+    product -mu s c omega_0/(1+j), where c is that of a vanishing lag.
+
+    Raises `InputError` if SR has no stationary solution that leans: for mu = 0, omega_0 = 0, and at omega_03, where
+    slip_x = 0.
+    """
+    leaning = [s.state for s in stationary_solutions(p, (Case.SR,)) if p.mu > 0]
+    if not leaning:
+        raise InputError(
+            f"omega_0 = {p.omega_0:g} rad s-1, mu = {p.mu:g}: SR has no stationary solution that leans on the floor"
+        )
+    (x,) = leaning
+    values, vectors = np.linalg.eig(dynamics.jacobian(Case.SR, x, p).astype(complex))
+    first = int(np.argmax(np.abs(values + drag.coefficient(0.0, p) / (1 + p.j))))
+    order = [first, 1 - first]
+    # How A_y falls with omega_c and slip_x.
+    falls = np.array([2 * p.R * x.omega_c + p.r * x.slip_x, p.r * x.omega_c])
+    rows = vectors.T[order]
+    return values[order], rows * np.where((rows @ falls).real > 0, -1.0, 1.0)[:, None]

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 import analytic
-from analytic.bifurcation import fluid_inertia
+from analytic.bifurcation import diagram
 from analytic.mechanics import drag
 from compare.commands import options
 from compare.kit import pages
@@ -67,7 +67,7 @@ def described(p: Parameters) -> dict[str, Any]:
         "operating_range_ends": {"by": limit.end.name, "because": limit.end.value},
         "reading_range": analytic.reading_range(p),
         "reading": reading(p),
-        "fluid_inertia": fluid_inertia.shifts(p) if p.density_ratio else None,
+        "fluid_inertia": diagram.inertia_shifts(p) if p.density_ratio else None,
         "solutions": solutions,
     }
 

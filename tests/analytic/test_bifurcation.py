@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from analytic import stationary_solutions, thresholds
-from analytic.bifurcation import fluid_inertia
+from analytic.bifurcation import diagram
 from analytic.bifurcation.diagram import (
     Exists,
     case_map,
@@ -246,21 +246,23 @@ def rolls(p: Parameters, omega: float) -> bool:
 def test_rolling_ends_where_no_forces_hold_it_and_the_wall_carries_it(s):
     for mu, eta in ((0.2, 0.2), (0.05, 0.3), (0.5, 0.1)):
         p = BALL.replace(mu=mu, eta=eta, density_ratio=s)
-        omega_01 = fluid_inertia.thresholds(p)["omega_01"]
+        omega_01 = diagram.thresholds_with_inertia(p)["omega_01"]
         # B_y is tried in 2e5 parts of m g: relative changes of omega_01 that matter are far above their size.
         assert rolls(p, omega_01 * (1 - 1e-4))
         assert not rolls(p, omega_01 * (1 + 1e-4))
     p = BALL.replace(density_ratio=s)
-    centripetal = p.m * p.R * fluid_inertia.thresholds(p)["omega_02"] ** 2
+    centripetal = p.m * p.R * diagram.thresholds_with_inertia(p)["omega_02"] ** 2
     assert p.eta * ((1 + s / 2) * centripetal - 1.5 * s * centripetal) == pytest.approx(p.m * p.g, rel=1e-12)
 
 
 def test_shifts():
     p = BALL.replace(density_ratio=0.4)
-    by = fluid_inertia.shifts(p)
+    by = diagram.inertia_shifts(p)
     assert by["omega_02"] == pytest.approx(1 / math.sqrt(0.6) - 1, rel=1e-12)
     assert by["rolling_rate"] == pytest.approx(1.8 / 2.0 - 1, rel=1e-12)
-    assert all(shift == 0.0 for shift in fluid_inertia.shifts(p.replace(density_ratio=0.0)).values())
-    assert math.isnan(fluid_inertia.shifts(p.replace(eta=0.5))["omega_01"])  # there is none without it
-    assert math.isfinite(fluid_inertia.thresholds(p.replace(eta=0.5))["omega_01"])  # but eta < j/(1 - s) is enough
-    assert "omega_01" not in fluid_inertia.shifts(p.replace(mu=0.0))
+    assert all(shift == 0.0 for shift in diagram.inertia_shifts(p.replace(density_ratio=0.0)).values())
+    assert math.isnan(diagram.inertia_shifts(p.replace(eta=0.5))["omega_01"])  # there is none without it
+    assert math.isfinite(
+        diagram.thresholds_with_inertia(p.replace(eta=0.5))["omega_01"]
+    )  # but eta < j/(1 - s) is enough
+    assert "omega_01" not in diagram.inertia_shifts(p.replace(mu=0.0))

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from analytic import contact_forces, vector_field
-from analytic.mechanics import flight
+from analytic.mechanics import drag
 from analytic.mechanics.rigid_body import energy, velocities
 from analytic.simulation import charts, motion, two_point_rolling
 from model import Case, Contact, Parameters, State
@@ -100,8 +100,8 @@ def test_vanishing_slip_has_a_direction(case):
 def test_fall_ends_on_the_floor(c, y, v_y):
     """y'' = -g - c y' by its textbook solution, in a form that needs no small-c care: the work-energy of the fall."""
     p = P.replace(c=c)
-    t = flight.fall_time(y, v_y, p)
-    height, speed = flight.fall(t, y, v_y, p)
+    t = drag.fall_time(y, v_y, p)
+    height, speed = drag.fall(t, y, v_y, p)
     scale = y + v_y**2 / p.g
     assert t > 0
     assert abs(height) <= 1e-14 * scale
@@ -109,7 +109,7 @@ def test_fall_ends_on_the_floor(c, y, v_y):
     # Momentum: v(t) - v(0) = -g t - c (y(t) - y(0)).
     assert speed - v_y == pytest.approx(-p.g * t - c * (0 - y), rel=1e-12)
     # And the height is the integral of the velocity.
-    drop = quad(lambda s: flight.fall(s, y, v_y, p)[1], 0.0, t, epsabs=1e-12 * scale, epsrel=1e-12)[0]
+    drop = quad(lambda s: drag.fall(s, y, v_y, p)[1], 0.0, t, epsabs=1e-12 * scale, epsrel=1e-12)[0]
     assert drop == pytest.approx(-y, abs=2e-12 * scale)
 
 

@@ -17,7 +17,7 @@ from analytic import simulate, solution, thresholds
 from analytic.mechanics import dynamics, rolling_forces
 from analytic.mechanics.contact_problem import Closed, solve
 from analytic.mechanics.rigid_body import slip_at_A, slip_at_B, smooth_rates, velocities
-from analytic.simulation import transitions, two_point_rolling
+from analytic.simulation import transitions
 from analytic.simulation.motion import Moment
 from model import Case, Contact, SimulationError, State
 from tests.random_motions import UNIT, P, random_start
@@ -164,7 +164,7 @@ def test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends():
             continue
         fluid = omega_c + brentq(margin, 0, 3, xtol=1e-14) * lag
         at = Moment(0.0, 0.0, State(omega_c=omega_c))
-        case, onset = two_point_rolling.onset(at, p, fluid)
+        case, onset = transitions.leave(at, p, fluid)
         ends.add(case)
         slips = (onset.alpha, case.A), (onset.beta, case.B)
         directions = [(math.sin(angle), math.cos(angle)) for angle, contact in slips if contact is Contact.S]

@@ -28,7 +28,7 @@ from analytic import (
 from analytic.bifurcation.diagram import case_map, critical_drag, double_points, number_of_folds, threshold_curves
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary import slipping_branch as sb
-from analytic.stationary.branch_stability import eigenvalues_at
+from analytic.stationary.slipping_branch import eigenvalues_at
 from model import Case, Contact, Parameters, State
 from model.cases import TRAITS
 from model.drag import LAWS, QUADRATIC, SCHILLER_NAUMANN, STOKES

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analytic import Settings, simulate
-from analytic.mechanics import drag, stokes
+from analytic.mechanics import drag
 from model import Case, Parameters, State
 from model.drag import LAWS
 from tests.drag_laws import BALL, BY_LAW, resistance
@@ -58,7 +58,7 @@ def test_a_law_without_a_formula_is_not_taken_for_another(monkeypatch):
 
 @pytest.mark.parametrize(("nu_f", "rho_f", "rho_b", "r"), [(1e-6, 998.0, 7850.0, 5e-3), (1e-3, 1260.0, 2500.0, 8e-3)])
 def test_a_ball_with_the_drag_10_sinks_at_stokes_speed(nu_f, rho_f, rho_b, r):
-    speed = stokes.sinking_speed(nu_f=nu_f, rho_f=rho_f, rho_b=rho_b, r=r, gravity=9.81)
+    speed = drag.sinking_speed(nu_f=nu_f, rho_f=rho_f, rho_b=rho_b, r=r, gravity=9.81)
     p = Parameters.from_fluid(nu_f=nu_f, rho_f=rho_f, rho_b=rho_b, r=r, R=5 * r, mu=0.2, eta=0.2, gravity=9.81)
     assert p.m * p.c * speed == pytest.approx(p.m * p.g, rel=1e-14)
     assert 6 * math.pi * nu_f * rho_f * r * speed == pytest.approx(p.m * p.g, rel=1e-14)

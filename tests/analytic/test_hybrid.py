@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from analytic import simulate, solution, vector_field
 from analytic.mechanics import rolling_forces
 from analytic.mechanics.dynamics import newton_euler
-from analytic.simulation import integrator, scenarios
+from analytic.simulation import integrator, simulator
 from model import Case, Flow, Parameters, SimulationError
 
 P = Parameters.named("reference")
@@ -288,7 +288,7 @@ LIMIT = math.sqrt(ROUGH.g / (ROUGH.eta * ROUGH.R))
 
 
 def test_figures_4_and_5_slip_dies_out_or_grows():
-    dies, grows = (scenarios.slip_perturbation(ROUGH.replace(omega_0=s * LIMIT), 1.0, 0.9, 0.1) for s in (1.2, 0.9))
+    dies, grows = (simulator.slip_perturbation(ROUGH.replace(omega_0=s * LIMIT), 1.0, 0.9, 0.1) for s in (1.2, 0.9))
     assert [Case(code) for code in dies.events.to_case] == [Case.NR]
     assert dies.cases[0] is Case.NS
     # (60): the slowest direction loses slip at (1+j)/(r j) (eta R omega_0^2 - g).
@@ -299,7 +299,7 @@ def test_figures_4_and_5_slip_dies_out_or_grows():
 
 
 def test_unloading_ends_in_two_point_rolling_after_impacts():
-    run = scenarios.unloading(ROUGH, hold=20.0)
+    run = simulator.unloading(ROUGH, hold=20.0)
     visited = [Case(code) for code in run.events.to_case]
     assert visited[0] is Case.NS
     assert visited[-1] is Case.RR

@@ -13,7 +13,7 @@ from analytic.orbits.fates import Kind, Run
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import NoOrbitError, Orbit
 from analytic.simulation import ensemble
-from analytic.stationary import branch_stability
+from analytic.stationary import slipping_branch
 from model import Case, Events, Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.trajectory import SAMPLE
@@ -113,7 +113,7 @@ def test_swinging_lives_between_hopf_points(swing: Orbit) -> None:
     branch = orbit_branch.follow(swing, "omega_0", 20.0, 30.0)
     ends = branch.places[0], branch.places[-1]
     assert [end.kind for end in ends] == [Bifurcation.HOPF] * 2
-    flows = sorted(float(branch_stability.states(s, SWINGING)[1]) for s in branch_stability.hopf_places(SWINGING))
+    flows = sorted(float(slipping_branch.states(s, SWINGING)[1]) for s in slipping_branch.hopf_places(SWINGING))
     assert [end.value for end in ends] == pytest.approx(flows, rel=1e-4)
 
 

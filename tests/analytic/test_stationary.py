@@ -20,8 +20,8 @@ from analytic import (
     vector_field,
 )
 from analytic.mechanics import dynamics
-from analytic.mechanics.jacobian import jacobian
-from analytic.stationary import branch_stability as stability
+from analytic.mechanics.dynamics import jacobian
+from analytic.stationary import slipping_branch as stability
 from analytic.stationary.slipping_branch import branch, fold, points_at
 from model import Case, InputError, Parameters, State
 from model.cases import TRAITS

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analytic.mechanics import stokes
+from analytic.mechanics import drag
 from compare.claim import Outcome, Verdict
 from compare.judge import judge
 from compare.kit.lab import Lab
@@ -104,8 +104,8 @@ def test_laws_and_drag_are_measured_with_mujoco(lab: Lab, monkeypatch: pytest.Mo
         "table-3": Outcome.CONFIRMED,
         "eq-10": Outcome.CONFIRMED,
     }
-    right = stokes.sinking_speed
-    monkeypatch.setattr(stokes, "sinking_speed", lambda **fluid: 1.0001 * right(**fluid))
+    right = drag.sinking_speed
+    monkeypatch.setattr(drag, "sinking_speed", lambda **fluid: 1.0001 * right(**fluid))
     assert verdict_of("eq-10", records).outcome is Outcome.REFUTED
 
 

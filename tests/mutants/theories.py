@@ -140,9 +140,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "stationary.solutions._lifting_spin": {"spin of SR and NR with 1 % more weight": given(other(g=1.01))},
     "stationary.solutions._wall_carries": {"(35) with the sign as printed": answer(lambda carries: not carries)},
     "stationary.solutions.stable_solutions": {"a ball on the wall is no attractor": _of(Case.NR, _gone)},
-    "stationary.branch_stability.eigenvalues_at": {"eigenvalues of SS 3 % large": scaled(1.03)},
-    "mechanics.jacobian.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
-    "stationary.leaning.leaning_modes": {"leaning rate of SR 5 % large": scaled(1.05, 0)},
+    "stationary.slipping_branch.eigenvalues_at": {"eigenvalues of SS 3 % large": scaled(1.03)},
+    "mechanics.dynamics.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
+    "stationary.solutions.leaning_modes": {"leaning rate of SR 5 % large": scaled(1.05, 0)},
     # Bifurcations, (84)-(90)
     "bifurcation.diagram.threshold_curves": {
         "ω₀₁ with 1 + μ for 1 + η": _mu_for_eta,
@@ -182,7 +182,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "slipping.slip_bounds.filippov_share": {"share of the sheets in (69) 5 % large": scaled(1.05)},
     "slipping.slip_bounds.rr_to_ss": {"(82), (83) with μ and η exchanged": given(swapped)},
     # Laws of drag
-    "mechanics.stokes.sinking_speed": {"(10) 1 % large": scaled(1.01)},
+    "mechanics.drag.sinking_speed": {"(10) 1 % large": scaled(1.01)},
     "mechanics.drag.of_velocity": {"the drag's slope left out of the eigenvalues": answer(np.real)},
     "mechanics.drag.law": {
         "Schiller and Naumann's wake 5 % strong": answer(fields(wake=times(1.05))),

@@ -2,7 +2,7 @@
 
 * A search: every set is a point of a scrambled Sobol sequence over mu, eta, j, r/R, kappa = c sqrt(R/g) and Omega_0 =
   omega_0 sqrt(R/g), and is started from a few random states. What still hops by time stepping is confirmed by the
-  event-driven simulation (`analytic.orbits.hopping`). A chunk of sets is a file, named by the hash of all that
+  event-driven simulation (`analytic.orbits.fates`). A chunk of sets is a file, named by the hash of all that
   determines it; a longer search contains the shorter ones.
 * A map of basins: which attractor the ball comes to from each start of a plane of states, on a fine grid by time
   stepping and on a coarse one by MuJoCo. They should differ at the boundaries of basins only, where the least error
@@ -25,10 +25,9 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic import Settings
-from analytic.orbits import hopping
+from analytic.orbits import fates
 from analytic.simulation.ensemble import interval
-from analytic.simulation.settings import fitting_step
-from analytic.simulation.simulator import start_state
+from analytic.simulation.simulator import fitting_step, start_state
 from compare.kit import pages
 from compare.kit.campaign import Campaign
 from compare.kit.engines import EVENT, MOREAU, MUJOCO
@@ -91,7 +90,7 @@ class Searched:
     sets: int
     rows: tuple[Mapping[str, Any], ...]
     """The groups of each, "hops": how many starts hop, "confirmed": the fields of
-    `analytic.orbits.hopping.Hopping` by the event-driven simulation, or None."""
+    `analytic.orbits.fates.Hopping` by the event-driven simulation, or None."""
     failed: int
     """Runs that broke down."""
 
@@ -140,13 +139,13 @@ def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
     rows = []
     for k, point in enumerate(points):
         p = parameters(point)
-        hop, x, failed = hopping.screen(p, random_starts(p, search.starts, [search.seed, chunk * CHUNK + k]))
+        hop, x, failed = fates.screen(p, random_starts(p, search.starts, [search.seed, chunk * CHUNK + k]))
         row: dict[str, Any] = {"hops": int(hop.sum()), "failed": failed}
         if hop.any():
             row |= {"x": x[hop][0].tolist(), "confirmed": None, "broken": ""}
         for state in x[hop]:
             try:
-                if confirmed := hopping.confirm(p, state):
+                if confirmed := fates.confirm(p, state):
                     row["confirmed"] = dataclasses.asdict(confirmed)
                     del row["broken"]
                     break

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from analytic.mechanics import stokes
+from analytic.mechanics import drag
 from analytic.mechanics.rolling_forces import margin, slip_margin
 from compare.claim import Bearing, Claim, Text, one
 from compare.judge import simulated
@@ -21,7 +21,7 @@ def _friction(m: Measurement) -> float:
 
 def _sinking(m: Measurement) -> float:
     """v_y in m/s by Stokes' drag, from the properties of fluid and ball."""
-    return -stokes.sinking_speed(**{name: float(m.conditions[name]) for name in FLUIDS[m.set]})
+    return -drag.sinking_speed(**{name: float(m.conditions[name]) for name in FLUIDS[m.set]})
 
 
 def _end(m: Measurement) -> float:
@@ -63,7 +63,7 @@ CLAIMS = (
         "eq-10",
         "(9), (10)",
         "A ball sinks freely at the speed at which Stokes' drag balances its weight less buoyancy.",
-        (Bearing("laws", "v_y", _sinking, by="analytic.mechanics.stokes.sinking_speed"),),
+        (Bearing("laws", "v_y", _sinking, by="analytic.mechanics.drag.sinking_speed"),),
         text=Text.CORRECTED,
         reason="Table 1 gives the unit of m·c as kg m/s; it is kg/s.",
     ),

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analytic.bifurcation import diagram as bifurcation
-from analytic.simulation import scenarios
+from analytic.simulation import simulator
 from compare.kit import style
 from compare.kit.drawing import Drawing, Material, Motion
 from compare.kit.engines import EVENT
@@ -28,7 +28,7 @@ _LASTS = 0.012
 def select(_: Material, figure: str) -> Motion:
     """The motion of the event-driven simulation, which starts in the formal stationary state of NR."""
     p = FLOWS[figure]
-    return Motion(f"{SLIP}, {BETA}", EVENT.name, p, partial(scenarios.slip_perturbation, p, SLIP, BETA, t_end=_LASTS))
+    return Motion(f"{SLIP}, {BETA}", EVENT.name, p, partial(simulator.slip_perturbation, p, SLIP, BETA, t_end=_LASTS))
 
 
 def caption(push: Motion) -> str:

@@ -10,9 +10,9 @@ from scipy.optimize import brentq
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
-from analytic.mechanics import dynamics, jacobian
+from analytic.mechanics import dynamics
 from analytic.slipping import slip_bounds
-from analytic.stationary import branch_stability, slipping_branch
+from analytic.stationary import slipping_branch
 from compare.claim import Claim, Text
 from compare.kit.check import Check
 from compare.kit.record import Measurement
@@ -35,8 +35,8 @@ def _figure_12() -> Iterator[Check]:
     curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
     released = {name: float(value) * unit for name, value in curves.items()}
     s = np.linspace(-8.0, 8.0, 65)
-    states, fluid = branch_stability.states(s, p)
-    ends = State.of(branch_stability.states(np.array([-40.0, 40.0]), p)[0])
+    states, fluid = slipping_branch.states(s, p)
+    ends = State.of(slipping_branch.states(np.array([-40.0, 40.0]), p)[0])
     rates = [dynamics.rates(Case.SS, x, p, w)[TURNING] for x, w in zip(states.tolist(), fluid.tolist(), strict=True)]
     pushed = slipping_branch.branch(s, p).A_y
 
@@ -44,10 +44,10 @@ def _figure_12() -> Iterator[Check]:
         """Of SR: its sign is that of the eigenvalue that isn't the decay of omega_c."""
         q = p.replace(omega_0=omega_0)
         (state,) = analytic.stationary_solutions(q, (Case.SR,))
-        return float(np.linalg.det(jacobian.jacobian(Case.SR, state.x, q)))
+        return float(np.linalg.det(dynamics.jacobian(Case.SR, state.x, q)))
 
     exchange = brentq(determinant, 0.8 * t.omega_03, 1.2 * t.omega_03, rtol=1e-14)
-    along = branch_stability.states(np.linspace(-8.0, 8.0, POINTS), p)[1]
+    along = slipping_branch.states(np.linspace(-8.0, 8.0, POINTS), p)[1]
     k = int(np.argmax(along))
     # The maximum lies between the neighbours of the largest value, which is lower by no more than they are.
     spacing = float(along[k] - min(along[k - 1], along[k + 1]))

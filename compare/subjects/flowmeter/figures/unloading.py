@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analytic.simulation import scenarios
+from analytic.simulation import simulator
 from compare.kit import style
 from compare.kit.drawing import GapError, Material, Motion
 from compare.kit.engines import EVENT
@@ -27,7 +27,7 @@ def select(material: Material) -> Motion:
         if m.conditions["start"] == "unloading" and (motions := material.motions(m)):
             return motions[-1]  # with the finest step
     # Flows held for no longer than 5 s each: longer ones are sampled less densely.
-    return Motion("held", EVENT.name, _P, partial(scenarios.unloading, _P, 5.0))
+    return Motion("held", EVENT.name, _P, partial(simulator.unloading, _P, 5.0))
 
 
 def caption(fall: Motion) -> str:

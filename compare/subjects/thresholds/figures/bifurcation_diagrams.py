@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analytic.bifurcation import diagram as bifurcation
-from analytic.stationary import branch_stability
+from analytic.stationary import slipping_branch
 from compare.branches import fold_state, lifted, slipping, spin, spins
 from compare.kit import style
 from compare.kit.drawing import Diagram, Material
@@ -48,7 +48,7 @@ def caption(of: Diagram) -> str:
     """Of Figs. 9-12, with their parameters."""
     p = of.p
     text = f"Stationary solutions {_SHOWN[of.figure]}; {style.named(p)}, r/R = {p.r / p.R:g}. Dashed: unstable."
-    if of.figure == "fig-12" and branch_stability.hopf_places(p):
+    if of.figure == "fig-12" and slipping_branch.hopf_places(p):
         text += " H: a Hopf point of SS, beyond which an oscillation grows, too."
     if of.states and of.figure in ("fig-10", "fig-11"):
         text += " A ball on the wall (NR) has the spin of SR, also where SR is unstable."
@@ -97,8 +97,8 @@ def draw(of: Diagram) -> Figure:
         style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (0, -8))
         style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-6, 4))
         style.mark(axes, omega_04, float(bifurcation.wall_spin(fold_state(p, released=True), p)), "F", (7, 0))
-        for s in branch_stability.hopf_places(p):
-            x, omega_0 = branch_stability.states(s, p)
+        for s in slipping_branch.hopf_places(p):
+            x, omega_0 = slipping_branch.states(s, p)
             style.mark(axes, float(omega_0), float(bifurcation.wall_spin(State.of(x), p)), "H", (5, -6))
     axes.set(xlim=(bottom, top), ylim=(0, 1.12 * axes.get_ylim()[1]), xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
     if of.figure == "fig-12":
