@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import Any
 
 import analytic
@@ -63,12 +63,11 @@ class Engine:
         """Why it can't run here; empty if it can."""
         return self.needs.missing if self.needs else ""
 
-    @property
+    @cached_property
     def versions(self) -> dict[str, str]:
         """Of all that determines its results."""
-        return {name: version(name) for name in self.stands_on} | (
-            {self.needs.name: self.needs.version} if self.needs else {}
-        )
+        needed = {self.needs.name: self.needs.version} if self.needs else {}
+        return {name: version(name) for name in self.stands_on} | needed
 
     def at(self, step: float | None, p: Parameters) -> Settings:
         """Settings of a study for a time step in s; engines without a step ignore it."""

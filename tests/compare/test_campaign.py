@@ -393,7 +393,7 @@ def test_bad_starts(x0: object, says: str) -> None:
 
 LONG_PROGRAM = """
 import sys
-from compare.runs import tasks
+from compare.kit import tasks
 from compare.kit.campaign import Campaign
 from mjsim.journal import Journal
 from model import Parameters
