@@ -26,6 +26,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SEAL = b"\ndualball sha256 "
 _TRAILER = len(_SEAL) + 64
 _BLOCK = 1 << 20
+_HOST = socket.gethostname().replace(".", "-")
 _DAMAGE = OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError, MemoryError
 """What reading a file that does not hold what it should may end in."""
 
@@ -120,11 +121,25 @@ def reading(path: str | Path, remedy: str = "") -> Iterator[h5py.File]:
         if not Path(path).is_file():
             raise StorageError("there is no such file")
         with Path(path).open("rb") as content:
-            _check_seal(content)
+            size = content.seek(0, os.SEEK_END) - _TRAILER
+            content.seek(0)
+            if content.read(len(_SIGNATURE)) != _SIGNATURE:
+                raise StorageError("it is not an HDF5 file")
+            content.seek(max(size, 0))
+            trailer = content.read()
+            if not trailer.startswith(_SEAL):
+                raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
+            if trailer != _SEAL + _checksum(content, size):
+                raise StorageError("it is damaged (its content does not match its checksum)")
         with h5py.File(path, "r") as file:
             yield file
     except _DAMAGE as error:
-        raise StorageError(f"cannot read {path}: {_reason(error)}{remedy and f'; {remedy}'}") from error
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+        if isinstance(error, OSError):
+            reason = error.strerror or reason
+        elif not isinstance(error, InputError):
+            reason = f"it does not hold what it should ({reason})"
+        raise StorageError(f"cannot read {path}: {reason}{remedy and f'; {remedy}'}") from error
 
 
 def dataset(file: h5py.File, name: str) -> h5py.Dataset:
@@ -145,19 +160,6 @@ def seal(content: BinaryIO) -> None:
     content.write(_SEAL + _checksum(content, content.seek(0, os.SEEK_END)))
 
 
-def _check_seal(content: BinaryIO) -> None:
-    size = content.seek(0, os.SEEK_END) - _TRAILER
-    content.seek(0)
-    if content.read(len(_SIGNATURE)) != _SIGNATURE:
-        raise StorageError("it is not an HDF5 file")
-    content.seek(max(size, 0))
-    trailer = content.read()
-    if not trailer.startswith(_SEAL):
-        raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
-    if trailer != _SEAL + _checksum(content, size):
-        raise StorageError("it is damaged (its content does not match its checksum)")
-
-
 def _checksum(content: BinaryIO, size: int) -> bytes:
     """Of the first `size` bytes."""
     digest = hashlib.sha256()
@@ -166,16 +168,6 @@ def _checksum(content: BinaryIO, size: int) -> bytes:
         digest.update(content.read(min(_BLOCK, size - start)))
     content.seek(size)
     return digest.hexdigest().encode()
-
-
-def _reason(error: Exception) -> str:
-    """Why a file can't be read."""
-    first_line = (str(error).strip() or type(error).__name__).splitlines()[0]
-    if isinstance(error, InputError):
-        return first_line
-    if isinstance(error, OSError):
-        return error.strerror or first_line
-    return f"it does not hold what it should ({first_line})"
 
 
 def make_directory(path: Path) -> None:
@@ -225,7 +217,7 @@ def remove_leftovers(directory: Path) -> None:
     """Remove the temporary files that writers killed on this machine have left in a directory."""
     for path in directory.glob(f".*{_SUFFIX}"):
         host, process = path.name.removesuffix(_SUFFIX).split(".")[-2:]
-        if host == _host() and process.isdigit():
+        if host == _HOST and process.isdigit():
             try:
                 os.kill(int(process), 0)
             except ProcessLookupError:
@@ -236,8 +228,4 @@ def remove_leftovers(directory: Path) -> None:
 
 def _temporary(path: Path) -> Path:
     """A name beside a file's, with the machine and process that write it."""
-    return path.with_name(f".{path.name}.{_host()}.{os.getpid()}{_SUFFIX}")
-
-
-def _host() -> str:
-    return socket.gethostname().replace(".", "-")
+    return path.with_name(f".{path.name}.{_HOST}.{os.getpid()}{_SUFFIX}")
