@@ -11,13 +11,15 @@ import io
 import json
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 import h5py
+import numpy as np
+import numpy.typing as npt
 
 from model.errors import InputError, StorageError
 
@@ -153,6 +155,24 @@ def dataset(file: h5py.File, name: str) -> h5py.Dataset:
     if not isinstance(stored, h5py.Dataset) or stored.external or stored.is_virtual:
         raise StorageError(f"{name!r} is not a dataset of its own")
     return stored
+
+
+def column(stored: h5py.Dataset) -> npt.NDArray[Any]:
+    """All of a dataset: numbers, or text as `str`."""
+    return np.asarray((stored.asstr() if h5py.check_string_dtype(stored.dtype) else stored)[...])
+
+
+def write_columns(file: h5py.File, columns: Mapping[str, Sequence[Any]], scale: str) -> dict[str, h5py.Dataset]:
+    """Write columns (n,) of numbers or of text, of which the first, `scale`, is the scale of their dimension."""
+    written = {}
+    for name, values in columns.items():
+        text = h5py.string_dtype() if len(values) and isinstance(values[0], str) else None
+        written[name] = file.create_dataset(name, data=values, dtype=text)
+        if name == scale:
+            written[name].make_scale(scale)
+        else:
+            written[name].dims[0].attach_scale(written[scale])
+    return written
 
 
 def seal(content: BinaryIO) -> None:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from compare.commands import options, running
-from compare.kit import campaign, collection, sweep
+from compare.kit import campaign, sweep
 from model import Flow
 
 
@@ -66,6 +66,6 @@ def run(args: argparse.Namespace) -> int:
 
 def collect(args: argparse.Namespace) -> int:
     """Gather the runs."""
-    count = collection.collect(args.directory, args.output)
+    count = sweep.collect(args.directory, args.output)
     print(f"{count} runs gathered into {args.output}")
     return 0
