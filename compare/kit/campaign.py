@@ -22,7 +22,6 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from compare.kit.progress import Show, nowhere
@@ -94,9 +93,7 @@ class Campaign:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         self._workers.close(at_once=kind is not None)
         remove_leftovers(self.directory)
 
@@ -207,7 +204,8 @@ class Campaign:
                 batches = [(again.popleft(),)]
             for batch in batches:
                 pending[self._workers.submit(run_batch, batch, self.directory, self.label, self.limit)] = batch
-            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+            wait(pending, return_when=FIRST_COMPLETED)
+            for future in [each for each in pending if each.done()]:
                 batch = pending.pop(future)
                 error = future.exception()
                 if error is None:

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from rich.table import Table
 
 from compare.kit import pages
-from compare.kit.statistics import settled_case, settled_mean
+from compare.kit.statistics import settled_case, tail, window_mean
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.arrays import Array
 from model.files import WholeFile, check_writable, column, dataset, reading, write_columns
@@ -214,9 +214,10 @@ def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
     row |= dataclasses.asdict(trajectory.header.parameters)
     row["duration"] = float(trajectory.time[-1]) if len(trajectory.time) else 0.0
     row["failure"] = trajectory.header.failure
+    last = tail(trajectory)
     for variable in VARIABLES:
         try:
-            mean = settled_mean(trajectory, getattr(trajectory, variable))
+            mean = window_mean(trajectory.time[last], getattr(trajectory, variable)[last])
         except InputError:  # too few samples for a mean
             row |= {variable: np.nan, f"{variable}_uncertainty": np.nan}
         else:
