@@ -43,7 +43,7 @@ class Quantity:
     unit: str
     """SI, as in the HDF5 files."""
     resolves: float
-    """Largest error of a prediction, over the scale of the quantity, that a check may overlook."""
+    """Largest error of a prediction, divided by the scale of the quantity, that a check may overlook."""
 
 
 _SPEEDS = {"v_y": "v_y", "v_h": "v_h"}

@@ -90,7 +90,7 @@ def measurement(
 
 
 def sure_enough(name: str, value: Measured, scale: float) -> bool:
-    """Whether a check of a measured quantity can resolve what it should, over a scale that is natural to it."""
+    """Whether the tolerance, divided by the natural scale of a quantity, is as small as its checks need."""
     return COVERAGE * value.uncertainty <= quantity(name).resolves * scale
 
 

@@ -141,7 +141,7 @@ def collect(directory: Path, output: Path) -> int:
             if units.get(name):
                 stored.attrs["units"] = units[name]
             if coordinates and name not in ("run", *coordinates):
-                stored.attrs["coordinates"] = " ".join(coordinates)  # the CF convention's way to say what it is over
+                stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
         whole.finish()
     return len(rows)
 

@@ -105,7 +105,7 @@ _between = threading.Lock()
 
 
 def _work(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
-    """In a worker: do a task, in the midst of which the worker may end."""
+    """In a worker: do a task, during which the worker may end."""
     if _between.locked():
         _between.release()
     try:

@@ -155,7 +155,7 @@ def test_a_run_that_diverges_is_kept_and_told(tmp_path: Path, capsys: pytest.Cap
 INTERRUPTED = """
 import os, signal, sys
 from compare.commands import cli, simulate
-from compare.runs import tasks
+from compare.kit import tasks
 from mjsim.journal import Journal
 tasks.LONG, stop_after = 1000, int(sys.argv[1])
 tasks.Journal = lambda directory: Journal(directory, interval=0.0)
