@@ -204,14 +204,14 @@ def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Set
         values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
         swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)
         drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolves for q in worst)
-        floor = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
+        solving = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
         excess, failure = max(drifting, swings / 1e-3), ""
         if counts.max() < 0.98 * length:
             excess = math.inf
             failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
-        elif max(excess, floor) > loose:
-            way = "drifts" if max(drifting, floor) > loose else "swings"
-            failure = f"in {case.name} it still {way} {max(excess, floor):.2g} times as much as it may"
+        elif max(excess, solving) > loose:
+            way = "drifts" if max(drifting, solving) > loose else "swings"
+            failure = f"in {case.name} it still {way} {max(excess, solving):.2g} times as much as it may"
         states.append(Settled(start, case, values, means[len(series) :], task, excess, failure))
     return min(states, key=lambda state: state.excess)
 
