@@ -87,7 +87,7 @@ class Campaign:
         self._files: dict[str, Path] = dict(_stored(self.directory))
         self._failed: dict[str, Failure] = {}
         self._lock = threading.Lock()
-        self._read: dict[Path, dict[str, Trajectory]] = {}
+        self._read: dict[str, Trajectory] = {}
         self._samples = 0
 
     def __enter__(self) -> Self:
@@ -116,22 +116,19 @@ class Campaign:
 
     def load(self, key: str) -> Trajectory:
         """The run of a task that was carried out, by its key; raises `StorageError` if it can't be read."""
-        file = self._files[key]
-        if key not in self._read.get(file, ()):
-            self._forget(file)
-            runs = storage.load_runs(file)
-            self._hold(file, runs if key in runs else {key: runs[""]})
-        return self._read[file][key]
+        if key not in self._read:
+            runs = storage.load_runs(self._files[key])
+            self._hold(runs if key in runs else {key: runs[""]})
+        return self._read[key]
 
-    def _hold(self, file: Path, runs: Mapping[str, Trajectory]) -> None:
-        """Keep runs of a file in memory, and forget those of earlier files while there are more than `READ` samples."""
-        self._read.setdefault(file, {}).update(runs)
-        self._samples += sum(len(run.time) for run in runs.values())
-        while self._samples > READ and len(self._read) > 1:
-            self._forget(next(iter(self._read)))
-
-    def _forget(self, file: Path) -> None:
-        self._samples -= sum(len(run.time) for run in self._read.pop(file, {}).values())
+    def _hold(self, runs: Mapping[str, Trajectory]) -> None:
+        """Keep runs in memory, and forget the earliest of the others while there are more than `READ` samples."""
+        for key, run in runs.items():
+            before = self._read.pop(key, None)
+            self._samples += len(run.time) - (len(before.time) if before else 0)
+            self._read[key] = run
+        while self._samples > READ and len(self._read) > len(runs):
+            self._samples -= len(self._read.pop(next(iter(self._read))).time)
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
@@ -163,8 +160,8 @@ class Campaign:
                 done += not reason
                 if file:
                     self._files[task.key] = file
-                if file and run:
-                    self._hold(file, {task.key: run})
+                if run:
+                    self._hold({task.key: run})
             self.report(self.doing, done, len(unique), len(failures))
         with self._lock:  # the parts of a campaign share the list
             if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
@@ -182,7 +179,7 @@ class Campaign:
             storage.save_batch({key: self.load(key) for key in sorted(keys)}, self.directory / f"{label}.h5")
         for file in gone:
             file.unlink(missing_ok=True)
-            self._forget(file)
+        self._read, self._samples = {}, 0
         self._files = {key: file for key, file in self._files.items() if file not in gone}
 
     def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[tuple[Task, ...], Sequence[Outcome]]]:
