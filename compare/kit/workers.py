@@ -27,7 +27,6 @@ Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 """What does as `map` does."""
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(eq=False)
@@ -75,8 +74,8 @@ def processes(count: int) -> Workers:
         return Workers(1, _Here, lambda executor, at_once: None, ())
 
     def start() -> Executor:
-        for name in _THREADS:  # inherited by the workers; numpy reads it when they import it
-            os.environ.setdefault(name, "1")
+        for library in ("OMP", "OPENBLAS", "MKL"):  # inherited by the workers; numpy reads it when they import it
+            os.environ.setdefault(f"{library}_NUM_THREADS", "1")
         return _Pool(count)
 
     def stop(executor: Executor, at_once: bool) -> None:
