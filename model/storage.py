@@ -68,9 +68,8 @@ class TrajectoryWriter(WholeFile):
         self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
         for of, time in ((Trajectory, "time"), (Events, "event_time")):
             for meta in columns(of).values():
-                sizes = {
-                    name: (size, *meta["shape"]) for name, size in (("shape", 0), ("maxshape", None), ("chunks", 1024))
-                }
+                shape = meta["shape"]
+                sizes = {"shape": (0, *shape), "maxshape": (None, *shape), "chunks": (1024, *shape)}
                 _create(self.file, meta, (time, "axis"), scales, **sizes, compression="gzip", shuffle=True)
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
