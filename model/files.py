@@ -11,13 +11,14 @@ import io
 import json
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 import h5py
+import numpy as np
+import numpy.typing as npt
 
 from model.errors import InputError, StorageError
 
@@ -26,6 +27,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SEAL = b"\ndualball sha256 "
 _TRAILER = len(_SEAL) + 64
 _BLOCK = 1 << 20
+_HOST = socket.gethostname().replace(".", "-")
 _DAMAGE = OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError, MemoryError
 """What reading a file that does not hold what it should may end in."""
 
@@ -50,9 +52,7 @@ class WholeFile:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         if not self._finished:
             self.file.close()
             self._disk.close()
@@ -120,11 +120,25 @@ def reading(path: str | Path, remedy: str = "") -> Iterator[h5py.File]:
         if not Path(path).is_file():
             raise StorageError("there is no such file")
         with Path(path).open("rb") as content:
-            _check_seal(content)
+            size = content.seek(0, os.SEEK_END) - _TRAILER
+            content.seek(0)
+            if content.read(len(_SIGNATURE)) != _SIGNATURE:
+                raise StorageError("it is not an HDF5 file")
+            content.seek(max(size, 0))
+            trailer = content.read()
+            if not trailer.startswith(_SEAL):
+                raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
+            if trailer != _SEAL + _checksum(content, size):
+                raise StorageError("it is damaged (its content does not match its checksum)")
         with h5py.File(path, "r") as file:
             yield file
     except _DAMAGE as error:
-        raise StorageError(f"cannot read {path}: {_reason(error)}{remedy and f'; {remedy}'}") from error
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+        if isinstance(error, OSError):
+            reason = error.strerror or reason
+        elif not isinstance(error, InputError):
+            reason = f"it does not hold what it should ({reason})"
+        raise StorageError(f"cannot read {path}: {reason}{remedy and f'; {remedy}'}") from error
 
 
 def dataset(file: h5py.File, name: str) -> h5py.Dataset:
@@ -140,22 +154,27 @@ def dataset(file: h5py.File, name: str) -> h5py.Dataset:
     return stored
 
 
+def column(stored: h5py.Dataset) -> npt.NDArray[Any]:
+    """All of a dataset: numbers, or text as `str`."""
+    return np.asarray((stored.asstr() if h5py.check_string_dtype(stored.dtype) else stored)[...])
+
+
+def write_columns(file: h5py.File, columns: Mapping[str, Sequence[Any]], scale: str) -> dict[str, h5py.Dataset]:
+    """Write columns (n,) of numbers or of text, of which the first, `scale`, is the scale of their dimension."""
+    written = {}
+    for name, values in columns.items():
+        text = h5py.string_dtype() if len(values) and isinstance(values[0], str) else None
+        written[name] = file.create_dataset(name, data=values, dtype=text)
+        if name == scale:
+            written[name].make_scale(scale)
+        else:
+            written[name].dims[0].attach_scale(written[scale])
+    return written
+
+
 def seal(content: BinaryIO) -> None:
     """Add its checksum to an HDF5 file, open for reading and writing, that has none."""
     content.write(_SEAL + _checksum(content, content.seek(0, os.SEEK_END)))
-
-
-def _check_seal(content: BinaryIO) -> None:
-    size = content.seek(0, os.SEEK_END) - _TRAILER
-    content.seek(0)
-    if content.read(len(_SIGNATURE)) != _SIGNATURE:
-        raise StorageError("it is not an HDF5 file")
-    content.seek(max(size, 0))
-    trailer = content.read()
-    if not trailer.startswith(_SEAL):
-        raise StorageError("it is cut short, changed, or not of this program (no checksum at its end)")
-    if trailer != _SEAL + _checksum(content, size):
-        raise StorageError("it is damaged (its content does not match its checksum)")
 
 
 def _checksum(content: BinaryIO, size: int) -> bytes:
@@ -166,16 +185,6 @@ def _checksum(content: BinaryIO, size: int) -> bytes:
         digest.update(content.read(min(_BLOCK, size - start)))
     content.seek(size)
     return digest.hexdigest().encode()
-
-
-def _reason(error: Exception) -> str:
-    """Why a file can't be read."""
-    first_line = (str(error).strip() or type(error).__name__).splitlines()[0]
-    if isinstance(error, InputError):
-        return first_line
-    if isinstance(error, OSError):
-        return error.strerror or first_line
-    return f"it does not hold what it should ({first_line})"
 
 
 def make_directory(path: Path) -> None:
@@ -225,7 +234,7 @@ def remove_leftovers(directory: Path) -> None:
     """Remove the temporary files that writers killed on this machine have left in a directory."""
     for path in directory.glob(f".*{_SUFFIX}"):
         host, process = path.name.removesuffix(_SUFFIX).split(".")[-2:]
-        if host == _host() and process.isdigit():
+        if host == _HOST and process.isdigit():
             try:
                 os.kill(int(process), 0)
             except ProcessLookupError:
@@ -236,8 +245,4 @@ def remove_leftovers(directory: Path) -> None:
 
 def _temporary(path: Path) -> Path:
     """A name beside a file's, with the machine and process that write it."""
-    return path.with_name(f".{path.name}.{_host()}.{os.getpid()}{_SUFFIX}")
-
-
-def _host() -> str:
-    return socket.gethostname().replace(".", "-")
+    return path.with_name(f".{path.name}.{_HOST}.{os.getpid()}{_SUFFIX}")

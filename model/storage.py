@@ -35,12 +35,10 @@ from model.trajectory import (
     attributes,
     columns,
     current_versions,
-    event_name,
 )
 
 BATCH, BATCH_VERSION = "dualball-batch", 1
 """What a file of many runs says of itself."""
-_CHUNK = 1024
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
 
@@ -69,10 +67,10 @@ class TrajectoryWriter(WholeFile):
         self.file.attrs.update(header.attributes())
         self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
         for of, time in ((Trajectory, "time"), (Events, "event_time")):
-            for _, name, meta in _columns(of):
-                sizes = {"shape": (0, *meta["shape"]), "maxshape": (None, *meta["shape"])}
-                layout = {"chunks": (_CHUNK, *meta["shape"]), "compression": "gzip", "shuffle": True}
-                _create(self.file, name, meta, (time, "axis"), scales, **sizes, **layout)
+            for meta in columns(of).values():
+                shape = meta["shape"]
+                sizes = {"shape": (0, *shape), "maxshape": (None, *shape), "chunks": (1024, *shape)}
+                _create(self.file, meta, (time, "axis"), scales, **sizes, compression="gzip", shuffle=True)
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
         """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush it."""
@@ -85,9 +83,10 @@ class TrajectoryWriter(WholeFile):
 
     def end(self, events: Events, failure: str = "", path: str | Path | None = None) -> None:
         """Write the events and why the run stopped early, if it did; then give the file its name, or `path`."""
-        for column, name, _ in _columns(Events) if len(events) else ():
-            self.file[name].resize(len(events), axis=0)
-            self.file[name][...] = getattr(events, column)
+        for name, meta in columns(Events).items() if len(events) else ():
+            column = self.file[meta["name"]]
+            column.resize(len(events), axis=0)
+            column[...] = getattr(events, name)
         self.file.attrs["failure"] = failure
         self.finish(path)
 
@@ -112,12 +111,12 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
             file.create_dataset(f"{dimension}s", data=counts).dims[0].attach_scale(scales["run"])
             scales[dimension] = file.create_dataset(dimension, data=np.arange(max(counts)))
             scales[dimension].make_scale(dimension)
-            for column, name, meta in _columns(of):
+            for name, meta in columns(of).items():
                 empty = -1 if meta["dtype"] is np.int8 else np.nan
                 values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
                 for row, count, table in zip(values, counts, tables, strict=True):
-                    row[:count] = getattr(table, column)
-                _create(file, name, meta, ("run", dimension, "axis"), scales, data=values)
+                    row[:count] = getattr(table, name)
+                _create(file, meta, ("run", dimension, "axis"), scales, data=values)
         whole.finish()
 
 
@@ -127,13 +126,13 @@ def load(path: str | Path) -> Trajectory:
     Raises `StorageError`, in one line, for a file that isn't one or is damaged.
     """
     path = Path(path)
-    if path.parent.is_file():
-        runs = load_runs(path.parent)
-        if path.name not in runs:
-            raise StorageError(f"cannot read {path}: {path.parent} holds no run of that name")
-        return runs[path.name]
-    with reading(path) as file:
-        return _read(file, slice(None))
+    if not path.parent.is_file():
+        with reading(path) as file:
+            return _read(file, slice(None))
+    try:
+        return load_runs(path.parent)[path.name]
+    except KeyError as error:
+        raise StorageError(f"cannot read {path}: {path.parent} holds no run of that name") from error
 
 
 def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
@@ -155,8 +154,8 @@ def contents(path: str | Path) -> tuple[str, list[str]]:
     Raises `StorageError` as `load` does.
     """
     with reading(path) as file:
-        version = str(_json(file.attrs, "versions").get("dualball"))
-        return version, _texts(file, "run") if is_batch(file) else []
+        version = str(_attribute(file.attrs, "versions", dict).get("dualball"))
+        return version, dataset(file, "run").asstr()[...].tolist() if is_batch(file) else []
 
 
 def exists(path: str | Path) -> bool:
@@ -175,22 +174,14 @@ def load_runs(path: str | Path) -> dict[str, Trajectory]:
         if not is_batch(file):
             return {"": _read(file, slice(None))}
         _check_schema(file, BATCH, BATCH_VERSION)
-        headers = [_json({"header": text}, "header") for text in _texts(file, "header")]
-        samples, events = _table(file, Trajectory, 2), _table(file, Events, 2)
-        counts = zip(dataset(file, "samples")[...].tolist(), dataset(file, "events")[...].tolist(), strict=True)
+        names, headers = (dataset(file, name).asstr()[...].tolist() for name in ("run", "header"))
+        counts = (dataset(file, name)[...].tolist() for name in ("samples", "events"))
+        tables = _table(file, Trajectory, 2), _table(file, Events, 2)
         runs = {}
-        for k, (name, (n, m)) in enumerate(zip(_texts(file, "run"), counts, strict=True)):
-            runs[name] = _trajectory(
-                headers[k],
-                {column: values[k, :n].copy() for column, values in samples.items()},
-                {column: values[k, :m].copy() for column, values in events.items()},
-            )
+        for k, (name, header, *sizes) in enumerate(zip(names, headers, *counts, strict=True)):
+            own = ({c: each[k, :n].copy() for c, each in table.items()} for table, n in zip(tables, sizes, strict=True))
+            runs[name] = _trajectory(_attribute({"header": header}, "header", dict), *own)
         return runs
-
-
-def _columns(of: type[Trajectory] | type[Events]) -> list[tuple[str, str, Mapping[str, Any]]]:
-    """Each column of a table: its name there, its name in a file, and its metadata."""
-    return [(name, event_name(name) if of is Events else name, meta) for name, meta in columns(of).items()]
 
 
 def _begin(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset]:
@@ -203,15 +194,10 @@ def _begin(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset
 
 
 def _create(
-    file: h5py.File,
-    name: str,
-    meta: Mapping[str, Any],
-    dimensions: Sequence[str],
-    scales: dict[str, h5py.Dataset],
-    **layout: Any,
+    file: h5py.File, meta: Mapping[str, Any], dimensions: Sequence[str], scales: dict[str, h5py.Dataset], **layout: Any
 ) -> None:
     """A column whose dimensions are the first of these names; without a scale for one, it is the scale itself."""
-    column = file.create_dataset(name, dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout)
+    column = file.create_dataset(meta["name"], dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout)
     column.attrs.update(attributes(meta))
     for dimension, scale in zip(column.dims, dimensions, strict=False):
         if scale in scales:
@@ -246,8 +232,8 @@ def _trajectory(
     texts: Mapping[str, Any], samples: Mapping[str, npt.NDArray[Any]], events: Mapping[str, npt.NDArray[Any]]
 ) -> Trajectory:
     """A run from the texts of its header and its columns."""
-    values: dict[str, Any] = {field.name: _text(texts, field.name) for field in dataclasses.fields(Header)}
-    values |= {name: _json(texts, name) for name in ("parameters", "flow", "settings", "versions")}
+    values = {field.name: _attribute(texts, field.name, str) for field in dataclasses.fields(Header)}
+    values |= {name: _attribute(texts, name, dict) for name in ("parameters", "flow", "settings", "versions")}
     values["parameters"] = Parameters.from_mapping(values["parameters"])
     values["flow"] = Flow.from_mapping(values["flow"])
     codes = np.concatenate([samples["case"], events["from_case"], events["to_case"]])
@@ -256,16 +242,15 @@ def _trajectory(
     return Trajectory(header=Header(**values), events=Events(**events), **samples)
 
 
-def _text(texts: Mapping[str, Any], name: str) -> str:
+def _attribute(texts: Mapping[str, Any], name: str, kind: type) -> Any:
+    """A text, or the table that it is in JSON."""
     value = texts.get(name)
     if not isinstance(value, str):
         raise StorageError(f"its attribute {name!r} is missing")
-    return value
-
-
-def _json(texts: Mapping[str, Any], name: str) -> dict[str, Any]:
+    if kind is str:
+        return value
     try:
-        value = json.loads(_text(texts, name))
+        value = json.loads(value)
     except (json.JSONDecodeError, RecursionError) as error:
         raise StorageError(f"its attribute {name!r} is not JSON") from error
     if not isinstance(value, dict):
@@ -273,18 +258,13 @@ def _json(texts: Mapping[str, Any], name: str) -> dict[str, Any]:
     return value
 
 
-def _texts(file: h5py.File, name: str) -> list[str]:
-    texts: list[str] = dataset(file, name).asstr()[...].tolist()
-    return texts
-
-
 def _table(
     file: h5py.File, of: type[Trajectory] | type[Events], leading: int, part: slice = slice(None)
 ) -> dict[str, npt.NDArray[Any]]:
     """All columns of a table, checked: so many dimensions come before those of one entry."""
     values = {}
-    for column, name, meta in _columns(of):
-        stored = dataset(file, name)
+    for column, meta in columns(of).items():
+        name, stored = meta["name"], dataset(file, meta["name"])
         if len(stored.shape or ()) != leading + len(meta["shape"]) or stored.shape[leading:] != meta["shape"]:
             raise StorageError(f"{name!r} has shape {stored.shape}")
         if stored.dtype.kind != np.dtype(meta["dtype"]).kind:

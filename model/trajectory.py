@@ -158,11 +158,10 @@ class Trajectory:
         except ImportError as error:
             raise InputError("to_xarray() needs xarray: pip install 'dualball[xarray]'") from error
         variables: dict[str, Any] = {"axis": ("axis", list(AXES), AXIS_ATTRIBUTES), "mjcf": ((), self.header.mjcf)}
-        for name, meta in columns(Trajectory).items():
-            variables[name] = (("time", "axis")[: 1 + len(meta["shape"])], getattr(self, name), attributes(meta))
-        for name, meta in columns(Events).items():
-            dimensions = ("event_time", "axis")[: 1 + len(meta["shape"])]
-            variables[event_name(name)] = (dimensions, getattr(self.events, name), attributes(meta))
+        for table, time in ((self, "time"), (self.events, "event_time")):
+            for name, meta in columns(type(table)).items():
+                values = getattr(table, name)
+                variables[meta["name"]] = ((time, "axis")[: values.ndim], values, attributes(meta))
         schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
         return xarray.Dataset(variables, attrs=schema | self.header.attributes())
 
@@ -194,8 +193,10 @@ class Events:
 
 
 def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]:
-    """Name and metadata (units, long_name, equation, shape, dtype) of every array column, in order."""
-    return {f.name: f.metadata for f in dataclasses.fields(of) if "units" in f.metadata}
+    """Metadata of every array column, in order: name in a file, units, long_name, equation, shape, dtype."""
+    table = "event_" if of is Events else ""
+    fields = [f for f in dataclasses.fields(of) if "units" in f.metadata]
+    return {f.name: {"name": table + f.name.removesuffix("_case"), **f.metadata} for f in fields}
 
 
 def attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
@@ -205,11 +206,6 @@ def attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
         attributes["flag_values"] = np.array([case.value for case in Case], np.int8)
         attributes["flag_meanings"] = " ".join(case.name for case in Case)
     return attributes
-
-
-def event_name(column: str) -> str:
-    """The name of a column of `Events` in a file and in xarray."""
-    return "event_" + column.removesuffix("_case")
 
 
 SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in columns(Trajectory).items()])

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from compare.commands import options, running
-from compare.kit import collection
+from compare.kit import sweep
 from compare.report import results
 from compare.view import inspection
 from mjsim import ContactSettings
@@ -83,11 +83,11 @@ def figures(args: argparse.Namespace) -> int:
 
 def inspect(args: argparse.Namespace) -> int:
     """Describe a run or a collection."""
-    if collection.is_collection(args.file):
+    if sweep.is_collection(args.file):
         if args.plot:
             raise InputError(f"{args.file} is a collection: only a run can be drawn")
-        gathered = collection.describe(args.file)
-        options.show(gathered, args.json, collection.table(gathered))
+        gathered = sweep.describe(args.file)
+        options.show(gathered, args.json, sweep.table(gathered))
         return 0
     if args.plot:
         from compare.kit import drawing

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from compare.commands import options, running
-from compare.kit import campaign, collection, sweep
+from compare.kit import campaign, sweep
 from compare.kit.tasks import failed_path, journal_path, store
 from compare.kit.workers import interrupts
 from compare.view import inspection
@@ -108,6 +108,6 @@ def grid(args: argparse.Namespace) -> int:
 
 def collect(args: argparse.Namespace) -> int:
     """Gather the runs."""
-    count = collection.collect(args.directory, args.output)
+    count = sweep.collect(args.directory, args.output)
     print(f"{count} runs gathered into {args.output}")
     return 0

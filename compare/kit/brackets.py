@@ -21,7 +21,7 @@ SECTIONS = 7
 
 @dataclass(frozen=True)
 class Care:
-    """How a run is done: times as long, and with the time step over `refine`."""
+    """How a run is done: `time` times as long, with the time step divided by `refine`."""
 
     time: int = 1
     refine: int = 1
@@ -62,6 +62,9 @@ class Search:
 def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
     """Narrow every search down to its width, or as far as runs show it, all of them together, round by round.
 
+    A round asks inside every bracket, and once more, for longer, where the run doesn't show the answer. The new bracket
+    is from the last yes before the first no to that no.
+
     With `careful` the ends of the brackets are asked once more with half the time step: one that doesn't hold is as
     uncertain as the bracket before it was wide, see `Bracket.shift`.
     """
@@ -69,39 +72,29 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     before = list(brackets)
     todo = list(range(len(searches)))
     while todo := [k for k in todo if brackets[k].high - brackets[k].low > searches[k].width]:
-        for k, bracket in zip(todo, _round(lab, [searches[k] for k in todo], [brackets[k] for k in todo]), strict=True):
-            before[k], brackets[k] = brackets[k], bracket
+        values = {k: np.linspace(brackets[k].low, brackets[k].high, SECTIONS + 2).tolist() for k in todo}
+        asked = [(searches[k], value, brackets[k]) for k in todo for value in values[k][1:-1]]
+        tasks = [search.task(value, bracket, USUAL) for search, value, bracket in asked]
+        runs = lab.run(tasks)
+        answers = [search.answer(run) for (search, _, _), run in zip(asked, runs, strict=True)]
+        unclear = [n for n, answer in enumerate(answers) if answer is None]
+        longer = [search.task(value, bracket, LONGER) for search, value, bracket in (asked[n] for n in unclear)]
+        for n, task, run in zip(unclear, longer, lab.run(longer), strict=True):
+            tasks[n], runs[n], answers[n] = task, run, asked[n][0].answer(run)
+        for n, k in enumerate(todo):
+            inside = slice(n * SECTIONS, (n + 1) * SECTIONS)
+            ends = brackets[k].runs
+            said, shown = [True, *answers[inside], False], [ends[0], *runs[inside], ends[1]]
+            no = said.index(False)
+            yes = max(m for m in range(no) if said[m])
+            by = tuple(tasks[inside][max(yes - 1, 0) : no])
+            before[k], brackets[k] = brackets[k], Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by)
         todo = [k for k in todo if brackets[k].high - brackets[k].low < (before[k].high - before[k].low) / 2]
     if careful:
-        ends = [(s, v, b) for s, b in zip(searches, brackets, strict=True) for v in (b.low, b.high)]
-        runs = iter(lab.run([s.task(v, b, FINER) for s, v, b in ends]))
+        asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in (b.low, b.high)]
+        checks = iter(lab.run([search.task(value, bracket, FINER) for search, value, bracket in asked]))
         for k, search in enumerate(searches):
-            low, high = search.answer(next(runs)), search.answer(next(runs))
+            low, high = search.answer(next(checks)), search.answer(next(checks))
             if low is False or high is True:
                 brackets[k] = replace(brackets[k], shift=before[k].high - before[k].low)
     return brackets
-
-
-def _round(lab: Lab, searches: Sequence[Search], brackets: Sequence[Bracket]) -> list[Bracket]:
-    """Ask inside every bracket; once more, for longer, where the run doesn't show the answer.
-
-    The new bracket is from the last yes before the first no to that no.
-    """
-    values = [np.linspace(b.low, b.high, SECTIONS + 2).tolist() for b in brackets]
-    asked = [(s, b, v) for s, b, row in zip(searches, brackets, values, strict=True) for v in row[1:-1]]
-    tasks = [s.task(v, b, USUAL) for s, b, v in asked]
-    runs = lab.run(tasks)
-    answers = [s.answer(run) for (s, _, _), run in zip(asked, runs, strict=True)]
-    unclear = [k for k, answer in enumerate(answers) if answer is None]
-    longer = [asked[k][0].task(asked[k][2], asked[k][1], LONGER) for k in unclear]
-    for k, task, run in zip(unclear, longer, lab.run(longer), strict=True):
-        tasks[k], runs[k], answers[k] = task, run, asked[k][0].answer(run)
-    narrower = []
-    for n, (bracket, at) in enumerate(zip(brackets, values, strict=True)):
-        inside = slice(n * SECTIONS, (n + 1) * SECTIONS)
-        said, shown = [True, *answers[inside], False], [bracket.runs[0], *runs[inside], bracket.runs[1]]
-        no = said.index(False)
-        yes = max(k for k in range(no) if said[k])
-        by = tuple(tasks[inside][max(yes - 1, 0) : no])
-        narrower.append(Bracket(at[yes], at[no], (shown[yes], shown[no]), by))
-    return narrower

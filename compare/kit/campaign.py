@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
+import itertools
 import json
 import math
 import os
@@ -18,14 +19,13 @@ import sys
 import threading
 from collections import Counter, deque
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from compare.kit.progress import Show, nowhere
-from compare.kit.tasks import Deadline, OutOfTimeError, Task, carry_out, failed_path, store
+from compare.kit.tasks import Task, carry_out, deadline, failed_path, store
 from compare.kit.workers import Workers, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
 from model.files import make_directory, remove_leftovers, write_text
@@ -53,38 +53,6 @@ class Failure:
     reason: str
 
 
-class _Executor:
-    """The executor that a campaign and its parts share: started when it is needed, and anew when its workers died."""
-
-    def __init__(self, workers: Workers) -> None:
-        self.workers, self.closed, self.lock = workers, False, threading.Lock()
-        self.running: Executor | None = None
-
-    def submit(self, *call: Any) -> Future[Any]:
-        """Give a call to the workers; raises `CancelledError` once there is to be no more work."""
-        with self.lock:
-            for _ in range(2):
-                if self.closed:
-                    raise CancelledError("the campaign was given up")
-                self.running = self.running or self.workers.start()
-                try:
-                    return self.running.submit(*call)
-                except self.workers.lost:
-                    self._stop(at_once=True)
-        raise StorageError("workers die as soon as they are started")
-
-    def close(self, at_once: bool) -> None:
-        """Let the workers go, `at_once` or after what is under way."""
-        with self.lock:
-            self.closed = at_once
-            self._stop(at_once)
-
-    def _stop(self, at_once: bool) -> None:
-        if self.running is not None:
-            self.workers.stop(self.running, at_once)
-            self.running = None
-
-
 @dataclass
 class Campaign:
     """A directory of runs and the workers that fill it; a context manager.
@@ -109,64 +77,58 @@ class Campaign:
     label: str = "runs"
 
     def __post_init__(self) -> None:
-        workers = processes(self.workers) if isinstance(self.workers, int) else self.workers
+        self._workers = processes(self.workers) if isinstance(self.workers, int) else self.workers
         check_number("batch", self.batch, "runs", Range(1, whole=True))
         if self.limit != math.inf:
             check_number("limit", self.limit, "s", POSITIVE)
         self.directory = Path(self.directory).resolve()
         make_directory(self.directory)
         remove_leftovers(self.directory)
-        self._executor = _Executor(workers)
         self._files: dict[str, Path] = dict(_stored(self.directory))
         self._failed: dict[str, Failure] = {}
-        self._read: dict[Path, dict[str, Trajectory]] = {}
+        self._lock = threading.Lock()
+        self._read: dict[str, Trajectory] = {}
         self._samples = 0
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._executor.close(at_once=kind is not None)
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
+        self._workers.close(at_once=kind is not None)
         remove_leftovers(self.directory)
 
     def under(self, label: str, doing: str) -> Campaign:
         """A part of the campaign with a label and runs of its own; parts may be carried out by several threads."""
         part = copy.copy(self)
         part.label, part.doing, part._read, part._samples = label, doing, {}, 0
-        part._files = {key: file for key, file in self._files.items() if file.name.rpartition("-")[0] == label}
-        part._files |= {key: file for key, file in self._files.items() if file.stem == label}
+        part._files = {key: f for key, f in self._files.items() if label in (f.stem, f.name.rpartition("-")[0])}
         return part
 
     @property
     def at_once(self) -> int:
         """How many parts keep the workers busy: two more than there are workers, as some wait for a single long run."""
-        count = self._executor.workers.count
+        count = self._workers.count
         return count + 2 if count > 1 else 1
 
     def give_up(self) -> None:
         """Stop all that is under way, in whatever thread."""
-        self._executor.close(at_once=True)
+        self._workers.close(at_once=True)
 
     def load(self, key: str) -> Trajectory:
         """The run of a task that was carried out, by its key; raises `StorageError` if it can't be read."""
-        file = self._files[key]
-        if key not in self._read.get(file, ()):
-            self._forget(file)
-            runs = storage.load_runs(file)
-            self._hold(file, runs if key in runs else {key: runs[""]})
-        return self._read[file][key]
+        if key not in self._read:
+            runs = storage.load_runs(self._files[key])
+            self._hold(runs if key in runs else {key: runs[""]})
+        return self._read[key]
 
-    def _hold(self, file: Path, runs: Mapping[str, Trajectory]) -> None:
-        """Keep runs of a file in memory, and forget those of earlier files while there are more than `READ` samples."""
-        self._read.setdefault(file, {}).update(runs)
-        self._samples += sum(len(run.time) for run in runs.values())
-        while self._samples > READ and len(self._read) > 1:
-            self._forget(next(iter(self._read)))
-
-    def _forget(self, file: Path) -> None:
-        self._samples -= sum(len(run.time) for run in self._read.pop(file, {}).values())
+    def _hold(self, runs: Mapping[str, Trajectory]) -> None:
+        """Keep runs in memory, and forget the earliest of the others while there are more than `READ` samples."""
+        for key, run in runs.items():
+            before = self._read.pop(key, None)
+            self._samples += len(run.time) - (len(before.time) if before else 0)
+            self._read[key] = run
+        while self._samples > READ and len(self._read) > len(runs):
+            self._samples -= len(self._read.pop(next(iter(self._read))).time)
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
@@ -174,10 +136,11 @@ class Campaign:
         Raises `SimulationError` for the first task that failed, `InputError` if it could not even start: use
         `complete` where failures are expected.
         """
-        for task, reason in ((failure.task, failure.reason) for failure in self.complete(tasks)[:1]):
-            if task.key in self._files:
-                raise SimulationError(f"the run {task.key} {reason}", self.load(task.key))
-            raise InputError(f"the run {task.key} failed: {reason}")
+        for failure in self.complete(tasks):
+            key = failure.task.key
+            if key in self._files:
+                raise SimulationError(f"the run {key} {failure.reason}", self.load(key))
+            raise InputError(f"the run {key} failed: {failure.reason}")
         return [self.load(task.key) for task in tasks]
 
     def complete(self, tasks: Iterable[Task]) -> list[Failure]:
@@ -191,18 +154,19 @@ class Campaign:
         failures = [Failure(unique[key], self.load(key).header.failure) for key in earlier]
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
-        for batch, outcomes in self._carry_out(_batches(todo, self.batch, self._executor.workers.count)):
+        for batch, outcomes in self._carry_out(_batches(todo, self.batch, self._workers.count)):
             for task, (reason, file, run) in zip(batch, outcomes, strict=True):
                 failures += [Failure(task, reason)] if reason else []
                 done += not reason
                 if file:
                     self._files[task.key] = file
-                if file and run:
-                    self._hold(file, {task.key: run})
+                if run:
+                    self._hold({task.key: run})
             self.report(self.doing, done, len(unique), len(failures))
-        if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
-            self._failed |= new
-            write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
+        with self._lock:  # the parts of a campaign share the list
+            if new := {failure.task.key: failure for failure in failures if failure.task.key not in self._failed}:
+                self._failed |= new
+                write_text(self.directory / FAILURES, json.dumps(listed(self._failed.values()), indent=1))
         return failures
 
     def reduce(self, label: str, keys: Collection[str] = ()) -> None:
@@ -215,7 +179,7 @@ class Campaign:
             storage.save_batch({key: self.load(key) for key in sorted(keys)}, self.directory / f"{label}.h5")
         for file in gone:
             file.unlink(missing_ok=True)
-            self._forget(file)
+        self._read, self._samples = {}, 0
         self._files = {key: file for key, file in self._files.items() if file not in gone}
 
     def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[tuple[Task, ...], Sequence[Outcome]]]:
@@ -229,21 +193,21 @@ class Campaign:
         died: Counter[str] = Counter()
         while True:
             # No more than a few batches wait at the executor, so that memory stays flat however long the list.
-            while len(pending) < 2 * self._executor.workers.count and (batch := next(fresh, ())):
-                pending[self._executor.submit(run_batch, batch, self.directory, self.label, self.limit)] = batch
-            alone = not pending
+            batches = list(itertools.islice(fresh, 2 * self._workers.count - len(pending)))
+            alone = not batches and not pending
             if alone:
                 if not again:
                     return
-                batch = (again.popleft(),)
-                pending[self._executor.submit(run_batch, batch, self.directory, self.label, self.limit)] = batch
-            ended, _ = wait(pending, return_when=FIRST_COMPLETED)
-            for future in [each for each in pending if each in ended]:  # in order, for what is held in memory
+                batches = [(again.popleft(),)]
+            for batch in batches:
+                pending[self._workers.submit(run_batch, batch, self.directory, self.label, self.limit)] = batch
+            wait(pending, return_when=FIRST_COMPLETED)
+            for future in [each for each in pending if each.done()]:
                 batch = pending.pop(future)
                 error = future.exception()
                 if error is None:
                     yield batch, future.result()
-                elif not isinstance(error, self._executor.workers.lost):
+                elif not isinstance(error, self._workers.lost):
                     raise error
                 elif alone and died[batch[0].key]:
                     yield batch, [("its worker died (killed, or out of memory)", None, None)]
@@ -267,10 +231,10 @@ def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) 
         if len(tasks) == 1 and (tasks[0].long or tasks[0].samples > HELD):
             failure = store(tasks[0], paths[0], limit)
             return [(failure, failed_path(paths[0]) if failure else paths[0], None)]
-        runs = carry_out(tasks, Deadline(limit * len(tasks)))
+        runs = carry_out(tasks, deadline(limit * len(tasks)))
     except StorageError:  # a full disk is for the user to mend
         raise
-    except (InputError, OutOfTimeError, MemoryError) as error:
+    except (InputError, TimeoutError, MemoryError) as error:
         if len(tasks) > 1:
             return [outcome for task in tasks for outcome in run_batch([task], directory, label, limit)]
         return [(str(error) or "out of memory", None, None)]
@@ -278,11 +242,13 @@ def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) 
     together = directory / f"{label}-{hashlib.sha256(' '.join(whole).encode()).hexdigest()[:24]}.h5"
     if whole:
         storage.save_batch(whole, together)
-    files = [together if run.complete else failed_path(path) for run, path in zip(runs, paths, strict=True)]
-    for run, file in zip(runs, files, strict=True):
+    outcomes: list[Outcome] = []
+    for run, path in zip(runs, paths, strict=True):
+        file = together if run.complete else failed_path(path)
         if not run.complete:
             storage.save(run, file)
-    return [(run.header.failure, file, run) for run, file in zip(runs, files, strict=True)]
+        outcomes.append((run.header.failure, file, run))
+    return outcomes
 
 
 def _stored(directory: Path) -> Iterator[tuple[str, Path]]:

@@ -17,8 +17,6 @@ _WIDEST = 1.5
 """Deviations beyond this multiple of the tolerance are drawn at the edge, as arrows."""
 _MANY = 100
 """From so many points on, they are drawn as pixels: a page of many figures stays small."""
-
-
 Checks = tuple[Check, ...]
 
 

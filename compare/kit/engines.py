@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import Any
 
 import analytic
@@ -63,12 +63,11 @@ class Engine:
         """Why it can't run here; empty if it can."""
         return self.needs.missing if self.needs else ""
 
-    @property
+    @cached_property
     def versions(self) -> dict[str, str]:
         """Of all that determines its results."""
-        return {name: version(name) for name in self.stands_on} | (
-            {self.needs.name: self.needs.version} if self.needs else {}
-        )
+        needed = {self.needs.name: self.needs.version} if self.needs else {}
+        return {name: version(name) for name in self.stands_on} | needed
 
     def at(self, step: float | None, p: Parameters) -> Settings:
         """Settings of a study for a time step in s; engines without a step ignore it."""
@@ -89,28 +88,16 @@ STUDY_SLIP = 2.0
 """Slip speed in m/s for which contact in the studies' settings is continuous, under the load of gravity, at mu = 1."""
 
 
-def _mujoco_study(step: float, p: Parameters) -> ContactSettings:
-    """One of two settings for all parameter sets, so that runs of a step share a batch."""
-    return _rough(step).suited(p)
-
-
 @cache
 def _rough(step: float) -> ContactSettings:
+    """For a ball on the roughest floor; with `suited` one of two for all sets, so that runs of a step share a batch."""
     return ContactSettings.for_problem(Parameters.named("reference").replace(mu=1.0, eta=0.0), step, STUDY_SLIP)
 
 
 def newcomer(step: float) -> ContactSettings:
     """MuJoCo's own contact parameters on the joints of this study, and none of the corrections between the steps."""
-    return ContactSettings(
-        timestep=step,
-        solref=(0.02, 1.0),
-        solreffriction=0.02,
-        solimp=0.9,
-        impratio=1.0,
-        servo=0.0,
-        memory=False,
-        order=1,
-    )
+    contacts = ContactSettings(timestep=step, solref=(0.02, 1.0), solreffriction=0.02, solimp=0.9, impratio=1.0)
+    return replace(contacts, servo=0.0, memory=False, order=1)
 
 
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
@@ -119,28 +106,18 @@ def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
         return mjsim.Run(*given, **more)
 
 
-def _theory(
-    method: str,
-    p: Parameters,
-    x0: State,
-    t_end: float,
-    flow: Flow,
-    settings: analytic.Settings,
-    sample_interval: float | None,
-    progress: Callable[[float], None],
-) -> Trajectory:
-    given = p, x0, t_end, flow, replace(settings, method=method)
+def _theory(method: str, *task: Any) -> Trajectory:
+    """A run by a method of theory, as far as it came; arguments of `Simulate`."""
+    p, x0, t_end, flow, settings, interval, progress = task
     try:
-        return analytic.simulate(*given, sample_interval=sample_interval, progress=progress)
+        settings = replace(settings, method=method)
+        return analytic.simulate(p, x0, t_end, flow, settings, sample_interval=interval, progress=progress)
     except SimulationError as error:
         return error.trajectory
 
 
 def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, colour: str) -> tuple[Engine, Engine]:
-    """Records of an engine with the best settings of its adapter and with a newcomer's.
-
-    The adapter is a module of `compare.engines`, with `Settings`, `newcomer` and `scene`; each record has a mark.
-    """
+    """Records of an engine with the best settings of its adapter and with a newcomer's, each with a mark."""
     name, other = library.name, f"{library.name}-defaults"
     best = Engine(
         name=name,
@@ -169,7 +146,7 @@ MUJOCO = Engine(
     settings=ContactSettings,
     options=("timestep",),
     configure=lambda given, p: ContactSettings.at(given.get("timestep", ContactSettings.timestep)).suited(p),
-    study=_mujoco_study,
+    study=lambda step, p: _rough(step).suited(p),
     stream=mjsim.Run,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
@@ -207,21 +184,17 @@ MOREAU = replace(
     colour="#009E73",
 )
 _OTHERS = (
-    _adapted(pybullet, Library("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
-    _adapted(drake, Library("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
-    _adapted(siconos, siconos.LIBRARY, 1e-3, "p2", "#000000"),
+    *_adapted(pybullet, Library("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
+    *_adapted(drake, Library("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
+    *_adapted(siconos, siconos.LIBRARY, 1e-3, "p2", "#000000"),
 )
-ENGINES: dict[str, Engine] = {
-    each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU, *(each for pair in _OTHERS for each in pair))
-}
+ENGINES: dict[str, Engine] = {each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU, *_OTHERS)}
 """Every engine by name."""
-ALIASES = {"analytic": "event"}
-"""Other names that the command line takes."""
 
 
 def engine(name: str) -> Engine:
-    """The engine of a name; `InputError` with a suggestion if there is none."""
-    name = ALIASES.get(name, name)
+    """The engine of a name, or of its alias `analytic`; `InputError` with a suggestion if there is none."""
+    name = "event" if name == "analytic" else name
     if name not in ENGINES:
         raise InputError(f"no engine is called {name!r}{suggestion(name, ENGINES)}; there are {', '.join(ENGINES)}")
     return ENGINES[name]

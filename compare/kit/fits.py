@@ -35,11 +35,6 @@ def slope_error(x: Array, degree: int) -> float:
     return float(np.linalg.norm(np.linalg.pinv(np.vander(x, degree + 1, increasing=True))[1]))
 
 
-def at_zero(x: Array, y: Array, degree: int) -> float:
-    """Value at x = 0 of the polynomial through points x, y (n,); with x and y exchanged, where y vanishes."""
-    return float(Polynomial.fit(x, y, degree)(0.0))
-
-
 def straight_line(x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike) -> tuple[Measured, Measured]:
     """Zero and slope of the line through points x, y (n,) whose y have the standard uncertainties `noise`.
 
@@ -81,7 +76,7 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Measured, Measured
 
 def vanishing(where: Array, values: Sequence[Measured]) -> Measured:
     """The place at which a quantity is zero, from places (n,) and its values there, the one nearest to zero first."""
-    return _extrapolated(lambda y, n: at_zero(y[:n] / np.abs(y).max(), where[:n], n - 1), values)
+    return _extrapolated(lambda y, n: float(Polynomial.fit(y[:n] / np.abs(y).max(), where[:n], n - 1)(0.0)), values)
 
 
 def initial_slope(where: Array, values: Sequence[Measured]) -> Measured:

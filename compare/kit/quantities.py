@@ -1,29 +1,27 @@
 """What is measured: every quantity with its symbol, unit, and the resolving power that a check of it must have.
 
-A check resolves r if it would notice a prediction that is off by r of the quantity's scale, see
-`compare.claim`. Where what was measured is too coarse for `Quantity.resolves`, the check is inconclusive,
-however well the numbers agree. The ceilings follow from what each protocol can do at its quick level:
+A check resolves r if it would notice a prediction that is off by r times the quantity's scale, see `compare.claim`. A
+check that resolves less than `Quantity.resolves` is inconclusive, however well the numbers agree. These ceilings follow
+from the errors of each protocol at its quick level:
 
-* settled states don't depend on the time step, so that only the settling is left, which is waited for down to 1e-8;
-  a slip is a difference of spins ten times its size, a force one of accelerations;
+* settled states don't depend on the time step: what is left is their drift, which is waited for down to 1e-8. A slip is
+  a difference of spins ten times its size, a force one of accelerations;
 * a threshold is bracketed, or extrapolated from settled states as near to it as their settling allows;
-* the unstable state between two attractors is what a ball comes to on its border: its oscillation has died out to 1e-4
-  of the spin, and three times that is to be resolved; a ball that is pushed leaves the floor within a time step, which
-  its height of some tenths of a millimetre shows;
-* friction opposes the slip of some point within a step: the law is off by what the slip turns in it, and the speed of a
-  landing by the fall within a step, about a thousandth of either;
-* a motion through landings follows the step h to second order, (omega_0 h)^2/24 = 5e-5 with the coarser step of a hop,
-  three quarters of which is its difference from the finer; a disturbance that shrinks by a tenth from hop to hop piles
-  up to ten times as much: 4e-4. A step of the flow by 4e-2 has shrunk to a hundredth when the hops are measured: 4e-4.
-  Both together, three times, are 1.7e-3 of omega_c. Hops are as high as the flow is above the one where they begin, a
-  sixteenth of it where they are lowest: sixteen times as much of the height, 2.7e-2. The time in the air goes with the
-  root of the height: half as much of the period. A multiplier comes from the ten hops in which a disturbance is neither
-  too large nor lost in that. Along rougher walls it rises by half of the relative change of eta: known to 4e-3, it
-  says to 8e-3 along which wall it is 1, and three times that is to be resolved;
-* what a pulsation or a jump does is compared at two time steps, to a part in a thousand of itself; the onset of slip is
-  bracketed to that, and slip begins within a time step, a few hundredths of a period, near a maximum; the mean reading
-  and the flow by which a ramp passes a fold are small differences of flows;
-* rates and growths come from short records of the motion and carry the error of a time step, a few tenths of a percent.
+* on the edge between two attractors the oscillation has died out to 1e-4 of the spin, three times which is to be
+  resolved; a ball that is pushed leaves the floor within a time step, seen from its height of tenths of a millimetre;
+* the direction of friction is that of the slip somewhere within a step, and the speed of a landing is uncertain by the
+  fall within a step: about a thousandth of either;
+* hops have errors of second order in the step h, (omega_0 h)^2/24 = 5e-5 for the coarser one, three quarters of which
+  is its difference from the finer. A disturbance shrinks by a tenth a hop, so that errors add up to ten times as much:
+  4e-4. A step of the flow by 4e-2 has shrunk to a hundredth when hops are measured: 4e-4. Three times both are 1.7e-3
+  of omega_c; sixteen times as much, 2.7e-2, of the height, since hops are lowest at a sixteenth of a flow above their
+  onset; half as much as that of the period, which goes with the root of the height. A multiplier comes from the ten
+  hops in which a disturbance is neither too large nor lost in errors. It rises by half of the relative change of eta:
+  known to 4e-3, it gives the eta at which it is 1 to 8e-3, three times which is to be resolved;
+* pulsations and jumps are compared at two time steps, to a thousandth. The onset of slip is bracketed to that, and slip
+  begins within a time step, a few hundredths of a period, near a maximum; the mean reading and the flow by which a ramp
+  passes a fold are small differences of flows;
+* rates and growths come from short records and carry the error of a time step, a few tenths of a percent.
 """
 
 from __future__ import annotations
@@ -43,14 +41,13 @@ class Quantity:
     unit: str
     """SI, as in the HDF5 files."""
     resolves: float
-    """Largest error of a prediction, over the scale of the quantity, that a check may overlook."""
+    """Largest error of a prediction, divided by the scale of the quantity, that a check may overlook."""
 
 
 _SPEEDS = {"v_y": "v_y", "v_h": "v_h"}
 _TURNS = {"omega_c": "ω_c", "slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
 _FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
-_FORCES |= {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}
-"""And what the balances say of the forces where both contacts roll."""
+_FORCES |= {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}  # determined where both contacts roll
 _ALL = (
     Quantity("case", "case", "1", 0.0),
     Quantity("cases", "cases reached", "1", 0.0),

@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from compare.kit.lab import Lab
@@ -24,7 +23,7 @@ from compare.kit.statistics import COVERAGE, Measured
 from compare.kit.tasks import Task
 from model import Parameters, StorageError
 from model.arrays import Array
-from model.files import WholeFile, dataset, reading
+from model.files import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
 from model.trajectory import current_commit, current_versions
 
@@ -91,7 +90,7 @@ def measurement(
 
 
 def sure_enough(name: str, value: Measured, scale: float) -> bool:
-    """Whether a check of a measured quantity can resolve what it should, over a scale that is natural to it."""
+    """Whether the tolerance, divided by the natural scale of a quantity, is as small as its checks need."""
     return COVERAGE * value.uncertainty <= quantity(name).resolves * scale
 
 
@@ -164,15 +163,16 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
     A condition that a row doesn't have is nan, or empty where it is text.
     """
     rows = records.measurements
-    columns: dict[str, list[Any]] = {name: [getattr(m, name) for m in rows] for name in _OWN}
+    columns: dict[str, Sequence[Any]] = {"row": range(len(rows))}
+    columns |= {name: [getattr(m, name) for m in rows] for name in _OWN}
     columns["runs"] = [" ".join(m.runs) for m in rows]
     columns |= {name: [getattr(m.parameters, name) for m in rows] for name in _PARAMETERS}
     texts = {name: isinstance(value, str) for m in rows for name, value in m.conditions.items()}
     for name, text in texts.items():
-        columns[f"at_{name}"] = [m.conditions.get(name, "" if text else np.nan) for m in rows]
+        values = [m.conditions.get(name, "" if text else np.nan) for m in rows]
+        columns[f"at_{name}"] = values if text else np.array(values, float).tolist()
     with WholeFile(path) as whole:
-        file = whole.file
-        file.attrs.update(
+        whole.file.attrs.update(
             schema=SCHEMA,
             schema_version=SCHEMA_VERSION,
             about=json.dumps(dict(about)),
@@ -180,12 +180,7 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
             versions=json.dumps(dict(current_versions())),
             commit=current_commit(),
         )
-        row = file.create_dataset("row", data=np.arange(len(rows)))
-        row.make_scale("row")
-        for name, values in columns.items():
-            kind = h5py.string_dtype() if values and isinstance(values[0], str) else np.dtype(np.float64)
-            column = file.create_dataset(name, data=np.array(values, dtype=kind), dtype=kind)
-            column.dims[0].attach_scale(row)
+        write_columns(whole.file, columns, "row")
         whole.finish()
 
 
@@ -197,10 +192,7 @@ def load(path: Path) -> Records:
     with reading(path) as file:
         if file.attrs.get("schema") != SCHEMA or file.attrs.get("schema_version") != SCHEMA_VERSION:
             raise StorageError("it does not hold measurements in this program's format")
-        columns: dict[str, list[Any]] = {}
-        for name in file:
-            stored = dataset(file, name)
-            columns[name] = (stored.asstr() if h5py.check_string_dtype(stored.dtype) else stored)[...].tolist()
+        columns = {name: column(dataset(file, name)).tolist() for name in file}
         rows = []
         for k in range(len(columns["value"])):
             conditions = {name[3:]: values[k] for name, values in columns.items() if name.startswith("at_")}

@@ -1,7 +1,7 @@
 """Runs until they are settled, by their own drift; what a settled state is, and how sure each of its numbers is.
 
-A mean over a window that falls off smoothly at both ends passes over the oscillation of a ball on the wall, which dies
-out slowly or, while it sinks, not at all. Three overlapping windows show how far the mean still drifts.
+The oscillation of a ball on the wall dies out slowly or, while it sinks, not at all; a mean over a tapered window is
+free of it. Three overlapping windows show how far the mean still drifts.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def rotation_scale(p: Parameters) -> float:
 
 
 def scale(name: str, p: Parameters) -> float:
-    """Natural size of a quantity of a settled state, over which errors are counted."""
+    """Natural size of a quantity of a settled state, by which errors are divided."""
     if name.startswith("force"):
         return p.m * p.g
     if name == "v_y":
@@ -125,8 +125,8 @@ def settle(
     A settled state may drift and swing `loose` times as much as values may that are held against theory; but as long as
     there are rounds, one that exceeds `sharp` times that goes on.
 
-    It goes on from its mean, but at the height from which it started: a ball on the wall alone knows nothing of its
-    height, and one that sinks must not land.
+    It goes on from its mean, but at the height from which it started: the motion of a ball on the wall alone does not
+    depend on its height, and one that sinks must not land.
     """
     states: dict[int, Settled] = {}
     todo = dict(enumerate(starts))
@@ -171,7 +171,7 @@ def duration(p: Parameters, span: float = SPAN) -> float:
 
 
 def high(p: Parameters) -> float:
-    """A height in m from which a ball that sinks as fast as it may freely doesn't land within a round."""
+    """A height in m from which a ball that sinks freely doesn't land within a round."""
     return 1.25 * dragged_speed(p) * duration(p, max(ROUNDS) * SPAN)
 
 
@@ -204,14 +204,14 @@ def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Set
         values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
         swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)
         drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolves for q in worst)
-        floor = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
+        solving = max(COVERAGE * solved / quantity(q).resolves for q in worst)  # the same however long a run is
         excess, failure = max(drifting, swings / 1e-3), ""
         if counts.max() < 0.98 * length:
             excess = math.inf
             failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
-        elif max(excess, floor) > loose:
-            way = "drifts" if max(drifting, floor) > loose else "swings"
-            failure = f"in {case.name} it still {way} {max(excess, floor):.2g} times as much as it may"
+        elif max(excess, solving) > loose:
+            way = "drifts" if max(drifting, solving) > loose else "swings"
+            failure = f"in {case.name} it still {way} {max(excess, solving):.2g} times as much as it may"
         states.append(Settled(start, case, values, means[len(series) :], task, excess, failure))
     return min(states, key=lambda state: state.excess)
 
@@ -235,7 +235,7 @@ def settles(run: Trajectory) -> bool | None:
 
 
 def taper(length: int) -> Array:
-    """The window (n,): it falls off smoothly at both ends."""
+    """The tapered window (n,)."""
     return np.asarray(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER)
 
 

@@ -75,12 +75,6 @@ def tail(run: Trajectory, share: float = 0.1) -> slice:
     return slice(int((1 - share) * len(run.time)), None)
 
 
-def settled_mean(run: Trajectory, values: Array) -> Measured:
-    """Mean of values (n,), one a sample, over the last part of a run."""
-    last = tail(run)
-    return window_mean(run.time[last], values[last])
-
-
 def settled_case(run: Trajectory) -> Case:
     """The case of most samples in the last part of a run."""
     return Case(int(np.bincount(run.case[tail(run)]).argmax()))

@@ -46,8 +46,6 @@ POINT: dict[str, Any] = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none
 """A special point."""
 HALO: dict[str, Any] = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.85}
 """Background of a name that stands on lines."""
-LEAST = 1e-16
-"""Smaller relative errors are drawn here: an error may be zero."""
 SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
 THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
 FREE_0, FREE_C = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$", "$\\Omega_c = \\omega_c\\sqrt{R/g}$"
@@ -201,20 +199,6 @@ def points(
         usual = {"ms": 5, "label": engine + way, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
         bars = [COVERAGE * unit * m.uncertainty for m in own]
         axes.errorbar([x(m) for m in own], [unit * y(m) for m in own], bars, **mark_of(engine) | usual | look)
-
-
-def deviations(
-    axes: Axes,
-    rows: Iterable[Measurement],
-    predicted: Callable[[Measurement], float],
-    x: Callable[[Measurement], float] = omega_0,
-) -> None:
-    """A panel of relative deviations of measured values from predicted ones, by engine, on a logarithmic axis."""
-    for engine, own in by_engine(rows, lambda m: m.engine).items():
-        off = [max(abs(m.value / predicted(m) - 1), LEAST) for m in own]
-        axes.plot([x(m) for m in own], off, ls="none", ms=5, **mark_of(engine))
-    axes.set(yscale="log", ylim=(LEAST / 10, 10), ylabel="relative deviation")
-    axes.grid(alpha=0.25)
 
 
 def legend(of: Axes | Figure, **where: Any) -> None:

@@ -1,18 +1,35 @@
-"""Designs: which parameters to vary, and the sets that follow."""
+"""Sweeps: the parameter sets that axes span, and what many runs settled to, in one file.
+
+`collect` writes one row a run: its parameters, and the mean, uncertainty and case over the last part of the run. The
+file opens in xarray with the dimension ``run``, along which the parameters that vary are coordinates.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+from rich.table import Table
 
-from model import InputError, Parameters
+from compare.kit import pages
+from compare.kit.statistics import settled_case, tail, window_mean
+from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.arrays import Array
+from model.files import WholeFile, check_writable, column, dataset, reading, write_columns
+from model.kinematics import UNITS, VARIABLES
 from model.parameters import ANY, Range, check_names, check_number, parse_number
 
+SCHEMA, SCHEMA_VERSION = "dualball-collection", 1
+NAMED = 5
+"""Most files that can't be gathered, and most runs of a file, that are named one by one."""
 FIELDS = {field.name: field.metadata["unit"] for field in Parameters.quantities()}
 """Units of the parameters."""
 
@@ -80,3 +97,129 @@ def levels(axes: Sequence[Axis], direction: str) -> list[float]:
         raise InputError(f"direction = {direction!r} sweeps omega_0 within one run: vary omega_0 and nothing else")
     up = sorted(axes[0].values)
     return {"up": up, "down": up[::-1], "both": up + up[-2::-1]}[direction]
+
+
+def collect(directory: Path, output: Path) -> int:
+    """Gather all runs of a directory, whole ones and failed ones, in the order of their names; return their number.
+
+    Raises `StorageError` if there are none, the output can't be written, or, with their names, some can't be read or
+    hold the same run twice.
+    """
+    check_writable(output)
+    if not directory.is_dir():
+        raise StorageError(f"cannot read {directory}: there is no such directory")
+    rows, problems, known = [], [], dict[str, Path]()
+    for file in sorted(directory.rglob("*.h5")):
+        # The journal of a run that goes on, and the collection of the last time, are no runs.
+        if file.parent.suffix == ".journal" or file.resolve() == output.resolve():
+            continue
+        try:
+            runs = storage.load_runs(file)
+        except StorageError as error:
+            problems.append(str(error))
+            continue
+        for name, run in runs.items():
+            header = dataclasses.asdict(dataclasses.replace(run.header, created="", failure=""))
+            header["flow"] = run.header.flow.to_mapping()
+            identity = json.dumps(header, sort_keys=True, default=dict)  # all that determines a run
+            if (first := known.setdefault(identity, file / name)) != file / name:
+                problems.append(f"{first} and {file / name} hold the same run")
+            rows.append(_row(run, (file / name).relative_to(directory)))
+    if problems:
+        more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
+        raise StorageError("; ".join(problems[:NAMED]) + more)
+    if not rows:
+        raise StorageError(f"there are no runs in {directory}")
+    units = {f.name: f.metadata["unit"] for f in Parameters.quantities()} | {"duration": "s"}
+    for name, unit in zip(VARIABLES, UNITS, strict=True):
+        units |= {name: unit, f"{name}_uncertainty": unit}
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
+    coordinates = varied(columns)
+    with WholeFile(output) as whole:
+        whole.file.attrs.update(schema=SCHEMA, schema_version=SCHEMA_VERSION)
+        for name, stored in write_columns(whole.file, columns, "run").items():
+            if units.get(name):
+                stored.attrs["units"] = units[name]
+            if coordinates and name not in ("run", *coordinates):
+                stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
+        whole.finish()
+    return len(rows)
+
+
+def varied(columns: Mapping[str, Any]) -> list[str]:
+    """The parameters that have several values; older files have no law of drag."""
+    return [f.name for f in dataclasses.fields(Parameters) if len(set(columns.get(f.name, ()))) > 1]
+
+
+def is_collection(path: Path) -> bool:
+    """Whether a file holds many runs: a collection, or a batch of a campaign; raises `StorageError` if unreadable."""
+    if path.parent.is_file():  # one run of a batch
+        return False
+    with reading(path) as file:
+        return bool(file.attrs.get("schema") == SCHEMA) or storage.is_batch(file)
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """What a collection or batch holds: names of runs, engines, failures, the range of every column, JSON-able.
+
+    Raises `StorageError` for one that is not whole or of a newer version.
+    """
+    with reading(path) as file:
+        if not storage.is_batch(file):
+            version = file.attrs.get("schema_version")
+            if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
+                raise StorageError(f"it is a collection of version {version!r}; this program reads {SCHEMA_VERSION}")
+            return described({name: column(dataset(file, name)) for name in file})
+    rows = [_row(run, path / name) for name, run in storage.load_runs(path).items()]
+    return described({name: np.array([row[name] for row in rows]) for name in rows[0]})
+
+
+def described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
+    """As `describe`, for the columns of a collection by name; `drag` is missing in older ones."""
+    codes, counts = np.unique(columns["case"], return_counts=True)
+    finite = {name: values[np.isfinite(values)] for name, values in columns.items() if values.dtype.kind == "f"}
+    return {
+        "runs": len(columns["run"]),
+        "names": columns["run"].tolist(),
+        "engines": sorted(set(columns["engine"].tolist())),
+        "cases": {Case(code).name: int(count) for code, count in zip(codes, counts, strict=True) if code >= 0},
+        "failures": [text for text in columns["failure"].tolist() if text],
+        "drag": sorted(set(columns["drag"].tolist())) if "drag" in columns else [],
+        "varied": varied(columns),
+        "ranges": {name: [float(v.min()), float(v.max())] for name, v in finite.items() if len(v)},
+    }
+
+
+def table(about: dict[str, Any]) -> Table:
+    """The description for the terminal."""
+    ranges, names = about["ranges"], about["names"]
+    more = f"\n… and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    rows = {
+        "runs": f"{about['runs']} ({', '.join(about['engines'])}), {len(about['failures'])} failed",
+        "named": "\n".join(names[:NAMED]) + more,
+        "cases": ", ".join(f"{name}: {count}" for name, count in about["cases"].items()),
+        "varied": "\n".join("{} {:g} … {:g}".format(n, *ranges[n]) for n in about["varied"] if n != "drag"),
+        "drag": ", ".join(about["drag"]),
+        "omega_c": "{:.9g} … {:.9g} rad s-1".format(*ranges.get("omega_c", [np.nan, np.nan])),
+    }
+    return pages.pairs(rows)
+
+
+def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
+    """A run's parameters, and mean, standard uncertainty and prevailing case over its last part.
+
+    Those are nan, and the case -1, for a run too short for them.
+    """
+    row: dict[str, Any] = {"run": str(name), "engine": trajectory.header.engine}
+    row |= dataclasses.asdict(trajectory.header.parameters)
+    row["duration"] = float(trajectory.time[-1]) if len(trajectory.time) else 0.0
+    row["failure"] = trajectory.header.failure
+    last = tail(trajectory)
+    for variable in VARIABLES:
+        try:
+            mean = window_mean(trajectory.time[last], getattr(trajectory, variable)[last])
+        except InputError:  # too few samples for a mean
+            row |= {variable: np.nan, f"{variable}_uncertainty": np.nan}
+        else:
+            row |= {variable: mean.value, f"{variable}_uncertainty": mean.uncertainty}
+    return row | {"case": int(settled_case(trajectory)) if len(trajectory.case) else -1}

@@ -9,7 +9,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -45,8 +45,7 @@ class Task:
     """s; None for a thousandth of t_end."""
 
     def __post_init__(self) -> None:
-        simulator = self.simulator
-        if self.settings is not None and not isinstance(self.settings, simulator.settings):
+        if not isinstance(self.settings, self.simulator.settings | None):
             raise InputError(f"settings of another engine were given to {self.engine!r}")
         object.__setattr__(self, "x0", State.one(self.x0))
 
@@ -63,7 +62,9 @@ class Task:
     @functools.cached_property
     def key(self) -> str:
         """Hash of all that determines the run: the fields of the task, the program's sources, the engine's version."""
-        text = json.dumps({"task": self.describe(), "code": _code(self.simulator)}, sort_keys=True)
+        engine = self.simulator
+        code = {"sources": sources(*engine.sources), **engine.versions}
+        text = json.dumps({"task": self.describe(), "code": code}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:24]
 
     def describe(self) -> dict[str, Any]:
@@ -106,31 +107,33 @@ class Task:
         return json.dumps(shared, sort_keys=True)
 
 
-class OutOfTimeError(RuntimeError):
-    """A run took longer than it may."""
+def deadline(limit: float) -> Callable[[], None]:
+    """A function that raises `TimeoutError` once more than `limit` s of real time have passed."""
+    start = time.monotonic()
+
+    def check() -> None:
+        if time.monotonic() - start > limit:
+            raise TimeoutError(f"it took longer than {limit:g} s")
+
+    return check
 
 
-@dataclass(frozen=True)
-class Deadline:
-    """How long something may take, in s of real time from its creation."""
+def carry_out(tasks: Sequence[Task], check: Callable[[], None] = lambda: None) -> list[Trajectory]:
+    """Run tasks of one `Task.batch_key`, calling `check` from time to time.
 
-    limit: float = math.inf
-    start: float = field(default_factory=time.monotonic)
-
-    def check(self) -> None:
-        """Raise `OutOfTimeError` if it is over."""
-        if time.monotonic() - self.start > self.limit:
-            raise OutOfTimeError(f"it took longer than {self.limit:g} s")
-
-
-def carry_out(tasks: Sequence[Task], deadline: Deadline | None = None) -> list[Trajectory]:
-    """Run tasks of one `Task.batch_key`; a run that breaks down comes back with its failure in the header."""
-    deadline = deadline or Deadline()
-    if not tasks[0].simulator.stream:
-        return [_simulated(task, deadline) for task in tasks]
+    A run that breaks down comes back with its failure in the header.
+    """
+    if simulate := tasks[0].simulator.simulate:
+        return [
+            simulate(
+                *(task.parameters, State.one(task.x0), task.t_end, task.fluid),
+                *(task.chosen_settings, task.sample_interval, lambda done: check()),
+            )
+            for task in tasks
+        ]
     run, blocks = _begun(tasks), []
     for block in run:
-        deadline.check()
+        check()
         blocks.append(block)
     return [
         Trajectory.from_blocks(header, parts, events)
@@ -149,14 +152,20 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
     ------
     StorageError
         If a file can't be written.
-    OutOfTimeError
+    TimeoutError
         If it takes longer than `limit` s.
     """
-    deadline = Deadline(limit)
-    if not task.simulator.stream:
-        run = _simulated(task, deadline, stop)
-        storage.save(run, path if run.complete else failed_path(path))
+    check = deadline(limit)
+    if task.simulator.simulate:
+
+        def interrupted() -> None:
+            check()
+            if stop():
+                raise KeyboardInterrupt
+
+        (run,) = carry_out([task], interrupted)
         failure = run.header.failure
+        storage.save(run, failed_path(path) if failure else path)
     else:
         journal = Journal(journal_path(task, path)) if task.long else None
         try:
@@ -168,7 +177,7 @@ def store(task: Task, path: Path, limit: float = math.inf, stop: Callable[[], bo
         stopped = ""
         with storage.TrajectoryWriter(path, under_way.headers[0]) as writer:
             for (block,) in under_way:
-                deadline.check()
+                check()
                 writer.append(block)
                 if stop():
                     stopped = f"was stopped at t = {block['time'].max(initial=0.0):g} s"
@@ -209,31 +218,14 @@ def _begun(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
     )
 
 
-def _simulated(task: Task, deadline: Deadline, stop: Callable[[], bool] = lambda: False) -> Trajectory:
-    def check(done: float) -> None:
-        deadline.check()
-        if stop():
-            raise KeyboardInterrupt
-
-    assert task.simulator.simulate
-    given = task.parameters, State.one(task.x0), task.t_end, task.fluid, task.chosen_settings, task.sample_interval
-    return task.simulator.simulate(*given, check)
-
-
-@functools.cache
-def _code(engine: Engine) -> dict[str, str]:
-    """Digest of the sources that produce an engine's results, and the versions they stand on."""
-    return {"sources": sources(*engine.sources), **engine.versions}
-
-
 @functools.cache
 def sources(*names: str) -> str:
     """Digest of the sources of packages, with all that is below them, and of modules."""
     digest = hashlib.sha256()
     for name in names:
         spec = find_spec(name)
-        assert spec is not None
-        assert spec.origin is not None
+        assert spec
+        assert spec.origin
         top = Path(spec.origin)
         for path in sorted(top.parent.rglob("*")) if spec.submodule_search_locations else [top]:
             if path.suffix in (".py", ".xml"):

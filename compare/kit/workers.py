@@ -1,7 +1,6 @@
 """Where tasks run: processes of this machine, or the workers of a Dask scheduler.
 
-Both come as executors of the shape of `concurrent.futures`, with what a campaign must know beside: how many tasks they
-run at once, which errors mean that a worker is lost, and how to stop them.
+Both are executors of `concurrent.futures`, and `Workers` says what a campaign must know beside.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,21 +19,19 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any, TypeVar
 
-from model import InputError
+from model import InputError, StorageError
 from model.parameters import Range, check_number
 
-S = TypeVar("S")
 T = TypeVar("T")
 Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 """What does as `map` does."""
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Workers:
-    """A kind of executor."""
+    """An executor, started when it is needed, and anew when its workers died; threads may share it."""
 
     count: int
     """Tasks at once."""
@@ -44,6 +41,31 @@ class Workers:
     lost: tuple[type[BaseException], ...]
     """Errors of a future that mean: the worker died."""
 
+    def __post_init__(self) -> None:
+        self._running: Executor | None = None
+        self._closed, self._lock = False, threading.Lock()
+
+    def submit(self, *call: Any) -> Future[Any]:
+        """Give a call to the workers; raises `CancelledError` once there is to be no more work."""
+        with self._lock:
+            for _ in range(2):
+                if self._closed:
+                    raise CancelledError("the campaign was given up")
+                self._running = self._running or self.start()
+                try:
+                    return self._running.submit(*call)
+                except self.lost:
+                    self.stop(self._running, True)
+                    self._running = None
+        raise StorageError("workers die as soon as they are started")
+
+    def close(self, at_once: bool) -> None:
+        """Let the workers go, `at_once` and for good, or after what is under way."""
+        with self._lock:
+            running, self._running, self._closed = self._running, None, at_once
+            if running is not None:
+                self.stop(running, at_once)
+
 
 def processes(count: int) -> Workers:
     """`count` processes of this machine, one BLAS thread each; for 0 this one. Raises `InputError` for a bad count."""
@@ -52,8 +74,8 @@ def processes(count: int) -> Workers:
         return Workers(1, _Here, lambda executor, at_once: None, ())
 
     def start() -> Executor:
-        for name in _THREADS:  # inherited by the workers; numpy reads it when they import it
-            os.environ.setdefault(name, "1")
+        for library in ("OMP", "OPENBLAS", "MKL"):  # inherited by the workers; numpy reads it when they import it
+            os.environ.setdefault(f"{library}_NUM_THREADS", "1")
         return _Pool(count)
 
     def stop(executor: Executor, at_once: bool) -> None:
@@ -82,7 +104,7 @@ _between = threading.Lock()
 
 
 def _work(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
-    """In a worker: do a task, in the midst of which the worker may end."""
+    """In a worker: do a task, during which the worker may end."""
     if _between.locked():
         _between.release()
     try:
@@ -116,7 +138,7 @@ def spread(count: int) -> Iterator[Spread]:
         yield map
         return
 
-    def over(one: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
+    def over(one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
         left = deque(items)
         try:
             for result in pool.map(one, tuple(left)):

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,16 +19,18 @@ import pytest
 
 from compare.kit.campaign import FAILURES, Campaign, Failure, run_batch
 from compare.kit.tasks import Task, carry_out
-from compare.kit.workers import dask, spread
+from compare.kit.workers import Workers, dask, spread
 from model import InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 
 REST = (0.0,) * 8
+P = Parameters.named("reference")
+WILD = Task(engine="mujoco", parameters=P, x0=(0, 0, 1e9, 0, 0, 0), t_end=0.2)
+"""Diverges."""
 
 
 def tasks(count: int = 9, t_end: float = 0.2) -> list[Task]:
-    p = Parameters.named("reference")
-    return [Task(engine="mujoco", parameters=p.replace(omega_0=5.0 + k), x0=REST, t_end=t_end) for k in range(count)]
+    return [Task(engine="mujoco", parameters=P.replace(omega_0=5.0 + k), x0=REST, t_end=t_end) for k in range(count)]
 
 
 def data(directory: Path) -> dict[str, dict[str, bytes]]:
@@ -106,9 +109,8 @@ def test_no_more_is_held_than_there_is_memory_for(tmp_path: Path, monkeypatch: p
 
 
 def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path: Path) -> None:
-    wild = Task(engine="mujoco", parameters=Parameters.named("reference"), x0=(0, 0, 1e9, 0, 0, 0), t_end=0.2)
     with Campaign(tmp_path, workers=0, batch=2, label="first") as campaign:
-        campaign.complete([*tasks(3), wild])
+        campaign.complete([*tasks(3), WILD])
         campaign.label = "first-and-more"
         campaign.complete(tasks(4))
         campaign.reduce("first", [tasks(2)[1].key])
@@ -187,30 +189,34 @@ def test_every_input_is_part_of_the_identity() -> None:
 
 
 def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
-    wild = Task(engine="mujoco", parameters=Parameters.named("reference"), x0=(0, 0, 1e9, 0, 0, 0), t_end=0.2)
     with Campaign(tmp_path, workers=0) as campaign:
-        failures = campaign.complete([*tasks(2), wild])
-        assert [failure.task for failure in failures] == [wild]
+        failures = campaign.complete([*tasks(2), WILD])
+        assert [failure.task for failure in failures] == [WILD]
         assert "diverged" in failures[0].reason
         assert sorted(path.suffixes for path in tmp_path.glob("*.h5")) == [[".failed", ".h5"], [".h5"]]
-        assert [entry["key"] for entry in json.loads((tmp_path / FAILURES).read_text())] == [wild.key]
+        assert [entry["key"] for entry in json.loads((tmp_path / FAILURES).read_text())] == [WILD.key]
         with pytest.raises(SimulationError, match="diverged"):
-            campaign.run([wild])
+            campaign.run([WILD])
     with Campaign(tmp_path, workers=0) as again:  # it is not tried again, but told again
-        assert [failure.task.key for failure in again.complete([wild])] == [wild.key]
+        assert [failure.task.key for failure in again.complete([WILD])] == [WILD.key]
 
 
-def test_a_killed_worker_costs_its_runs_in_flight_only(tmp_path: Path, undisturbed) -> None:
-    killed = []
+def complete_while_one_is_killed(directory: Path, workers: int | Workers, victim: Callable[[], int]) -> None:
+    """Carry out the tasks, and kill a worker, by its process number, once the first of them is done."""
+    killed: list[int] = []
 
     def kill_one(doing: str, done: int, total: int, failed: int) -> None:
         if not killed and done:
-            killed.append(multiprocessing.active_children()[0])
-            killed[0].kill()
+            killed.append(victim())
+            os.kill(killed[0], signal.SIGKILL)
 
-    with Campaign(tmp_path, workers=2, batch=1, report=kill_one) as campaign:
+    with Campaign(directory, workers, batch=1, report=kill_one) as campaign:
         assert campaign.complete(tasks()) == []
     assert killed
+
+
+def test_a_killed_worker_costs_its_runs_in_flight_only(tmp_path: Path, undisturbed) -> None:
+    complete_while_one_is_killed(tmp_path, 2, lambda: multiprocessing.active_children()[0].pid or 0)
     assert data(tmp_path) == undisturbed
     assert not list(tmp_path.glob(".*"))
 
@@ -250,7 +256,7 @@ def test_kill_minus_nine_loses_nothing_that_was_done(tmp_path: Path, undisturbed
 
 
 def test_a_run_that_takes_too_long_is_reported(tmp_path: Path) -> None:
-    endless = Task(engine="mujoco", parameters=Parameters.named("reference"), x0=REST, t_end=6000.0)
+    endless = Task(engine="mujoco", parameters=P, x0=REST, t_end=6000.0)
     slow = Task(engine="time-stepping", parameters=endless.parameters, x0=REST, t_end=6000.0, sample_interval=0.01)
     with Campaign(tmp_path, workers=0, limit=2) as campaign:
         failures = campaign.complete([endless, *tasks(1, t_end=0.01), slow])
@@ -329,11 +335,8 @@ def test_the_parent_stays_small(tmp_path: Path) -> None:
 def scheduler():
     """A Dask scheduler with two worker processes of one thread, on loopback."""
     distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
-        ) as cluster,
-    ):
+    two = {"n_workers": 2, "threads_per_worker": 1, "processes": True}
+    with distributed.LocalCluster(**two, host="127.0.0.1", dashboard_address=None) as cluster:
         yield cluster
 
 
@@ -346,16 +349,9 @@ def test_dask_gives_the_same_bits(tmp_path: Path, undisturbed, scheduler) -> Non
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_killed_dask_worker_does_not_stop_the_campaign(tmp_path: Path, undisturbed, scheduler) -> None:
-    killed = []
-
-    def kill_one(doing: str, done: int, total: int, failed: int) -> None:
-        if not killed and done:
-            killed.append(next(iter(scheduler.workers.values())).pid)
-            os.kill(killed[0], signal.SIGKILL)
-
-    with Campaign(tmp_path, dask(scheduler.scheduler_address), batch=1, report=kill_one) as campaign:
-        assert campaign.complete(tasks()) == []
-    assert killed
+    complete_while_one_is_killed(
+        tmp_path, dask(scheduler.scheduler_address), lambda: next(iter(scheduler.workers.values())).pid
+    )
     assert data(tmp_path) == undisturbed
 
 
@@ -375,7 +371,7 @@ def test_bad_campaigns(tmp_path: Path) -> None:
     with pytest.raises(StorageError, match="cannot write to"):
         Campaign(tmp_path / "file")
     with pytest.raises(InputError, match=r"no engine is called 'mujuco' \(did you mean 'mujoco'\?\)"):
-        Task(engine="mujuco", parameters=Parameters.named("reference"), x0=REST, t_end=1)
+        Task(engine="mujuco", parameters=P, x0=REST, t_end=1)
 
 
 @pytest.mark.parametrize(
@@ -388,7 +384,7 @@ def test_bad_campaigns(tmp_path: Path) -> None:
 )
 def test_bad_starts(x0: object, says: str) -> None:
     with pytest.raises(InputError, match=says):
-        Task(engine="mujoco", parameters=Parameters.named("reference"), x0=x0, t_end=1)
+        Task(engine="mujoco", parameters=P, x0=x0, t_end=1)
 
 
 LONG_PROGRAM = """

@@ -11,11 +11,11 @@ import pytest
 import xarray
 
 from compare.commands import cli
-from compare.kit import collection
+from compare.kit import sweep
 from compare.kit.campaign import Campaign
 from compare.kit.tasks import Task
 from model import Parameters, StorageError, storage
-from model.files import dataset, reading
+from model.files import column, dataset, reading
 
 P = Parameters.named("reference")
 OMEGAS, ETAS = (5.0, 7.5, 10.0), (0.1, 0.3)
@@ -38,7 +38,7 @@ def runs(grid: Path, tmp_path: Path) -> Path:
 
 
 def test_varied_parameters_are_coordinates(grid: Path, tmp_path: Path) -> None:
-    assert collection.collect(grid, tmp_path / "all.h5") == 6
+    assert sweep.collect(grid, tmp_path / "all.h5") == 6
     with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
         assert set(data.coords) == {"run", "omega_0", "eta"}
         assert data.omega_0.dims == ("run",)
@@ -48,26 +48,26 @@ def test_varied_parameters_are_coordinates(grid: Path, tmp_path: Path) -> None:
         np.testing.assert_array_equal(table.eta, ETAS)
         assert np.isfinite(table).all()
         assert set(data.mu.values) == {P.mu}
-    assert collection.describe(tmp_path / "all.h5")["varied"] == ["eta", "omega_0"]
+    assert sweep.describe(tmp_path / "all.h5")["varied"] == ["eta", "omega_0"]
 
 
 def test_the_law_of_drag_is_kept(tmp_path: Path) -> None:
     sets = [P, P.replace(drag="quadratic", nu_f=1e-6)]
     with Campaign(tmp_path / "runs", workers=0) as campaign:
         assert not campaign.complete(Task(engine="event", parameters=p, x0=(0.0,) * 8, t_end=0.1) for p in sets)
-    collection.collect(tmp_path / "runs", tmp_path / "all.h5")
-    about = collection.describe(tmp_path / "all.h5")
+    sweep.collect(tmp_path / "runs", tmp_path / "all.h5")
+    about = sweep.describe(tmp_path / "all.h5")
     assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
-    assert collection.table(about).row_count == 6
+    assert sweep.table(about).row_count == 6
     with reading(tmp_path / "all.h5") as file:
-        older = {name: dataset(file, name)[...] for name in file if name != "drag"}
-    assert collection.described(older)["varied"] == ["nu_f"]
+        older = {name: column(dataset(file, name)) for name in file if name != "drag"}
+    assert sweep.described(older)["varied"] == ["nu_f"]
 
 
 def test_a_single_run_varies_nothing(runs: Path, tmp_path: Path) -> None:
     for path in sorted(runs.glob("*.h5"))[1:]:
         path.unlink()
-    assert collection.collect(runs, tmp_path / "all.h5") == 1
+    assert sweep.collect(runs, tmp_path / "all.h5") == 1
     with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
         assert set(data.coords) == {"run"}
 
@@ -78,7 +78,7 @@ def test_the_same_run_twice_is_refused_by_name(runs: Path, tmp_path: Path) -> No
     (runs / "copies").mkdir()
     shutil.copy(first, runs / "copies" / "copy.h5")
     with pytest.raises(StorageError) as caught:
-        collection.collect(runs, tmp_path / "all.h5")
+        sweep.collect(runs, tmp_path / "all.h5")
     assert str(caught.value) == f"{runs / 'copies' / 'copy.h5' / key} and {first / key} hold the same run"
     assert not (tmp_path / "all.h5").exists()
 
@@ -89,7 +89,7 @@ def test_what_cannot_be_read_is_named(runs: Path, tmp_path: Path, damaged: int, 
     for path in paths:
         path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(StorageError) as caught:
-        collection.collect(runs, tmp_path / "all.h5")
+        sweep.collect(runs, tmp_path / "all.h5")
     assert [str(path) in str(caught.value) for path in paths] == [k < named for k in range(damaged)]
     assert ("and 1 more" in str(caught.value)) == (damaged > named)
     assert "\n" not in str(caught.value)
@@ -99,8 +99,8 @@ def test_what_is_no_run_is_left_out(runs: Path) -> None:
     """The collection of the last time, and the journal of a run that goes on."""
     (runs / "x.journal").mkdir()
     (runs / "x.journal" / "000000.h5").touch()
-    assert collection.collect(runs, runs / "all.h5") == 6
-    assert collection.collect(runs, runs / "all.h5") == 6
+    assert sweep.collect(runs, runs / "all.h5") == 6
+    assert sweep.collect(runs, runs / "all.h5") == 6
 
 
 def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(
@@ -117,11 +117,11 @@ def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(
     assert (about["varied"], about["ranges"]["omega_0"]) == (["omega_0"], [min(OMEGAS), max(OMEGAS)])
     assert cli.main(["inspect", about["names"][1], "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["parameters"]["omega_0"] == OMEGAS[1]
-    assert collection.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
-    assert collection.describe(tmp_path / "all.h5")["names"] == [str(Path(*path.parts[-2:])) for path in paths]
+    assert sweep.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
+    assert sweep.describe(tmp_path / "all.h5")["names"] == [str(Path(*path.parts[-2:])) for path in paths]
 
 
 def test_a_collection_is_not_drawn(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    collection.collect(runs, runs / "all.h5")
+    sweep.collect(runs, runs / "all.h5")
     assert cli.main(["inspect", str(runs / "all.h5"), "--plot", str(runs / "plot.png")]) == 2
     assert "only a run can be drawn" in capsys.readouterr().err

@@ -244,10 +244,7 @@ def test_how_figures_look(material: Material) -> None:
     labels = {"omega_c": "$ω_c$ (rad/s)", "slip_x": r"$\tilde{ω}_x$ (rad/s)", "wall_spin": "$ω_x^0$ (rad/s)"}
     labels |= {"force_Ax-By": "$A_x$ − $B_y$ (N)", "gamma": "γ (rad/s²)", "hops": "hops on"}
     assert {name: style.label(name) for name in labels} == labels
-    _, axes = style.panels(4, 3)
     states = list(material.select("omega_c", "case"))[:2]
-    style.deviations(axes, states, lambda m: 10.0)
-    assert sorted(float(y) for line in axes.lines for y in line.get_ydata()) == pytest.approx([style.LEAST, 0.1])
     words = style.caption(Parameters.named("reference"), "What it is.", states=states, names=("mu",))
     assert words.startswith("What it is. μ = 0.2. Marks: 2 measured values")
 

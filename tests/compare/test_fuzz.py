@@ -15,7 +15,7 @@ import pytest
 
 import analytic
 from compare.commands import cli
-from compare.kit import collection, record
+from compare.kit import record, sweep
 from compare.kit.adapters import loop
 from compare.kit.adapters.adapter import Floats, Library, Touch
 from compare.kit.engines import ENGINES
@@ -99,7 +99,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         else:
             assert cli.main(["simulate", "--engine", name, "--time", "0.05", "-o", str(kept[name]), "--json"]) == 0
     storage.save(analytic.simulate(P, State(), 5.0, sample_interval=1e-3), kept[CHUNKS])
-    collection.collect(made / "runs", kept["collection"])
+    sweep.collect(made / "runs", kept["collection"])
     storage.save_batch({name: storage.load(kept[name]) for name in RUNS[:3]}, kept["batch"])
     measured = [
         Measurement(
@@ -142,8 +142,8 @@ READERS: list[tuple[str, Callable[[Path], Any]]] = [
     *((name, read) for name in RUNS for read in (whole, parts)),
     ("batch", storage.contents),
     ("batch", storage.load_runs),
-    ("collection", collection.is_collection),
-    ("collection", collection.describe),
+    ("collection", sweep.is_collection),
+    ("collection", sweep.describe),
     ("measurements", record.load),
 ]
 

@@ -44,6 +44,13 @@ RECORDS = Records(
 )
 
 
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file of those."""
+    record.save(RECORDS, tmp_path / "settled.h5", {})
+    return tmp_path / "settled.h5"
+
+
 def test_a_file_gives_back_what_was_saved(tmp_path: Path) -> None:
     other = dataclasses.replace(RECORDS.measurements[0], parameters=BLUNT)
     records = dataclasses.replace(RECORDS, measurements=(*RECORDS.measurements, other))
@@ -51,9 +58,7 @@ def test_a_file_gives_back_what_was_saved(tmp_path: Path) -> None:
     assert record.load(tmp_path / "settled.h5") == records
 
 
-def test_files_without_the_law_of_drag_are_stokes(tmp_path: Path) -> None:
-    path = tmp_path / "settled.h5"
-    record.save(RECORDS, path, {})
+def test_files_without_the_law_of_drag_are_stokes(path: Path) -> None:
     with h5py.File(path, "r+") as older:
         for name in ("drag", "nu_f", "C_D", "density_ratio"):
             del older[name]
@@ -68,9 +73,8 @@ def test_no_measurements_are_measurements_too(tmp_path: Path) -> None:
     assert record.load(tmp_path / "none.h5") == only_missing
 
 
-def test_xarray_reads_it_as_a_table(tmp_path: Path) -> None:
-    record.save(RECORDS, tmp_path / "settled.h5", {})
-    with xarray.open_dataset(tmp_path / "settled.h5", engine="h5netcdf") as data:
+def test_xarray_reads_it_as_a_table(path: Path) -> None:
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
         table = data.to_dataframe()
     assert list(table.quantity) == ["omega_c", "force_Ay", "case", "slip_x"]
     assert table.unit[1] == "N"
@@ -78,18 +82,14 @@ def test_xarray_reads_it_as_a_table(tmp_path: Path) -> None:
     assert np.isnan(table.at_y[0])
 
 
-def test_a_file_that_was_edited_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "settled.h5"
-    record.save(RECORDS, path, {})
+def test_a_file_that_was_edited_is_refused(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["value"][0] = 12.0
     with pytest.raises(StorageError, match=r"settled\.h5: it is cut short, changed"):
         record.load(path)
 
 
-def test_a_file_that_was_cut_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "settled.h5"
-    record.save(RECORDS, path, {})
+def test_a_file_that_was_cut_is_refused(path: Path) -> None:
     content = path.read_bytes()
     for length in range(0, len(content), len(content) // 7):
         path.write_bytes(content[:length])
@@ -97,10 +97,8 @@ def test_a_file_that_was_cut_is_refused(tmp_path: Path) -> None:
             record.load(path)
 
 
-def test_bytes_that_were_exchanged_are_noticed_or_harmless(tmp_path: Path) -> None:
-    path, generator, refusals = tmp_path / "settled.h5", np.random.default_rng(1), []
-    record.save(RECORDS, path, {})
-    content = path.read_bytes()
+def test_bytes_that_were_exchanged_are_noticed_or_harmless(path: Path) -> None:
+    content, generator, refusals = path.read_bytes(), np.random.default_rng(1), []
     for _ in range(200):
         damaged = bytearray(content)
         start = int(generator.integers(len(content)))

@@ -48,6 +48,13 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
     assert one == two
 
 
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file of a run."""
+    storage.save(make(), tmp_path / "run.h5")
+    return tmp_path / "run.h5"
+
+
 @pytest.mark.parametrize(("n", "events"), [(50, 2), (0, 0), (1, 0), (5000, 7)])
 def test_what_is_saved_is_loaded(tmp_path: Path, n: int, events: int) -> None:
     trajectory = make(n, events)
@@ -86,9 +93,8 @@ def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> N
         make().to_xarray()
 
 
-def test_plain_h5py_shows_the_enum(tmp_path: Path) -> None:
-    storage.save(make(), tmp_path / "run.h5")
-    with h5py.File(tmp_path / "run.h5") as file:
+def test_plain_h5py_shows_the_enum(path: Path) -> None:
+    with h5py.File(path) as file:
         assert h5py.check_enum_dtype(file["case"].dtype) == {case.name: case.value for case in Case}
 
 
@@ -151,14 +157,12 @@ except test_storage.StorageError as error:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_every_truncation_is_refused(tmp_path: Path) -> None:
-    storage.save(make(), tmp_path / "run.h5")
-    whole = (tmp_path / "run.h5").read_bytes()
-    cut = tmp_path / "cut.h5"
+def test_every_truncation_is_refused(path: Path) -> None:
+    whole = path.read_bytes()
     for length in np.linspace(0, len(whole) - 1, 40, dtype=int):
-        cut.write_bytes(whole[:length])
+        path.write_bytes(whole[:length])
         with pytest.raises(StorageError) as caught:
-            storage.load(cut)
+            storage.load(path)
         assert "\n" not in str(caught.value)
 
 
@@ -175,18 +179,14 @@ def replace(file: h5py.File, name: str, value: object) -> None:
     file[name] = value
 
 
-def test_a_file_that_was_changed_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "run.h5"
-    storage.save(make(), path)
+def test_a_file_that_was_changed_is_refused(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["y"][0] = 1.0
     with pytest.raises(StorageError, match=r"run\.h5: it is cut short, changed, or not of this program"):
         storage.load(path)
 
 
-def test_one_bit_is_noticed(tmp_path: Path) -> None:
-    path = tmp_path / "run.h5"
-    storage.save(make(), path)
+def test_one_bit_is_noticed(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
@@ -221,9 +221,8 @@ def test_a_run_without_samples_is_one_part(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyError, OSError, TypeError, OverflowError, MemoryError])
-def test_whatever_goes_wrong_inside_a_file_names_it(tmp_path: Path, error: type[Exception]) -> None:
-    storage.save(make(), tmp_path / "run.h5")
-    with pytest.raises(StorageError, match=r"cannot read .*run\.h5: .*first") as caught, reading(tmp_path / "run.h5"):
+def test_whatever_goes_wrong_inside_a_file_names_it(path: Path, error: type[Exception]) -> None:
+    with pytest.raises(StorageError, match=r"cannot read .*run\.h5: .*first") as caught, reading(path):
         raise error("first\nsecond")
     assert "\n" not in str(caught.value)
 
@@ -247,9 +246,7 @@ def test_whatever_goes_wrong_inside_a_file_names_it(tmp_path: Path, error: type[
         (lambda f: replace(f, "case", np.full(50, 9, np.int8)), "case that does not exist"),
     ],
 )
-def test_a_foreign_or_damaged_file_is_refused(tmp_path: Path, change, says: str) -> None:
-    path = tmp_path / "run.h5"
-    storage.save(make(), path)
+def test_a_foreign_or_damaged_file_is_refused(path: Path, change, says: str) -> None:
     edit(path, change)
     with pytest.raises(StorageError, match=says) as caught:
         storage.load(path)
