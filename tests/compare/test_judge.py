@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from compare.claim import Bearing, Claim, Outcome, Text
-from compare.judge import judge, remembered, select
+from compare.judge import judge, select, theory
 from compare.kit.check import Relation
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records
@@ -117,11 +117,10 @@ def test_resolving_power_is_the_error_of_theory_that_would_be_noticed() -> None:
 
 
 def test_predictions_are_forgotten_between_judgements() -> None:
-    theory = {"omega_c": P.omega_0}
-    predict = remembered(lambda m: theory["omega_c"])
-    of = claim(Bearing(protocol="settled", quantity="omega_c", predict=lambda m: predict(m.parameters)))
+    values = {"omega_c": P.omega_0}
+    of = claim(Bearing(protocol="settled", quantity="omega_c", predict=lambda m: theory(values.__getitem__, "omega_c")))
     assert outcome(of, measured(P.omega_0, FINE)) is Outcome.CONFIRMED
-    theory["omega_c"] *= 1.01
+    values["omega_c"] *= 1.01
     assert outcome(of, measured(P.omega_0, FINE)) is Outcome.REFUTED
 
 

@@ -22,8 +22,7 @@ from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
 from compare.kit.settling import family
 from compare.kit.statistics import settled_case
-from compare.subjects.motion import cases
-from compare.subjects.motion import claims as equations
+from compare.subjects.motion import claims as motion
 from compare.subjects.motion.measure import field, motions
 from compare.subjects.slipping import claims as slipping
 from compare.subjects.slipping.measure import bounds, growth, lift
@@ -56,7 +55,7 @@ def measured(lab: Lab) -> Measured:
 
 
 def verdicts(records: Records) -> dict[str, Verdict]:
-    return {each.claim.id: each for each in judge(equations.CLAIMS + slipping.CLAIMS + cases.CLAIMS, records)}
+    return {each.claim.id: each for each in judge(motion.LAWS + motion.EQUATIONS + slipping.CLAIMS, records)}
 
 
 @pytest.mark.parametrize("case", list(Case))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
@@ -18,11 +19,7 @@ SLIPPING = "floor force of settled slipping → 0"
 """How omega_02 is measured where slipping at both points ends without a fold: that is a claim of its own."""
 
 
-def _in_a_jump(m: Measurement) -> bool:
-    return m.conditions["by"] != SLIPPING
-
-
-def _at(quantity: str, when: When = _in_a_jump, protocol: str = "thresholds") -> Bearing:
+def _at(quantity: str, when: When = lambda m: m.conditions["by"] != SLIPPING, protocol: str = "thresholds") -> Bearing:
     """A threshold."""
 
     def predict(m: Measurement) -> float:
@@ -50,8 +47,8 @@ def _folds(m: Measurement) -> float:
     return float(p.eta > theory(analytic.thresholds, p).eta_cr)
 
 
-def _has_fold(m: Measurement) -> float:
-    return float(math.isfinite(theory(analytic.thresholds, m.parameters).omega_04))
+def _number_of_folds(predict: Callable[[Measurement], float], by: str) -> Bearing:
+    return Bearing("thresholds", "folds", lambda m: float(predict(m)), by=by)
 
 
 CLAIMS = (
@@ -83,7 +80,13 @@ CLAIMS = (
         "table-5-F",
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
-        (_at("omega_04"), Bearing("thresholds", "folds", _has_fold, by="analytic.thresholds: omega_04")),
+        (
+            _at("omega_04"),
+            _number_of_folds(
+                lambda m: math.isfinite(theory(analytic.thresholds, m.parameters).omega_04),
+                "analytic.thresholds: omega_04",
+            ),
+        ),
     ),
     Claim(
         "sub-branches",
@@ -97,7 +100,7 @@ CLAIMS = (
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
         "the wall at ω₀₂, without a jump.",
         (
-            Bearing("thresholds", "folds", _folds, by="analytic.thresholds: eta_cr"),
+            _number_of_folds(_folds, "analytic.thresholds: eta_cr"),
             Bearing(
                 "birth",
                 "critical_drag",
@@ -112,11 +115,8 @@ CLAIMS = (
         "after Prop. 7",
         "There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
         (
-            Bearing(
-                "thresholds",
-                "folds",
-                lambda m: float(bifurcation.number_of_folds(m.parameters)),
-                by="analytic.bifurcation.diagram.number_of_folds",
+            _number_of_folds(
+                lambda m: bifurcation.number_of_folds(m.parameters), "analytic.bifurcation.diagram.number_of_folds"
             ),
         ),
     ),
