@@ -1,17 +1,15 @@
 """Where slip begins to grow: gamma along straight lines of states, its zero and its slope.
 
-A ball that goes round at a held omega_c is given more and more flow; or the flow takes it along at its own omega_0,
-rolling at both points or hanging on the wall alone, as its settled states do. Two flows show about where gamma passes
-through zero, and two more are taken around it. gamma is a line in omega_0, or in its square where the orbit goes with
-it. Where another law of drag than Stokes' bends the line, a cubic is laid through the four.
+A ball goes round at a held omega_c in faster and faster flows; or with the flow, rolling at both points or hanging on
+the wall alone. Two flows show about where gamma passes through zero, and two more are taken around it. gamma is a line
+in omega_0, or in its square where the orbit goes with it; another law of drag than Stokes' makes it a cubic.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,10 +26,8 @@ from model.arrays import Array
 from model.drag import STOKES
 
 PROTOCOL = "bounds"
-AROUND = (0.7, 1.3)
-"""The second two flows, divided by the zero that the first two show."""
-AROUND_BENT = (0.8, 1.1)
-"""The same on a line that the law of drag bends: apart from the first two, too."""
+AROUND, AROUND_BENT = (0.7, 1.3), (0.8, 1.1)
+"""The second two flows, divided by the zero that the first two show; and where the law of drag bends the line."""
 MEDIUM = (1.0, 0.5)
 """Sizes of slip of a ball that hangs on a smooth wall, and so goes round fast, in units as those of `Push.sizes`."""
 BEYOND = 2.1
@@ -69,18 +65,14 @@ class Crossing:
         zero = float(q[0] - gammas[0] / slope) if slope else math.inf
         if not 0 < zero < (LARGEST * max(flows)) ** self.power:  # or nan
             return ()
-        least = flows[0] if self.power == 1 else 0.0
-        around = AROUND_BENT if self.bent else AROUND
-        return tuple(self.at(float(least + (zero ** (1 / self.power) - least) * factor)) for factor in around)
-
-    def at(self, omega_0: float) -> Push:
-        """The push at another flow, of a ball that rolls at both points."""
-        first = self.pushes[0]
-        orbit = State.of(first.start.x0).omega_c if self.power == 1 else omega_0
-        start = dataclasses.replace(
-            first.start, p=first.start.p.replace(omega_0=omega_0), x0=State(omega_c=orbit).stacked()
-        )
-        return dataclasses.replace(first, start=start)
+        least, first = flows[0] if self.power == 1 else 0.0, self.pushes[0]
+        pushes = []
+        for factor in AROUND_BENT if self.bent else AROUND:
+            omega_0 = float(least + (zero ** (1 / self.power) - least) * factor)
+            orbit = State.of(first.start.x0).omega_c if self.power == 1 else omega_0
+            p, x0 = first.start.p.replace(omega_0=omega_0), State(omega_c=orbit).stacked()
+            pushes.append(replace(first, start=replace(first.start, p=p, x0=x0)))
+        return tuple(pushes)
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -105,12 +97,30 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     first = list(_points(lab, [line.pushes[:2] for line in lines]))
     around = _points(lab, [line.around(points[1]) for line, (points, _) in zip(lines, first, strict=True)])
     for line, (points, tasks), (more, others) in zip(lines, first, around, strict=True):
-        push = line.pushes[0]
+        push, square, tasks = line.pushes[0], "_square" if line.power == 2 else "", [*tasks, *others]
+        name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
         if np.isnan(points[1]).any():
-            why = f"slips from {push.inner.name} to {push.outer.name} did not stay in {push.outer.name}"
-            yield Missing(PROTOCOL, push.start.set, why)
+            yield Missing(PROTOCOL, name, f"slips {slips} did not stay in {push.outer.name}")
+            continue
+        least = points[2].max()  # what the step changes may be little by chance at one of the flows
+        points = np.concatenate([points, more], axis=1)
+        flows, gamma, noise = points[:, ~np.isnan(points[1])]
+        q, noise = flows**line.power, np.maximum(noise, least)
+        if line.bent:
+            zero, slope = zero_and_slope(q, gamma, noise)
         else:
-            yield from _result(lab, line, np.concatenate([points, more], axis=1), [*tasks, *others])
+            # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none.
+            _, slope = straight_line(q, gamma, noise)
+            zero, _ = straight_line(q, gamma, noise * math.sqrt(len(q)))
+        growth = f"growth of slip {slips}, {push.start.name},"
+        if not sure_enough("gamma_slope", slope, abs(slope.value)):
+            yield Missing(PROTOCOL, name, f"{growth} changes too little with the flow, or is too uncertain")
+            continue
+        if abs(zero.value) <= BEYOND * np.abs(q).max():
+            row = push.row(lab, PROTOCOL, f"gamma_zero{square}", zero, tasks)
+            natural = (push.start.p.g / push.start.p.R) ** (line.power / 2)
+            yield if_sure(row, max(abs(zero.value), natural), f"{growth} has too uncertain a zero")
+        yield push.row(lab, PROTOCOL, f"gamma_slope{square}", slope, tasks)
 
 
 def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, list[Task]]]:
@@ -119,7 +129,6 @@ def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, l
     gamma is for a vanishing step and size of slip, from two sizes with the shorter step, and one with the longer one;
     it is uncertain by what the step and the degree of the polynomials change, and nan if the case was another.
     """
-
     tasks = []
     for push in (push for pushes in rows for push in pushes):
         large_size, small_size = MEDIUM if push.inner is Case.NR else push.sizes
@@ -134,29 +143,6 @@ def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, l
             noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p) * slip_unit(p))
             points.append((p.omega_0, best[0] + change * LIMIT, noise))
         yield np.reshape(points, (-1, 3)).T, own
-
-
-def _result(lab: Lab, line: Crossing, points: Array, tasks: Sequence[Task]) -> Iterator[Measurement | Missing]:
-    least = points[2, :2].max()  # what the step changes may be little by chance at one of the flows
-    flows, gamma, noise = points[:, ~np.isnan(points[1])]
-    q, noise = flows**line.power, np.maximum(noise, least)
-    if line.bent:
-        zero, slope = zero_and_slope(q, gamma, noise)
-    else:
-        # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none.
-        _, slope = straight_line(q, gamma, noise)
-        zero, _ = straight_line(q, gamma, noise * math.sqrt(len(q)))
-    push, square = line.pushes[0], "_square" if line.power == 2 else ""
-    p, name = push.start.p, push.start.set
-    growth = f"growth of slip from {push.inner.name} to {push.outer.name}, {push.start.name},"
-    if not sure_enough("gamma_slope", slope, abs(slope.value)):
-        yield Missing(PROTOCOL, name, f"{growth} changes too little with the flow, or is too uncertain")
-        return
-    if abs(zero.value) <= BEYOND * np.abs(q).max():
-        row = push.row(lab, PROTOCOL, f"gamma_zero{square}", zero, tasks)
-        natural = (p.g / p.R) ** (line.power / 2)
-        yield if_sure(row, max(abs(zero.value), natural), f"{growth} has too uncertain a zero")
-    yield push.row(lab, PROTOCOL, f"gamma_slope{square}", slope, tasks)
 
 
 def _rolling(name: str, p: Parameters) -> Iterator[Crossing]:
@@ -175,6 +161,9 @@ def _rolling(name: str, p: Parameters) -> Iterator[Crossing]:
         (Case.SS, (0, 0, 1), "stationary", (0.4 * hanging, 0.8 * hanging)),
         (Case.SS, (0, 0, -1), "stationary", (1.5 * rubbing, 2.2 * rubbing)),
     ):
-        start = Start(name, p.replace(omega_0=flows[0]), by, State(omega_c=flows[0]).stacked())
-        push = Push(start, Case.RR, outer, np.array(n))
-        yield Crossing((push, Crossing((push,)).at(flows[1])))
+        orbits = (flows[0], flows[0] if by == "held" else flows[1])
+        starts = (
+            Start(name, p.replace(omega_0=flow), by, State(omega_c=orbit).stacked())
+            for flow, orbit in zip(flows, orbits, strict=True)
+        )
+        yield Crossing(tuple(Push(start, Case.RR, outer, np.array(n)) for start in starts))

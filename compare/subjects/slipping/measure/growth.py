@@ -1,11 +1,11 @@
 """Growth of slip: a rolling ball is given a slip along one direction; in the first milliseconds it grows or dies out.
 
-gamma, the initial rate of change of the slip along its direction, is extrapolated to a vanishing size of the slip from
-runs of several sizes. A record counts only if, by the engine's own contacts, all of it is in the case in which the ball
-was to slip. States are at random in natural units, and away from stationary ones.
+gamma, the initial rate of change of the slip along its direction, is extrapolated from several sizes of the slip to
+none. A record counts only if all of it is, by the engine's own contacts, in the case in which the ball was to slip.
+States are at random in natural units, and away from stationary ones.
 
-Out of rolling on the wall alone, growths along directions all round make a curve; where its first harmonic is greatest,
-slip grows the most. The other harmonics are measured, too: what they may turn the direction by is its uncertainty.
+Out of rolling on the wall alone, slip grows the most where the first harmonic of gamma over all directions is greatest.
+By what the other harmonics may turn that direction, it is uncertain.
 """
 
 from __future__ import annotations
@@ -149,8 +149,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             if sure_enough("filippov_share", share, 1.0):
                 yield push.row(lab, "growth", "filippov_share", share, own)
     for (name, inner, outer), count in left.items():
-        slips = f"{count} slips from {inner.name} to {outer.name}"
-        yield Missing("growth", name, f"{slips} did not stay in {outer.name}, or turned too fast")
+        why = f"{count} slips from {inner.name} to {outer.name} did not stay in {outer.name}, or turned too fast"
+        yield Missing("growth", name, why)
 
 
 def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
@@ -226,7 +226,15 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     rough = {name: p for name, p in sets.items() if p.eta and p.c}
     why = "without friction at the wall, or drag, no direction stands out"
     yield from (Missing("steepest", name, why) for name in sets if name not in rough)
-    fans = [fan for name, p in rough.items() for fan in _fans(name, p, lab.effort("steepest.states"))]
+    fans = []  # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
+    for name, p in rough.items():
+        rng = np.random.default_rng([FAN_SEED, *name.encode()])
+        for _ in range(lab.effort("steepest.states")):
+            x = random_state(Case.NR, p, rng)
+            pull = rng.choice([-1, 1]) * rng.uniform(*DRAGGED)
+            start = Start(name, p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R), "", x)
+            angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+            fans.append([Push(start, Case.NR, Case.NS, np.array([0.0, np.sin(b), np.cos(b)])) for b in angles])
     runs = lab.groups([push.tasks(lab) for fan in fans for push in fan])
     why = "slip along some direction did not last, or no direction stands out"
     for fan in fans:
@@ -244,14 +252,3 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
         start, tasks = fan[0].start, [task for push in fan for task in push.tasks(lab)]
         row = measurement(lab, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
         yield if_sure(row, 1.0, why)
-
-
-def _fans(name: str, p: Parameters, count: int) -> Iterator[list[Push]]:
-    """Random states, each pushed at angles all round from slip_z to slip_y of the wall's contact (8)."""
-    rng = np.random.default_rng([FAN_SEED, *name.encode()])
-    for _ in range(count):
-        x = random_state(Case.NR, p, rng)
-        pull = rng.choice([-1, 1]) * rng.uniform(*DRAGGED)
-        start = Start(name, p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R), "", x)
-        angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
-        yield [Push(start, Case.NR, Case.NS, np.array([0.0, np.sin(b), np.cos(b)])) for b in angles]
