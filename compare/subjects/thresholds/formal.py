@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 from scipy.optimize import brentq
@@ -62,22 +63,18 @@ def _figure_12() -> Iterator[Check]:
 def _pulling() -> Iterator[Check]:
     """The normal forces of slip at its onset, on either bound and a grid of friction coefficients."""
     grid = [FORMAL.replace(mu=mu, eta=eta) for mu in np.geomspace(0.05, 3.0, 13) for eta in np.geomspace(0.05, 3.0, 13)]
-    presses = {side: [each for p in grid for each in _at_onset(p, side)] for side in (1, -1)}
+    presses: dict[int, list[tuple[float, float, float]]] = {1: [], -1: []}  # by side: eta, A_y and B_x in N
+    for p, side in product(grid, presses):  # along (0, 0), side 1, or (pi, pi) where (82) or (83) has it begin
+        square, direction = slip_bounds.rr_to_ss(p, side).zero, (0.0, float(side))
+        if 0 < square < math.inf:
+            omega = math.sqrt(square)
+            forces = dynamics.forces(Case.SS, State(omega_c=omega), p, omega, direction, direction)
+            presses[side].append((p.eta, float(forces.A_y), float(forces.B_x)))
     yield _check("law", "(83): friction at which the wall presses", sum(B_x >= 0 for _, _, B_x in presses[-1]), 0.0)
     wrong = sum((A_y > 0) != (eta < FORMAL.j) for eta, A_y, _ in presses[1])
     yield _check("law", "(82): friction at which the floor presses and η > j, or pulls and η < j", wrong, 0.0)
     smooth = sum(eta <= 1 for eta, _, _ in presses[-1])
     yield _check("law", "(83): friction with a bound and η ≤ 1", smooth, 0.0)
-
-
-def _at_onset(p: Parameters, side: int) -> Iterator[tuple[float, float, float]]:
-    """Friction of the wall, A_y and B_x in N of slip along (0, 0), side 1, or (pi, pi) where (82) or (83) has it begin;
-    nothing where it doesn't."""
-    square, direction = slip_bounds.rr_to_ss(p, side).zero, (0.0, float(side))
-    if 0 < square < math.inf:
-        omega = math.sqrt(square)
-        forces = dynamics.forces(Case.SS, State(omega_c=omega), p, omega, direction, direction)
-        yield p.eta, float(forces.A_y), float(forces.B_x)
 
 
 def _check(quantity: str, what: str, value: float, predicted: float, uncertainty: float = 0.0) -> Check:

@@ -94,7 +94,10 @@ def draw(plane: Plane) -> Figure:
     for section, text in () if plane.equal else _SECTIONS.items():
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
         axes.text(section, 0.985 * fastest, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3")
-    _points(axes, plane)
+    for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items():
+        axes.plot(*_places(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
+    if failed := [check for check in plane.checks if not check.agrees]:
+        axes.plot(*_places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
     friction = "friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$"
     axes.set(xlabel=friction, ylabel=style.OMEGA_0, xlim=(0, _WIDEST), ylim=(0, fastest))
     style.legend(figure, loc="outside lower center", ncols=6, handlelength=2.6)
@@ -121,10 +124,10 @@ def _regions(axes: Axes, p: Parameters, mu: Array, eta: Array, omega_0: Array) -
             shown = np.where((eta < p.j) & (name == "omega_03"), np.nan, curve * unit)
             axes.plot(eta, shown, color=colour, ls=line, lw=1.8, label=style.THRESHOLD_LABELS[name])
     for kind in kinds:
-        _label_regions(axes, plane == kind, eta, omega_0, int(kind))
+        _name(axes, plane == kind, eta, omega_0, int(kind))
 
 
-def _label_regions(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, kind: int) -> None:
+def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, kind: int) -> None:
     """Write the cases at the widest spot of every connected region that has room for them, clear of sections.
 
     The region with two stable motions is too narrow: its name stands at the top, with a line to where it belongs.
@@ -148,11 +151,5 @@ def _label_regions(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0
             style.name(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
 
 
-def _points(axes: Axes, plane: Plane) -> None:
-    def places(checks: Sequence[Check]) -> Array:
-        return np.transpose([(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks])
-
-    for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items():
-        axes.plot(*places(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
-    if failed := [check for check in plane.checks if not check.agrees]:
-        axes.plot(*places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
+def _places(checks: Sequence[Check]) -> Array:
+    return np.transpose([(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks])

@@ -1,15 +1,14 @@
 """The unstable state between two attractors, by following the edge of their basins.
 
 Where at one flow a ball slips on the floor (SS) or goes round with the fluid (SR, which is NR at y = 0), the straight
-line between the two measured states crosses the border between the two basins. Two runs close to it on either side stay
-together for a while near the unstable state, which a ball on the border would reach. The mean of their states while
-they are together begins the next line, across the same border.
+line between the two states crosses the border between their basins. Two runs close to it on either side stay together
+for a while near the unstable state. The mean of their states while they are together begins the next line.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -66,10 +65,9 @@ class Edge:
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Between the measured omega_02 and omega_04, cross the border again and again.
+    """Between the measured omega_02 and omega_04, cross the border again and again; not under the quadratic law.
 
-    Not under the quadratic law: near SR the ball lags so little that this hardly damps its swing along the border. At
-    the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
+    At the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
     """
     yield from (Missing(PROTOCOL, name, SWINGS_ON) for name, p in sets.items() if p.drag == QUADRATIC)
     limits: dict[str, tuple[float, float]] = {}
@@ -94,33 +92,36 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         else:
             a, b = _grounded(slipping.mean), _grounded(lifted.mean)
             edges.append(Edge(name, q, a, b, a, b - a))
-    followed = _followed(lab, edges)
-    for edge in followed:
+    for _ in range(lab.effort("edge.lines")):  # cross each border on one line after the other
+        lines = [_onward(edge) for edge in edges]
+        for k, bracket in enumerate(narrow(lab, [_search(lab, line) for line in lines], careful=False)):
+            edge = edges[k]
+            if None in bracket.runs:
+                edges[k] = replace(edge, moves=(), missed=edge.missed + 1)
+            else:
+                crossed = replace(lines[k], bracket=bracket, missed=0)
+                moves = (*edge.moves, np.abs(crossed.crossing - edge.crossing)) if edge.bracket else ()
+                edges[k] = replace(crossed, moves=moves)
+    edges = [edge for edge in edges if edge.moves]  # crossed by the last line, and by one before
+    for edge in edges:
         yield from _rows(lab, edge)
-    for name, (low, high) in limits.items():
+    for name, (low, high) in limits.items():  # the edge meets the lifted ball where they don't differ in omega_c
         last = low + (max(CLOSING) + 1e-6) * (high - low)
-        yield from _closing(lab, name, [edge for edge in followed if edge.set == name and edge.p.omega_0 < last])
+        near = [edge for edge in edges if edge.set == name and edge.p.omega_0 < last]
+        if len(near) < len(CLOSING):
+            continue
+        noise = max(float(_uncertainty(edge)[2]) for edge in near)
+        apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
+        place = vanishing(np.array([edge.p.omega_0 for edge in near]), apart)
+        if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
+            tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
+            q, at = near[0].p.replace(omega_0=place.value), {"by": "unstable slipping meets the lifted ball"}
+            yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", **at)
 
 
 def _grounded(x: Array) -> Array:
     """The state on the floor: a lifted ball knows nothing of its height."""
     return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
-
-
-def _followed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
-    """Cross each border on one line after the other; those that are crossed by the last, and by one before."""
-    current = list(edges)
-    for _ in range(lab.effort("edge.lines")):
-        lines = [_onward(edge) for edge in current]
-        for k, bracket in enumerate(narrow(lab, [_search(lab, line) for line in lines], careful=False)):
-            edge = current[k]
-            if None in bracket.runs:
-                current[k] = replace(edge, moves=(), missed=edge.missed + 1)
-            else:
-                crossed = replace(lines[k], bracket=bracket, missed=0)
-                moves = (*edge.moves, np.abs(crossed.crossing - edge.crossing)) if edge.bracket else ()
-                current[k] = replace(crossed, moves=moves)
-    return [edge for edge in current if edge.moves]
 
 
 def _search(lab: Lab, edge: Edge) -> Search:
@@ -189,16 +190,3 @@ def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
         row = measurement(lab, PROTOCOL, edge.set, p, f"edge_{name}", of, edge.bracket.tasks, case="SS")
         why = f"{name} on the edge at omega_0 = {p.omega_0:.4g} rad/s is uncertain by {of.uncertainty:.1g} rad/s"
         yield if_sure(row, rotation_scale(p) * unit, why)
-
-
-def _closing(lab: Lab, name: str, edges: Sequence[Edge]) -> Iterator[Measurement]:
-    """Where the edge would meet the lifted ball: the distance in omega_c, extrapolated to zero."""
-    if len(edges) < len(CLOSING):
-        return
-    noise = max(float(_uncertainty(edge)[2]) for edge in edges)
-    apart = [Measured(float(State.of(edge.crossing).omega_c - State.of(edge.lifted).omega_c), noise) for edge in edges]
-    place = vanishing(np.array([edge.p.omega_0 for edge in edges]), apart)
-    if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
-        tasks = [task for edge in edges if edge.bracket for task in edge.bracket.tasks]
-        q, at = edges[0].p.replace(omega_0=place.value), {"by": "unstable slipping meets the lifted ball"}
-        yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", **at)
