@@ -1,8 +1,8 @@
 """The equations of motion themselves: accelerations and contact forces in all nine cases, at the engine's own states.
 
-Balls start at random in the state space of every case, in natural units, and move freely for a few hundredths of a
-second. Their case is that of the engine's contacts. In short windows during which the case does not change, polynomials
-through the samples give the state, its rate of change and the contact forces at the centre of the window.
+Balls start at random states of every case and move freely for a few hundredths of a second. In short windows during
+which the engine's contacts do not change, polynomials through the samples give the state, its rate of change and the
+contact forces at the centre of the window.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ SEED = 53
 CENTRES = (16, 40, 64)
 """Centres of the windows, in steps of the coarser run."""
 APART = 4
-"""Steps before and after a window in which the case doesn't change, either: friction then builds up or dies out."""
+"""Steps before and after a window in which the case doesn't change, either, so that friction has built up."""
 TURN = 0.5
-"""Largest change of a slip in a window divided by the slip itself, and of the change that friction alone would make:
-friction turns too fast where slip is about to vanish, or is held at a trace."""
+"""Largest change of a slip in a window, and of that which friction alone would make, divided by the slip: where slip is
+about to vanish, or is held at a trace, friction turns too fast."""
 COMPONENTS = ("Ax", "Ay", "Az", "Bx", "By", "Bz")
 STATE, RATES, FORCES = slice(0, 8), slice(8, 16), slice(16, 22)
 """Parts of what is read at the centre of a window (22,): state, rates of change in SI, and `COMPONENTS` in N."""
@@ -79,9 +79,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 yield measurement(lab, PROTOCOL, start.set, start.p, what, value, pair, case=case.name, **at)
     for name, case in product(sets, Case):
         if not kept[name, case]:
-            yield Missing(
-                PROTOCOL, name, f"no random start moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
-            )
+            why = f"no random start moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
+            yield Missing(PROTOCOL, name, why)
 
 
 def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:

@@ -1,9 +1,8 @@
 """Motions through all nine cases, and landings: which is it, or how fast, some milliseconds later?
 
-Fixed starts, in natural units, are followed and cut into short pieces. A piece begins and ends away from changes of
-case, at each of which friction has to build up or die out; in between there may be any number of them. A landing, steep
-or at a slant, with slip or none, is looked at a few steps after the engine's own contact has closed, at the same moment
-with two time steps.
+Motions from fixed starts are cut into short pieces, each of which begins and ends away from changes of case, at which
+friction builds up or dies out. A landing is looked at a few steps after the engine's contact has closed, at the same
+moment with two time steps.
 """
 
 from __future__ import annotations
@@ -26,8 +25,7 @@ STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
     (0.86, (0.44, 0.06, 2.36, 0.68, 0.15, 0.03, 0.6, 0.25)),
     # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
     (1.03, (0.0, 0.0, -1.62, -0.005, 0.47, -0.14, 0.3, -0.12)),
-    # Long stays in cases that those pass in a moment: spun up from rest, slipping at both points, spinning on wall and
-    # floor, slipping down the wall, rolling and sliding on the floor.
+    # Long stays in the other cases.
     (1.43, (0.0,) * 8),
     (1.80, (0.0, 0.0, 1.02, -0.02, 0.03, 0.12, 0.0, 0.0)),
     (1.07, (0.0, 0.0, 1.07, 0.34, 0.0, 0.0, 0.0, 0.0)),
@@ -41,18 +39,14 @@ LASTS = 6.0
 LENGTH = 40
 """Samples in a piece."""
 APART = 10
-"""Samples between the ends of a piece and any change of case: a slip dies out and a force builds up in three or so, the
-case is taken to have changed after as many more, and a change comes by a few steps earlier or later than it should."""
+"""Samples between the ends of a piece and any change of case: three until a force has built up, three until the case
+is taken to have changed, and a few by which a change comes too early or late."""
 NARROW = 1e-4
 """Least gap of an open contact divided by R at the ends of a piece: an unloaded contact may hover."""
 LATE = 2.0
-"""Steps, of which two landings may come one late each. What weight does to a slip in that time is the least slip at the
-ends of a piece: where two contacts roll one may creep so fast, since how they share a load is not determined.
-"""
+"""Steps by which two landings may be late; the least slip at the ends of a piece is what weight makes in that time."""
 LEFT = 0.01
-"""Least share of the friction limit that a rolling contact leaves at the ends of a piece: with less left it creeps by
-what the limit changes, as fast as a slip that has just begun or is about to end.
-"""
+"""Least share of the friction limit that a rolling contact leaves at the ends of a piece: with less left it creeps."""
 
 LANDINGS: dict[str, tuple[float, ...]] = {
     "floor, with slip": (0.05, -0.5, 0.5, 0.6, 0.2, -0.9, 0.4, 0.0),
@@ -101,8 +95,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 def pieces(run: Trajectory, count: int) -> list[int]:
     """Where pieces begin, about evenly spread: their ends are away from changes of case.
 
-    There contacts are plainly what they are called: an open one is open, a slipping one slips by more than a trace, and
-    a rolling one needs less friction than it may.
+    There an open contact is open, a slipping one slips by more than a trace, and a rolling one needs less friction than
+    it may.
     """
     p, A, B = run.header.parameters, run.force_A.T, run.force_B.T
     plain = np.full(len(run.time), True)

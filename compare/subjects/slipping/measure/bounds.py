@@ -30,10 +30,9 @@ AROUND, AROUND_BENT = (0.7, 1.3), (0.8, 1.1)
 """The second two flows, divided by the zero that the first two show; and where the law of drag bends the line."""
 MEDIUM = (1.0, 0.5)
 """Sizes of slip of a ball that hangs on a smooth wall, and so goes round fast, in units as those of `Push.sizes`."""
-BEYOND = 2.1
-"""Largest zero that counts, divided by the largest value at which slip stayed in its case: the line ends there."""
-LARGEST = 100.0
-"""Largest zero that is followed, divided by the largest of the first flows."""
+BEYOND, LARGEST = 2.1, 100.0
+"""Largest zero that is recorded, divided by the largest value at which slip stayed in its case; and that is followed,
+divided by the largest of the first flows."""
 HANGING = (1.05, 1.6, 1.3)
 """Flows at which a ball hangs on the wall, divided by the measured one at which it ceases to."""
 

@@ -54,8 +54,7 @@ STEPS, SKIPPED = 20, 6
 """Steps of a record, and those at its start in which contact forces build up."""
 LARGE, SMALL, BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
 """Slips at the start in units of `start_unit`: so large that they neither end nor turn much in a record; small where
-one contact has to hold, or the ball goes round slowly and the wall carries little; and three where the direction of a
-contact that slips already depends on the size."""
+one contact has to hold; and three beside a slip that is there already, where the direction depends on the size."""
 DEGREES = (4, 3)
 """Degrees of the polynomials; the lower one shows what the degree changes."""
 AT_START = slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]) / slope_error(
@@ -71,16 +70,15 @@ DIRECTIONS = 8
 DRAGGED = (0.5, 3.0)
 """Least and largest pull of the fluid along the orbit divided by the weight, either way: it turns the direction."""
 AHEAD = 3.0
-"""Largest angle of the greatest growth from the vertical, rad, that is recorded: one beyond may come out on either side
-of pi."""
+"""Largest angle of the greatest growth from the vertical, rad: one near pi may come out on either side of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Push:
     """A start that rolls, and the slip that it is given.
 
-    The start's name: ``sideways`` for the direction `SIDEWAYS`, ``dragged`` where the fluid pulls hard, ``rest`` out of
-    rest in a fluid at rest, empty for a direction at random, and those of `compare.subjects.slipping.measure.bounds`.
+    The start's name: ``sideways`` for the direction `SIDEWAYS`, ``dragged`` where the fluid pulls hard, ``rest`` in a
+    fluid at rest, empty for a direction at random, ``held`` and ``stationary`` for `bounds`.
     """
 
     start: Start
@@ -196,13 +194,13 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
     for (inner, outer), count in PUSHES.items():
         for _ in range(count * more):
             x = State.of(random_state(inner, p, rng))
-            # The orbit is one at which both contacts press, in whatever way they rub.
+            # The orbit is one at which both contacts press, whichever way friction acts.
             if outer is Case.SR:  # the spin axis turns with the orbit, and the wall alone turns it
                 x = x._replace(omega_c=math.sqrt(rng.uniform(0.4, 0.8) * p.g / (p.j * p.R)))
             if outer is Case.SS:
                 least, most = p.mu, min(1 / p.eta, 3.0)
                 x = x._replace(omega_c=math.sqrt((least + rng.uniform(0.3, 0.7) * (most - least)) * p.g / p.R))
-            # A slip that is there already is so fast that a slower one beside it hardly turns it.
+            # A slip that is there already is so fast that the new one hardly turns it.
             if inner is Case.RS:
                 fast = rng.choice([-1, 1]) * rng.uniform(3.0, 5.0)
                 x = x._replace(slip_y=fast * start_unit(p, x.stacked()))
