@@ -9,17 +9,7 @@ from compare.claim import Bearing, Claim, Text, When, every, given
 from compare.judge import theory
 from compare.kit.record import Measurement
 from compare.kit.settling import FORCES, SUMS
-from compare.settled import (
-    cases,
-    detected,
-    from_floor,
-    is_in,
-    lifts_first,
-    natural_size,
-    number,
-    reached,
-    slips_first,
-)
+from compare.settled import cases, detected, from_floor, is_in, lifts_first, natural_size, number, reached, slips_first
 from model import Case
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
@@ -83,11 +73,7 @@ CLAIMS = (
         "Prop. 1, (30)-(32)",
         "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
         "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j).",
-        (
-            *bearings((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
-            _cases(_ROLLS),
-            _with_fluid(),
-        ),
+        (*bearings((*MOTION, *SUMS), _ROLLS, "(31), (32)"), _cases(_ROLLS), _with_fluid()),
     ),
     Claim(
         "prop-1-rough",
@@ -99,23 +85,14 @@ CLAIMS = (
         "prop-2-forces",
         "Prop. 2, (33), (34)",
         "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
-        bearings(
-            ("omega_c", "slip_x", "slip_z", "v_y", *FORCES),
-            is_in(Case.RS),
-            "(33), (34)",
-            Case.RS,
-        ),
+        bearings(("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS),
     ),
     Claim(
         "prop-3-5",
         "Props. 3 and 5, (35), (36), (46), (47)",
         "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
         "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR.",
-        (
-            *bearings(_STATE, _LIFTED, "(46), (47)"),
-            *bearings(_STATE, _LEANS, "(35), (36)", Case.SR),
-            _cases(_LIFTED),
-        ),
+        (*bearings(_STATE, _LIFTED, "(46), (47)"), *bearings(_STATE, _LEANS, "(35), (36)", Case.SR), _cases(_LIFTED)),
         text=Text.CORRECTED,
         reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it.",
     ),
