@@ -25,8 +25,8 @@ from compare.kit.statistics import settled_case
 from compare.subjects.motion import claims as motion
 from compare.subjects.motion.measure import field, motions
 from compare.subjects.slipping import claims as slipping
-from compare.subjects.slipping.measure import bounds, growth, lift
-from compare.subjects.thresholds import formal
+from compare.subjects.slipping.measure import growth, onset
+from compare.subjects.thresholds import claims as bifurcations
 from compare.subjects.thresholds.measure.thresholds import birth
 from model import Case, Parameters, storage
 from model.cases import TRAITS
@@ -46,8 +46,8 @@ def measured(lab: Lab) -> Measured:
     protocols = {
         "field": lambda: field.measure(lab, SETS, Records()),
         "growth": lambda: growth.measure(lab, SETS, Records()),
-        "bounds": lambda: bounds.measure(lab, SETS, known),
-        "lift": lambda: lift.measure(lab, {name: QUICK[name] for name in ("rubber-wall", "rough-floor")}, Records()),
+        "bounds": lambda: onset.bounds(lab, SETS, known),
+        "lift": lambda: onset.lift(lab, {name: QUICK[name] for name in ("rubber-wall", "rough-floor")}, Records()),
         "motions": lambda: motions.measure(lab, SETS, Records()),
         "impacts": lambda: motions.impacts(lab, SETS, Records()),
     }
@@ -168,9 +168,8 @@ def test_the_fold_is_born_at_the_critical_drag(lab: Lab) -> None:
 
 def test_without_friction_nothing_rolls_and_the_reader_is_told(lab: Lab) -> None:
     smooth = {"ice": SETS["reference"].replace(eta=0.0)}
-    for protocol in (growth, bounds):
-        (missing,) = protocol.measure(lab, smooth, Records())
-        assert missing == Missing(protocol.__name__.split(".")[-1], "ice", growth.SMOOTH)
+    for protocol, measure in (("growth", growth.measure), ("bounds", onset.bounds)):
+        assert list(measure(lab, smooth, Records())) == [Missing(protocol, "ice", growth.SMOOTH)]
 
 
 def test_pieces_keep_away_from_changes_of_case(lab: Lab, measured: Measured) -> None:
@@ -183,7 +182,7 @@ def test_pieces_keep_away_from_changes_of_case(lab: Lab, measured: Measured) -> 
 
 
 def test_formal_claims_are_algebra() -> None:
-    for verdict in judge(formal.CLAIMS, Records()):
+    for verdict in judge(bifurcations.FORMAL_CLAIMS, Records()):
         assert verdict.outcome is Outcome.CONFIRMED
         assert {check.measurement.engine for check in verdict.checks} == {"theory"}
 
