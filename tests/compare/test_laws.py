@@ -100,10 +100,8 @@ def test_laws_and_drag_are_measured_with_mujoco(lab: Lab, monkeypatch: pytest.Mo
     monkeypatch.setattr(laws, "LASTS", 256)
     records = Records.of(laws.measure(lab, {"reference": Parameters.named("reference")}, Records()))
     mine = [claim for claim in claims.LAWS if claim.protocols == {laws.PROTOCOL}]
-    assert {verdict.claim.id: verdict.outcome for verdict in judge(mine, records)} == {
-        "table-3": Outcome.CONFIRMED,
-        "eq-10": Outcome.CONFIRMED,
-    }
+    outcome_of = {verdict.claim.id: verdict.outcome for verdict in judge(mine, records)}
+    assert outcome_of == {"table-3": Outcome.CONFIRMED, "eq-10": Outcome.CONFIRMED}
     right = stokes.sinking_speed
     monkeypatch.setattr(stokes, "sinking_speed", lambda **fluid: 1.0001 * right(**fluid))
     assert verdict_of("eq-10", records).outcome is Outcome.REFUTED
