@@ -21,9 +21,10 @@ from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
 from compare.kit.settling import family
+from compare.kit.short import random_state
 from compare.kit.statistics import settled_case
 from compare.subjects.motion import claims as motion
-from compare.subjects.motion.measure import field, motions
+from compare.subjects.motion.measure import motions
 from compare.subjects.slipping import claims as slipping
 from compare.subjects.slipping.measure import growth, onset
 from compare.subjects.thresholds import claims as bifurcations
@@ -44,11 +45,11 @@ def measured(lab: Lab) -> Measured:
     """What each protocol measures, on one set or two."""
     known = thresholds("reference", SETS["reference"], "omega_01", "omega_02")
     protocols = {
-        "field": lambda: field.measure(lab, SETS, Records()),
+        "field": lambda: motions.field(lab, SETS, Records()),
         "growth": lambda: growth.measure(lab, SETS, Records()),
         "bounds": lambda: onset.bounds(lab, SETS, known),
         "lift": lambda: onset.lift(lab, {name: QUICK[name] for name in ("rubber-wall", "rough-floor")}, Records()),
-        "motions": lambda: motions.measure(lab, SETS, Records()),
+        "motions": lambda: motions.motions(lab, SETS, Records()),
         "impacts": lambda: motions.impacts(lab, SETS, Records()),
     }
     return cache(lambda name: Records.of(protocols[name]()))
@@ -61,7 +62,7 @@ def verdicts(records: Records) -> dict[str, Verdict]:
 @pytest.mark.parametrize("case", list(Case))
 def test_random_states_satisfy_their_case(case: Case) -> None:
     p = SETS["reference"]
-    x = field.random_state(case, p, np.random.default_rng(1))
+    x = random_state(case, p, np.random.default_rng(1))
     analytic.vector_field(case, x, p)  # it refuses a state that isn't of the case
     assert np.count_nonzero(x) == TRAITS[case].dimension + (case is Case.RN)
 
@@ -192,8 +193,8 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share: float,
     """It doesn't change, yet a 1e-4 of it turns its friction so far that the rates are others."""
     p, time = Parameters.named("reference"), np.linspace(0.0, 1e-3, 5)
     # A sphere's contact point feels friction f as an acceleration f/m (1 + 1/j).
-    friction = p.m * field.TURN / (time[-1] * (1 + 1 / p.j)) * share
+    friction = p.m * motions.TURN / (time[-1] * (1 + 1 / p.j)) * share
     x = np.tile([0, 0, 1.0, 0, 1.0 / p.r, 0, 0, 0], (5, 1))
     forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / p.eta)}
     run = SimpleNamespace(header=SimpleNamespace(parameters=p), time=time, x=x, **forces)
-    assert field.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
+    assert motions.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
