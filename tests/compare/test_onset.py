@@ -22,7 +22,7 @@ from compare.kit.settling import begin, lasting, settles
 from compare.kit.statistics import Measured
 from compare.subjects.thresholds import claims as bifurcations
 from compare.subjects.thresholds.measure import thresholds
-from compare.subjects.thresholds.measure.edge import Edge, ends_slipping
+from compare.subjects.thresholds.measure.basins import Edge, ends_slipping
 from compare.subjects.thresholds.measure.thresholds import ASKED, BESIDE, TURNS
 from model import Case, Parameters
 from tests.measured import measured

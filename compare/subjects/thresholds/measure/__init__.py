@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from compare.kit.programme import Protocol
-from compare.subjects.thresholds.measure import edge, plane, thresholds
+from compare.subjects.thresholds.measure import basins, thresholds
 
 PROTOCOLS = (
-    Protocol("plane", plane.measure, alone="the planes of Figs. 7 and 8 are those of reference only"),
+    Protocol("plane", basins.planes, alone="the planes of Figs. 7 and 8 are those of reference only"),
     Protocol("thresholds", thresholds.measure, ("settled",)),
-    Protocol("edge", edge.measure, ("thresholds",), quick=("reference", "rough-floor")),
+    Protocol("edge", basins.borders, ("thresholds",), quick=("reference", "rough-floor")),
     Protocol("birth", thresholds.birth, ("thresholds",)),
 )
