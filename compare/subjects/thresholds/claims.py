@@ -33,22 +33,24 @@ SLIPPING = "floor force of settled slipping → 0"
 
 def _at(quantity: str, when: When = lambda m: m.conditions["by"] != SLIPPING, protocol: str = "thresholds") -> Bearing:
     """A threshold."""
-
-    def predict(m: Measurement) -> float:
-        return float(getattr(theory(analytic.thresholds, m.parameters), quantity))
-
-    return Bearing(protocol, quantity, predict, when=when, by=f"analytic.thresholds: {quantity}")
+    return Bearing(
+        protocol,
+        quantity,
+        lambda m: float(getattr(theory(analytic.thresholds, m.parameters), quantity)),
+        when=when,
+        by=f"analytic.thresholds: {quantity}",
+    )
 
 
 def _edge(name: str) -> Bearing:
     """A quantity of the unstable state."""
-
-    def predict(m: Measurement) -> float:
-        unstable = theory(analytic.solution, m.parameters, Case.SS, stable=False)
-        return number(name, unstable, m.parameters)
-
-    size, by = (lambda m: scale(name, m.parameters)), "analytic.solution: SS beyond the fold, (37)-(41)"
-    return Bearing("edge", f"edge_{name}", predict, size=size, by=by)
+    return Bearing(
+        "edge",
+        f"edge_{name}",
+        lambda m: number(name, theory(analytic.solution, m.parameters, Case.SS, stable=False), m.parameters),
+        size=lambda m: scale(name, m.parameters),
+        by="analytic.solution: SS beyond the fold, (37)-(41)",
+    )
 
 
 def _folds(m: Measurement) -> float:

@@ -1,5 +1,7 @@
-"""Figs. 7 and 8: stationary solutions in the plane of wall friction and flow, and where runs ended. Figs. 9-12:
-bifurcation diagrams, the spin on the wall (91) over the flow, with measured states upon them."""
+"""Figs. 7 and 8, which stationary solutions exist and where runs ended, and the bifurcation diagrams of Figs. 9-12.
+
+Those show stationary solutions against the flow, by their spin on the wall (91), with measured states upon them.
+"""
 
 from __future__ import annotations
 
@@ -161,7 +163,7 @@ def _places(checks: Sequence[Check]) -> Array:
 
 
 RELEASED = Parameters.named("reference").replace(eta=0.43)
-"""eta so little over j that the branch of SS, with (12) released, is whole."""
+"""eta so little above j that the branch of SS, with (12) released, is whole."""
 _SETS = {
     "fig-9": ("reference", ("NS", "NR")),
     "fig-10": ("reference", ("RR", "SS", "SR", "NR")),

@@ -19,7 +19,7 @@ import numpy as np
 
 from compare.kit.fits import slope_error
 from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
-from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
+from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
 from compare.kit.short import (
     DOUBT,
     HALF_WINDOW,
@@ -85,7 +85,7 @@ class Push:
     inner: Case
     outer: Case
     n: Array
-    """Direction, a unit vector (3,) over slip_x, slip_y, slip_z."""
+    """Direction, a unit vector (3,) of slip_x, slip_y, slip_z."""
 
     @property
     def sizes(self) -> tuple[float, ...]:
@@ -113,9 +113,7 @@ class Push:
             return np.full(2, np.nan)
         return polynomials(run.time[record], run.x[record, SLIP_XYZ] @ self.n, DEGREES)[1]
 
-    def row(
-        self, lab: Lab, protocol: str, quantity: str, value: Measured, tasks: Sequence[Task], **more: Condition
-    ) -> Measurement:
+    def row(self, lab: Lab, protocol: str, quantity: str, value: Measured, tasks: Sequence[Task]) -> Measurement:
         """What was measured of it, with its state and direction."""
         start, n = self.start, dict(zip(("n_x", "n_y", "n_z"), self.n.tolist(), strict=True))
         along = {"inner": self.inner.name, "outer": self.outer.name, "by": start.name} | state_of(start.x0) | n

@@ -317,7 +317,7 @@ def _rows(
 def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The drag at which omega_0 as a function of the floor's force has no slope where that vanishes.
 
-    By slopes over 1/c, to which what a force makes a ball lag by is proportional: the zero of the line through them.
+    The zero of the straight line through the slopes as a function of 1/c, to which the lag by a force is proportional.
     """
     ranges = {}
     for name in sets:
