@@ -6,7 +6,7 @@ Fig. 12, and (83) for eta > 1, no ball shows, since a contact would have to pull
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
@@ -61,10 +61,6 @@ def _folds(m: Measurement) -> float:
     return float(p.eta > theory(analytic.thresholds, p).eta_cr)
 
 
-def _number_of_folds(predict: Callable[[Measurement], float], by: str) -> Bearing:
-    return Bearing("thresholds", "folds", lambda m: float(predict(m)), by=by)
-
-
 CLAIMS = (
     Claim(
         "table-5-P3",
@@ -96,9 +92,11 @@ CLAIMS = (
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
         (
             _at("omega_04"),
-            _number_of_folds(
+            Bearing(
+                "thresholds",
+                "folds",
                 lambda m: math.isfinite(theory(analytic.thresholds, m.parameters).omega_04),
-                "analytic.thresholds: omega_04",
+                by="analytic.thresholds: omega_04",
             ),
         ),
     ),
@@ -114,7 +112,7 @@ CLAIMS = (
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
         "the wall at ω₀₂, without a jump.",
         (
-            _number_of_folds(_folds, "analytic.thresholds: eta_cr"),
+            Bearing("thresholds", "folds", _folds, by="analytic.thresholds: eta_cr"),
             Bearing(
                 "birth",
                 "critical_drag",
@@ -129,8 +127,11 @@ CLAIMS = (
         "after Prop. 7",
         "There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
         (
-            _number_of_folds(
-                lambda m: bifurcation.number_of_folds(m.parameters), "analytic.bifurcation.diagram.number_of_folds"
+            Bearing(
+                "thresholds",
+                "folds",
+                lambda m: bifurcation.number_of_folds(m.parameters),
+                by="analytic.bifurcation.diagram.number_of_folds",
             ),
         ),
     ),
