@@ -51,12 +51,12 @@ def given(**conditions: Condition) -> When:
 
 
 def every(*whens: When) -> When:
-    """Chooses what all of them choose."""
+    """True where all conditions hold."""
     return lambda m: all(when(m) for when in whens)
 
 
 def one(m: Measurement) -> float:
-    """The size of what is a ratio, an angle, or a deviation over its own scale."""
+    """The size of what is a ratio, an angle, or a deviation divided by its own scale."""
     return 1.0
 
 
@@ -71,7 +71,7 @@ class Bearing:
     _: KW_ONLY
     when: When = lambda m: True
     size: Callable[[Measurement], float] | None = None
-    """Natural size of the quantity, over which errors are counted; None for the predicted value itself."""
+    """Natural size of the quantity, by which errors are divided; None for the predicted value itself."""
     relation: Relation = Relation.EQUAL
     by: str = ""
     """The function or equation that predicts, for the reader."""
@@ -140,5 +140,5 @@ class Verdict:
 
     @property
     def worst(self) -> float:
-        """Largest deviation over tolerance of all checks; inf where theory knows no such state."""
+        """Largest deviation divided by its tolerance; inf where theory knows no such state."""
         return max((check.share for check in self.checks), default=math.nan)

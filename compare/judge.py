@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, ParamSpec, TypeVar
+from collections.abc import Callable, Iterable, Sequence
+from typing import ParamSpec, TypeVar
 
 import analytic
 from analytic.orbits.periodic import NoOrbitError
@@ -17,44 +17,32 @@ from compare.kit.statistics import COVERAGE, Measured
 from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
 
-F = TypeVar("F", bound=Callable[..., Any])
 P = ParamSpec("P")
 R = TypeVar("R")
-_remembered: list[Any] = []
 RTOL = 1e-7
 """Relative tolerance of simulations that predict: what most of them predict is measured to 1e-4 at best."""
 UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
 """What a prediction raises where theory knows no such state or motion: that is a deviation, not a breakdown."""
 
 
-def remembered(function: F) -> F:
-    """Compute each prediction once a judgement: a cache that `judge` empties, because theory may be exchanged."""
-    cached = functools.lru_cache(maxsize=None)(function)
-    _remembered.append(cached)
-    return cached  # type: ignore[return-value]
-
-
-@remembered
-def _computed(function: Callable[..., Any], args: tuple[Any, ...], options: tuple[tuple[str, Any], ...]) -> Any:
-    return function(*args, **dict(options))
+_computed = functools.cache(lambda function, *args, **options: function(*args, **options))
 
 
 def theory(function: Callable[P, R], *args: P.args, **options: P.kwargs) -> R:
-    """A function of `analytic` at arguments that can be hashed, computed once a judgement.
+    """A function of `analytic` at arguments that can be hashed, computed once: `judge` empties the cache.
 
     Name the function through its module where it is called, as in ``theory(pulsation.slip_onset, p, f)``: then a theory
     that was exchanged is the one that is asked.
     """
-    result: R = _computed(function, args, tuple(sorted(options.items())))
+    result: R = _computed(function, *args, **options)  # type: ignore[arg-type]  # they can be hashed
     return result
 
 
-@remembered
 def simulated(
     p: Parameters, x: tuple[float, ...], t_end: float, samples: int = 1, flow: Flow | None = None, rtol: float = RTOL
 ) -> Trajectory:
     """The motion of theory from a state, with so many samples after the first."""
-    return analytic.simulate(p, x, t_end, flow, sample_interval=t_end / samples, rtol=rtol)
+    return theory(analytic.simulate, p, x, t_end, flow, sample_interval=t_end / samples, rtol=rtol)
 
 
 def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:
@@ -65,8 +53,7 @@ def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:
 
 def forget() -> None:
     """Forget all predictions."""
-    for cached in _remembered:
-        cached.cache_clear()
+    _computed.cache_clear()
 
 
 def verdict(claim: Claim, records: Records) -> Verdict:
@@ -79,7 +66,15 @@ def verdict(claim: Claim, records: Records) -> Verdict:
         dict.fromkeys(f"{each.set}: {each.reason}" for each in records.missing if each.protocol in claim.protocols)
     )
     try:
-        checks = tuple(claim.algebra() if claim.algebra else _checks(claim.bearings, records))
+        checks = (
+            tuple(claim.algebra())
+            if claim.algebra
+            else tuple(
+                check(bearing, m)
+                for bearing in claim.bearings
+                for m in records.select(bearing.protocol, bearing.quantity, bearing.when)
+            )
+        )
     except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other
         reason = f"{type(error).__name__}: {error}"
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
@@ -92,12 +87,6 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     else:
         outcome = Outcome.CONFIRMED
     return Verdict(claim=claim, outcome=outcome, checks=checks, missing=missing)
-
-
-def _checks(bearings: Sequence[Bearing], records: Records) -> Iterator[Check]:
-    for bearing in bearings:
-        for m in records.select(bearing.protocol, bearing.quantity, bearing.when):
-            yield check(bearing, m)
 
 
 def check(bearing: Bearing, m: Measurement) -> Check:

@@ -10,7 +10,6 @@ from compare.judge import theory
 from compare.kit.record import Measurement
 from compare.kit.settling import family, forces, scale
 from model import Case, Parameters
-from model.arrays import Array
 
 
 def lasting(p: Parameters) -> list[StationarySolution]:
@@ -45,22 +44,17 @@ def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
     if quantity == "wall_spin":
         return float(bifurcation.wall_spin(s.state, p))
     if quantity.startswith("force_"):
-        return force(quantity.removeprefix("force_"), s.force_A, s.force_B)
+        return float(forces(s.force_A, s.force_B)[quantity.removeprefix("force_")])
     return float(getattr(s.state, quantity))
 
 
-def force(name: str, A: Array, B: Array) -> float:
-    """A component of the contact forces (3,), such as "Ax", or a sum that mechanics determine, such as "Ax-By"."""
-    return float(forces(A, B)[name])
-
-
 def natural_size(m: Measurement) -> float:
-    """Over which errors of a settled state are counted."""
+    """The size by which errors of a settled state are divided."""
     return scale(m.quantity, m.parameters)
 
 
 def is_in(*cases: Case) -> When:
-    """Chooses the settled states of these cases."""
+    """True for settled states of these cases."""
     return lambda m: detected(m) in cases
 
 

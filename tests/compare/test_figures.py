@@ -25,7 +25,7 @@ from compare.kit.engines import ENGINES
 from compare.kit.record import Measurement, Records
 from compare.subjects.flowmeter.figures import unloading
 from compare.subjects.slipping import figures as slipping
-from compare.subjects.thresholds.figures import bifurcation_diagrams
+from compare.subjects.thresholds import figures as bifurcations
 from compare.subjects.unsteady import figures as unsteady
 from model import Case, InputError, Parameters, StorageError
 
@@ -156,7 +156,7 @@ def test_stable_and_unstable_parts_of_figure_10() -> None:
 def test_the_hopf_point_of_figure_12_is_marked() -> None:
     (axes,) = FIGURES["fig-12"].draw(FIGURES["fig-12"].select(Material())).axes
     assert {"P3", "NF2", "NT1", "F", "H"} <= {text.get_text() for text in axes.texts}
-    assert "Hopf" in FIGURES["fig-12"].caption(Diagram("fig-12", bifurcation_diagrams.RELEASED))
+    assert "Hopf" in FIGURES["fig-12"].caption(Diagram("fig-12", bifurcations.RELEASED))
 
 
 @pytest.mark.parametrize("name", ["fig-4", "fig-5"])

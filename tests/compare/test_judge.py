@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import pytest
 
+import tests.measured
 from compare.claim import Bearing, Claim, Outcome, Text
-from compare.judge import judge, remembered, select
+from compare.judge import judge, select, theory
 from compare.kit.check import Relation
 from compare.kit.quantities import quantity
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Missing, Records
 from compare.kit.statistics import COVERAGE, Measured
 from model import InputError, Parameters
 
@@ -21,16 +22,7 @@ FINE = quantity("omega_c").resolves / 10
 
 
 def measured(value: float, uncertainty: float, name: str = "omega_c") -> Records:
-    m = Measurement(
-        protocol="settled",
-        quantity=name,
-        value=value,
-        uncertainty=uncertainty,
-        engine="mujoco",
-        set="mine",
-        parameters=P,
-    )
-    return Records((m,))
+    return Records((tests.measured.measured("settled", name, value, uncertainty, P, "mine"),))
 
 
 def claim(bearing: Bearing | None = None) -> Claim:
@@ -42,20 +34,18 @@ def outcome(of: Claim, records: Records) -> Outcome:
     return judge([of], records)[0].outcome
 
 
-def test_what_agrees_is_confirmed() -> None:
-    assert outcome(claim(), measured(P.omega_0, FINE)) is Outcome.CONFIRMED
-
-
-def test_what_deviates_is_refuted() -> None:
-    assert outcome(claim(), measured(P.omega_0 * (1 + 1e-5), FINE)) is Outcome.REFUTED
-
-
-def test_what_is_too_coarse_is_inconclusive_however_well_it_agrees() -> None:
-    assert outcome(claim(), measured(P.omega_0, 0.01 * P.omega_0)) is Outcome.INCONCLUSIVE
-
-
-def test_what_deviates_is_refuted_even_if_it_is_coarse() -> None:
-    assert outcome(claim(), measured(2 * P.omega_0, 0.01 * P.omega_0)) is Outcome.REFUTED
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "expected"),
+    [
+        (P.omega_0, FINE, Outcome.CONFIRMED),
+        (P.omega_0 * (1 + 1e-5), FINE, Outcome.REFUTED),
+        (P.omega_0, 0.01 * P.omega_0, Outcome.INCONCLUSIVE),  # too coarse, however well it agrees
+        (2 * P.omega_0, 0.01 * P.omega_0, Outcome.REFUTED),  # even if it is coarse
+        (math.nan, FINE, Outcome.REFUTED),
+    ],
+)
+def test_a_verdict_is_computed_from_the_numbers(value: float, uncertainty: float, expected: Outcome) -> None:
+    assert outcome(claim(), measured(value, uncertainty)) is expected
 
 
 def test_without_measurements_it_was_not_run_and_the_reason_is_kept() -> None:
@@ -65,26 +55,13 @@ def test_without_measurements_it_was_not_run_and_the_reason_is_kept() -> None:
     assert verdict.missing == ("mine: nothing settles",)
 
 
-def test_a_measurement_that_is_not_a_number_refutes() -> None:
-    assert outcome(claim(), measured(math.nan, FINE)) is Outcome.REFUTED
-
-
-def test_a_state_that_theory_does_not_know_refutes() -> None:
-    def unknown(m: Measurement) -> float:
-        raise LookupError("no such state")
-
-    (verdict,) = judge([claim(replace(claim().bearings[0], predict=unknown))], measured(1.0, FINE))
-    assert verdict.outcome is Outcome.REFUTED
-    assert verdict.worst == math.inf
-
-
-def test_a_theory_that_breaks_down_loses_its_own_claim_only() -> None:
-    def broken(m: Measurement) -> float:
-        raise ZeroDivisionError("float division by zero")
-
-    verdicts = judge([claim(replace(claim().bearings[0], predict=broken)), claim()], measured(P.omega_0, FINE))
-    assert [v.outcome for v in verdicts] == [Outcome.ERROR, Outcome.CONFIRMED]
-    assert "division by zero" in verdicts[0].error
+def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own_claim_only() -> None:
+    predictions = (lambda m: {}["no such state"], lambda m: 1 / 0)
+    claims = [claim(replace(claim().bearings[0], predict=predict)) for predict in predictions]
+    unknown, broken, right = judge([*claims, claim()], measured(P.omega_0, FINE))
+    assert [v.outcome for v in (unknown, broken, right)] == [Outcome.REFUTED, Outcome.ERROR, Outcome.CONFIRMED]
+    assert unknown.worst == math.inf
+    assert "division by zero" in broken.error
 
 
 @pytest.mark.parametrize(("relation", "agrees"), [(Relation.AT_MOST, -1), (Relation.AT_LEAST, 1)])
@@ -117,11 +94,10 @@ def test_resolving_power_is_the_error_of_theory_that_would_be_noticed() -> None:
 
 
 def test_predictions_are_forgotten_between_judgements() -> None:
-    theory = {"omega_c": P.omega_0}
-    predict = remembered(lambda m: theory["omega_c"])
-    of = claim(Bearing(protocol="settled", quantity="omega_c", predict=lambda m: predict(m.parameters)))
+    values = {"omega_c": P.omega_0}
+    of = claim(Bearing(protocol="settled", quantity="omega_c", predict=lambda m: theory(values.__getitem__, "omega_c")))
     assert outcome(of, measured(P.omega_0, FINE)) is Outcome.CONFIRMED
-    theory["omega_c"] *= 1.01
+    values["omega_c"] *= 1.01
     assert outcome(of, measured(P.omega_0, FINE)) is Outcome.REFUTED
 
 

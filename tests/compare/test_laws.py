@@ -13,7 +13,7 @@ from compare.claim import Outcome, Verdict
 from compare.judge import judge
 from compare.kit.lab import Lab
 from compare.kit.record import Measurement, Records
-from compare.subjects.motion import cases as claims
+from compare.subjects.motion import claims
 from compare.subjects.motion.measure import laws
 from model import Case, Flow, Parameters, Trajectory
 from model.trajectory import SAMPLE, Events, Header
@@ -80,7 +80,7 @@ def law(quantity: str, value: float, uncertainty: float, contact: str = "A") -> 
 
 
 def verdict_of(name: str, records: Records) -> Verdict:
-    return judge([claim for claim in claims.CLAIMS if claim.id == name], records)[0]
+    return judge([claim for claim in claims.LAWS if claim.id == name], records)[0]
 
 
 def test_laws_are_judged() -> None:
@@ -99,17 +99,15 @@ def test_laws_are_judged() -> None:
 def test_laws_and_drag_are_measured_with_mujoco(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(laws, "LASTS", 256)
     records = Records.of(laws.measure(lab, {"reference": Parameters.named("reference")}, Records()))
-    mine = [claim for claim in claims.CLAIMS if claim.protocols == {laws.PROTOCOL}]
-    assert {verdict.claim.id: verdict.outcome for verdict in judge(mine, records)} == {
-        "table-3": Outcome.CONFIRMED,
-        "eq-10": Outcome.CONFIRMED,
-    }
+    mine = [claim for claim in claims.LAWS if claim.protocols == {laws.PROTOCOL}]
+    outcome_of = {verdict.claim.id: verdict.outcome for verdict in judge(mine, records)}
+    assert outcome_of == {"table-3": Outcome.CONFIRMED, "eq-10": Outcome.CONFIRMED}
     right = drag.sinking_speed
     monkeypatch.setattr(drag, "sinking_speed", lambda **fluid: 1.0001 * right(**fluid))
     assert verdict_of("eq-10", records).outcome is Outcome.REFUTED
 
 
-def test_a_drag_coefficient_that_disagrees_with_stokes_is_noticed(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drag_coefficient_that_disagrees_with_drag_is_noticed(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     of_fluid = Parameters.from_fluid
     monkeypatch.setattr(Parameters, "from_fluid", lambda **values: (p := of_fluid(**values)).replace(c=1.01 * p.c))
     assert verdict_of("eq-10", Records.of(laws.measure(lab, {}, Records()))).outcome is Outcome.REFUTED

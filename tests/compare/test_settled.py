@@ -13,7 +13,7 @@ from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
 from compare.subjects.flowmeter.measure import characteristic
 from compare.subjects.stationary import measure as settled
-from compare.subjects.thresholds.measure import plane
+from compare.subjects.thresholds.measure import basins
 from model import Case, Parameters
 from tests.measured import thresholds
 
@@ -92,19 +92,15 @@ class TestSettled:
         assert m.uncertainty >= solved
 
 
-class TestSteadyMean:
-    def test_an_exponential_approach_is_within_its_uncertainty(self) -> None:
-        t = np.arange(1000) / 1000
-        for rate in (3.0, 10.0, 30.0):
-            means, uncertain = settling.steady_mean(np.array([2.0 + np.exp(-rate * t)]), 500)
-            assert abs(means[0] - 2.0) <= 3 * uncertain[0]
-
-    def test_an_oscillation_is_passed_over(self) -> None:
-        t = np.arange(1000) / 1000
-        for turns in (20.3, 31.7, 47.1):
-            means, _ = settling.steady_mean(np.array([2.0 + np.sin(2 * np.pi * turns * t + 1.0)]), 500)
-            # (TAPER/2)!^2/(pi m^(TAPER+1)) for m periods in the window.
-            assert abs(means[0] - 2.0) <= 24**2 / (np.pi * (turns / 2 - 4) ** (settling.TAPER + 1))
+def test_a_steady_mean_is_as_sure_as_it_says_and_passes_over_oscillations() -> None:
+    t = np.arange(1000) / 1000
+    for rate in (3.0, 10.0, 30.0):
+        means, uncertain = settling.steady_mean(np.array([2.0 + np.exp(-rate * t)]), 500)
+        assert abs(means[0] - 2.0) <= 3 * uncertain[0]
+    for turns in (20.3, 31.7, 47.1):
+        means, _ = settling.steady_mean(np.array([2.0 + np.sin(2 * np.pi * turns * t + 1.0)]), 500)
+        # (TAPER/2)!^2/(pi m^(TAPER+1)) for m periods in the window.
+        assert abs(means[0] - 2.0) <= 24**2 / (np.pi * (turns / 2 - 4) ** (settling.TAPER + 1))
 
 
 class TestOthers:
@@ -142,8 +138,8 @@ class TestOthers:
 
 class TestPlane:
     def test_points_are_added_at_borders_each_kind_in_turn(self) -> None:
-        seen = [(u, 1 if u[0] < 0.5 else 2 if u[1] < 0.5 else 4) for u in plane.spread(60, 1)]
-        added = plane.added(seen)[:12]
+        seen = [(u, 1 if u[0] < 0.5 else 2 if u[1] < 0.5 else 4) for u in basins.spread(60, 1)]
+        added = basins.added(seen)[:12]
         assert len(added) == 12
         # Between points that differ: near one of the two lines.
         assert all(abs(u[0] - 0.5) < 0.25 or abs(u[1] - 0.5) < 0.25 for u in added)
@@ -153,10 +149,10 @@ class TestPlane:
     def test_a_few_points_are_measured(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(EFFORT, "plane.spread", (2, 2, 2))
         monkeypatch.setitem(EFFORT, "plane.added", ((), (), ()))
-        monkeypatch.setattr(plane, "DRAG", 10.0)
-        rows = list(plane.measure(lab, {"reference": THICK}, Records()))
+        monkeypatch.setattr(basins, "DRAG", 10.0)
+        rows = list(basins.planes(lab, {"reference": THICK}, Records()))
         masks = [row for row in rows if isinstance(row, Measurement)]
-        assert {m.conditions["figure"] for m in masks} <= set(plane.FIGURES)
+        assert {m.conditions["figure"] for m in masks} <= set(basins.FIGURES)
         assert len(masks) + sum(isinstance(row, Missing) for row in rows) >= 2
         for m in masks:
             assert int(m.value) & (1 << Case.NR | 1 << Case.NS)  # what starts on the wall stays or sinks

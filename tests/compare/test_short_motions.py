@@ -21,13 +21,13 @@ from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
 from compare.kit.settling import family
+from compare.kit.short import random_state
 from compare.kit.statistics import settled_case
-from compare.subjects.motion import cases
-from compare.subjects.motion import claims as equations
-from compare.subjects.motion.measure import field, motions
+from compare.subjects.motion import claims as motion
+from compare.subjects.motion.measure import motions
 from compare.subjects.slipping import claims as slipping
-from compare.subjects.slipping.measure import bounds, growth, lift
-from compare.subjects.thresholds import formal
+from compare.subjects.slipping.measure import growth, onset
+from compare.subjects.thresholds import claims as bifurcations
 from compare.subjects.thresholds.measure.thresholds import birth
 from model import Case, Parameters, storage
 from model.cases import TRAITS
@@ -45,24 +45,24 @@ def measured(lab: Lab) -> Measured:
     """What each protocol measures, on one set or two."""
     known = thresholds("reference", SETS["reference"], "omega_01", "omega_02")
     protocols = {
-        "field": lambda: field.measure(lab, SETS, Records()),
+        "field": lambda: motions.field(lab, SETS, Records()),
         "growth": lambda: growth.measure(lab, SETS, Records()),
-        "bounds": lambda: bounds.measure(lab, SETS, known),
-        "lift": lambda: lift.measure(lab, {name: QUICK[name] for name in ("rubber-wall", "rough-floor")}, Records()),
-        "motions": lambda: motions.measure(lab, SETS, Records()),
+        "bounds": lambda: onset.bounds(lab, SETS, known),
+        "lift": lambda: onset.lift(lab, {name: QUICK[name] for name in ("rubber-wall", "rough-floor")}, Records()),
+        "motions": lambda: motions.motions(lab, SETS, Records()),
         "impacts": lambda: motions.impacts(lab, SETS, Records()),
     }
     return cache(lambda name: Records.of(protocols[name]()))
 
 
 def verdicts(records: Records) -> dict[str, Verdict]:
-    return {each.claim.id: each for each in judge(equations.CLAIMS + slipping.CLAIMS + cases.CLAIMS, records)}
+    return {each.claim.id: each for each in judge(motion.LAWS + motion.EQUATIONS + slipping.CLAIMS, records)}
 
 
 @pytest.mark.parametrize("case", list(Case))
 def test_random_states_satisfy_their_case(case: Case) -> None:
     p = SETS["reference"]
-    x = field.random_state(case, p, np.random.default_rng(1))
+    x = random_state(case, p, np.random.default_rng(1))
     analytic.vector_field(case, x, p)  # it refuses a state that isn't of the case
     assert np.count_nonzero(x) == TRAITS[case].dimension + (case is Case.RN)
 
@@ -169,9 +169,8 @@ def test_the_fold_is_born_at_the_critical_drag(lab: Lab) -> None:
 
 def test_without_friction_nothing_rolls_and_the_reader_is_told(lab: Lab) -> None:
     smooth = {"ice": SETS["reference"].replace(eta=0.0)}
-    for protocol in (growth, bounds):
-        (missing,) = protocol.measure(lab, smooth, Records())
-        assert missing == Missing(protocol.__name__.split(".")[-1], "ice", growth.SMOOTH)
+    for protocol, measure in (("growth", growth.measure), ("bounds", onset.bounds)):
+        assert list(measure(lab, smooth, Records())) == [Missing(protocol, "ice", growth.SMOOTH)]
 
 
 def test_pieces_keep_away_from_changes_of_case(lab: Lab, measured: Measured) -> None:
@@ -184,7 +183,7 @@ def test_pieces_keep_away_from_changes_of_case(lab: Lab, measured: Measured) -> 
 
 
 def test_formal_claims_are_algebra() -> None:
-    for verdict in judge(formal.CLAIMS, Records()):
+    for verdict in judge(bifurcations.FORMAL_CLAIMS, Records()):
         assert verdict.outcome is Outcome.CONFIRMED
         assert {check.measurement.engine for check in verdict.checks} == {"theory"}
 
@@ -194,8 +193,8 @@ def test_a_slip_that_friction_holds_at_a_trace_is_no_smooth_motion(share: float,
     """It doesn't change, yet a 1e-4 of it turns its friction so far that the rates are others."""
     p, time = Parameters.named("reference"), np.linspace(0.0, 1e-3, 5)
     # A sphere's contact point feels friction f as an acceleration f/m (1 + 1/j).
-    friction = p.m * field.TURN / (time[-1] * (1 + 1 / p.j)) * share
+    friction = p.m * motions.TURN / (time[-1] * (1 + 1 / p.j)) * share
     x = np.tile([0, 0, 1.0, 0, 1.0 / p.r, 0, 0, 0], (5, 1))
     forces = {"force_A": np.zeros((5, 3)), "force_B": np.full((5, 3), friction / p.eta)}
     run = SimpleNamespace(header=SimpleNamespace(parameters=p), time=time, x=x, **forces)
-    assert field.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns
+    assert motions.turns_or_hovers(Case.NS, run, slice(0, 5)) is turns

@@ -11,12 +11,12 @@ import pytest
 
 import analytic
 from analytic import StationarySolution
-from compare import settled
 from compare.claim import Outcome
 from compare.judge import judge
 from compare.kit.quantities import quantity
 from compare.kit.record import Records
 from compare.kit.settling import determined, family, scale
+from compare.settled import lasting, number
 from compare.subjects.flowmeter import claims as flowmeter
 from compare.subjects.stationary import claims as stationary
 from model import Case, Parameters
@@ -50,14 +50,14 @@ def _records(coarse: float = 0.1) -> Records:
                 rows.append(measured("settled", "case", float(s.case), 0.0, q, name, **at))
                 for what in determined(s.case):
                     sure = coarse * quantity(what).resolves / 3 * scale(what, q)
-                    rows.append(measured("settled", what, settled.number(what, s, q), sure, q, name, **at))
-            mask = sum(1 << case for case in {family(s.case) for s in settled.lasting(q)})
+                    rows.append(measured("settled", what, number(what, s, q), sure, q, name, **at))
+            mask = sum(1 << case for case in {family(s.case) for s in lasting(q)})
             rows.append(measured("plane", "cases", float(mask), 0.0, q, name, figure="fig-7"))
         still = p.replace(omega_0=0.0)
         resting = analytic.solution(still, Case.RS)
         for what in determined(Case.RS):
             sure = coarse * quantity(what).resolves / 3 * scale(what, still)
-            value = settled.number(what, resting, still)
+            value = number(what, resting, still)
             rows.append(measured("settled", what, value, sure, still, name, case="RN", start="spinning"))
     return Records(tuple(rows))
 

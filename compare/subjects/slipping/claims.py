@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -24,12 +23,9 @@ def _x(m: Measurement) -> Array:
     return np.array(state(m))
 
 
-def _held(m: Measurement) -> float:
-    return float(m.conditions["omega_c"])
-
-
-def _side(m: Measurement, name: str) -> int:
-    return round(float(m.conditions[name]))
+def _at(m: Measurement, name: str) -> float:
+    """A number among the conditions."""
+    return float(m.conditions[name])
 
 
 def _arrow(m: Measurement) -> tuple[Case, Case]:
@@ -42,18 +38,24 @@ def _along(arrow: tuple[Case, Case], *by: str) -> When:
     return lambda m: _arrow(m) == arrow and m.conditions.get("by", "") in by
 
 
-def _growth(predict: Callable[[Measurement], float], when: When, by: str = "slip_stability.gamma") -> Bearing:
-    return Bearing("growth", "gamma", predict, when=when, size=lambda m: slip_unit(m.parameters), by=by)
+def _growth(
+    predict: Callable[[Measurement], float],
+    when: When,
+    by: str = "slip_stability.gamma",
+    relation: Relation = Relation.EQUAL,
+) -> Bearing:
+    return Bearing(
+        "growth", "gamma", predict, when=when, size=lambda m: slip_unit(m.parameters), relation=relation, by=by
+    )
 
 
 def _gamma(m: Measurement) -> float:
-    n = [float(m.conditions[f"n_{name[-1]}"]) for name in slip_stability.normals(*_arrow(m))]
+    n = [_at(m, f"n_{name[-1]}") for name in slip_stability.normals(*_arrow(m))]
     return float(slip_stability.gamma(*_arrow(m), _x(m), np.array(n), m.parameters))
 
 
 def _gamma_nr(m: Measurement) -> float:
-    beta = math.atan2(float(m.conditions["n_y"]), float(m.conditions["n_z"]))
-    return float(slip_bounds.gamma_nr(beta, _x(m), m.parameters))
+    return float(slip_bounds.gamma_nr(math.atan2(_at(m, "n_y"), _at(m, "n_z")), _x(m), m.parameters))
 
 
 def _greatest_as_printed(m: Measurement) -> float:
@@ -97,26 +99,12 @@ def _on_the_wall(m: Measurement) -> float:
     return float(Case.NR if stable else Case.NS)
 
 
-def _lifting(inner: Case, outer: Case) -> Claim:
-    never = f"Out of {inner.name} the ball never lifts off the floor, whatever its orbit."
-    once = f"Out of {inner.name} the ball lifts off the floor once the wall alone, in {outer.name}, would drive it up."
+def _lifts(m: Measurement) -> float:
+    return float(slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0)
 
-    def lifts(m: Measurement) -> float:
-        return float(slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0)
 
-    def onset(m: Measurement) -> float:
-        return slip_stability.lift_onset(*_arrow(m), _x(m), m.parameters)
-
-    when = given(inner=inner.name)
-    return Claim(
-        f"lift-{inner.name}-{outer.name}",
-        "Fig. 6, dotted",
-        never if inner is Case.RS else once,
-        (
-            Bearing("lift", "lifts", lifts, when=when, by="slip_stability.lift_acceleration"),
-            Bearing("lift", "lift_onset", onset, when=when, by="slip_stability.lift_onset"),
-        ),
-    )
+def _lift_onset(m: Measurement) -> float:
+    return slip_stability.lift_onset(*_arrow(m), _x(m), m.parameters)
 
 
 CLAIMS = (
@@ -158,7 +146,7 @@ CLAIMS = (
         "eq-66",
         "(66)",
         "A ball that lags behind the fluid begins to slip at the wall where (66) says.",
-        _bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, _held(m), _side(m, "n_y"))),
+        _bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, _at(m, "omega_c"), round(_at(m, "n_y")))),
         text=Text.CORRECTED,
         reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
     ),
@@ -172,7 +160,7 @@ CLAIMS = (
         "eq-73",
         "(73)",
         "A ball that lags behind the fluid begins to slip at the floor where (73) says.",
-        _bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, _held(m), _side(m, "n_x"))),
+        _bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, _at(m, "omega_c"), round(_at(m, "n_x")))),
     ),
     Claim(
         "eq-74",
@@ -212,7 +200,7 @@ CLAIMS = (
             Bearing(
                 "growth",
                 "filippov_share",
-                lambda m: slip_bounds.filippov_share(_arrow(m)[1], _held(m), m.parameters),
+                lambda m: slip_bounds.filippov_share(_arrow(m)[1], _at(m, "omega_c"), m.parameters),
                 size=one,
                 by="slip_bounds.filippov_share",
             ),
@@ -235,15 +223,34 @@ CLAIMS = (
         "after (80)",
         "(α, β) = (0, 0) and (π, π) are the global extrema of γ.",
         (
-            replace(
-                _growth(_greatest_as_printed, _along(_RR_SS, "sideways"), "slip_stability.gamma at (0, 0), (π, π)"),
-                relation=Relation.AT_MOST,
+            _growth(
+                _greatest_as_printed,
+                _along(_RR_SS, "sideways"),
+                "slip_stability.gamma at (0, 0), (π, π)",
+                Relation.AT_MOST,
             ),
         ),
         expected=Outcome.REFUTED,
         reason="False for the Euclidean normal (75): γ is larger along other directions. With kinetic energy as the "
         "inner product it is true.",
     ),
-    *(_lifting(*arrow) for arrow in slip_stability.LIFT_ARROWS),
+    *(
+        Claim(
+            f"lift-{inner.name}-{outer.name}",
+            "Fig. 6, dotted",
+            f"Out of {inner.name} the ball never lifts off the floor, whatever its orbit."
+            if inner is Case.RS
+            else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in {outer.name}, would drive "
+            "it up.",
+            tuple(
+                Bearing("lift", quantity, predict, when=given(inner=inner.name), by=f"slip_stability.{by}")
+                for quantity, predict, by in (
+                    ("lifts", _lifts, "lift_acceleration"),
+                    ("lift_onset", _lift_onset, "lift_onset"),
+                )
+            ),
+        )
+        for inner, outer in slip_stability.LIFT_ARROWS
+    ),
 )
 SECTIONS = {"Slipping": CLAIMS}

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import analytic
-from compare.claim import Bearing, Claim, Text, every, given
+from compare.claim import Bearing, Claim, Text, When, every, given
 from compare.judge import theory
 from compare.kit.check import Relation
 from compare.kit.record import Measurement
 from compare.subjects.stability.measure import natural_size
 from model import Case
+
+_JACOBIAN = "analytic.stationary_solutions: eigenvalues of the exact Jacobian"
 
 
 def _spectrum(m: Measurement) -> tuple[complex, ...]:
@@ -29,26 +33,28 @@ def _other(m: Measurement) -> float:
     return float(m.conditions["frequency" if m.quantity == "decay_rate" else "decay_rate"])
 
 
-def _nearest(m: Measurement, values: tuple[complex, ...]) -> float:
-    """Decay rate or frequency of the value, of those with Im >= 0, that is nearest to the measured eigenvalue."""
-    decays = m.quantity == "decay_rate"
-    measured = complex(-m.value, _other(m)) if decays else complex(-_other(m), m.value)
-    nearest = min((complex(v.real, abs(v.imag)) for v in values), key=lambda value: abs(value - measured))
-    return -nearest.real if decays else nearest.imag
-
-
 def _size(m: Measurement) -> float:
     return natural_size(m.value, _other(m), m.parameters)
 
 
+def _rate(
+    quantity: str, when: When, eigenvalues: Callable[[Measurement], Iterable[complex]] = _spectrum, by: str = _JACOBIAN
+) -> Bearing:
+    """Decay rates or frequencies, by that eigenvalue with Im >= 0 which is nearest to the measured one."""
+
+    def predict(m: Measurement) -> float:
+        measured = complex(-m.value, _other(m)) if quantity == "decay_rate" else complex(-_other(m), m.value)
+        nearest = min((complex(v.real, abs(v.imag)) for v in eigenvalues(m)), key=lambda value: abs(value - measured))
+        return -nearest.real if quantity == "decay_rate" else nearest.imag
+
+    return Bearing("rates", quantity, predict, when=when, size=_size, by=by)
+
+
 def _bearings(case: Case) -> tuple[Bearing, ...]:
     """The whole spectrum of the state of a case."""
-    when, by = given(case=case.name), "analytic.stationary_solutions: eigenvalues of the exact Jacobian"
-    return (
-        Bearing("rates", "decay_rate", lambda m: _nearest(m, _spectrum(m)), when=when, size=_size, by=by),
-        Bearing("rates", "frequency", lambda m: _nearest(m, _spectrum(m)), when=when, size=_size, by=by),
-        Bearing("rates", "modes", lambda m: float(len(_spectrum(m))), when=when, by=by),
-    )
+    when = given(case=case.name)
+    count = Bearing("rates", "modes", lambda m: float(len(_spectrum(m))), when=when, by=_JACOBIAN)
+    return _rate("decay_rate", when), _rate("frequency", when), count
 
 
 def _slowest(grows: bool) -> Bearing:
@@ -85,13 +91,11 @@ CLAIMS = (
             *_bearings(Case.SR),
             _slowest(grows=False),
             _slowest(grows=True),
-            Bearing(
-                "rates",
+            _rate(
                 "decay_rate",
-                lambda m: _nearest(m, tuple(theory(analytic.leaning_modes, m.parameters)[0])),
-                when=given(case="SR"),
-                size=_size,
-                by="analytic.leaning_modes",
+                given(case="SR"),
+                lambda m: theory(analytic.leaning_modes, m.parameters)[0],
+                "analytic.leaning_modes",
             ),
         ),
         text=Text.CORRECTED,

@@ -2,12 +2,11 @@
 
 Every active variable of a case is pushed by itself, up and down. Half the difference of the two runs, divided by the
 size of the push, is a column of D(t), which a linear motion turns into P D(t) some time later: the logarithms of the
-eigenvalues of P are the exponents, all of them, and no direction is singled out. Two sizes of the push are extrapolated
-to zero, and so are two time steps.
+eigenvalues of P are the exponents. Two sizes of the push are extrapolated to zero, and so are two time steps.
 
-Two states are special. A ball that spins in a fluid at rest (RS) feels the wall only while it goes round, with a
-friction of the order of omega_c^2: it takes a large push. And where floor and ball only just touch (SR), every push
-makes the ball lean on the floor one way and lifts it off the other way: only the first is used.
+Two states are special. A ball that spins in a fluid at rest (RS) feels the wall only by a friction of the order of
+omega_c^2: it takes a large push. Where floor and ball only just touch (SR), every push makes the ball lean on the floor
+one way and lifts it off the other way: only the first is used.
 """
 
 from __future__ import annotations
@@ -40,12 +39,10 @@ RECORD = (64, 256)
 BRIEF = {Case.RS: (2, 16)}
 """The same where a large push soon changes the state itself."""
 PUSH = {Case.RS: 0.3, Case.SR: 0.1}
-"""Size of a push, in the `units`, in the two cases in which it is extrapolated to zero from this and half of it."""
-USUAL = 2e-4
-"""Size of a push in all other cases; the run with the coarser step has half of it, and shows that it doesn't matter."""
-SLIGHT = 2e-6
-"""The same where the law of drag isn't Stokes': the drag of the lag that a push makes is in proportion to it only
-as far as its Reynolds number is far below 1."""
+"""Size of a push, in the `units`, where it is extrapolated to zero from this and half of it."""
+USUAL, SLIGHT = 2e-4, 2e-6
+"""Size of a push elsewhere, under Stokes' law of drag and under others: theirs is in proportion to a lag only far below
+a Reynolds number of 1. The run with the coarser step has half of it, and shows that it doesn't matter."""
 SLOWEST = 0.04
 """Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
 ORDER = {Case.RS: 2, Case.SR: 1}
@@ -53,17 +50,17 @@ ORDER = {Case.RS: 2, Case.SR: 1}
 STRAYS = 0.4
 """A record ends once a variable is so far from its settled value, in the `units`."""
 LEAST = {Case.SR: 48}
-"""Samples that a record must have, else 8: a floor that is about to carry nothing follows its load less exactly."""
+"""Samples that a record must have, else 8: an almost unloaded floor follows its load less exactly."""
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 """Most states of a case and set at the quick level, spread over the flows; more at the others."""
 STOPPED = 4.0
-"""Coarse steps in which friction may stop the slip of a state at the soonest: in less, its decay is not resolved."""
+"""Coarse steps in which friction may stop the slip of a state at the soonest: a faster decay is not resolved."""
 HOVERS = 10.0
 """How many times as fast as `STUDY_SLIP` allows for its load a contact may slip: at 20 times it hovers."""
 RESOLVED = 0.25
 """Largest exponent in units of the finer time step."""
 REST = 0.05
-"""Share of the drag coefficient c below which a measured rate counts as none."""
+"""Measured rates below this share of the drag coefficient c count as none."""
 Exponents = npt.NDArray[np.complex128]
 
 
@@ -125,7 +122,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         if min(map(len, answers)) < LEAST.get(state.case, 8):
             yield state.missing("pushed, the ball doesn't stay in this case")
         else:
-            yield from _measurements(lab, state, *spectrum(state, answers, step), step, own[-count:])
+            yield from _rows(lab, state, *spectrum(state, answers, step), step, own[-count:])
     for name in sets:
         for case in STATES:
             if case not in {state.case for state in states if state.start.set == name}:
@@ -136,8 +133,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed]:
     """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
 
-    One on the wall alone is pushed high up, and where it only just touches the floor. What slips must do so neither
-    so slowly that a push turns it, or friction stops it within a few steps, nor so fast that it hovers.
+    One on the wall alone is pushed high up, and where it only just touches the floor. Contacts must slip neither so
+    slowly that a push turns the slip, or friction stops it within a few steps, nor so fast that they hover.
     """
     unit = time_unit(p)
     spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
@@ -177,8 +174,7 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed
 def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
     """D (n, d, d): how the active variables, in `units`, follow pushes of one size; runs in the order of the tasks.
 
-    Only as long as the ball stays in the case and near the state; the first sample, at which forces build up, is not
-    among them.
+    Only as long as the ball stays in the case and near the state, and without the first sample: forces build up then.
     """
     ups, downs = runs[::2], runs[1::2]
     if state.case is Case.SR:
@@ -207,14 +203,12 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
     the next order in the size of the push; the error of a step for the fastest exponent; the accuracy of the solver.
     """
     lasts, samples = BRIEF.get(state.case, RECORD)
-    interval = lasts * coarse_step(state.start.p) / samples
+    interval, order = lasts * coarse_step(state.start.p) / samples, ORDER.get(state.case, 2)
     # All records are cut to the length of the shortest, so that all are extrapolated from the same motion.
     length = min(map(len, answers))
 
-    gain = 1 / (2 ** ORDER.get(state.case, 2) - 1)
-
     def exponents_of(large: Array, small: Array, share: float = 1.0) -> Exponents:
-        last = max(4, round(share * length))
+        last, gain = max(4, round(share * length)), 1 / (2**order - 1)
 
         def at(lag: int) -> Array:
             P, P_large = (propagator(record[:last], lag) for record in (small, large))
@@ -228,7 +222,7 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
     correction = (plain - matched(exponents_of(coarse, coarse), plain)) / 3
     half = np.abs(values - matched(exponents_of(large, small, 0.5), values))
     bent, size = np.abs(values - plain), max(state.sizes)
-    bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size ** ORDER.get(state.case, 2), 1.0)
+    bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size**order, 1.0)
     stepped = np.abs(values) * (np.abs(values).max() * step) ** 2 / 12
     solved = SOLVED / (size * interval)
     uncertainty = np.sqrt(np.abs(correction) ** 2 + half**2 + bent**2 + stepped**2 + solved**2)
@@ -237,20 +231,16 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
     return values + correction, np.maximum(uncertainty, alike)
 
 
-def _measurements(
+def _rows(
     lab: Lab, state: Pushed, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
 ) -> Iterator[Measurement | Missing]:
     """One of each pair of conjugates, in the order of their decay, slowest first; and how many there are in all."""
-    start = state.start
+    start, rows = state.start, []
     at: dict[str, Condition] = {"case": state.case.name, **state_of(start.x0)}
     yield measurement(lab, PROTOCOL, start.set, start.p, "modes", len(exponents), tasks, **at)
-    rows = []
-    order = [k for k in np.argsort(-exponents.real) if exponents[k].imag >= 0]
-    fast = [k for k in order if abs(exponents[k]) * step > RESOLVED]
-    for k in fast:
-        yield state.missing(f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step")
-    for mode, k in enumerate(order, start=1):
-        if k in fast:
+    for mode, k in enumerate((k for k in np.argsort(-exponents.real) if exponents[k].imag >= 0), start=1):
+        if abs(exponents[k]) * step > RESOLVED:
+            yield state.missing(f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step")
             continue
         parts = {"decay_rate": -float(exponents[k].real), "frequency": float(exponents[k].imag)}
         for (quantity, value), (name, other) in zip(parts.items(), reversed(parts.items()), strict=True):

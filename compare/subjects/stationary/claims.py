@@ -2,33 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import analytic
-from analytic import StationarySolution
 from compare.claim import Bearing, Claim, Text, When, every, given
 from compare.judge import theory
 from compare.kit.record import Measurement
 from compare.kit.settling import FORCES, SUMS
-from compare.settled import (
-    cases,
-    detected,
-    from_floor,
-    is_in,
-    lifts_first,
-    natural_size,
-    number,
-    reached,
-    slips_first,
-)
+from compare.settled import cases, detected, from_floor, is_in, lifts_first, natural_size, number, reached, slips_first
 from model import Case
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
-
-
-def leaning(m: Measurement) -> StationarySolution:
-    """The state of SR."""
-    return theory(analytic.solution, m.parameters, Case.SR)
 
 
 def case(m: Measurement) -> float:
@@ -60,18 +44,12 @@ def rolling(m: Measurement) -> float:
     return m.value
 
 
-def reachable(m: Measurement) -> float:
-    """The set of cases that last, as the measurement's bit mask."""
-    return float(sum(1 << each for each in cases(m.parameters)))
-
-
-def bearings(
-    quantities: Iterable[str], when: When, state: Callable[[Measurement], StationarySolution] = reached, by: str = ""
-) -> tuple[Bearing, ...]:
-    """Bearings of settled states on a claim, one a quantity."""
+def bearings(quantities: Iterable[str], when: When, by: str, of: Case | None = None) -> tuple[Bearing, ...]:
+    """Bearings of settled states on a claim, one a quantity; predicted by the state of a case, or of that detected."""
 
     def predict(m: Measurement) -> float:
-        return number(m.quantity, state(m), m.parameters)
+        state = theory(analytic.solution, m.parameters, of) if of else reached(m)
+        return number(m.quantity, state, m.parameters)
 
     return tuple(Bearing("settled", q, predict, when=when, size=natural_size, by=by) for q in quantities)
 
@@ -85,16 +63,6 @@ def _with_fluid(when: When = lambda m: True) -> Bearing:
     return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 
 
-def _plane(figure: str, source: str, axis: str) -> Claim:
-    return Claim(
-        figure,
-        source,
-        f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
-        "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR).",
-        (Bearing("plane", "cases", reachable, when=given(figure=figure), by="analytic.stable_solutions"),),
-    )
-
-
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
 _LEANS = every(_LIFTED, from_floor)
 _STATE = (*MOTION, *FORCES)
@@ -105,39 +73,26 @@ CLAIMS = (
         "Prop. 1, (30)-(32)",
         "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
         "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j).",
-        (
-            *bearings((*MOTION, *SUMS), _ROLLS, by="(31), (32)"),
-            _cases(_ROLLS),
-            _with_fluid(),
-        ),
+        (*bearings((*MOTION, *SUMS), _ROLLS, "(31), (32)"), _cases(_ROLLS), _with_fluid()),
     ),
     Claim(
         "prop-1-rough",
         "Prop. 1, (83), (86)",
         "With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
-        (*bearings(("omega_c",), every(lifts_first, _ROLLS), by="(32)"), _with_fluid(lifts_first)),
+        (*bearings(("omega_c",), every(lifts_first, _ROLLS), "(32)"), _with_fluid(lifts_first)),
     ),
     Claim(
         "prop-2-forces",
         "Prop. 2, (33), (34)",
         "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
-        bearings(
-            ("omega_c", "slip_x", "slip_z", "v_y", *FORCES),
-            is_in(Case.RS),
-            lambda m: theory(analytic.solution, m.parameters, Case.RS),
-            by="(33), (34)",
-        ),
+        bearings(("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS),
     ),
     Claim(
         "prop-3-5",
         "Props. 3 and 5, (35), (36), (46), (47)",
         "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
         "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR.",
-        (
-            *bearings(_STATE, _LIFTED, by="(46), (47)"),
-            *bearings(_STATE, _LEANS, leaning, by="(35), (36)"),
-            _cases(_LIFTED),
-        ),
+        (*bearings(_STATE, _LIFTED, "(46), (47)"), *bearings(_STATE, _LEANS, "(35), (36)", Case.SR), _cases(_LIFTED)),
         text=Text.CORRECTED,
         reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it.",
     ),
@@ -146,20 +101,14 @@ CLAIMS = (
         "Prop. 4, (37)-(42)",
         "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
         "its contact forces are (42)-(44).",
-        (
-            *bearings(_STATE, _SLIPS, by="(37)-(44)"),
-            _cases(_SLIPS),
-        ),
+        (*bearings(_STATE, _SLIPS, "(37)-(44)"), _cases(_SLIPS)),
     ),
     Claim(
         "prop-6",
         "Prop. 6, (49), (50)",
         "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
         "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
-        (
-            *bearings(_STATE, _SINKS, by="(49), (50)"),
-            _cases(_SINKS),
-        ),
+        (*bearings(_STATE, _SINKS, "(49), (50)"), _cases(_SINKS)),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
     ),
@@ -170,15 +119,15 @@ DIAGRAMS = (
         "fig-9",
         "Fig. 9",
         "Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
-        bearings(("wall_spin",), is_in(Case.NS, Case.NR), by="(91)"),
+        bearings(("wall_spin",), is_in(Case.NS, Case.NR), "(91)"),
     ),
     Claim(
         "fig-10",
         "Fig. 10",
         "For η < j the spins on the wall in rolling, slipping and in the lifted state join as drawn.",
         (
-            *bearings(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), by="(91)"),
-            *bearings(("wall_spin",), every(slips_first, _LEANS), leaning, by="(91)"),
+            *bearings(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
+            *bearings(("wall_spin",), every(slips_first, _LEANS), "(91)", Case.SR),
         ),
     ),
     Claim(
@@ -186,12 +135,28 @@ DIAGRAMS = (
         "Fig. 11",
         "For η > j rolling ends at ω₀₃ upon the state whose spin on the wall falls like 1/ω₀.",
         (
-            *bearings(("wall_spin",), every(lifts_first, _ROLLS), by="(91)"),
-            *bearings(("wall_spin",), every(lifts_first, _LEANS), leaning, by="(91)"),
+            *bearings(("wall_spin",), every(lifts_first, _ROLLS), "(91)"),
+            *bearings(("wall_spin",), every(lifts_first, _LEANS), "(91)", Case.SR),
             _with_fluid(lifts_first),
         ),
     ),
-    _plane("fig-7", "Fig. 7", "η"),
-    _plane("fig-8", "Fig. 8", "μ = η"),
+    *(
+        Claim(
+            figure,
+            f"Fig. {figure[-1]}",
+            f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
+            "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR).",
+            (
+                Bearing(
+                    "plane",
+                    "cases",
+                    lambda m: float(sum(1 << case for case in cases(m.parameters))),  # the measurement's bit mask
+                    when=given(figure=figure),
+                    by="analytic.stable_solutions",
+                ),
+            ),
+        )
+        for figure, axis in (("fig-7", "η"), ("fig-8", "μ = η"))
+    ),
 )
 SECTIONS = {"Stationary states": CLAIMS, "Bifurcations": DIAGRAMS}

@@ -1,8 +1,8 @@
 """Settled states: where the ball ends from fixed starts at fixed flows, with the forces that mechanics determine.
 
 Flows are the same multiples of sqrt(g/R) for every set. States are measured with the coarse step, and once more with
-half of it: what that changes belongs to their uncertainty, as does what different starts make of the same state. Beside
-them stands the engine as it comes: the characteristic curve with its own contact parameters, for display.
+half of it: what that changes belongs to their uncertainty, as does what different starts make of the same state. For
+display, the characteristic curve is measured with the engine's own contact parameters, too.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from itertools import groupby
 
 from compare.kit import engines
 from compare.kit.lab import Lab, time_unit
@@ -47,14 +46,23 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         if state.failure:
             continue
         yield _record(lab, state, "case", state.case)
-        if _stopping_rate(state) * duration(p) < LIVELY:
+        rate = p.c  # at which the fluid would stop a free ball: in proportion to the lag under the quadratic law
+        if p.drag == QUADRATIC:
+            _, v_y, omega_c, *_ = state.mean.tolist()
+            Re = 2 * p.r / p.nu_f * math.hypot(v_y, p.R * (omega_c - p.omega_0))
+            rate *= p.C_D / 24 * Re
+        if rate * duration(p) < LIVELY:
             what = f"{state.case.name} at omega_0 = {p.omega_0:.4g} rad/s"
             why = f"{what}: a slight lag is one for ever under the quadratic law"
             slack.append(Missing(PROTOCOL, state.start.set, why))
         else:
             sure.append(state)
     yield from slack
-    alike = [list(same) for _, same in groupby(sorted(sure, key=_key), key=_key)]
+    groups: dict[tuple[str, float, int], list[Settled]] = {}
+    for state in sure:
+        key = state.start.set, state.start.p.omega_0, int(family(state.case))
+        groups.setdefault(key, []).append(state)
+    alike = [groups[key] for key in sorted(groups)]
     again = []  # with half the step, from the mean, at the height from which it started
     for state, *_ in alike:
         x0 = State.of(state.mean)._replace(y=max(State.of(state.start.x0).y, 0.0))
@@ -102,19 +110,6 @@ def _unsettled(states: list[Settled]) -> Iterator[Missing]:
             p = each.start.p
             at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
             yield Missing(PROTOCOL, each.start.set, f"not settled from {each.start.name} at {at}: {each.failure}")
-
-
-def _stopping_rate(each: Settled) -> float:
-    """At what rate the fluid would stop a free ball, s-1: c, but in proportion to the lag under the quadratic law."""
-    p, (_, v_y, omega_c, *_) = each.start.p, each.mean.tolist()
-    if p.drag != QUADRATIC:
-        return p.c
-    Re = 2 * p.r / p.nu_f * math.hypot(v_y, p.R * (omega_c - p.omega_0))
-    return p.c * p.C_D / 24 * Re
-
-
-def _key(each: Settled) -> tuple[str, float, int]:
-    return each.start.set, each.start.p.omega_0, int(family(each.case))
 
 
 def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> Measurement:

@@ -1,45 +1,56 @@
-"""Claims about the bifurcations over omega_0: Table 5, Proposition 7, and the branch that divides two attractors."""
+"""Claims about the bifurcations over omega_0: Table 5, Proposition 7, and the branch that divides two attractors.
+
+Fig. 12, and (83) for eta > 1, no ball shows, since a contact would have to pull: they are checked by algebra alone.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+from scipy.optimize import brentq
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
-from compare.claim import Bearing, Claim, When, given
+from analytic.mechanics import dynamics
+from analytic.slipping import slip_bounds
+from analytic.stationary import slipping_branch
+from compare.claim import Bearing, Claim, Text, When, given
 from compare.judge import theory
+from compare.kit.check import Check
 from compare.kit.record import Measurement
 from compare.kit.settling import scale
+from compare.kit.statistics import COVERAGE
 from compare.settled import number
-from compare.subjects.thresholds import formal
-from model import Case
+from model import Case, Parameters, State
+from model.kinematics import TURNING
 
 SLIPPING = "floor force of settled slipping → 0"
 """How omega_02 is measured where slipping at both points ends without a fold: that is a claim of its own."""
 
 
-def _in_a_jump(m: Measurement) -> bool:
-    return m.conditions["by"] != SLIPPING
-
-
-def _at(quantity: str, when: When = _in_a_jump, protocol: str = "thresholds") -> Bearing:
+def _at(quantity: str, when: When = lambda m: m.conditions["by"] != SLIPPING, protocol: str = "thresholds") -> Bearing:
     """A threshold."""
-
-    def predict(m: Measurement) -> float:
-        return float(getattr(theory(analytic.thresholds, m.parameters), quantity))
-
-    return Bearing(protocol, quantity, predict, when=when, by=f"analytic.thresholds: {quantity}")
+    return Bearing(
+        protocol,
+        quantity,
+        lambda m: float(getattr(theory(analytic.thresholds, m.parameters), quantity)),
+        when=when,
+        by=f"analytic.thresholds: {quantity}",
+    )
 
 
 def _edge(name: str) -> Bearing:
     """A quantity of the unstable state."""
-
-    def predict(m: Measurement) -> float:
-        unstable = theory(analytic.solution, m.parameters, Case.SS, stable=False)
-        return number(name, unstable, m.parameters)
-
-    size, by = (lambda m: scale(name, m.parameters)), "analytic.solution: SS beyond the fold, (37)-(41)"
-    return Bearing("edge", f"edge_{name}", predict, size=size, by=by)
+    return Bearing(
+        "edge",
+        f"edge_{name}",
+        lambda m: number(name, theory(analytic.solution, m.parameters, Case.SS, stable=False), m.parameters),
+        size=lambda m: scale(name, m.parameters),
+        by="analytic.solution: SS beyond the fold, (37)-(41)",
+    )
 
 
 def _folds(m: Measurement) -> float:
@@ -48,10 +59,6 @@ def _folds(m: Measurement) -> float:
     if not p.eta < p.j:
         raise LookupError("no branch of slipping at both points for eta > j")
     return float(p.eta > theory(analytic.thresholds, p).eta_cr)
-
-
-def _has_fold(m: Measurement) -> float:
-    return float(math.isfinite(theory(analytic.thresholds, m.parameters).omega_04))
 
 
 CLAIMS = (
@@ -83,7 +90,15 @@ CLAIMS = (
         "table-5-F",
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
-        (_at("omega_04"), Bearing("thresholds", "folds", _has_fold, by="analytic.thresholds: omega_04")),
+        (
+            _at("omega_04"),
+            Bearing(
+                "thresholds",
+                "folds",
+                lambda m: math.isfinite(theory(analytic.thresholds, m.parameters).omega_04),
+                by="analytic.thresholds: omega_04",
+            ),
+        ),
     ),
     Claim(
         "sub-branches",
@@ -115,10 +130,100 @@ CLAIMS = (
             Bearing(
                 "thresholds",
                 "folds",
-                lambda m: float(bifurcation.number_of_folds(m.parameters)),
+                lambda m: bifurcation.number_of_folds(m.parameters),
                 by="analytic.bifurcation.diagram.number_of_folds",
             ),
         ),
     ),
 )
-SECTIONS = {"Bifurcations": CLAIMS, "Formal": formal.CLAIMS}
+
+FORMAL = Parameters.named("reference").replace(eta=0.43)
+"""eta so little above j that the branch of SS is whole once (12) is released."""
+ROUND_OFF = 1e-12
+"""Relative: some thousand operations, each to the last digit."""
+POINTS = 4001
+"""Along the branch, where its turning point is looked for."""
+
+
+def _figure_12() -> Iterator[Check]:
+    """The branch with A_y < 0 solves the equations and joins the thresholds as drawn."""
+    p, unit = FORMAL, math.sqrt(FORMAL.g / FORMAL.R)
+    t = analytic.thresholds(p)
+    curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
+    released = {name: float(value) * unit for name, value in curves.items()}
+    s = np.linspace(-8.0, 8.0, 65)
+    states, fluid = slipping_branch.states(s, p)
+    ends = State.of(slipping_branch.states(np.array([-40.0, 40.0]), p)[0])
+    rates = [dynamics.rates(Case.SS, x, p, w)[TURNING] for x, w in zip(states.tolist(), fluid.tolist(), strict=True)]
+    pushed = slipping_branch.branch(s, p).A_y
+
+    def determinant(omega_0: float) -> float:
+        """Of SR: its sign is that of the eigenvalue that isn't the decay of omega_c."""
+        q = p.replace(omega_0=omega_0)
+        (state,) = analytic.stationary_solutions(q, (Case.SR,))
+        return float(np.linalg.det(dynamics.jacobian(Case.SR, state.x, q)))
+
+    exchange = brentq(determinant, 0.8 * t.omega_03, 1.2 * t.omega_03, rtol=1e-14)
+    along = slipping_branch.states(np.linspace(-8.0, 8.0, POINTS), p)[1]
+    k = int(np.argmax(along))
+    # The maximum lies between the neighbours of the largest value, which is lower by no more than they are.
+    spacing = float(along[k] - min(along[k - 1], along[k + 1]))
+    yield _check("omega_01", "P3: ω_c where slip vanishes", float(ends.omega_c[0]), released["omega_01"])
+    yield _check("omega_02", "NF2: ω_c where w̃_z vanishes", float(ends.omega_c[1]), t.omega_02)
+    yield _check("omega_03", "NT1: ω₀ where SR turns stable", float(exchange), t.omega_03)
+    yield _check("omega_04", "F: ω₀ where the branch turns", float(along[k]), released["omega_04"], spacing)
+    yield _check("law", "greatest rate on the branch divided by g/r", np.abs(rates).max() * p.r / p.g, 0.0)
+    yield _check("law", "points with A_y ≥ 0", float(np.sum(pushed >= 0)), 0.0)
+
+
+def _pulling() -> Iterator[Check]:
+    """The normal forces of slip at its onset, on either bound and a grid of friction coefficients."""
+    grid = [FORMAL.replace(mu=mu, eta=eta) for mu in np.geomspace(0.05, 3.0, 13) for eta in np.geomspace(0.05, 3.0, 13)]
+    presses: dict[int, list[tuple[float, float, float]]] = {1: [], -1: []}  # by side: eta, A_y and B_x in N
+    for p, side in product(grid, presses):  # along (0, 0), side 1, or (pi, pi) where (82) or (83) has it begin
+        square, direction = slip_bounds.rr_to_ss(p, side).zero, (0.0, float(side))
+        if 0 < square < math.inf:
+            omega = math.sqrt(square)
+            forces = dynamics.forces(Case.SS, State(omega_c=omega), p, omega, direction, direction)
+            presses[side].append((p.eta, float(forces.A_y), float(forces.B_x)))
+    yield _check("law", "(83): friction at which the wall presses", sum(B_x >= 0 for _, _, B_x in presses[-1]), 0.0)
+    wrong = sum((A_y > 0) != (eta < FORMAL.j) for eta, A_y, _ in presses[1])
+    yield _check("law", "(82): friction at which the floor presses and η > j, or pulls and η < j", wrong, 0.0)
+    smooth = sum(eta <= 1 for eta, _, _ in presses[-1])
+    yield _check("law", "(83): friction with a bound and η ≤ 1", smooth, 0.0)
+
+
+def _check(quantity: str, what: str, value: float, predicted: float, uncertainty: float = 0.0) -> Check:
+    own = max(uncertainty, ROUND_OFF * (abs(predicted) or 1.0))
+    algebra = Measurement(
+        protocol="algebra",
+        quantity=quantity,
+        value=value,
+        uncertainty=own,
+        engine="theory",
+        set="reference",
+        parameters=FORMAL,
+        conditions={"by": what},
+    )
+    return Check(measurement=algebra, predicted=predicted, tolerance=COVERAGE * own, scale=abs(predicted) or 1.0)
+
+
+FORMAL_CLAIMS = (
+    Claim(
+        "fig-12",
+        "Fig. 12",
+        "With (12) released all bifurcations of Table 5 appear for η > j as well.",
+        algebra=_figure_12,
+        text=Text.FORMAL,
+        reason="The floor would have to pull: no ball and no engine does this.",
+    ),
+    Claim(
+        "eq-83-rough",
+        "(82), (83), end of section 4.3",
+        "(83) is a bound for η > 1 only, and contradicts (12) there; (82) does so unless η < j.",
+        algebra=_pulling,
+        text=Text.FORMAL,
+        reason="At (83) the wall would have to pull, and at (82) for η > j the floor.",
+    ),
+)
+SECTIONS = {"Bifurcations": CLAIMS, "Formal": FORMAL_CLAIMS}

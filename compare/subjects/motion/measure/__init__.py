@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from compare.kit.programme import ONE, TWO, Protocol
-from compare.subjects.motion.measure import field, laws, motions
+from compare.subjects.motion.measure import laws, motions
 
 PROTOCOLS = (
     Protocol("laws", laws.measure, waits=False, cost=3),
-    Protocol("field", field.measure, waits=False),
-    Protocol("motions", motions.measure, quick=ONE, waits=False),
+    Protocol("field", motions.field, waits=False),
+    Protocol("motions", motions.motions, quick=ONE, waits=False),
     Protocol("impacts", motions.impacts, quick=TWO, waits=False),
 )

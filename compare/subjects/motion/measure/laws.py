@@ -1,9 +1,8 @@
 """What holds at every instant: contacts that roll, press and rub as Table 3 and (12)-(17) say; and the fluid's drag.
 
 Balls go through the cases of Fig. 2 while the flow rises and falls; the laws are looked at in all samples of a set.
-Laws that an engine's contact solver keeps in every step, (12) and (13), are measured at their worst. Those that need a
-few steps, as when a contact begins to roll or friction turns with the slip, are measured at their typical value:
-samples right after an impact or a change of case say nothing of the law.
+(12) and (13), which a contact solver keeps in every step, are measured at their worst; the others at their typical
+value, because friction needs a few steps after an impact or a change of case.
 """
 
 from __future__ import annotations

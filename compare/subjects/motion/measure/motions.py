@@ -1,33 +1,62 @@
-"""Motions through all nine cases, and landings: which is it, or how fast, some milliseconds later?
+"""The equations of motion themselves, in all nine cases, by the engine's own contacts; and landings.
 
-Fixed starts, in natural units, are followed and cut into short pieces. A piece begins and ends away from changes of
-case, at each of which friction has to build up or die out; in between there may be any number of them. A landing, steep
-or at a slant, with slip or none, is looked at a few steps after the engine's own contact has closed, at the same moment
-with two time steps.
+For `field`, balls start at random states of every case and move freely for a few hundredths of a second. In short
+windows during which the case does not change, polynomials through the samples give the state, its rate of change and
+the contact forces at the centre of the window.
+
+For `motions`, motions from fixed starts are cut into short pieces, each of which begins and ends away from changes of
+case, at which friction builds up or dies out. For `impacts`, a landing is looked at a few steps after the contact has
+closed, at the same moment with two time steps.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from itertools import product
 
 import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
-from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
-from compare.kit.short import REFINED, constrained
+from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
+from compare.kit.settling import PRESSES
+from compare.kit.short import (
+    DOUBT,
+    HALF_WINDOW,
+    LIMIT,
+    REFINED,
+    WINDOW_DEGREES,
+    constrained,
+    lag_error,
+    polynomials,
+    random_state,
+)
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory
-from model.kinematics import VARIABLES
+from model.arrays import Array
+from model.cases import TRAITS
+from model.kinematics import VARIABLES, slip_velocities
+
+SEED = 53
+CENTRES = (16, 40, 64)
+"""Centres of the windows, in steps of the coarser run."""
+NEAR = 4
+"""Steps before and after a window in which the case doesn't change, either, so that friction has built up."""
+TURN = 0.5
+"""Largest change of a slip in a window, and of that which friction alone would make, divided by the slip: where slip is
+about to vanish, or is held at a trace, friction turns too fast."""
+COMPONENTS = ("Ax", "Ay", "Az", "Bx", "By", "Bz")
+STATE, RATES, FORCES = slice(0, 8), slice(8, 16), slice(16, 22)
+"""Parts of what is read at the centre of a window (22,): state, rates of change in SI, and `COMPONENTS` in N."""
 
 STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
     # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
     (0.86, (0.44, 0.06, 2.36, 0.68, 0.15, 0.03, 0.6, 0.25)),
     # Slides on the floor, rolls, rides the wall without slip, and comes down through SS and SR.
     (1.03, (0.0, 0.0, -1.62, -0.005, 0.47, -0.14, 0.3, -0.12)),
-    # Long stays in cases that those pass in a moment: spun up from rest, slipping at both points, spinning on wall and
-    # floor, slipping down the wall, rolling and sliding on the floor.
+    # Long stays in the other cases.
     (1.43, (0.0,) * 8),
     (1.80, (0.0, 0.0, 1.02, -0.02, 0.03, 0.12, 0.0, 0.0)),
     (1.07, (0.0, 0.0, 1.07, 0.34, 0.0, 0.0, 0.0, 0.0)),
@@ -41,18 +70,14 @@ LASTS = 6.0
 LENGTH = 40
 """Samples in a piece."""
 APART = 10
-"""Samples between the ends of a piece and any change of case: a slip dies out and a force builds up in three or so, the
-case is taken to have changed after as many more, and a change comes by a few steps earlier or later than it should."""
+"""Samples between the ends of a piece and any change of case: three until a force has built up, three until the case
+is taken to have changed, and a few by which a change comes too early or late."""
 NARROW = 1e-4
 """Least gap of an open contact divided by R at the ends of a piece: an unloaded contact may hover."""
 LATE = 2.0
-"""Steps, of which two landings may come one late each. What weight does to a slip in that time is the least slip at the
-ends of a piece: where two contacts roll one may creep so fast, since how they share a load is not determined.
-"""
+"""Steps by which two landings may be late; the least slip at the ends of a piece is what weight makes in that time."""
 LEFT = 0.01
-"""Least share of the friction limit that a rolling contact leaves at the ends of a piece: with less left it creeps by
-what the limit changes, as fast as a slip that has just begun or is about to end.
-"""
+"""Least share of the friction limit that a rolling contact leaves at the ends of a piece: with less left it creeps."""
 
 LANDINGS: dict[str, tuple[float, ...]] = {
     "floor, with slip": (0.05, -0.5, 0.5, 0.6, 0.2, -0.9, 0.4, 0.0),
@@ -71,7 +96,107 @@ NAMES = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 """Variables that a landing changes."""
 
 
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Rates of change and contact forces, each with the state they belong to."""
+    starts = []
+    for name, p in sets.items():
+        rng = np.random.default_rng([SEED, *name.encode()])
+        for case, _ in product(Case, range(lab.effort("field.starts"))):
+            x = random_state(case, p, rng)
+            # Two contacts that both roll hold the ball against no more than a slight lag.
+            rolls = case is Case.RR
+            omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
+            starts.append(Start(name, p.replace(omega_0=omega_0), case.name, x))
+    steps = CENTRES[-1] + HALF_WINDOW + NEAR
+    tasks = [lab.pair(start.p, start.x0, steps, coarse_step(start.p) / REFINED) for start in starts]
+    runs = list(lab.groups(tasks))
+    kept = Counter[tuple[str, Case]]()
+    for centre in CENTRES:
+        for start, pair, (coarse, fine) in zip(starts, tasks, runs, strict=True):
+            case = Case(int(coarse.case[centre]))
+            if kept[start.set, case] == lab.effort("field.kept"):
+                continue
+            window = _window(case, coarse, fine, centre)
+            if window is None:
+                continue
+            values = _values(case, window, start.p)
+            kept[start.set, case] += bool(values)
+            for what, value in values.items():
+                at = state_of(window[0, STATE])
+                yield measurement(lab, "field", start.set, start.p, what, value, pair, case=case.name, **at)
+    for name, case in product(sets, Case):
+        if not kept[name, case]:
+            why = f"no random start moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
+            yield Missing("field", name, why)
+
+
+def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
+    """What is read at the centre of a window (3, 22): extrapolated to a vanishing step, by the finer run, and by that
+    with the lower degree. None if another case is in or near the window, or a slip turns or hardly presses.
+    """
+    read = []
+    for run, times in ((coarse, 1), (fine, 2)):
+        near, half, middle = ((HALF_WINDOW + NEAR) * times, HALF_WINDOW * times, centre * times)
+        window = slice(middle - half, middle + half + 1)
+        if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(case, run, window):
+            return None
+        time, at = run.time[window], float(run.time[middle])
+        # The forces of a sample act from then on for a step: they belong to the middle of it.
+        acting = time + (time[1] - time[0]) / 2
+        forces = polynomials(acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at)[0]
+        read.append(np.concatenate([*polynomials(time, run.x[window], WINDOW_DEGREES, at), forces], axis=1))
+    (one, _), (two, lower) = read
+    best = two + (two - one) * LIMIT
+    best[STATE] = constrained(case, best[STATE], fine.header.parameters)
+    return np.stack([best, two, lower])
+
+
+def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
+    """Whether a contact that slips hardly presses, or its velocity changes by more than `TURN` of it, or would by
+    friction alone.
+    """
+    p, time = run.header.parameters, float(np.ptp(run.time[window]))
+    loads = (p.mu, run.force_A[window, 1]), (p.eta, run.force_B[window, 0])
+    for v, contact, (friction, load) in zip(slip_velocities(run.x[window], p), (case.A, case.B), loads, strict=True):
+        change = max(float(np.linalg.norm(v[-1] - v[0])), friction * load.max() * (1 + p.j) / (p.j * p.m) * time)
+        hovers = load.min() < PRESSES * p.m * p.g
+        if contact is Contact.S and (hovers or change > TURN * np.linalg.norm(v, axis=1).min()):
+            return True
+    return False
+
+
+def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
+    """Quantities with uncertainties, from what the extrapolation and the degree of the polynomials change.
+
+    The largest relative change of the rates, or of the forces, stands for all of them: that of one may vanish by
+    chance. Empty where it is more than a check may have.
+    """
+    moving = [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
+    speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
+    scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
+    forces = [_forces(case, row) for row in window[:, FORCES]]
+    rate_change, force_change = (
+        max((abs(a - b) * DOUBT / LIMIT + abs(b - c) for a, b, c in np.transpose(rows).tolist()), default=0.0)
+        for rows in ((window[:, RATES] / scales)[:, moving], [[w / weight for w in each.values()] for each in forces])
+    )
+    rate_change, force_change = max(rate_change, lag_error(p) * (1 + p.j) / p.j), max(force_change, lag_error(p))
+    # Where the ball slips fast and hardly presses, contact comes and goes.
+    if not sure_enough("rate_v_y", Measured(0.0, max(rate_change, force_change)), 1.0):
+        return {}
+    rates = {f"rate_{VARIABLES[k]}": Measured(window[0, RATES][k], rate_change * scales[k]) for k in moving}
+    return rates | {f"moving_force_{name}": Measured(w, force_change * weight) for name, w in forces[0].items()}
+
+
+def _forces(case: Case, forces: Array) -> dict[str, float]:
+    """Of forces (6,) those that the motion determines, of the contacts that are closed."""
+    named = dict(zip(COMPONENTS, forces.tolist(), strict=True))
+    if case is Case.RR:  # the contacts share the load in ways that Newton's laws don't tell apart
+        A_x, A_y, A_z, B_x, B_y, B_z = named.values()
+        return {"Ax-By": A_x - B_y, "Ay+By": A_y + B_y, "Bx+By": B_x + B_y, "Az": A_z, "Bz": B_z}
+    return {name: force for name, force in named.items() if getattr(case, name[0]) is not Contact.N}
+
+
+def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The case at the end of every piece, with the state at its beginning."""
     starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
     tasks = []
@@ -101,8 +226,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 def pieces(run: Trajectory, count: int) -> list[int]:
     """Where pieces begin, about evenly spread: their ends are away from changes of case.
 
-    There contacts are plainly what they are called: an open one is open, a slipping one slips by more than a trace, and
-    a rolling one needs less friction than it may.
+    There an open contact is open, a slipping one slips by more than a trace, and a rolling one needs less friction than
+    it may.
     """
     p, A, B = run.header.parameters, run.force_A.T, run.force_B.T
     plain = np.full(len(run.time), True)

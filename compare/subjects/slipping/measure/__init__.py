@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from compare.kit.programme import Protocol
-from compare.subjects.slipping.measure import bounds, growth, lift
+from compare.subjects.slipping.measure import growth, onset
 
 PROTOCOLS = (
     Protocol("growth", growth.measure, waits=False),
     Protocol("steepest", growth.steepest, waits=False),
-    Protocol("lift", lift.measure, waits=False),
-    Protocol("bounds", bounds.measure, ("thresholds",), cost=2),
+    Protocol("lift", onset.lift, waits=False),
+    Protocol("bounds", onset.bounds, ("thresholds",), cost=2),
 )

@@ -1,11 +1,11 @@
 """Growth of slip: a rolling ball is given a slip along one direction; in the first milliseconds it grows or dies out.
 
-gamma, the initial rate of change of the slip along its direction, is extrapolated to a vanishing size of the slip from
-runs of several sizes. A record counts only if, by the engine's own contacts, all of it is in the case in which the ball
-was to slip. States are at random in natural units, and away from stationary ones.
+gamma, the initial rate of change of the slip along its direction, is extrapolated from several sizes of the slip to
+none. A record counts only if all of it is, by the engine's own contacts, in the case in which the ball was to slip.
+States are at random in natural units, and away from stationary ones.
 
-Out of rolling on the wall alone, growths along directions all round make a curve; where its first harmonic is greatest,
-slip grows the most. The other harmonics are measured, too: what they may turn the direction by is its uncertainty.
+Out of rolling on the wall alone, slip grows the most where the first harmonic of gamma over all directions is greatest.
+By what the other harmonics may turn that direction, it is uncertain.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 
 from compare.kit.fits import slope_error
 from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
-from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
+from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
 from compare.kit.short import (
     DOUBT,
     HALF_WINDOW,
@@ -54,8 +54,7 @@ STEPS, SKIPPED = 20, 6
 """Steps of a record, and those at its start in which contact forces build up."""
 LARGE, SMALL, BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
 """Slips at the start in units of `start_unit`: so large that they neither end nor turn much in a record; small where
-one contact has to hold, or the ball goes round slowly and the wall carries little; and three where the direction of a
-contact that slips already depends on the size."""
+one contact has to hold; and three beside a slip that is there already, where the direction depends on the size."""
 DEGREES = (4, 3)
 """Degrees of the polynomials; the lower one shows what the degree changes."""
 AT_START = slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]) / slope_error(
@@ -71,23 +70,22 @@ DIRECTIONS = 8
 DRAGGED = (0.5, 3.0)
 """Least and largest pull of the fluid along the orbit divided by the weight, either way: it turns the direction."""
 AHEAD = 3.0
-"""Largest angle of the greatest growth from the vertical, rad, that is recorded: one beyond may come out on either side
-of pi."""
+"""Largest angle of the greatest growth from the vertical, rad: one near pi may come out on either side of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Push:
     """A start that rolls, and the slip that it is given.
 
-    The start's name: ``sideways`` for the direction `SIDEWAYS`, ``dragged`` where the fluid pulls hard, ``rest`` out of
-    rest in a fluid at rest, empty for a direction at random, and those of `compare.subjects.slipping.measure.bounds`.
+    The start's name: ``sideways`` for the direction `SIDEWAYS`, ``dragged`` where the fluid pulls hard, ``rest`` in a
+    fluid at rest, empty for a direction at random, ``held`` and ``stationary`` for `bounds`.
     """
 
     start: Start
     inner: Case
     outer: Case
     n: Array
-    """Direction, a unit vector (3,) over slip_x, slip_y, slip_z."""
+    """Direction, a unit vector (3,) of slip_x, slip_y, slip_z."""
 
     @property
     def sizes(self) -> tuple[float, ...]:
@@ -115,9 +113,7 @@ class Push:
             return np.full(2, np.nan)
         return polynomials(run.time[record], run.x[record, SLIP_XYZ] @ self.n, DEGREES)[1]
 
-    def row(
-        self, lab: Lab, protocol: str, quantity: str, value: Measured, tasks: Sequence[Task], **more: Condition
-    ) -> Measurement:
+    def row(self, lab: Lab, protocol: str, quantity: str, value: Measured, tasks: Sequence[Task]) -> Measurement:
         """What was measured of it, with its state and direction."""
         start, n = self.start, dict(zip(("n_x", "n_y", "n_z"), self.n.tolist(), strict=True))
         along = {"inner": self.inner.name, "outer": self.outer.name, "by": start.name} | state_of(start.x0) | n
@@ -149,8 +145,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             if sure_enough("filippov_share", share, 1.0):
                 yield push.row(lab, "growth", "filippov_share", share, own)
     for (name, inner, outer), count in left.items():
-        slips = f"{count} slips from {inner.name} to {outer.name}"
-        yield Missing("growth", name, f"{slips} did not stay in {outer.name}, or turned too fast")
+        why = f"{count} slips from {inner.name} to {outer.name} did not stay in {outer.name}, or turned too fast"
+        yield Missing("growth", name, why)
 
 
 def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
@@ -196,13 +192,13 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
     for (inner, outer), count in PUSHES.items():
         for _ in range(count * more):
             x = State.of(random_state(inner, p, rng))
-            # The orbit is one at which both contacts press, in whatever way they rub.
+            # The orbit is one at which both contacts press, whichever way friction acts.
             if outer is Case.SR:  # the spin axis turns with the orbit, and the wall alone turns it
                 x = x._replace(omega_c=math.sqrt(rng.uniform(0.4, 0.8) * p.g / (p.j * p.R)))
             if outer is Case.SS:
                 least, most = p.mu, min(1 / p.eta, 3.0)
                 x = x._replace(omega_c=math.sqrt((least + rng.uniform(0.3, 0.7) * (most - least)) * p.g / p.R))
-            # A slip that is there already is so fast that a slower one beside it hardly turns it.
+            # A slip that is there already is so fast that the new one hardly turns it.
             if inner is Case.RS:
                 fast = rng.choice([-1, 1]) * rng.uniform(3.0, 5.0)
                 x = x._replace(slip_y=fast * start_unit(p, x.stacked()))
@@ -226,7 +222,15 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     rough = {name: p for name, p in sets.items() if p.eta and p.c}
     why = "without friction at the wall, or drag, no direction stands out"
     yield from (Missing("steepest", name, why) for name in sets if name not in rough)
-    fans = [fan for name, p in rough.items() for fan in _fans(name, p, lab.effort("steepest.states"))]
+    fans = []  # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
+    for name, p in rough.items():
+        rng = np.random.default_rng([FAN_SEED, *name.encode()])
+        for _ in range(lab.effort("steepest.states")):
+            x = random_state(Case.NR, p, rng)
+            pull = rng.choice([-1, 1]) * rng.uniform(*DRAGGED)
+            start = Start(name, p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R), "", x)
+            angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+            fans.append([Push(start, Case.NR, Case.NS, np.array([0.0, np.sin(b), np.cos(b)])) for b in angles])
     runs = lab.groups([push.tasks(lab) for fan in fans for push in fan])
     why = "slip along some direction did not last, or no direction stands out"
     for fan in fans:
@@ -244,14 +248,3 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
         start, tasks = fan[0].start, [task for push in fan for task in push.tasks(lab)]
         row = measurement(lab, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
         yield if_sure(row, 1.0, why)
-
-
-def _fans(name: str, p: Parameters, count: int) -> Iterator[list[Push]]:
-    """Random states, each pushed at angles all round from slip_z to slip_y of the wall's contact (8)."""
-    rng = np.random.default_rng([FAN_SEED, *name.encode()])
-    for _ in range(count):
-        x = random_state(Case.NR, p, rng)
-        pull = rng.choice([-1, 1]) * rng.uniform(*DRAGGED)
-        start = Start(name, p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R), "", x)
-        angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
-        yield [Push(start, Case.NR, Case.NS, np.array([0.0, np.sin(b), np.cos(b)])) for b in angles]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from compare.kit.programme import Protocol
-from compare.subjects.thresholds.measure import edge, plane, thresholds
+from compare.subjects.thresholds.measure import basins, thresholds
 
 PROTOCOLS = (
-    Protocol("plane", plane.measure, alone="the planes of Figs. 7 and 8 are those of reference only", cost=3),
+    Protocol("plane", basins.planes, alone="the planes of Figs. 7 and 8 are those of reference only", cost=3),
     Protocol("thresholds", thresholds.measure, ("settled",), cost=20),
-    Protocol("edge", edge.measure, ("thresholds",), quick=("reference", "rough-floor"), cost=8),
+    Protocol("edge", basins.borders, ("thresholds",), quick=("reference", "rough-floor"), cost=8),
     Protocol("birth", thresholds.birth, ("thresholds",), cost=3),
 )

@@ -4,13 +4,11 @@
   the least at which the wall holds a ball that rides it; the flow up to which a lifted ball, pressed lightly on the
   floor, goes back to rolling on both; the largest flow at which a slipping ball settles.
 * Extrapolated from settled states on one side: the flow at which their lag behind the fluid, their sinking or the force
-  of the floor would vanish, or at which omega_0 along the branch has its maximum. It is a smooth function of the lag,
-  whatever the law of drag; of the slip it needn't be.
+  of the floor would vanish, or at which omega_0 along the branch has its maximum.
 
-And the drag below which slipping at both points ends in a fold, and above which it passes to the wall without a jump.
-Where the branch of settled slipping comes to its end, the floor carries nothing. How omega_0 goes with the force of the
-floor there, rising or falling, decides whether the branch turns back: the drag is looked for at which it does neither.
-All states are settled in stronger drag than that, where the branch has no fold and they last up to its end.
+And the critical drag: below it slipping at both points ends in a fold, above it passes to the wall without a jump. At
+the end of the branch the floor carries nothing; the sign of the slope of omega_0 over the floor's force there decides
+whether the branch turns back. States are settled in stronger drag than that, where they last up to the end.
 """
 
 from __future__ import annotations
@@ -18,13 +16,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from compare.kit.brackets import Answer, Bracket, Care, Search, narrow
 from compare.kit.fits import POINTS, initial_slope, straight_line, turning, vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
-from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, sure_enough
+from compare.kit.record import Measurement, Missing, Records, if_sure, measurement
 from compare.kit.settling import (
     PRESSES,
     Settled,
@@ -52,12 +51,11 @@ TURNS: Array = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
 RIDES: Array = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
 """The same of the states that are continued to where a ball rides the wall as slowly as it can."""
 SLIPPING_SPEED = 3e-8
-"""Slip speed, divided by sqrt(g R), that counts as slip: far above what contacts are solved to, 1e-12, and reached
-within the time of a run by a ball whose friction falls short by a millionth."""
+"""Slip speed, divided by sqrt(g R), that counts as slip: contacts are solved to 1e-12, and a ball whose friction falls
+short by a millionth reaches it within a run."""
 FIRST_DRAGS, NEARER_DRAGS = (2.0, 4.0), (1.6, 2.6)
-"""Drags at which the birth of a fold is looked for: two values of c sqrt(R/g), at which the fluid takes a ball along
-within a fraction of the time of its fall; then multiples of the drag extrapolated from those two, near to it but so far
-off that states still settle soon."""
+"""Drags at which the birth of a fold is looked for: two values of c sqrt(R/g), then multiples of the drag extrapolated
+from those two, so far off that states still settle soon."""
 BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
 """Distances of the states from omega_02 there, in parts of the range of slipping."""
 
@@ -211,8 +209,7 @@ def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
 def stays_rolling(run: Trajectory) -> bool | None:
     """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip still dies out.
 
-    It does where slip has fallen below 0.6 of what it was in the second half; a hundredth of what counts as slip is
-    none.
+    Slip dies out that has fallen below 0.6 of what it was in the second half; a hundredth of what counts is none.
     """
     if not presses(run):
         return False
@@ -261,28 +258,24 @@ def _rows(
 ) -> Iterator[Measurement | Missing]:
     """What was measured on one set: the end of rolling, the begin of riding, and the end of slipping on both."""
     tasks = {kind: [state.task for state in settled] for kind, settled in states.items()}
+    missing = partial(Missing, PROTOCOL, name)
 
-    def missing(reason: str) -> Missing:
-        return Missing(PROTOCOL, name, reason)
-
-    def record(quantity: str, value: Measured | float, tasks: Sequence[Task], **at: Condition) -> Measurement:
-        q = p.replace(omega_0=value.value) if isinstance(value, Measured) else p
-        return measurement(lab, PROTOCOL, name, q, quantity, value, tasks, **at)
+    def row(quantity: str, at: Measured | None, tasks: Sequence[Task], side: str, by: str) -> Measurement | Missing:
+        if at is None:
+            return missing(f"too few states settled for {quantity} by {by}, or they point nowhere")
+        row = measurement(lab, PROTOCOL, name, p.replace(omega_0=at.value), quantity, at, tasks, side=side, by=by)
+        return if_sure(row, at.value, f"{quantity} by {by} is uncertain by {at.uncertainty:.1g} rad/s")
 
     def bisected(quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
         # Slip that is still too small to count may have begun below: it is proportional to the distance.
         speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in (run.slip_speed_A, run.slip_speed_B))
         unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
-        row = record(quantity, place, of.tasks, side=side, by=by)
-        return if_sure(row, place.value, f"{quantity} by {by} is uncertain by {place.uncertainty:.1g} rad/s")
+        return row(quantity, place, of.tasks, side, by)
 
-    def vanishes(what: str, kind: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
-        place = extrapolated(states.get(kind, []), what, vanishing)
-        if place and sure_enough(quantity, place, place.value):
-            yield record(quantity, place, tasks[kind], side=side, by=f"{by} → 0")
-        elif kind in states:
-            yield missing(f"too few states settled for {quantity} by {by}, or they point to it too vaguely")
+    def vanishes(kind: str, what: str, quantity: str, side: str, by: str) -> Iterator[Measurement | Missing]:
+        if kind in states:
+            yield row(quantity, extrapolated(states[kind], what, vanishing), tasks[kind], side, f"{by} → 0")
 
     rolling, leaning, riding, fold = (brackets.get(kind) for kind in ("rolling", "leaning", "riding", "fold"))
     none = "no flow that was tried, up to twice the fastest of the settled states,"
@@ -298,35 +291,33 @@ def _rows(
     else:
         yield missing("two-point rolling ends by slipping before the ball is lifted: there is no omega_03")
         yield bisected("omega_01", rolling, "from below", "onset of slip")
-        yield from vanishes("lag", "slipping", "omega_01", "from above", "lag of settled slipping")
+        yield from vanishes("slipping", "lag", "omega_01", "from above", "lag of settled slipping")
     if riding:
         yield bisected("omega_02", riding, "from above", "onset of sliding on the wall")
     else:
         yield missing(f"{none} is the least to hold a ball on the wall")
-    yield from vanishes("v_y", "sinking", "omega_02", "from below", "speed of settled sinking")
+    yield from vanishes("sinking", "v_y", "omega_02", "from below", "speed of settled sinking")
     if not states.get("turning"):
         yield missing("a ball that slips at both points settles at no flow: there is no omega_04")
     elif top is None:
         yield missing("slipping at both points passes to the wall without a jump: there is no omega_04")
-        yield from vanishes("force_Ay", "turning", "omega_02", "from below", "floor force of settled slipping")
-        yield record("folds", 0.0, tasks["turning"])
+        yield from vanishes("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
+        yield measurement(lab, PROTOCOL, name, p, "folds", 0.0, tasks["turning"])
     else:
-        by = "maximum of omega_0 along the branch"
-        row = record("omega_04", top, tasks["turning"], side="from below", by=by)
-        yield if_sure(row, top.value, f"the {by} is uncertain by {top.uncertainty:.1g} rad/s")
+        yield row("omega_04", top, tasks["turning"], "from below", "maximum of omega_0 along the branch")
         if fold:
             yield bisected("omega_04", fold, "from below", "last settled slipping")
         else:
             yield missing("the end of slipping at both points could be extrapolated, but not be bracketed")
         last = fold.low if fold else states["turning"][0].start.p.omega_0
         if riding and last > riding.high:
-            yield record("folds", 1.0, tasks["turning"])
+            yield measurement(lab, PROTOCOL, name, p, "folds", 1.0, tasks["turning"])
 
 
 def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The drag at which omega_0 as a function of the floor's force has no slope where that vanishes.
 
-    By slopes over 1/c, to which what a force makes a ball lag by is proportional: the zero of the line through them.
+    The zero of the straight line through the slopes as a function of 1/c, to which the lag by a force is proportional.
     """
     ranges = {}
     for name in sets:

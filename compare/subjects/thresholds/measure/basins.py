@@ -1,26 +1,32 @@
-"""The unstable state between two attractors, by following the edge of their basins.
+"""Which motions there are: cases reached over the planes of Figs. 7 and 8, and the border between two basins.
+
+In a plane of eta and omega_0 points are spread evenly first; more are put where neighbours differ, each kind of border
+in turn, and among rare ones.
 
 Where at one flow a ball slips on the floor (SS) or goes round with the fluid (SR, which is NR at y = 0), the straight
-line between the two measured states crosses the border between the two basins. Two runs close to it on either side stay
-together for a while near the unstable state, which a ball on the border would reach. The mean of their states while
-they are together begins the next line, across the same border.
+line between the two states crosses the border between their basins. Two runs close to it on either side stay together
+for a while near the unstable state. The mean of their states while they are together begins the next line.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice, zip_longest
 
 import numpy as np
+from scipy.spatial import Delaunay
+from scipy.stats import qmc
 
 from compare.kit.brackets import Bracket, Care, Search, narrow
 from compare.kit.fits import vanishing
-from compare.kit.lab import Lab, coarse_step
+from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, sure_enough
-from compare.kit.settling import begin, family, lasting, rotation_scale, settle_groups, taper
+from compare.kit.settling import LOOSE, begin, family, lasting, rotation_scale, settle_groups, taper
 from compare.kit.statistics import Measured, tail
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
@@ -28,7 +34,13 @@ from model.arrays import Array
 from model.drag import QUADRATIC
 from model.kinematics import SLIP_XYZ
 
-PROTOCOL = "edge"
+DRAG = 1.25
+"""Drag c, s-1: states settle within seconds, and slipping still lasts beyond the flow at which the wall can carry."""
+FIGURES = ("fig-7", "fig-8")
+"""mu as it is, and mu = eta."""
+ETA, OMEGA = (0.02, 0.8), (0.45, 3.6)
+"""Ranges of eta and of omega_0 sqrt(R/g)."""
+
 CLOSING = (0.1, 0.17, 0.26, 0.38)
 """Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
 FIRST, NEXT = 3e-4, 2.5e-6
@@ -38,6 +50,62 @@ HALF_LENGTH = 5e-3
 TOGETHER = 2e-3
 """The distance up to which two runs count as being together, in those parts."""
 SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
+
+
+def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is left out."""
+    plane = sets["reference"].replace(c=DRAG)
+    points = {figure: spread(lab.effort("plane.spread"), 7 + k) for k, figure in enumerate(FIGURES)}
+    seen: dict[str, list[tuple[Array, int]]] = {figure: [] for figure in FIGURES}
+    tried: dict[str, set[tuple[float, ...]]] = {figure: set() for figure in FIGURES}
+    for count in (*lab.effort("plane.added"), 0):
+        chosen = [(figure, u) for figure in FIGURES for u in points[figure]]
+        starts = []
+        for figure, u in chosen:
+            eta, flow = (low + float(part) * (high - low) for part, (low, high) in zip(u, (ETA, OMEGA), strict=True))
+            p = plane.replace(eta=eta, omega_0=flow / time_unit(plane))
+            p = p.replace(mu=eta) if figure == "fig-8" else p
+            starts.append([begin(figure, p, how) for how in ("rest", "half as fast", "with the fluid", "on the wall")])
+        for (figure, u), states in zip(chosen, settle_groups(lab, starts, span=20.0, loose=LOOSE), strict=True):
+            if not any(each.failure for each in states):
+                mask = sum(1 << case for case in {family(each.case) for each in states})
+                seen[figure].append((u, mask))
+                p, tasks = states[0].start.p, [each.task for each in states]
+                yield measurement(lab, "plane", "reference", p, "cases", mask, tasks, figure=figure)
+        for figure in FIGURES:
+            tried[figure] |= {tuple(u.tolist()) for u in points[figure]}
+            fresh = (u for u in added(seen[figure]) if tuple(u.tolist()) not in tried[figure])
+            points[figure] = list(islice(fresh, count))
+    for figure in FIGURES:
+        if out := len(tried[figure]) - len(seen[figure]):
+            total = len(tried[figure])
+            reason = f"{figure}: {out} of {total} points are left out, too close to a change of case to settle"
+            yield Missing("plane", "reference", reason)
+
+
+def spread(count: int, seed: int) -> list[Array]:
+    """Points (2,) of the unit square, evenly spread."""
+    return list(qmc.Halton(2, seed=seed).random(count))
+
+
+def added(seen: Sequence[tuple[Array, int]]) -> list[Array]:
+    """Midpoints between neighbours that differ, each kind of border in turn, the longest first; and among rare ones.
+
+    A set of cases is rare if it was seen less than half as often as if all were seen equally often.
+    """
+    if len(seen) < 4:
+        return []
+    places, masks = np.array([u for u, _ in seen]), [m for _, m in seen]
+    often = Counter(masks)
+    rare = {m for m, number in often.items() if number < 0.5 * len(masks) / len(often)}
+    borders: dict[tuple[int, ...], list[tuple[float, int, int]]] = {}
+    for a, b in {tuple(sorted((int(t[i]), int(t[i - 1])))) for t in Delaunay(places).simplices for i in range(3)}:
+        if masks[a] != masks[b] or masks[a] in rare:
+            length = float(np.hypot(*(places[a] - places[b])))
+            borders.setdefault(tuple(sorted((masks[a], masks[b]))), []).append((-length, a, b))
+    rows = zip_longest(*(sorted(edges) for _, edges in sorted(borders.items())))
+    turns = [edge for row in rows for edge in row if edge]
+    return [(places[a] + places[b]) / 2 for _, a, b in turns]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,20 +133,19 @@ class Edge:
         return np.asarray(self.centre + self.bracket.place.value * self.line)
 
 
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Between the measured omega_02 and omega_04, cross the border again and again.
+def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Between the measured omega_02 and omega_04, cross the border again and again; not under the quadratic law.
 
-    Not under the quadratic law: near SR the ball lags so little that this hardly damps its swing along the border. At
-    the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
+    At the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
     """
-    yield from (Missing(PROTOCOL, name, SWINGS_ON) for name, p in sets.items() if p.drag == QUADRATIC)
+    yield from (Missing("edge", name, SWINGS_ON) for name, p in sets.items() if p.drag == QUADRATIC)
     limits: dict[str, tuple[float, float]] = {}
     for name in (name for name, p in sets.items() if p.drag != QUADRATIC):
         holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
         if holds and folds:
             limits[name] = holds.value, folds.value
         else:
-            yield Missing(PROTOCOL, name, "at no flow are a slipping ball and a lifted one both settled")
+            yield Missing("edge", name, "at no flow are a slipping ball and a lifted one both settled")
     soonest = max(limits, key=lambda name: sets[name].c, default="") if lab.level is Level.QUICK else ""
     flows = [
         (name, sets[name].replace(omega_0=low + part * (high - low)))
@@ -90,37 +157,40 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for (name, q), (slipping, lifted) in zip(flows, settle_groups(lab, starts, loose=10.0), strict=True):
         if slipping.failure or lifted.failure or (slipping.case, family(lifted.case)) != (Case.SS, Case.NR):
             fates = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
-            yield Missing(PROTOCOL, name, f"no two attractors settled at omega_0 = {q.omega_0:.4g} rad/s: {fates}")
+            yield Missing("edge", name, f"no two attractors settled at omega_0 = {q.omega_0:.4g} rad/s: {fates}")
         else:
             a, b = _grounded(slipping.mean), _grounded(lifted.mean)
             edges.append(Edge(name, q, a, b, a, b - a))
-    followed = _followed(lab, edges)
-    for edge in followed:
+    for _ in range(lab.effort("edge.lines")):  # cross each border on one line after the other
+        lines = [_onward(edge) for edge in edges]
+        for k, bracket in enumerate(narrow(lab, [_search(lab, line) for line in lines], careful=False)):
+            edge = edges[k]
+            if None in bracket.runs:
+                edges[k] = replace(edge, moves=(), missed=edge.missed + 1)
+            else:
+                crossed = replace(lines[k], bracket=bracket, missed=0)
+                moves = (*edge.moves, np.abs(crossed.crossing - edge.crossing)) if edge.bracket else ()
+                edges[k] = replace(crossed, moves=moves)
+    edges = [edge for edge in edges if edge.moves]  # crossed by the last line, and by one before
+    for edge in edges:
         yield from _rows(lab, edge)
-    for name, (low, high) in limits.items():
+    for name, (low, high) in limits.items():  # the edge meets the lifted ball where they don't differ in omega_c
         last = low + (max(CLOSING) + 1e-6) * (high - low)
-        yield from _closing(lab, name, [edge for edge in followed if edge.set == name and edge.p.omega_0 < last])
+        near = [edge for edge in edges if edge.set == name and edge.p.omega_0 < last]
+        if len(near) < len(CLOSING):
+            continue
+        noise = max(float(_uncertainty(edge)[2]) for edge in near)
+        apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
+        place = vanishing(np.array([edge.p.omega_0 for edge in near]), apart)
+        if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
+            tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
+            q, at = near[0].p.replace(omega_0=place.value), {"by": "unstable slipping meets the lifted ball"}
+            yield measurement(lab, "edge", name, q, "omega_02", place, tasks, side="from above", **at)
 
 
 def _grounded(x: Array) -> Array:
     """The state on the floor: a lifted ball knows nothing of its height."""
     return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
-
-
-def _followed(lab: Lab, edges: Sequence[Edge]) -> list[Edge]:
-    """Cross each border on one line after the other; those that are crossed by the last, and by one before."""
-    current = list(edges)
-    for _ in range(lab.effort("edge.lines")):
-        lines = [_onward(edge) for edge in current]
-        for k, bracket in enumerate(narrow(lab, [_search(lab, line) for line in lines], careful=False)):
-            edge = current[k]
-            if None in bracket.runs:
-                current[k] = replace(edge, moves=(), missed=edge.missed + 1)
-            else:
-                crossed = replace(lines[k], bracket=bracket, missed=0)
-                moves = (*edge.moves, np.abs(crossed.crossing - edge.crossing)) if edge.bracket else ()
-                current[k] = replace(crossed, moves=moves)
-    return [edge for edge in current if edge.moves]
 
 
 def _search(lab: Lab, edge: Edge) -> Search:
@@ -186,19 +256,6 @@ def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
     for name, value in values.items():
         unit = 1.0 if name == "omega_c" else roll
         of = Measured(value, slips / roll if name == "omega_c" else slips)
-        row = measurement(lab, PROTOCOL, edge.set, p, f"edge_{name}", of, edge.bracket.tasks, case="SS")
+        row = measurement(lab, "edge", edge.set, p, f"edge_{name}", of, edge.bracket.tasks, case="SS")
         why = f"{name} on the edge at omega_0 = {p.omega_0:.4g} rad/s is uncertain by {of.uncertainty:.1g} rad/s"
         yield if_sure(row, rotation_scale(p) * unit, why)
-
-
-def _closing(lab: Lab, name: str, edges: Sequence[Edge]) -> Iterator[Measurement]:
-    """Where the edge would meet the lifted ball: the distance in omega_c, extrapolated to zero."""
-    if len(edges) < len(CLOSING):
-        return
-    noise = max(float(_uncertainty(edge)[2]) for edge in edges)
-    apart = [Measured(float(State.of(edge.crossing).omega_c - State.of(edge.lifted).omega_c), noise) for edge in edges]
-    place = vanishing(np.array([edge.p.omega_0 for edge in edges]), apart)
-    if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
-        tasks = [task for edge in edges if edge.bracket for task in edge.bracket.tasks]
-        q, at = edges[0].p.replace(omega_0=place.value), {"by": "unstable slipping meets the lifted ball"}
-        yield measurement(lab, PROTOCOL, name, q, "omega_02", place, tasks, side="from above", **at)

@@ -1,0 +1,276 @@
+"""Where slip begins to grow, and where a ball leaves the floor (the dotted arrows of Fig. 6).
+
+`bounds` are gamma along straight lines of states, its zero and its slope. A ball goes round at a held omega_c in faster
+and faster flows; or with the flow, rolling at both points or hanging on the wall alone. Two flows show about where
+gamma passes through zero, and two more are taken around it. gamma is a line in omega_0, or in its square where the
+orbit goes with it; another law of drag than Stokes' makes it a cubic.
+
+For `lift`, states of a case differ only in omega_c, from slow, where the floor presses, to fast. A few show roughly
+where it stops pressing; at slower ones its force is measured and extrapolated to zero as a function of omega_c^2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compare.kit.fits import straight_line, vanishing, zero_and_slope
+from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.quantities import quantity
+from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
+from compare.kit.settling import begin, settle_groups
+from compare.kit.short import DOUBT, LIMIT, REFINED, lag_error, polynomials, slip_unit
+from compare.kit.statistics import COVERAGE, Measured
+from compare.kit.tasks import Task
+from compare.kit.trials import Start
+from compare.subjects.slipping.measure.growth import SMOOTH, Push, without_size
+from model import Case, Parameters, State, Trajectory
+from model.arrays import Array
+from model.drag import STOKES
+
+AROUND, AROUND_BENT = (0.7, 1.3), (0.8, 1.1)
+"""The second two flows, divided by the zero that the first two show; and where the law of drag bends the line."""
+MEDIUM = (1.0, 0.5)
+"""Sizes of slip of a ball that hangs on a smooth wall, and so goes round fast, in units as those of `Push.sizes`."""
+BEYOND, LARGEST = 2.1, 100.0
+"""Largest zero that is recorded, divided by the largest value at which slip stayed in its case; and that is followed,
+divided by the largest of the first flows."""
+HANGING = (1.05, 1.6, 1.3)
+"""Flows at which a ball hangs on the wall, divided by the measured one at which it ceases to."""
+ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
+    (Case.RR, Case.NR): (0.0, 0.0, 0.0),
+    (Case.RS, Case.NS): (0.0, 0.8, 0.0),
+    (Case.SR, Case.NR): (-0.6, 0.0, 0.0),
+    (Case.SS, Case.NS): (0.3, 0.1, 0.8),
+}
+"""Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r omega_c."""
+ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
+"""The first orbits, omega_c sqrt(R/g)."""
+NEAR = (0.05, 0.08, 0.12, 0.17)
+"""Relative distances of the later orbits below the one at which the first ones show the ball to leave."""
+STEPS, SKIPPED, FEWEST = 16, 4, 5
+"""Steps of a run, those at its start in which contact forces build up, and the fewest that must be left."""
+DEGREES = (3, 2)
+"""Degrees of the polynomials; the lower one shows what the degree changes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """Pushes at several flows, between which gamma passes through zero."""
+
+    pushes: tuple[Push, ...]
+    """At the first two flows; and others than those around the zero, where the ball can't be at that."""
+
+    @property
+    def power(self) -> int:
+        """Power of omega_0 in which gamma is a line: 1 where the orbit is held, 2 where it goes with the flow."""
+        return 1 if self.pushes[0].start.name == "held" else 2
+
+    @property
+    def bent(self) -> bool:
+        """Whether gamma isn't a straight line over omega_0, because drag isn't in proportion to the lag."""
+        return self.power == 1 and self.pushes[0].start.p.drag != STOKES
+
+    def around(self, gammas: Array) -> tuple[Push, ...]:
+        """Pushes at two flows around the zero of the line through the first two; none if there is none ahead."""
+        if len(self.pushes) > 2:
+            return self.pushes[2:]
+        flows = np.array([push.start.p.omega_0 for push in self.pushes])
+        q = flows**self.power
+        slope = np.diff(gammas)[0] / np.diff(q)[0]
+        zero = float(q[0] - gammas[0] / slope) if slope else math.inf
+        if not 0 < zero < (LARGEST * max(flows)) ** self.power:  # or nan
+            return ()
+        least, first = flows[0] if self.power == 1 else 0.0, self.pushes[0]
+        pushes = []
+        for factor in AROUND_BENT if self.bent else AROUND:
+            omega_0 = float(least + (zero ** (1 / self.power) - least) * factor)
+            orbit = State.of(first.start.x0).omega_c if self.power == 1 else omega_0
+            p, x0 = first.start.p.replace(omega_0=omega_0), State(omega_c=orbit).stacked()
+            pushes.append(replace(first, start=replace(first.start, p=p, x0=x0)))
+        return tuple(pushes)
+
+
+def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Zero and slope of gamma along every line."""
+    yield from (Missing("bounds", name, SMOOTH) for name, p in sets.items() if not (p.mu and p.eta))
+    sets = {name: p for name, p in sets.items() if p.mu and p.eta}
+    lines = [line for name, p in sets.items() for line in _rolling(name, p)]
+    ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
+    starts = [
+        [begin(name, sets[name].replace(omega_0=end * factor), "on the wall") for factor in HANGING]
+        for name, end in ends.items()
+    ]
+    hanging = dict(zip(ends, settle_groups(lab, starts), strict=True))
+    for name, p in sets.items():
+        states = hanging.get(name, [])
+        if not states or any(state.failure or state.case is not Case.NR for state in states):
+            yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
+            continue
+        rides = [(state.start.p, np.array([p.R, 0, *state.mean[2:4], 0, 0, 0, 0])) for state in states]
+        pushes = (Push(Start(name, q, "stationary", x), Case.NR, Case.NS, np.array([0, 0, 1])) for q, x in rides)
+        lines.append(Crossing(tuple(pushes)))
+    first = list(_points(lab, [line.pushes[:2] for line in lines]))
+    around = _points(lab, [line.around(points[1]) for line, (points, _) in zip(lines, first, strict=True)])
+    for line, (points, tasks), (more, others) in zip(lines, first, around, strict=True):
+        push, square, tasks = line.pushes[0], "_square" if line.power == 2 else "", [*tasks, *others]
+        name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
+        if np.isnan(points[1]).any():
+            yield Missing("bounds", name, f"slips {slips} did not stay in {push.outer.name}")
+            continue
+        least = points[2].max()  # what the step changes may be little by chance at one of the flows
+        points = np.concatenate([points, more], axis=1)
+        flows, gamma, noise = points[:, ~np.isnan(points[1])]
+        q, noise = flows**line.power, np.maximum(noise, least)
+        if line.bent:
+            zero, slope = zero_and_slope(q, gamma, noise)
+        else:
+            # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none.
+            _, slope = straight_line(q, gamma, noise)
+            zero, _ = straight_line(q, gamma, noise * math.sqrt(len(q)))
+        growth = f"growth of slip {slips}, {push.start.name},"
+        if not sure_enough("gamma_slope", slope, abs(slope.value)):
+            yield Missing("bounds", name, f"{growth} changes too little with the flow, or is too uncertain")
+            continue
+        if abs(zero.value) <= BEYOND * np.abs(q).max():
+            row = push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks)
+            natural = (push.start.p.g / push.start.p.R) ** (line.power / 2)
+            yield if_sure(row, max(abs(zero.value), natural), f"{growth} has too uncertain a zero")
+        yield push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks)
+
+
+def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, list[Task]]]:
+    """Flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2, of every row of pushes, and the runs.
+
+    gamma is for a vanishing step and size of slip, from two sizes with the shorter step, and one with the longer one;
+    it is uncertain by what the step and the degree of the polynomials change, and nan if the case was another.
+    """
+    tasks = []
+    for push in (push for pushes in rows for push in pushes):
+        large_size, small_size = MEDIUM if push.inner is Case.NR else push.sizes
+        tasks.append([*push.pair(lab, large_size), push.pair(lab, small_size)[1]])
+    runs, todo = lab.groups(tasks), iter(tasks)
+    for pushes in rows:
+        points, own = [], [task for _ in pushes for task in next(todo)]
+        for push in pushes:
+            coarse, large, small = (push.rates(run) for run in next(runs))
+            best, change = without_size(np.array([large, small])), (large - coarse)[0]
+            p = push.start.p
+            noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p) * slip_unit(p))
+            points.append((p.omega_0, best[0] + change * LIMIT, noise))
+        yield np.reshape(points, (-1, 3)).T, own
+
+
+def _rolling(name: str, p: Parameters) -> Iterator[Crossing]:
+    """The lines out of rolling at both points, in natural units; what friction and inertia there are sets the scale."""
+    unit = time_unit(p)
+    slow = 0.5 / unit * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
+    rubbing, spinning = math.sqrt(p.mu) / unit, math.sqrt(1 / p.j) / unit
+    fast, hanging = 0.7 * spinning, min(1.0, 1 / math.sqrt(p.eta)) / unit
+    for outer, n, by, flows in (
+        (Case.RS, (0, 1, 0), "held", (slow, 3 * slow)),
+        (Case.RS, (0, 1, 0), "stationary", (0.5 * rubbing, 0.9 * rubbing)),
+        (Case.RS, (0, -1, 0), "stationary", (0.5 * rubbing, 0.9 * rubbing)),
+        (Case.SR, (-1, 0, 0), "held", (fast, 1.5 * fast)),
+        (Case.SR, (1, 0, 0), "stationary", (0.5 * spinning, 0.8 * spinning)),
+        (Case.SR, (-1, 0, 0), "stationary", (0.5 * spinning, 0.8 * spinning)),
+        (Case.SS, (0, 0, 1), "stationary", (0.4 * hanging, 0.8 * hanging)),
+        (Case.SS, (0, 0, -1), "stationary", (1.5 * rubbing, 2.2 * rubbing)),
+    ):
+        orbits = (flows[0], flows[0] if by == "held" else flows[1])
+        starts = (
+            Start(name, p.replace(omega_0=flow), by, State(omega_c=orbit).stacked())
+            for flow, orbit in zip(flows, orbits, strict=True)
+        )
+        yield Crossing(tuple(Push(start, Case.RR, outer, np.array(n)) for start in starts))
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """States of a case that differ in omega_c, and the case to which the ball leaves the floor."""
+
+    lab: Lab
+    set: str
+    p: Parameters
+    inner: Case
+    outer: Case
+
+    def start(self, omega_c: float) -> tuple[Parameters, Array]:
+        """The state at an orbit, with the fluid going round like the ball."""
+        unit = self.p.R / self.p.r * omega_c if self.inner is Case.SR else state_units(self.p)[3]
+        slips = np.array(ARROWS[self.inner, self.outer]) * unit
+        return self.p.replace(omega_0=omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
+
+    def task(self, omega_c: float, times: int = 1) -> Task:
+        """The run from there, with steps half as long as those of `short`, divided by `times`."""
+        step = coarse_step(self.p) / (2 * REFINED * times)
+        return self.lab.task(*self.start(omega_c), STEPS * step, step, samples=STEPS)
+
+    def row(self, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]) -> Measurement:
+        """What was measured along it, with the state at an orbit."""
+        p, x0 = self.start(omega_c)
+        at = {"inner": self.inner.name, "outer": self.outer.name} | state_of(x0)
+        return measurement(self.lab, "lift", self.set, p, quantity, value, tasks, **at)
+
+
+def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
+    arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
+    first = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
+    seen: list[list[Trajectory]] = []
+    near: list[list[Task]] = []
+    for arrow, runs in zip(arrows, lab.groups(first), strict=True):
+        # The first runs in a row in which the ball passes into no case but the two ends of the arrow.
+        strays = [not np.isin(run.case[SKIPPED:], [arrow.inner, arrow.outer]).all() for run in runs]
+        begin = [*strays, False].index(False)
+        seen.append(runs[begin : [*strays, True].index(True, begin)])
+        # Where the line over omega_c^2 through the forces at the last two orbits before the ball leaves vanishes.
+        near.append([])
+        pressed = [(run.omega_c[0] ** 2, force.value) for run in seen[-1] if (force := _force(run))]
+        if 2 <= len(pressed) < len(seen[-1]):
+            (a, high), (b, low) = pressed[-2:]
+            where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
+            near[-1] = [arrow.task(where * (1 - part), times) for part in NEAR for times in (1, 2) if where]
+    for arrow, orbits, begun, tasks, runs in zip(arrows, first, seen, near, lab.groups(near), strict=True):
+        lifted = next((run for run in begun if _force(run) is None), None)
+        if not begun:
+            yield Missing("lift", arrow.set, f"the ball doesn't stay in {arrow.inner.name} at any orbit")
+        elif lifted is None:
+            yield arrow.row("lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
+        elif (to := Case(int(lifted.case[-1]))) is not arrow.outer:
+            yield Missing("lift", arrow.set, f"out of {arrow.inner.name} the ball leaves the floor for {to.name}")
+        elif (value := _onset(runs)) is None:
+            why = f"where the ball leaves {arrow.inner.name} the floor's contact comes and goes"
+            yield Missing("lift", arrow.set, why)
+        else:
+            yield arrow.row("lift_onset", value.value, value, tasks)
+
+
+def _force(run: Trajectory) -> Measured | None:
+    """Force of the floor at the beginning divided by the weight; None where it doesn't press for long enough."""
+    p, force = run.header.parameters, run.force_A[SKIPPED:, 1]
+    pressed = int(np.argmax(np.append(force <= 0, True)))
+    if pressed < FEWEST:
+        return None
+    time = run.time[SKIPPED:][:pressed]
+    # The force of a sample acts from then on for a step: it belongs to the middle of it.
+    begin = -(time[1] - time[0]) / 2
+    value, lower = (polynomials(time, force[:pressed], DEGREES, begin)[0] / (p.m * p.g)).tolist()
+    return Measured(value, abs(value - lower))
+
+
+def _onset(runs: Sequence[Trajectory]) -> Measured | None:
+    """omega_c where the force vanishes, from runs with both steps at each orbit; None if it does not so smoothly."""
+    squares, forces = np.array([run.omega_c[0] ** 2 for run in runs[::2]]), []
+    for coarse, fine in zip(map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
+        if coarse is None or fine is None:
+            return None
+        change = fine.value - coarse.value
+        forces.append(Measured(fine.value + change * LIMIT, math.hypot(fine.uncertainty, change * DOUBT)))
+    square = vanishing(squares, forces) if forces else Measured(0.0, math.inf)
+    if not 0 < COVERAGE * square.uncertainty < 2 * quantity("lift_onset").resolves * square.value:
+        return None
+    return Measured(math.sqrt(square.value), square.uncertainty / (2 * math.sqrt(square.value)))

@@ -1,0 +1,292 @@
+"""Figs. 7 and 8, which stationary solutions exist and where runs ended, and the bifurcation diagrams of Figs. 9-12.
+
+Those show stationary solutions against the flow, by their spin on the wall (91), with measured states upon them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from scipy import ndimage
+
+from analytic.bifurcation import diagram as bifurcation
+from analytic.bifurcation.diagram import Exists
+from analytic.stationary import slipping_branch
+from compare.branches import fold_state, lifted, slipping, spin, spins
+from compare.kit import style
+from compare.kit.check import Check
+from compare.kit.drawing import Diagram, Drawing, Material
+from compare.kit.style import UNSTABLE, Place
+from model import Case, Parameters, State
+from model.arrays import Array
+
+_THEORY = Parameters.named("reference")
+"""Shown where nothing was measured."""
+_WIDEST = 0.8
+_SECTIONS = {0.2: "Figs. 9, 10", 0.6: "Figs. 9, 11"}
+"""The two typical sections of Fig. 7, by wall friction."""
+_LINES = {
+    "omega_01": ("#0072B2", "-"),
+    "omega_02": ("#009E73", "--"),
+    "omega_03": ("#E69F00", "-."),
+    "omega_04": ("#D55E00", (0, (1, 1))),
+}
+_BISTABLE = Exists.SS | Exists.SS_BEYOND_FOLD | Exists.SR | Exists.NR
+_TINTS = {
+    Exists.RR | Exists.NS: "#e8f1f8",
+    Exists.SS | Exists.NS: "#fbe6dc",
+    _BISTABLE: "#f4e6ef",
+    Exists.RR | Exists.SR | Exists.NR: "#fdf3df",
+    Exists.SR | Exists.NR: "#e3f3ec",
+}
+"""Pale grounds of the regions; lines and names tell them apart without colour."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane of parameters, and where runs ended in it."""
+
+    p: Parameters
+    equal: bool
+    """Whether mu = eta (Fig. 8) or fixed (Fig. 7)."""
+    checks: tuple[Check, ...]
+
+
+def select_plane(material: Material, figure: str) -> Plane:
+    """The plane of the measured points of a figure, "fig-7" or "fig-8"; of several sets the first."""
+    checks = material.checks.get(figure, ())
+    chosen = tuple(c for c in checks if c.measurement.set == checks[0].measurement.set)
+    return Plane(chosen[0].measurement.parameters if chosen else _THEORY, figure == "fig-8", chosen)
+
+
+def plane_caption(plane: Plane) -> str:
+    """Of either figure."""
+    p, runs = plane.p, len(plane.checks)
+    fixed = style.named(p, "j", "kappa") if plane.equal else style.named(p, "mu", "j", "kappa")
+    text = (
+        f"Which stationary solutions exist over ω₀ and {'η = μ' if plane.equal else 'η'}, for {fixed}. Lines: the "
+        "thresholds (84)-(88); dots: where they meet; SS*: the unstable part of SS; hatched: two stable motions (SS, "
+        "and SR or NR)."
+    )
+    if runs:
+        failed = sum(not check.agrees for check in plane.checks)
+        text += f" Marks: the {runs} points at which runs were started; {failed or 'none'} crossed, not as predicted."
+    return text
+
+
+def draw_plane(plane: Plane) -> Figure:
+    """Regions with their names, the thresholds between them, measured points by what was reached there."""
+    p = plane.p
+    figure = style.figure(6.4, 4.9)
+    axes = figure.add_subplot()
+    eta = np.linspace(0.0, _WIDEST, 801)
+    mu = eta if plane.equal else np.full(eta.shape, p.mu)
+    doubles = bifurcation.double_points(p, plane.equal)
+    highest = [point.omega_0 for point in doubles] + [c.measurement.parameters.omega_0 for c in plane.checks]
+    fastest = 1.15 * max([2.2 * float(np.sqrt(p.g / p.R)), *highest])
+    _regions(axes, p, mu, eta, np.linspace(0.0, fastest, 901))
+    for point in doubles:
+        axes.plot([point.eta], [point.omega_0], **style.POINT)
+        axes.axvline(point.eta, ymax=point.omega_0 / fastest, **style.GUIDE)
+        name = "$j$" if point.eta == p.j else "$\\eta_{cr}$"
+        axes.annotate(name, (point.eta, 0), xytext=(3, 5), textcoords="offset points", fontsize=9)
+    for section, text in () if plane.equal else _SECTIONS.items():
+        axes.axvline(section, color="0.4", lw=0.7, zorder=1)
+        axes.text(section, 0.985 * fastest, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3")
+    for engine, own in style.by_engine(plane.checks, lambda check: check.measurement.engine).items():
+        axes.plot(*_places(own), ls="none", ms=4.5, label=f"{engine}, as predicted", **style.mark_of(engine))
+    if failed := [check for check in plane.checks if not check.agrees]:
+        axes.plot(*_places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
+    friction = "friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$"
+    axes.set(xlabel=friction, ylabel=style.OMEGA_0, xlim=(0, _WIDEST), ylim=(0, fastest))
+    style.legend(figure, loc="outside lower center", ncols=6, handlelength=2.6)
+    style.dimensionless(axes, p, y=style.FREE_0)
+    return figure
+
+
+def _regions(axes: Axes, p: Parameters, mu: Array, eta: Array, omega_0: Array) -> None:
+    plane = bifurcation.case_map(p, mu, eta, omega_0).T
+    kinds = np.unique(plane)
+    shades = ListedColormap([_TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
+    grid: dict[str, Any] = {"origin": "lower", "aspect": "auto", "extent": (*eta[[0, -1]], *omega_0[[0, -1]])}
+    shown = np.searchsorted(kinds, plane)
+    axes.imshow(shown, cmap=shades, vmin=0, vmax=len(kinds) - 1, interpolation="nearest", zorder=0, **grid)
+    both = (plane == _BISTABLE).astype(float)
+    if both.any():
+        hatched = axes.contourf(eta, omega_0, both, levels=[0.5, 1.5], colors="none", hatches=["////"], zorder=0.2)
+        hatched.set(edgecolor="0.75", linewidth=0)
+    unit = np.sqrt(p.g / p.R)
+    for name, curve in bifurcation.threshold_curves(p, mu, eta).items():
+        if name in _LINES:
+            colour, line = _LINES[name]
+            # omega_03 ends rolling for eta > j only.
+            shown = np.where((eta < p.j) & (name == "omega_03"), np.nan, curve * unit)
+            axes.plot(eta, shown, color=colour, ls=line, lw=1.8, label=style.THRESHOLD_LABELS[name])
+    for kind in kinds:
+        _name(axes, plane == kind, eta, omega_0, int(kind))
+
+
+def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, kind: int) -> None:
+    """Write the cases at the widest spot of every connected region that has room for them, clear of sections.
+
+    The region with two stable motions is too narrow: its name stands at the top, with a line to where it belongs.
+    """
+    names = [flag.name.replace("SS_BEYOND_FOLD", "SS*") for flag in Exists if flag & kind and flag.name]
+    text = "\n".join(["  ".join(names[:2]), "  ".join(names[2:])]) if len(names) > 2 else "  ".join(names)
+    regions, count = ndimage.label(where)
+    near = np.any([np.abs(eta - section) < 0.035 for section in _SECTIONS], axis=0)
+    for k, box in zip(range(1, count + 1), ndimage.find_objects(regions), strict=True):
+        # The frame counts as an edge; text is about three times as wide as high.
+        inside = np.pad(regions[box] == k, 1)
+        room = ndimage.distance_transform_edt(inside, sampling=(1.0, 0.55))[1:-1, 1:-1]
+        room = np.where(near[box[1]][None, :], room / 4, room)
+        row, column = np.unravel_index(np.argmax(room), room.shape)
+        here = float(eta[box[1]][column]), float(omega_0[box[0]][row])
+        if room[row, column] > 7 and kind == _BISTABLE:
+            look: dict[str, Any] = {"bbox": style.HALO, "arrowprops": {"arrowstyle": "-", "lw": 0.7, "color": "0.4"}}
+            at: dict[str, Any] = {"xytext": (0.31, 0.97), "textcoords": "axes fraction", "va": "top"}
+            axes.annotate(f"{text}\nbistable", here, **at, **look, fontsize=9, zorder=6)
+        elif room[row, column] > 7:
+            style.name(axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0))
+
+
+def _places(checks: Sequence[Check]) -> Array:
+    return np.transpose([(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks])
+
+
+RELEASED = Parameters.named("reference").replace(eta=0.43)
+"""eta so little above j that the branch of SS, with (12) released, is whole."""
+_SETS = {
+    "fig-9": ("reference", ("NS", "NR")),
+    "fig-10": ("reference", ("RR", "SS", "SR", "NR")),
+    "fig-11": ("high-wall-friction", ("RR", "SR", "NR")),
+}
+"""The parameter set of each figure that shows measured states, and their cases."""
+_SHOWN = {
+    "fig-9": "off the floor, where y is free: sinking along the wall (NS) passes over to riding it (NR) at P2",
+    "fig-10": "on the floor, for η < j: rolling (RR) passes over to slipping (SS) at P3, SS turns back at the fold "
+    "F and ends in SR at NF2",
+    "fig-11": "on the floor, for η > j: SR appears at ω₀₂, and RR ends at ω₀₃ where it meets SR",
+    "fig-12": "as Fig. 11, but with the floor allowed to pull (A_y < 0), which is formal: the branch of SS and its "
+    "bifurcations P3, F and NF2 reappear, and RR and SR exchange stability at NT1",
+}
+
+
+def select_diagram(material: Material, figure: str) -> Diagram:
+    """The measured spins on the wall, by case and set."""
+    if figure == "fig-12":
+        return Diagram(figure, RELEASED)
+    name, cases = _SETS[figure]
+    measured = [*material.select("wall_spin", "case"), *material.select("edge_wall_spin", "case")]
+    own = tuple(m for m in measured if m.set == name and m.conditions["case"] in cases)
+    return Diagram(figure, Parameters.named(name), own)
+
+
+def diagram_caption(of: Diagram) -> str:
+    """Of Figs. 9-12, with their parameters."""
+    p = of.p
+    text = f"Stationary solutions {_SHOWN[of.figure]}; {style.named(p)}, r/R = {p.r / p.R:g}. Dashed: unstable."
+    if of.figure == "fig-12" and slipping_branch.hopf_places(p):
+        text += " H: a Hopf point of SS, beyond which an oscillation grows, too."
+    if of.states and of.figure in ("fig-10", "fig-11"):
+        text += " A ball on the wall (NR) has the spin of SR, also where SR is unstable."
+    return text + style.edge(of.states) + style.marks(of.states)
+
+
+def draw_diagram(of: Diagram) -> Figure:
+    """One diagram, with both scales."""
+    figure, p = style.figure(5.8, 4.1), of.p
+    axes, t = figure.add_subplot(), bifurcation.thresholds(of.p)
+    guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
+    bottom, top = 0.0, 2 * t.omega_02
+    if of.figure == "fig-9":
+        guides = {"omega_02": t.omega_02}
+        _branch(axes, p, Case.NS, 1e-3 * t.omega_02, (1 - 1e-9) * t.omega_02, "NS", (0.35, (-4, 6)))
+        _branch(axes, p, Case.NR, t.omega_02, top, "NR", (0.5, (4, 6)))
+        style.mark(axes, t.omega_02, lifted(t.omega_02, p), "P2", (0, 8))
+    elif of.figure == "fig-10":
+        del guides["omega_03"]
+        top = 1.25 * t.omega_04
+        _branch(axes, p, Case.RR, 0.0, t.omega_01)
+        slipping(axes, p, partial(spin, p), (0.5, (0, -7)), (0.4, (6, 6)))
+        _branch(axes, p, Case.SR, t.omega_02, top, "SR", (0.85, (-5, -5)))
+        style.mark(axes, t.omega_01, t.omega_01 * p.R / p.r, "P3", (-6, 4))
+        style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-4, -6))
+        style.mark(axes, t.omega_04, float(bifurcation.wall_spin(fold_state(p), p)), "F", (4, -6))
+    elif of.figure == "fig-11":
+        guides = {"omega_02": t.omega_02, "omega_03": t.omega_03}
+        top = 1.6 * t.omega_03
+        _branch(axes, p, Case.RR, 0.0, t.omega_03)
+        _branch(axes, p, Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.4, (6, 4)), UNSTABLE)
+        _branch(axes, p, Case.SR, t.omega_03, top, "SR", (0.5, (4, 6)))
+        for w in (t.omega_02, t.omega_03):
+            axes.plot([w], [lifted(w, p)], **style.POINT)
+    else:
+        curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
+        guides |= {name: float(curves[name] * np.sqrt(p.g / p.R)) for name in ("omega_01", "omega_04")}
+        omega_01, omega_04 = guides["omega_01"], guides["omega_04"]
+        bottom, top = (edge + part * (omega_04 - t.omega_02) for edge, part in ((t.omega_02, -0.5), (omega_04, 0.35)))
+        _branch(axes, p, Case.RR, bottom, t.omega_03)
+        _branch(axes, p, Case.RR, t.omega_03, omega_01, "RR, virtual", (0.6, (-4, 4)), UNSTABLE)
+        slipping(axes, p, partial(spin, p), (0.5, (0, 7)), (0.35, (0, 7)))
+        _branch(axes, p, Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.5, (-20, 60)), UNSTABLE)
+        _branch(axes, p, Case.SR, t.omega_03, top, "SR", (0.35, (-5, -5)))
+        style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
+        style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (0, -8))
+        style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-6, 4))
+        style.mark(axes, omega_04, float(bifurcation.wall_spin(fold_state(p, released=True), p)), "F", (7, 0))
+        for s in slipping_branch.hopf_places(p):
+            x, omega_0 = slipping_branch.states(s, p)
+            style.mark(axes, float(omega_0), float(bifurcation.wall_spin(State.of(x), p)), "H", (5, -6))
+    axes.set(xlim=(bottom, top), ylim=(0, 1.12 * axes.get_ylim()[1]), xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
+    if of.figure == "fig-12":
+        axes.set_ylim(0.75 * t.omega_03 * p.R / p.r, 1.15 * guides["omega_01"] * p.R / p.r)
+    style.points(axes, of.states)
+    style.guides(axes, guides)
+    style.legend(axes, loc="upper left")
+    style.dimensionless(axes, p, style.FREE_0, style.FREE_X)
+    return figure
+
+
+def _branch(
+    axes: Axes,
+    p: Parameters,
+    case: Case,
+    begin: float,
+    end: float,
+    text: str = "RR",
+    place: Place = (0.5, (-5, 5)),
+    line: style.Line = style.STABLE,
+) -> None:
+    """The spin on the wall in RR, SR, NR or NS from one flow to another, with its name."""
+    flows = np.linspace(begin, end, 200)
+    values = flows * p.R / p.r if case is Case.RR else spins(Case.NR if case is Case.SR else case, flows, p)
+    style.curve(axes, case, flows, values, text, place, line)
+
+
+_PLANES = {
+    "fig-7": "Fig. 7: regions over wall friction and flow",
+    "fig-8": "Fig. 8: regions over equal friction and flow",
+}
+_DIAGRAMS = {
+    "fig-9": "Fig. 9: off the floor",
+    "fig-10": "Fig. 10: on the floor, η < j",
+    "fig-11": "Fig. 11: on the floor, η > j",
+    "fig-12": "Fig. 12: on the floor, η > j, (12) released",
+}
+FIGURES = {
+    name: Drawing(title, partial(select, figure=name), draw, caption, (name,))
+    for titles, select, draw, caption in (
+        (_PLANES, select_plane, draw_plane, plane_caption),
+        (_DIAGRAMS, select_diagram, draw_diagram, diagram_caption),
+    )
+    for name, title in titles.items()
+}
