@@ -11,7 +11,7 @@ from compare.claim import Bearing, Claim
 from compare.judge import simulated, theory
 from compare.kit.check import Relation
 from compare.kit.record import Measurement, state
-from compare.subjects.unsteady.measure.jumps import caught_up
+from compare.subjects.unsteady.measure import caught_up
 from model import Case, Flow, Parameters
 from model.drag import STOKES
 

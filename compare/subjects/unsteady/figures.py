@@ -18,7 +18,7 @@ from compare.branches import slipping
 from compare.kit import style
 from compare.kit.drawing import Drawing, Material, Motion
 from compare.kit.record import Measurement
-from compare.subjects.unsteady.measure.jumps import JUMP, caught_up, odd_part
+from compare.subjects.unsteady.measure import JUMP, caught_up, odd_part
 from model import Case, Flow, Parameters
 
 SET = "reference"
