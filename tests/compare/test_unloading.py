@@ -10,8 +10,8 @@ from compare.judge import forget, judge
 from compare.kit.levels import Level
 from compare.kit.record import Records
 from compare.kit.sets import sets
+from compare.subjects.flowmeter import measure
 from compare.subjects.flowmeter.claims import CLAIMS
-from compare.subjects.flowmeter.measure import unloading
 from tests.measured import thresholds
 
 NAME = "thick-fluid"
@@ -22,7 +22,7 @@ UNLOADING = [claim for claim in CLAIMS if "unloading" in claim.protocols]
 @pytest.fixture(scope="module")
 def records(lab):
     known = thresholds(NAME, P, "omega_02")
-    return known + Records.of(unloading.measure(lab, {NAME: P}, known))
+    return known + Records.of(measure.unloading(lab, {NAME: P}, known))
 
 
 def test_everything_is_measured_and_theory_and_engine_agree(records):
@@ -55,4 +55,4 @@ def test_first_top_lies_between_samples():
     run = analytic.simulate(P, [0.05, 1.0, 0, 0, 0, 0, 0.01, 0], 0.5, sample_interval=0.01)
     fine = analytic.simulate(P, [0.05, 1.0, 0, 0, 0, 0, 0.01, 0], 0.5, sample_interval=1e-4)
     # Between samples 10 ms apart only the change of the acceleration is left out, c per second of it.
-    assert unloading.first_top(run) == pytest.approx(float(fine.y.max()), abs=P.g * 0.01**2 * P.c * 0.01)
+    assert measure.first_top(run) == pytest.approx(float(fine.y.max()), abs=P.g * 0.01**2 * P.c * 0.01)

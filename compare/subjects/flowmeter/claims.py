@@ -14,7 +14,7 @@ from compare.kit.record import Measurement, state
 from compare.kit.settling import family
 from compare.kit.statistics import Measured
 from compare.settled import cases, detected, from_floor, is_in, lasting, lifts_first, natural_size, slips_first
-from compare.subjects.flowmeter.measure.unloading import BY_SPIN, UNLOADED, UPWARDS, first_top
+from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
 from model import Case, Contact, Trajectory
 
 RTOL = 1e-9
