@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -18,8 +16,7 @@ from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, GapError, Material, Motion
 from compare.kit.engines import EVENT, NEWCOMER
 from compare.kit.record import Measurement
-from model import Case, Contact, Parameters, Trajectory
-from model.arrays import Array
+from model import Case, Contact, Parameters
 
 SETS = {"fig-13-left": "reference", "fig-13-right": "high-wall-friction"}
 """The parameter set of each panel, eta < j and eta > j."""
@@ -185,57 +182,47 @@ def caption_fall(fall: Motion) -> str:
 def draw_fall(fall: Motion) -> Figure:
     """Height, velocities and slip around the fall, and 20 ms about the landing: the gaps as high as the ball hops."""
     run = fall.load()
-    lands = next(
-        (t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is not Contact.N), None
-    )
-    if lands is None:
+    landings = [t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is not Contact.N]
+    if not landings:
         raise GapError("the ball never landed")
+    lands = landings[0]
     leaves = run.events.time[(run.events.from_case == Case.NR) & (run.events.time <= lands)]
     left = leaves[-1] if len(leaves) else run.time[0]
     figure, panels = style.panels(9, 6, 3, 2, sharex="col", width_ratios=[1.7, 1])
     whole, close = panels.T
-    k, t = _column(whole, run, (left - 0.3, left + 1.7), left, 1.0, 1e3)
-    whole[0].set_ylabel("gap (mm)")
-    whole[1].plot(t, run.omega_c[k], color="black", label="$\\omega_c$")
-    whole[1].plot(t, run.header.flow(run.time[k]), color="0.5", ls="--", label="$\\omega_0$")
-    whole[1].set_ylabel("$\\omega_c$, $\\omega_0$ (rad/s)")
-    whole[2].set_xlabel("$t$ after the end of NR (s)")
-    for axes in whole:
-        axes.axvline(lands - left, color="0.3", lw=0.8)
-        style.legend(axes, frameon=False)
-    k, t = _column(close, run, (lands - 0.02, lands + 0.02), lands, 1e3, 1e6)
-    hops = run.y[k][run.v_y[k] > 0].max(initial=0.0)
-    highest = 1e6 * max(float(run.h[k].max()), float(hops), 1e-7)
-    close[0].set(ylim=(-0.4 * highest, 1.4 * highest), ylabel="gap (µm)")
-    close[1].plot(t, run.v_y[k], color="black")
-    close[1].set_ylabel("$v_y$ (m/s)")
-    close[2].set_xlabel("$t$ after the landing (ms)")
-    for axes in close:
-        axes.axvline(0, color="0.3", lw=0.8)
+    around, landing = (left - 0.3, left + 1.7), (lands - 0.02, lands + 0.02)
+    # Axes, span of time, its origin, and the units of time and gaps, in parts of a second and of a metre.
+    for column, span, origin, unit, size in (whole, around, left, 1.0, 1e3), (close, landing, lands, 1e3, 1e6):
+        k = np.flatnonzero((run.time > span[0]) & (run.time < span[1]))
+        k = k[:: max(1, len(k) // 1500)]
+        t = unit * (run.time[k] - origin)
+        gaps, speed, slip = column
+        gaps.plot(t, size * run.y[k], color="black", label="$y$ (floor)")
+        gaps.plot(t, size * run.h[k], color=style.FORCE, ls="--", label="$h$ (wall)")
+        if column is whole:
+            gaps.set_ylabel("gap (mm)")
+            speed.plot(t, run.omega_c[k], color="black", label="$\\omega_c$")
+            speed.plot(t, run.header.flow(run.time[k]), color="0.5", ls="--", label="$\\omega_0$")
+            speed.set_ylabel("$\\omega_c$, $\\omega_0$ (rad/s)")
+            slip.set_xlabel("$t$ after the end of NR (s)")
+        else:
+            hops = run.y[k][run.v_y[k] > 0].max(initial=0.0)
+            highest = 1e6 * max(float(run.h[k].max()), float(hops), 1e-7)
+            gaps.set(ylim=(-0.4 * highest, 1.4 * highest), ylabel="gap (µm)")
+            speed.plot(t, run.v_y[k], color="black")
+            speed.set_ylabel("$v_y$ (m/s)")
+            slip.set_xlabel("$t$ after the landing (ms)")
+        for point, value, line in (("A", run.slip_speed_A, "-"), ("B", run.slip_speed_B, "--")):
+            touches = [case for case in Case if getattr(case, point) is not Contact.N]
+            shown = np.where(np.isin(run.case[k], touches), value[k], np.nan)
+            slip.plot(t, shown, color="black", ls=line, label=f"$|v_{point}|$")
+        slip.set(ylabel="slip speed (m/s)", xlim=(unit * (span[0] - origin), unit * (span[1] - origin)))
+        for axes in column:
+            style.ground(axes, run, span, unit, origin, named=axes is gaps)
+            axes.axvline(unit * (lands - origin), color="0.3", lw=0.8)
+            if column is whole:
+                style.legend(axes, frameon=False)
     return figure
-
-
-def _column(
-    panels: Sequence[Axes], run: Trajectory, span: tuple[float, float], origin: float, unit: float, size: float
-) -> tuple[npt.NDArray[np.intp], Array]:
-    """Draw gaps, `size` to a metre, slip speeds where there is contact, and the cases, over a span of time in s.
-
-    Return which samples are drawn, some 1500 evenly chosen, and their times in units of the axis, `unit` to a second.
-    """
-    k = np.flatnonzero((run.time > span[0]) & (run.time < span[1]))
-    k = k[:: max(1, len(k) // 1500)]
-    t = unit * (run.time[k] - origin)
-    gaps, _, slip = panels
-    gaps.plot(t, size * run.y[k], color="black", label="$y$ (floor)")
-    gaps.plot(t, size * run.h[k], color=style.FORCE, ls="--", label="$h$ (wall)")
-    for point, value, line in (("A", run.slip_speed_A, "-"), ("B", run.slip_speed_B, "--")):
-        touches = [case for case in Case if getattr(case, point) is not Contact.N]
-        shown = np.where(np.isin(run.case[k], touches), value[k], np.nan)
-        slip.plot(t, shown, color="black", ls=line, label=f"$|v_{point}|$")
-    slip.set(ylabel="slip speed (m/s)", xlim=(unit * (span[0] - origin), unit * (span[1] - origin)))
-    for axes in panels:
-        style.ground(axes, run, span, unit, origin, named=axes is gaps)
-    return k, t
 
 
 FIGURES = {
