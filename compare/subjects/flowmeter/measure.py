@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
+from compare.kit.fits import at_zero
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import ONE, TWO, Protocol
 from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of
@@ -73,7 +73,7 @@ class Curve:
 def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there to unloading."""
     most = lab.effort("slope.slipping")
-    curves = [c for name, p in sets.items() for c in (*_local(name, records, most), *_wide(name, p, records))]
+    curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
     for by, sharp in SHARP.items():
         own = [curve for curve in curves if curve.by == by]
         starts = [[Start(c.set, c.p.replace(omega_0=w), by, np.array(c.x0)) for w in c.flows] for c in own]
@@ -91,8 +91,12 @@ def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
                 yield Missing("slope", curve.set, f"{where}: the states there are not of one kind ({cases})")
 
 
-def _local(name: str, records: Records, most: int) -> Iterator[Curve]:
-    """Settled states that slip on the floor, at most so many; of the others, that of the fastest flow."""
+def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[Curve]:
+    """Where slopes of a set are wanted.
+
+    Between neighbours of settled states that slip on the floor, at most so many, and of the fastest of the others;
+    across the onset of slipping; and from there to the flow at which the wall begins to carry the ball.
+    """
     states: dict[Case, dict[float, dict[str, Measurement]]] = {case: {} for case in Case}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity != "case"):
         if m.parameters.omega_0:
@@ -103,14 +107,10 @@ def _local(name: str, records: Records, most: int) -> Iterator[Curve]:
         few = np.linspace(0, len(alike) - 1, most).round() if case is Case.SS else [len(alike) - 1]
         for k in sorted({int(n) for n in few if alike}):
             omega_0, values = alike[k]
-            p, moving = values["omega_c"].parameters, ("v_y", "omega_c", "slip_x", "slip_y", "slip_z")
-            x0 = (high(p) * (case is Case.NR), *(values[q].value for q in moving), 0.0, 0.0)
+            q, moving = values["omega_c"].parameters, ("v_y", "omega_c", "slip_x", "slip_y", "slip_z")
+            x0 = (high(q) * (case is Case.NR), *(values[each].value for each in moving), 0.0, 0.0)
             flows = tuple(omega_0 * (1 + d) for d in (-STEP, -STEP / 2, STEP / 2, STEP))
-            yield Curve("neighbours", name, p, flows, x0)
-
-
-def _wide(name: str, p: Parameters, records: Records) -> Iterator[Curve]:
-    """Across the onset of slipping, and from there to the flow at which the wall begins to carry the ball."""
+            yield Curve("neighbours", name, q, flows, x0)
     slips, holds = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
     if slips is not None:
         q, x0 = p.replace(omega_0=slips.value), (0.0, 0.0, slips.value, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -282,9 +282,7 @@ def _landed(run: Trajectory) -> Numbers:
     growing = np.arange(*np.searchsorted(np.maximum.accumulate(slip), (1e-4, 1e-3)))
     if not len(touches) or not 1 < touches[0] < len(run.time) - 12 or len(growing) < 10:
         return {}
-    quadratic, cubic = (
-        float(Polynomial.fit(np.sqrt(slip[growing]), run.time[growing], degree)(0.0)) for degree in (2, 3)
-    )
+    quadratic, cubic = (at_zero(np.sqrt(slip[growing]), run.time[growing], degree) for degree in (2, 3))
     k = int(touches[0]) - 1
     wait = float(run.y[k] / -run.v_y[k])
     v_y = float(run.v_y[k] + (run.v_y[k] - run.v_y[k - 1]) / step * wait)

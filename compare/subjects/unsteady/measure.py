@@ -44,8 +44,6 @@ PHASES = 8
 
 JUMP = 1e-3
 """Relative size of a jump."""
-SHOWS = {"RR": ("jump_delay",), "SS": ("jump_peak", "jump_height")}
-"""What is measured after a jump, by the case of the ball before it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,10 +120,10 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
             at = f"at {each.frequency:g} Hz a ball slips in a pulsation half as large as in a slow one"
             yield Missing("pulsation", each.set, at)
             continue
-        gain, angle = abs(each.ratio), each.uncertainty / abs(each.ratio)
-        yield each.row(lab, "gain", Measured(gain, each.uncertainty), each.tasks, amplitude=each.amplitude)
-        lag = Measured(-cmath.phase(each.ratio), angle)
-        yield each.row(lab, "phase_lag", lag, each.tasks, amplitude=each.amplitude)
+        gain, lag = abs(each.ratio), -cmath.phase(each.ratio)
+        own = {"gain": Measured(gain, each.uncertainty), "phase_lag": Measured(lag, each.uncertainty / gain)}
+        for quantity, value in own.items():
+            yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
     rolling, slipping = _raised(lab, [each for each in followed if each.rolls]), []
     for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
         at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
@@ -302,7 +300,7 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             continue
         trial = result.trial
         if trial.flow is None:
-            for quantity in SHOWS[trial.name]:
+            for quantity in ("jump_delay",) if trial.name == Case.RR.name else ("jump_peak", "jump_height"):
                 row = result.row(lab, quantity, finer(result.coarse[quantity].value, result.fine[quantity]))
                 yield if_sure(row, abs(row.value), f"{quantity} in {trial.name}: no peak, or one that is too uncertain")
         elif math.isfinite(result.coarse) and math.isfinite(result.fine):
