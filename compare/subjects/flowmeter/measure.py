@@ -138,7 +138,7 @@ def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
     if curve.by == "jump" and cases[1:3] == [Case.RR, Case.SS]:
         secants, middles = np.diff(w[2:]) / np.diff(f[2:]), (f[2:-1] + f[3:]) / 2 - onset
         cubic, parabola = np.polyfit(middles, secants, 3), np.polyfit(middles[:3], secants[:3], 2)
-        # What noise of the states does to the secants, and these to the slope: no weight in the cubic exceeds 4.
+        # Noise of the states, propagated to the secants and from them to the slope: no weight in the cubic exceeds 4.
         solved = 4 * math.sqrt(2) * noise / (f[3] - f[2])
         placed = parabola[-2] * curve.noise
         return Measured(float(cubic[-1] - below), math.hypot(cubic[-1] - parabola[-1], solved, placed))
@@ -166,7 +166,7 @@ def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
         if isinstance(run, str):
             yield Missing("hysteresis", name, f"the run {run}")
             continue
-        # What half the step changes of omega_c, relative to omega_0: the most of all settled states.
+        # By how much half the step changes omega_c, relative to omega_0: the largest of all settled states.
         settled = [m for m in records.select("settled", "omega_c") if m.set == name and m.parameters.omega_0 > 0]
         certainty = max(m.uncertainty / m.parameters.omega_0 for m in settled)
         count, before = (len(run.time) - 1) // len(levels), "RR"
@@ -237,7 +237,7 @@ def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
             change = abs(coarse[key].value / fine.value - 1)
             measured.setdefault((name, *key), []).append((result, fine, change))
     for (name, quantity, event), rows in measured.items():
-        # The difference may be small by chance: it counts at least as much as in half of the trials.
+        # The difference may be small by chance: at least the median of all trials counts.
         usual = float(np.median([change for *_, change in rows]))
         for result, fine, change in rows:
             value = Measured(fine.value, math.hypot(max(change, usual) * fine.value, fine.uncertainty))
@@ -278,7 +278,7 @@ def _landed(run: Trajectory) -> Numbers:
     p, step = run.header.parameters, float(run.time[1] - run.time[0])
     slip = run.slip_speed_B / math.sqrt(p.g * p.R)
     touches = np.flatnonzero(run.force_A[:, 1] > 0)
-    # Slip grows like the square of the time: its onset is extrapolated from speeds that are neither noise nor large.
+    # Slip grows as the square of time: its onset is extrapolated from speeds above the noise, but small.
     growing = np.arange(*np.searchsorted(np.maximum.accumulate(slip), (1e-4, 1e-3)))
     if not len(touches) or not 1 < touches[0] < len(run.time) - 12 or len(growing) < 10:
         return {}

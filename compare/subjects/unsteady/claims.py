@@ -15,6 +15,9 @@ from compare.subjects.unsteady.measure import caught_up
 from model import Case, Flow
 from model.drag import STOKES
 
+_BY = "analytic.flowmeter"
+_RATE = f"{_BY}.response.rolling_rate"
+
 
 def _at(m: Measurement, name: str = "f") -> float:
     return float(m.conditions[name])
@@ -33,9 +36,12 @@ def _slips(rule: str, relation: Relation) -> Bearing:
     def onset(m: Measurement) -> float:
         return theory(pulsation.slip_onset, m.parameters, _at(m), rule)
 
-    return Bearing(
-        "pulsation", "slip_amplitude", onset, relation=relation, by=f"analytic.flowmeter.pulsation.slip_onset, {rule}"
-    )
+    by = f"{_BY}.pulsation.slip_onset, {rule}"
+    return Bearing("pulsation", "slip_amplitude", onset, relation=relation, by=by)
+
+
+def _mean_error(m: Measurement) -> float:
+    return theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m))
 
 
 def _peak(m: Measurement) -> tuple[float, float]:
@@ -66,18 +72,10 @@ CLAIMS = (
         "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c.",
         (
             Bearing(
-                "pulsation",
-                "gain",
-                lambda m: abs(_ratio(m)),
-                by="analytic.flowmeter.response.transfer, pulsation.first_harmonic",
+                "pulsation", "gain", lambda m: abs(_ratio(m)), by=f"{_BY}.response.transfer, pulsation.first_harmonic"
             ),
             Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_ratio(m)), by="the same"),
-            Bearing(
-                "unsteady",
-                "jump_delay",
-                lambda m: 1 / response.rolling_rate(m.parameters),
-                by="analytic.flowmeter.response.rolling_rate",
-            ),
+            Bearing("unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE),
         ),
     ),
     Claim(
@@ -93,22 +91,15 @@ CLAIMS = (
         "pulsation-mean",
         "(23), (26), Definitions 1-3",
         "A pulsation that makes the ball slip makes its mean reading low.",
-        (
-            Bearing(
-                "pulsation",
-                "mean_error",
-                lambda m: theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m)),
-                by="analytic.flowmeter.pulsation.mean_error",
-            ),
-        ),
+        (Bearing("pulsation", "mean_error", _mean_error, by=f"{_BY}.pulsation.mean_error"),),
     ),
     Claim(
         "jump-slipping",
         "(26), (38)-(42)",
         "After a jump of the flow a ball that slips at both points overshoots its new reading and rings.",
         (
-            Bearing("unsteady", "jump_peak", lambda m: _peak(m)[0], by="analytic.flowmeter.response.peak"),
-            Bearing("unsteady", "jump_height", lambda m: _peak(m)[1], by="analytic.flowmeter.response.peak"),
+            Bearing("unsteady", "jump_peak", lambda m: _peak(m)[0], by=f"{_BY}.response.peak"),
+            Bearing("unsteady", "jump_height", lambda m: _peak(m)[1], by=f"{_BY}.response.peak"),
         ),
     ),
     Claim(

@@ -138,7 +138,7 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
             yield Missing("pulsation", each.set, f"in {at} one contact slips before both do, too little to tell when")
             continue
         measured = each.row(lab, "slip_amplitude", onset, bracket.tasks)
-        # What will be predicted may be a tenth smaller than what is measured.
+        # The predicted amplitude may be a tenth smaller than the measured one.
         yield (row := if_sure(measured, 0.9 * onset.value, f"slip in {at} begins at no definite amplitude"))
         if isinstance(row, Measurement):
             slipping.append((each, 1.5 * onset.value))
@@ -205,7 +205,7 @@ def _search(lab: Lab, each: Pulsation) -> Search:
         return each.task(lab, amplitude, x, 1.5 * care.time, 2 * care.refine, SAMPLES, largest=begin.high)
 
     if each.p.drag == STOKES:
-        # Where slip begins is not known yet: the least amplitude at which it may is taken for a rough width.
+        # Slip may begin from about half the largest amplitude on: the width is taken relative to that.
         largest = each.reach / abs(each.ratio)
         begin, size = Bracket(0.0, largest), largest / 2
     else:
@@ -241,7 +241,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
         value = mean - each.p.omega_0
         spread = float(np.abs(turns * each.frequency - usual).max())
         drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
-        # Slip begins and ends within a coarse step: half of that part of the mean error is uncertain.
+        # Slip begins and ends within a coarse step: the mean error is uncertain by half of that part.
         error = Measured(value, drift + abs(value) / round(task.steps / PERIODS))
         row = each.row(lab, "mean_error", error, [task], amplitude=amplitude)
         at = f"the mean reading at {each.frequency:g} Hz"
