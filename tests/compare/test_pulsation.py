@@ -71,12 +71,10 @@ def test_pulsation_under_the_quadratic_law(lab) -> None:
 def test_a_mean_may_depend_on_more_than_the_state(lab) -> None:
     """Where theory itself has two answers (docs/theory.md, 11) the protocol sees that its own is none, blind."""
     p, f, a = sets(Level.DEFAULT)["design-5"].replace(omega_0=11.7694), 4.0, 199.89
-    early, late = (
-        analytic.flowmeter.pulsation.mean_error(p, a, f, leave_rolling=rule)
-        for rule in ("slip-stability", "infeasible")
-    )
+    theory, rules = analytic.flowmeter.pulsation, ("slip-stability", "infeasible")
+    early, late = (theory.mean_error(p, a, f, leave_rolling=rule) for rule in rules)
     assert late - early > 0.015 * abs(early)
-    begin = analytic.flowmeter.pulsation.swing(p, a, f, 0.0)[0] - p.omega_0
+    begin = theory.swing(p, a, f, 0.0)[0] - p.omega_0
     driven = unsteady.Pulsation("design-5", p, f, a, reach=1.0, begin=float(begin) / a)
     (row,) = unsteady.mean_errors(replace(lab, level=Level.DEFAULT), [(driven, a)])
     assert "more than the state" in row.reason
@@ -110,9 +108,10 @@ def test_a_measured_flow_by_both_witnesses(tmp_path) -> None:
     """Noise and a swell that makes the ball slip, a hundred samples a second."""
     p, t = Parameters.named("reference").replace(c=4.0), np.arange(0.0, 3.0, 0.01)
     omega_0 = 12.0 + 4.0 * np.sin(2 * np.pi * t / 3.0) + 0.3 * np.random.default_rng(1).standard_normal(len(t))
-    path, columns = tmp_path / "flow.csv", np.stack([t, omega_0], axis=-1)
-    np.savetxt(path, columns, delimiter=",", header="time,omega_0", comments="")
-    flow = Flow.from_csv(path)
+    np.savetxt(
+        tmp_path / "flow.csv", np.stack([t, omega_0], axis=-1), delimiter=",", header="time,omega_0", comments=""
+    )
+    flow = Flow.from_csv(tmp_path / "flow.csv")
     theory, run = (simulate(p, [0, 0, 12.0, 0, 0, 0], 3.0, flow) for simulate in (analytic.simulate, mjsim.simulate))
     assert {Case.RR, Case.SS} <= set(theory.cases) & set(run.cases)
     np.testing.assert_allclose(run.omega_c, theory.omega_c, rtol=1e-3)
