@@ -50,6 +50,8 @@ SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
 THRESHOLD_LABELS = {name: f"$\\omega_{{{name[-2:]}}}$" for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
 FREE_0, FREE_C = "$\\Omega_0 = \\omega_0\\sqrt{R/g}$", "$\\Omega_c = \\omega_c\\sqrt{R/g}$"
 FREE_X = "$\\omega_x^0\\sqrt{R/g}$"
+LEAST = 1e-16
+"""Smaller relative errors are drawn here: an error may be zero."""
 
 
 def figure(width: float, height: float) -> Figure:
@@ -224,3 +226,17 @@ def ground(
             axes.axvspan(*x, color=COLOURS[case], alpha=0.15, lw=0)
             if named and high - low > 0.04 * (span[1] - span[0]):
                 axes.text(x.mean(), 1.02, case.name, transform=axes.get_xaxis_transform(), ha="center", fontsize=8)
+
+
+def deviations(
+    axes: Axes,
+    rows: Iterable[Measurement],
+    predicted: Callable[[Measurement], float],
+    x: Callable[[Measurement], float] = omega_0,
+) -> None:
+    """A panel of relative deviations of measured values from predicted ones, by engine, on a logarithmic axis."""
+    for engine, own in by_engine(rows, lambda m: m.engine).items():
+        off = [max(abs(m.value / predicted(m) - 1), LEAST) for m in own]
+        axes.plot([x(m) for m in own], off, ls="none", ms=5, **mark_of(engine))
+    axes.set(yscale="log", ylim=(LEAST / 10, 10), ylabel="relative deviation")
+    axes.grid(alpha=0.25)

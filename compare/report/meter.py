@@ -129,7 +129,7 @@ def described(made: Design) -> dict[str, Any]:
 def page(made: Design) -> str:
     """All of it as a page that needs nothing but itself."""
     from compare.report import pictures
-    from compare.subjects.flowmeter.figures import meter as figures  # here, because drawing takes a second to load
+    from compare.subjects.flowmeter import meter as figures  # here, because drawing takes a second to load
 
     r, bounds = made.request, made.request.bounds[made.material]
     response = f", time constant up to {r.response:g} s" if math.isfinite(r.response) else ""

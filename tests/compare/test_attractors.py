@@ -29,14 +29,13 @@ def test_undecided_with_what_it_did_last(capsys: pytest.CaptureFixture[str], tmp
     assert main(["attractors", *given, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert [each["omega_0"] for each in data["sets"]] == [60, 70]
-    for each in data["sets"]:
-        (only,) = each["attractors"]
+    for (only,) in (each["attractors"] for each in data["sets"]):
         assert only["kind"] == "undecided"
         assert only["low"]["omega_c"] <= only["mean"]["omega_c"] <= only["high"]["omega_c"]
     head = page.read_text("utf-8").split("| omega_0", 1)[0]
-    assert "μ = 0.45554, η = 0.072543" in head
-    assert "ω₀ = 69.211 rad s-1" in head
-    assert f"dualball attractors {' '.join(given)} --json" in head
+    command = f"dualball attractors {' '.join(given)} --json"
+    for words in ("μ = 0.45554, η = 0.072543", "ω₀ = 69.211 rad s-1", command):
+        assert words in head
     rows = [line for line in page.read_text("utf-8").splitlines() if line.startswith("|")]
     assert len(rows) == 2 + 2
     assert len({row.replace("\\|", "").count("|") for row in rows}) == 1
@@ -117,12 +116,9 @@ def test_time_stepping_comes_to_the_orbit_of_theory() -> None:
     pytest.importorskip("numba")
     orbit = orbits.refine(HOPPING, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.223)
     theory = np.array([orbit.period, orbit.turn / orbit.period, orbit.cycle.y.max()])
-    coarse, fine = (
-        np.array([each.value for each in attractors.tops(run, 12.0, 16.0).values.values()])
-        for run in (
-            analytic.simulate(HOPPING, orbit.loop.x, 16.0, method="time-stepping", timestep=step, sample_interval=1e-3)
-            for step in (4e-6, 2e-6)
-        )
-    )
+    how = {"method": "time-stepping", "sample_interval": 1e-3}
+    runs = [analytic.simulate(HOPPING, orbit.loop.x, 16.0, timestep=step, **how) for step in (4e-6, 2e-6)]
+    tops = [attractors.tops(run, 12.0, 16.0).values.values() for run in runs]
+    coarse, fine = (np.array([each.value for each in values]) for values in tops)
     assert np.abs(fine / theory - 1).max() < np.abs(coarse / theory - 1).max() / 3
     assert (fine + (fine - coarse) / 3) / theory == pytest.approx(np.ones(3), abs=1e-6)

@@ -23,7 +23,7 @@ from compare.kit.check import Check
 from compare.kit.drawing import Diagram, GapError, Material, Motion
 from compare.kit.engines import ENGINES
 from compare.kit.record import Measurement, Records
-from compare.subjects.flowmeter.figures import unloading
+from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.slipping import figures as slipping
 from compare.subjects.thresholds import figures as bifurcations
 from compare.subjects.unsteady import figures as unsteady
@@ -212,7 +212,7 @@ def test_a_fall_that_did_not_happen_is_a_gap() -> None:
     p = Parameters.named("reference")
     run = analytic.simulate(p, [0, 0, p.omega_0, 0, 0, 0], 0.1)
     with pytest.raises(GapError, match="never landed"):
-        unloading.draw(Motion("rolling", "event", p, lambda: run))
+        flowmeter.draw_fall(Motion("rolling", "event", p, lambda: run))
 
 
 def test_claims_have_their_own_figures_or_deviations() -> None:

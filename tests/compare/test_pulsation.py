@@ -16,8 +16,7 @@ from compare.kit.levels import Level
 from compare.kit.record import Records
 from compare.kit.sets import sets
 from compare.subjects.unsteady import claims
-from compare.subjects.unsteady.measure import jumps as unsteady
-from compare.subjects.unsteady.measure import pulsation
+from compare.subjects.unsteady import measure as unsteady
 from model import Case, Flow, Parameters
 from tests.measured import thresholds
 from tests.mutants.exchange import believed
@@ -41,8 +40,8 @@ def known(name: str) -> Records:
 @pytest.fixture(scope="module")
 def records(lab) -> Records:
     pulsating = {name: QUICK[name] for name in (NAME, "wake")}
-    rows = [*pulsation.measure(lab, pulsating, known(NAME) + known("wake"))]
-    return Records.of([*rows, *unsteady.measure(lab, {NAME: QUICK[NAME]}, known(NAME))])
+    rows = [*unsteady.pulsation(lab, pulsating, known(NAME) + known("wake"))]
+    return Records.of([*rows, *unsteady.jumps(lab, {NAME: QUICK[NAME]}, known(NAME))])
 
 
 def test_everything_is_measured_and_theory_and_engine_agree(records: Records, lab) -> None:
@@ -63,7 +62,7 @@ def test_wrong_theories_are_noticed(records: Records, wrong) -> None:
 
 @pytest.mark.slow
 def test_pulsation_under_the_quadratic_law(lab) -> None:
-    measured = Records.of(pulsation.measure(lab, {"blunt": QUICK["blunt"]}, known("blunt")))
+    measured = Records.of(unsteady.pulsation(lab, {"blunt": QUICK["blunt"]}, known("blunt")))
     assert not measured.missing
     assert {v.outcome for v in judge(claims.CLAIMS[:3], measured)} == {Outcome.CONFIRMED}
 
@@ -72,20 +71,18 @@ def test_pulsation_under_the_quadratic_law(lab) -> None:
 def test_a_mean_may_depend_on_more_than_the_state(lab) -> None:
     """Where theory itself has two answers (docs/theory.md, 11) the protocol sees that its own is none, blind."""
     p, f, a = sets(Level.DEFAULT)["design-5"].replace(omega_0=11.7694), 4.0, 199.89
-    early, late = (
-        analytic.flowmeter.pulsation.mean_error(p, a, f, leave_rolling=rule)
-        for rule in ("slip-stability", "infeasible")
-    )
+    theory, rules = analytic.flowmeter.pulsation, ("slip-stability", "infeasible")
+    early, late = (theory.mean_error(p, a, f, leave_rolling=rule) for rule in rules)
     assert late - early > 0.015 * abs(early)
-    begin = analytic.flowmeter.pulsation.swing(p, a, f, 0.0)[0] - p.omega_0
-    driven = pulsation.Pulsation("design-5", p, f, a, reach=1.0, begin=float(begin) / a)
-    (row,) = pulsation.mean_errors(replace(lab, level=Level.DEFAULT), [(driven, a)])
+    begin = theory.swing(p, a, f, 0.0)[0] - p.omega_0
+    driven = unsteady.Pulsation("design-5", p, f, a, reach=1.0, begin=float(begin) / a)
+    (row,) = unsteady.mean_errors(replace(lab, level=Level.DEFAULT), [(driven, a)])
     assert "more than the state" in row.reason
 
 
 def test_sets_without_slip_say_why(lab) -> None:
     wall = {"wall": Parameters.named("high-wall-friction")}
-    rows = [*pulsation.measure(lab, wall, Records()), *unsteady.measure(lab, wall, Records())]
+    rows = [*unsteady.pulsation(lab, wall, Records()), *unsteady.jumps(lab, wall, Records())]
     assert [row.reason for row in rows] == [
         "no flow was measured at which two-point rolling ends by slipping",
         "no flows were measured between which the ball slips at both points",
@@ -93,8 +90,8 @@ def test_sets_without_slip_say_why(lab) -> None:
 
 
 def test_limit_of_a_geometric_sequence() -> None:
-    assert pulsation.limit(5 + 0.3 ** np.arange(3)) == pytest.approx(5.0, rel=1e-12)
-    assert pulsation.limit(np.array([0.0, 1.0, 3.0])) == 3.0
+    assert unsteady.limit(5 + 0.3 ** np.arange(3)) == pytest.approx(5.0, rel=1e-12)
+    assert unsteady.limit(np.array([0.0, 1.0, 3.0])) == 3.0
 
 
 CASES = [(Case.RR, 0, True), (Case.SS, 0, True), (Case.SS, 14, True), (Case.SS, 9, False), (Case.NR, 9, False)]
@@ -103,17 +100,18 @@ CASES = [(Case.RR, 0, True), (Case.SS, 0, True), (Case.SS, 14, True), (Case.SS, 
 @pytest.mark.parametrize(("case", "at", "rolls"), [*CASES, (Case.RS, 9, True)])
 def test_rolling_on_is_judged_after_the_beginning(case, at: int, rolls: bool) -> None:
     cases = np.full(16, Case.RR)
-    cases[at : at + pulsation.LASTS] = case
-    assert pulsation.rolls_on(SimpleNamespace(time=np.linspace(0.0, 1.5, 16), case=cases)) is rolls
+    cases[at : at + unsteady.LASTS] = case
+    assert unsteady.rolls_on(SimpleNamespace(time=np.linspace(0.0, 1.5, 16), case=cases)) is rolls
 
 
 def test_a_measured_flow_by_both_witnesses(tmp_path) -> None:
     """Noise and a swell that makes the ball slip, a hundred samples a second."""
     p, t = Parameters.named("reference").replace(c=4.0), np.arange(0.0, 3.0, 0.01)
     omega_0 = 12.0 + 4.0 * np.sin(2 * np.pi * t / 3.0) + 0.3 * np.random.default_rng(1).standard_normal(len(t))
-    path, columns = tmp_path / "flow.csv", np.stack([t, omega_0], axis=-1)
-    np.savetxt(path, columns, delimiter=",", header="time,omega_0", comments="")
-    flow = Flow.from_csv(path)
+    np.savetxt(
+        tmp_path / "flow.csv", np.stack([t, omega_0], axis=-1), delimiter=",", header="time,omega_0", comments=""
+    )
+    flow = Flow.from_csv(tmp_path / "flow.csv")
     theory, run = (simulate(p, [0, 0, 12.0, 0, 0, 0], 3.0, flow) for simulate in (analytic.simulate, mjsim.simulate))
     assert {Case.RR, Case.SS} <= set(theory.cases) & set(run.cases)
     np.testing.assert_allclose(run.omega_c, theory.omega_c, rtol=1e-3)

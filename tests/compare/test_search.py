@@ -17,17 +17,7 @@ from compare.kit.campaign import Campaign
 from compare.kit.sweep import Axis
 from compare.kit.workers import processes
 from compare.subjects.attractors import search
-from compare.subjects.attractors.search import (
-    BOX,
-    FATES,
-    Basins,
-    Search,
-    Searched,
-    basins,
-    carry_out,
-    parameters,
-    random_starts,
-)
+from compare.subjects.attractors.search import BOX, FATES, Basins, Search, Searched, basins, parameters, random_starts
 from docs.studies.figures import SEARCHES
 from model import InputError, Parameters, StorageError, storage
 
@@ -48,23 +38,22 @@ def test_points_fill_the_box_and_a_longer_search_contains_the_shorter():
 
 def test_a_search_goes_on_where_it_stopped(tmp_path):
     """A chunk that is there is read, not computed: nothing is left for the workers to do."""
-    points = QUICK.points(search.CHUNK)[:, :]
-    path = tmp_path / f"{QUICK.key(0)}.json"
     rows = [{"hops": 0, "failed": 0}] * (search.CHUNK - 1) + [{"hops": 1, "failed": 1, "x": [], "confirmed": None}]
-    path.write_text(json.dumps({"chunk": 0, "rows": rows}), "utf-8")
+    (tmp_path / f"{QUICK.key(0)}.json").write_text(json.dumps({"chunk": 0, "rows": rows}), "utf-8")
     seen = []
     record = search.run(tmp_path, QUICK, 10, processes(1), lambda *now: seen.append(now))
     assert seen == [("search", search.CHUNK, search.CHUNK, 0)]
     assert (record.sets, record.failed, len(record.rows), record.confirmed) == (search.CHUNK, 1, 1, [])
-    assert record.rows[0]["mu"] == points[-1, 0]
+    assert record.rows[0]["mu"] == QUICK.points(search.CHUNK)[-1, 0]
 
 
 def test_a_chunk_is_the_same_whoever_computes_it(tmp_path):
     points = QUICK.points(search.CHUNK)[:3]
     for name in ("a", "b"):
-        carry_out(QUICK, 0, points, tmp_path / name)
-    assert (tmp_path / "a").read_text() == (tmp_path / "b").read_text()
-    assert len(json.loads((tmp_path / "a").read_text())["rows"]) == 3
+        search.carry_out(QUICK, 0, points, tmp_path / name)
+    a, b = ((tmp_path / name).read_text() for name in ("a", "b"))
+    assert a == b
+    assert len(json.loads(a)["rows"]) == 3
 
 
 def test_screen_and_confirmation_tell_hopping_from_rest():

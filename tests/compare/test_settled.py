@@ -11,7 +11,7 @@ from compare.kit.levels import EFFORT, Level
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
-from compare.subjects.flowmeter.measure import characteristic
+from compare.subjects.flowmeter import measure as characteristic
 from compare.subjects.stationary import measure as settled
 from compare.subjects.thresholds.measure import basins
 from model import Case, Parameters

@@ -10,40 +10,36 @@ from compare.judge import forget, judge
 from compare.kit.levels import Level
 from compare.kit.record import Records
 from compare.kit.sets import sets
-from compare.subjects.flowmeter import unloading as claims
-from compare.subjects.flowmeter.measure import unloading
+from compare.subjects.flowmeter import measure
+from compare.subjects.flowmeter.claims import CLAIMS
 from tests.measured import thresholds
 
 NAME = "thick-fluid"
 P = sets(Level.QUICK)[NAME]
+UNLOADING = [claim for claim in CLAIMS if "unloading" in claim.protocols]
 
 
 @pytest.fixture(scope="module")
 def records(lab):
     known = thresholds(NAME, P, "omega_02")
-    return known + Records.of(unloading.measure(lab, {NAME: P}, known))
+    return known + Records.of(measure.unloading(lab, {NAME: P}, known))
 
 
 def test_everything_is_measured_and_theory_and_engine_agree(records):
     assert not records.missing
     assert len({(m.quantity, m.conditions.get("event")) for m in records.select("unloading")}) == 7
-    confirmed = {v.claim.id for v in judge(claims.CLAIMS, records) if v.outcome is Outcome.CONFIRMED}
+    confirmed = {v.claim.id for v in judge(UNLOADING, records) if v.outcome is Outcome.CONFIRMED}
     assert confirmed == {"fig-13-right", "push"}
 
 
 def test_predictions_are_as_sure_as_they_say(records, monkeypatch):
     def predicted():
         forget()
-        return [
-            b.predict(m)
-            for c in claims.CLAIMS
-            for b in c.bearings
-            if b.quantity != "case"
-            for m in records.select("unloading", b.quantity, b.when)
-        ]
+        bearings = [b for claim in UNLOADING for b in claim.bearings if b.quantity != "case"]
+        return [b.predict(m) for b in bearings for m in records.select("unloading", b.quantity, b.when)]
 
     usual = predicted()
-    monkeypatch.setattr("compare.subjects.flowmeter.unloading.RTOL", 1e-11)
+    monkeypatch.setattr("compare.subjects.flowmeter.claims.RTOL", 1e-11)
     for one, finer in zip(usual, predicted(), strict=True):
         assert abs(one.value - finer.value) <= one.uncertainty
 
@@ -52,11 +48,11 @@ def test_predictions_are_as_sure_as_they_say(records, monkeypatch):
 def test_claims_notice_other_friction_and_inertia(records, monkeypatch, claim, other):
     right, changed = analytic.simulate, {name: factor * getattr(P, name) for name, factor in other.items()}
     monkeypatch.setattr(analytic, "simulate", lambda p, *args, **more: right(p.replace(**changed), *args, **more))
-    assert {v.claim.id: v.outcome for v in judge(claims.CLAIMS, records)}[claim] is Outcome.REFUTED
+    assert {v.claim.id: v.outcome for v in judge(UNLOADING, records)}[claim] is Outcome.REFUTED
 
 
 def test_first_top_lies_between_samples():
     run = analytic.simulate(P, [0.05, 1.0, 0, 0, 0, 0, 0.01, 0], 0.5, sample_interval=0.01)
     fine = analytic.simulate(P, [0.05, 1.0, 0, 0, 0, 0, 0.01, 0], 0.5, sample_interval=1e-4)
     # Between samples 10 ms apart only the change of the acceleration is left out, c per second of it.
-    assert unloading.first_top(run) == pytest.approx(float(fine.y.max()), abs=P.g * 0.01**2 * P.c * 0.01)
+    assert measure.first_top(run) == pytest.approx(float(fine.y.max()), abs=P.g * 0.01**2 * P.c * 0.01)

@@ -22,7 +22,7 @@ _PERIODIC = "Section 5.3, last paragraph"
 
 
 def _hops(m: Measurement) -> float:
-    """Whether the ball hops on that theory lets go in the same state for as long."""
+    """Whether the ball of theory still hops after as long a run from the same state."""
     return hops(simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
 
 
@@ -31,7 +31,7 @@ def _birth(m: Measurement) -> float:
 
 
 def _death(orbit: Orbit) -> float:
-    """Where multipliers leave the unit circle, on the branch from an orbit along rougher walls."""
+    """The wall friction at which multipliers leave the unit circle, on the branch of an orbit; nan if they don't."""
     branch = orbit_branch.follow(orbit, "eta", orbit.p.eta, 1.1 * orbit.p.eta)
     return next((place.value for place in branch.places if place.kind is Bifurcation.TORUS), math.nan)
 
@@ -58,7 +58,7 @@ def _orbiting(protocol: str, *quantities: str) -> tuple[Bearing, ...]:
 
 
 def _after_rest(m: Measurement) -> float:
-    """What theory comes to from rest within 60/c; the slowest part decays in 2 (1 + 2 j)/c."""
+    """The settled state of theory from rest, after 60/c: the slowest part decays with a time constant 2 (1 + 2 j)/c."""
     run = simulated(m.parameters, (0.0,) * 6, 60.0 / m.parameters.c)
     return float(getattr(run, m.quantity)[-1])
 

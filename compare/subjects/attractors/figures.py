@@ -28,9 +28,9 @@ LOW, HIGH = 0.9, 1.4
 COLOUR = "#7B3294"
 
 
-def select(material: Material) -> Diagram:
-    """The measured mean angular velocities of the hopping ball; the orbits are theory's."""
-    return Diagram("hopping", SET, tuple(material.select("orbit_omega_c", "period")))
+def select(material: Material, quantity: str) -> Diagram:
+    """What was measured of the hopping ball; the orbits are theory's."""
+    return Diagram(quantity, SET, tuple(material.select(quantity, "period")))
 
 
 @functools.cache
@@ -48,56 +48,58 @@ def _branch() -> OrbitBranch:
 def caption_branch(of: Diagram) -> str:
     """Of both diagrams."""
     factors = np.abs([orbit.multipliers[0] for orbit in _branch().orbits])
-    return (
+    return style.caption(
+        of.p,
         "Stationary motions as in Fig. 13 (left) and Figs. 9 and 10 (right), and the hopping ball (purple): its mean "
         "over a period, shaded from least to greatest. Hops begin with no height at ω₀₂, where NS, NR, SR and the "
-        f"unstable SS meet; the largest |multiplier| is {factors.min():.3f} … {factors.max():.3f} here. "
-        f"{style.named(of.p)}, r/R = {of.p.r / of.p.R:.3g}. Dashed: unstable.{style.marks(of.states)}"
+        f"unstable SS meet; the largest |multiplier| is {factors.min():.3f} … {factors.max():.3f} here. Dashed: "
+        f"unstable. r/R = {of.p.r / of.p.R:.3g},",
+        states=of.states,
     )
 
 
 def draw_branch(of: Diagram) -> Figure:
     """omega_c and the spin on the wall over the flow."""
-    edge = bifurcation.thresholds(of.p).omega_02
+    p, branch = of.p, _branch()
+    edge = bifurcation.thresholds(p).omega_02
     figure, (orbit, wall) = style.panels(9.0, 4.2, 1, 2)
-    _diagram(orbit, of.p, lambda slip_x, omega_c: omega_c, (-5, -7), (-5, 7), (-5, 12))
-    _diagram(wall, of.p, functools.partial(spin, of.p), (-5, 7), (-60, -50), (-18, -80))
+    fast = p.replace(omega_0=0.95 * HIGH * edge)  # the branch of SS goes on far beyond the frame
+    means = State(*np.transpose([each.mean for each in branch.orbits]))
+    # What is drawn, and where names stand, in points from the curves of SS, SR and NR, and hopping.
+    shown: tuple[tuple[Axes, Quantity, tuple[tuple[float, float], ...]], ...] = (
+        (orbit, lambda slip_x, omega_c: omega_c, ((-5, -7), (-5, 7), (-5, 12))),
+        (wall, functools.partial(spin, p), ((-5, 7), (-60, -50), (-18, -80))),
+    )
+    for axes, quantity, (slips, rides, hops) in shown:
+        slipping(axes, p, quantity)
+        for stable, text in ((True, "SS"), (False, "SS, unstable")):
+            end = analytic.solution(fast, Case.SS, stable=stable).state
+            height = float(quantity(end.slip_x, end.omega_c))
+            style.name(axes, fast.omega_0, height, text, slips, style.COLOURS[Case.SS])
+        for case, x, text, place in (
+            (Case.NR, np.linspace(edge, HIGH * edge, 100), "SR, NR", (0.6, rides)),
+            (Case.NS, np.array([LOW, 1 - 1e-9]) * edge, "NS", (0.5, (-3, 9))),
+        ):
+            slip = np.asarray(spins(case, x, p)) - p.R / p.r * x
+            style.curve(axes, case, x, quantity(slip, x), text, place)
+        cycles = [quantity(each.cycle.slip_x, each.cycle.omega_c) for each in branch.orbits]
+        mean = quantity(means.slip_x, means.omega_c)
+        low, high = [c.min() for c in cycles], [c.max() for c in cycles]
+        axes.fill_between(branch.values, low, high, color=COLOUR, alpha=0.25, lw=0)
+        for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
+            axes.plot(branch.values, np.where(part, mean, np.nan), color=COLOUR, ls=line, lw=2)
+        style.name(axes, float(branch.values[-3]), float(mean[-3]), "hopping", hops, COLOUR)
+        for special in branch.places:
+            if special.kind is orbit_branch.Bifurcation.BIRTH:
+                born = State(*special.orbit.mean)
+                style.mark(axes, special.value, float(quantity(born.slip_x, born.omega_c)), "birth", (-10, -30))
+        axes.set(xlim=(LOW * edge, HIGH * edge), xlabel=style.OMEGA_0)
+        style.guides(axes, {"omega_02": edge})
     orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * HIGH * edge))
-    wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, of.p)))
+    wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, p)))
     style.points(orbit, of.states)
     style.legend(orbit, loc="center right")
     return figure
-
-
-def _diagram(axes: Axes, p: Parameters, quantity: Quantity, *offsets: tuple[float, float]) -> None:
-    """The diagram of a quantity; names stand at offsets in points from the curves of SS, SR and NR, hopping."""
-    slips, rides, hops = offsets
-    edge, branch = bifurcation.thresholds(p).omega_02, _branch()
-    slipping(axes, p, quantity)
-    fast = p.replace(omega_0=0.95 * HIGH * edge)  # the branch goes on far beyond the frame
-    for stable, text in ((True, "SS"), (False, "SS, unstable")):
-        end = analytic.solution(fast, Case.SS, stable=stable).state
-        style.name(axes, fast.omega_0, float(quantity(end.slip_x, end.omega_c)), text, slips, style.COLOURS[Case.SS])
-    for case, x, text, place in (
-        (Case.NR, np.linspace(edge, HIGH * edge, 100), "SR, NR", (0.6, rides)),
-        (Case.NS, np.array([LOW, 1 - 1e-9]) * edge, "NS", (0.5, (-3, 9))),
-    ):
-        slip = np.asarray(spins(case, x, p)) - p.R / p.r * x
-        style.curve(axes, case, x, quantity(slip, x), text, place)
-    cycles = [quantity(orbit.cycle.slip_x, orbit.cycle.omega_c) for orbit in branch.orbits]
-    means = State(*np.transpose([orbit.mean for orbit in branch.orbits]))
-    mean = quantity(means.slip_x, means.omega_c)
-    low, high = [c.min() for c in cycles], [c.max() for c in cycles]
-    axes.fill_between(branch.values, low, high, color=COLOUR, alpha=0.25, lw=0)
-    for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
-        axes.plot(branch.values, np.where(part, mean, np.nan), color=COLOUR, ls=line, lw=2)
-    style.name(axes, float(branch.values[-3]), float(mean[-3]), "hopping", hops, COLOUR)
-    for special in branch.places:
-        if special.kind is orbit_branch.Bifurcation.BIRTH:
-            born = State(*special.orbit.mean)
-            style.mark(axes, special.value, float(quantity(born.slip_x, born.omega_c)), "birth", (-10, -30))
-    axes.set(xlim=(LOW * edge, HIGH * edge), xlabel=style.OMEGA_0)
-    style.guides(axes, {"omega_02": edge})
 
 
 def caption_orbit(of: Diagram) -> str:
@@ -144,11 +146,6 @@ def walls() -> dict[str, Any]:
     return branch
 
 
-def select_walls(material: Material) -> Diagram:
-    """The measured end of hopping."""
-    return Diagram("hopping-walls", SET, tuple(material.select("orbit_death")))
-
-
 def caption_walls(of: Diagram) -> str:
     """What happens along the branch."""
     places = "; ".join(f"{place['kind']} at η = {place['value']:.4g}" for place in walls()["places"])
@@ -183,26 +180,14 @@ def draw_walls(of: Diagram) -> Figure:
     return figure
 
 
+_RECORDS = (
+    ("hopping-orbit", "a ball that hops for ever", "omega_c", draw_orbit, caption_orbit, "hopping"),
+    ("hopping-branch", "Figs. 9, 10 and 13 with hopping", "omega_c", draw_branch, caption_branch, "hopping-birth"),
+    ("hopping-walls", "hops along rougher walls", "death", draw_walls, caption_walls, "hopping-death"),
+)
 FIGURES = {
-    "hopping-orbit": Drawing(
-        "Beyond the paper: a ball that hops for ever",
-        select,
-        draw_orbit,
-        caption_orbit,
-        ("hopping",),
-    ),
-    "hopping-branch": Drawing(
-        "Beyond the paper: Figs. 9, 10 and 13 with hopping",
-        select,
-        draw_branch,
-        caption_branch,
-        ("hopping-birth",),
-    ),
-    "hopping-walls": Drawing(
-        "Beyond the paper: hops along rougher walls",
-        select_walls,
-        draw_walls,
-        caption_walls,
-        ("hopping-death",),
-    ),
+    name: Drawing(
+        f"Beyond the paper: {title}", functools.partial(select, quantity=f"orbit_{what}"), draw, caption, (claim,)
+    )
+    for name, title, what, draw, caption, claim in _RECORDS
 }

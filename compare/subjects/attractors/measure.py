@@ -1,17 +1,11 @@
 """Motions that never settle: a ball that hops for ever, one that swings for ever, and whether others do.
 
-* A ball hops: it starts near its hop; then the flow is lowered in held steps. At each the tops of the hops say period,
-  height and orbit; how the heights settle says by what factor a disturbance shrinks from hop to hop; and the flow at
-  which the height would be zero is extrapolated. At the flow of the set alone Moreau-Jean time stepping shows it, too.
-* The hop is followed along rougher and rougher walls, to where disturbances grow: from tops that settle, or leave, the
-  top of the steady hop is computed, and from two of them the start at the next wall is extrapolated. On both sides of
-  the wall at which disturbances neither grow nor shrink, a ball is left alone: does it hop on?
+* A ball hops while the flow is lowered in held steps. The tops of its hops give period, height, orbit, and by what
+  factor disturbances shrink from hop to hop; the flow at which hops would have no height is extrapolated.
+* The hop is followed along rougher walls to where disturbances grow; on both sides of that wall balls are left alone.
 * A ball swings beside a Hopf point: it slips at both points, and goes round now faster and now slower.
 * Balls in strong drag are followed until drag has had its time: do they go on hopping?
-* On floors so rough (mu > 1) that rolling and slipping are both consistent with the forces, rolling on for as long as
-  forces allow would lead to a cycle of sticking and slipping that never settles: what does the ball settle to?
-
-An engine may locate a landing to a step only; the difference of two time steps is then the error of the finer one.
+* On floors so rough (mu > 1) that forces allow rolling and slipping both: what does the ball settle to?
 """
 
 from __future__ import annotations
@@ -21,8 +15,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
-from scipy.stats import qmc
 
 from compare.kit.engines import MOREAU
 from compare.kit.lab import Lab, coarse_step, time_unit
@@ -32,6 +24,7 @@ from compare.kit.record import Measurement, Missing, Records, if_sure, measureme
 from compare.kit.settling import settle
 from compare.kit.short import constrained
 from compare.kit.statistics import Measured, hops, peaks, top
+from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
 from compare.kit.trials import Start, Trial, carry_out, finer
 from model import Case, Flow, Parameters, State, Trajectory
@@ -41,15 +34,15 @@ SET = "hopping"
 TOP = State(y=6.4e-3, omega_c=57.3, slip_x=-106.0)
 """A state near the top of a hop of the set."""
 HOLD, LAST, LATER = 12.0, 3.0, 2.0
-"""How long each flow is held, the last part of it in which the motion is measured, and the first in which disturbances
-are too large to be linear, s."""
+"""How long each flow is held, the last part of it that is measured, and the first part, in which disturbances are not
+yet linear, s."""
 REFINED = 8, 16
-"""Steps of the engine in one of `coarse_step`."""
+"""Time steps in one of `coarse_step`."""
 SAMPLE = 1e-3
 """Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
 WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
-"""Friction of the walls along which the hop is followed, in units of that of the set; few balls come to a hop that
-start beside it, so that the first steps, with less to extrapolate from, are short."""
+"""Friction of the walls along which the hop is followed, in units of that of the set. The first steps are short, as the
+start is extrapolated from one or two hops, and few balls beside a hop come to it."""
 NEAR = 4
 """The last walls, among which disturbances come to grow."""
 FOLLOWED, ALONE = 10.0, 60.0
@@ -62,7 +55,13 @@ ROUGH = {
     "rough-floor-1": (1.7222, 0.0388, 0.482, 0.292, 0.1099, 2.635),
     "rough-floor-2": (1.2277, 0.1721, 0.611, 0.154, 0.1198, 2.099),
 }
-"""mu, eta, j, r/R, kappa, omega_0 sqrt(R/g)."""
+"""mu, eta, j, r/R, kappa, Omega_0."""
+
+
+def with_groups(p: Parameters, mu: float, eta: float, j: float, r: float, kappa: float, Omega_0: float) -> Parameters:
+    """The set p with r in m, kappa = c sqrt(R/g), Omega_0 = omega_0 sqrt(R/g), and the other dimensionless groups."""
+    unit = time_unit(p)
+    return p.replace(mu=mu, eta=eta, j=j, r=r, c=kappa / unit, omega_0=Omega_0 / unit)
 
 
 class Hops(NamedTuple):
@@ -76,7 +75,7 @@ class Hops(NamedTuple):
     def values(self) -> dict[str, Measured]:
         """Period, mean angular velocity and height, uncertain by half the range over single hops.
 
-        Disturbances swing while they die out, so that means of parts may agree by chance.
+        Means of two parts could agree by chance, because disturbances swing while they die out.
         """
         span, periods, height = self.time[-1] - self.time[0], np.diff(self.time), self.x[:, 0]
         values = {
@@ -108,8 +107,7 @@ def _staircase(
     flows = [share * p.omega_0 for share in shares]
     lasts = HOLD * len(flows)
     samples, flow = round(lasts / SAMPLE), Flow.staircase(flows, HOLD)
-    trial = Trial(SET, p, "hops", TOP.stacked(), lasts, refine, samples, flow=flow)
-    (result,) = carry_out(lab, protocol, [trial])
+    (result,) = carry_out(lab, protocol, [Trial(SET, p, "hops", TOP.stacked(), lasts, refine, samples, flow=flow)])
     if isinstance(result, Missing):
         yield result
         return
@@ -176,13 +174,17 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     p = Parameters.named(SET)
     walls = [p.replace(eta=share * p.eta) for share in WALLS]
     etas = [q.eta for q in walls]
-    steady = [TOP.stacked().repeat(2).reshape(8, 2).T]  # where hops return to themselves, with both steps (2, 8)
+
+    def task(q: Parameters, x: Array, lasts: float, refined: int) -> Task:
+        return lab.task(q, x, lasts, coarse_step(q) / refined, samples=round(lasts / SAMPLE))
+
+    steady = [np.array([TOP.stacked()] * 2)]  # fixed points of the map from hop to hop, with both steps (2, 8)
     factors, tasks, near = [], [], []
     for k, q in enumerate(walls):
         ahead = steady[-1]
         if k > 1:
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
-        pair = [_followed(lab, q, x, FOLLOWED, refined) for x, refined in zip(ahead, REFINED, strict=True)]
+        pair = [task(q, x, FOLLOWED, refined) for x, refined in zip(ahead, REFINED, strict=True)]
         runs = lab.attempt(pair)
         parts = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
@@ -197,12 +199,8 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     place = death(etas[-NEAR:], factors[-NEAR:])
     used = [task for pair in tasks[-NEAR:] for task in pair]
     yield measurement(lab, "followed", SET, walls[-NEAR], "orbit_death", place, used, **near[-NEAR])
-    again = [_followed(lab, walls[k], tasks[k][1].x0, ALONE, REFINED[0]) for k in (-NEAR, -1)]
+    again = [task(walls[k], np.array(tasks[k][1].x0), ALONE, REFINED[0]) for k in (-NEAR, -1)]
     yield from _left_alone(lab, "followed", SET, again)
-
-
-def _followed(lab: Lab, p: Parameters, x: npt.ArrayLike, lasts: float, refined: int) -> Task:
-    return lab.task(p, x, lasts, coarse_step(p) / refined, samples=round(lasts / SAMPLE))
 
 
 def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured:
@@ -215,54 +213,45 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured
 
 
 def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Period, mean and size of the swing of omega_c, on a very rough floor.
+    """Period, mean and size of the swing of omega_c, from its turning points, on a very rough floor.
 
     With other steps than these the contact of the floor, which carries a hundredth of the weight, comes and goes.
     """
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
-    trial = Trial("reference", p, "swing", x0, SWINGS, (60, 80), 12_000)
-    (result,) = carry_out(lab, "swing", [trial])
+    (result,) = carry_out(lab, "swing", [Trial("reference", p, "swing", x0, SWINGS, (60, 80), 12_000)])
     end = SWINGS - SWUNG
     if isinstance(result, Missing):
         yield result
-    elif any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
+        return
+    if any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
         yield Missing("swing", "reference", "the ball does not slip at both points for ever")
-    else:
-        parts = (result.coarse, end), (result.fine, end), (result.fine, end - SWUNG)
-        coarse, fine, before = (_swung(run, since) for run, since in parts)
-        conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": fine["swing_period"]}
-        for name, value in fine.items():
-            sure = finer(coarse[name], Measured(value, abs(value - before[name])))
-            yield result.row(lab, name, sure, **conditions)
-
-
-def _swung(run: Trajectory, start: float) -> dict[str, float]:
-    """From the turning points of omega_c in `SWUNG` s after a time."""
-    inside = (run.time > start) & (run.time <= start + SWUNG)
-    time, omega_c = run.time[inside], run.omega_c[inside]
-    (k, late), (low, lower) = peaks(omega_c), peaks(-omega_c)
-    at = time[k] + late * (time[1] - time[0])
-    size = np.mean(top(omega_c, k, late)) - np.mean(top(omega_c, low, lower))
-    theta = np.interp(at[[0, -1]], run.time, run.theta)
-    return {
-        "swing_period": float((at[-1] - at[0]) / (len(at) - 1)),
-        "swing_omega_c": float((theta[1] - theta[0]) / (at[-1] - at[0])),
-        "swing_size": float(size),
-    }
+        return
+    parts = []
+    for run, start in (result.coarse, end), (result.fine, end), (result.fine, end - SWUNG):
+        inside = (run.time > start) & (run.time <= start + SWUNG)
+        time, omega_c = run.time[inside], run.omega_c[inside]
+        (k, late), (low, lower) = peaks(omega_c), peaks(-omega_c)
+        at = time[k] + late * (time[1] - time[0])
+        span, turn = at[-1] - at[0], np.diff(np.interp(at[[0, -1]], run.time, run.theta))[0]
+        size = np.mean(top(omega_c, k, late)) - np.mean(top(omega_c, low, lower))
+        parts.append((float(span / (len(at) - 1)), float(turn / span), float(size)))
+    conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": parts[1][0]}
+    for name, coarse, fine, before in zip(("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True):
+        yield result.row(lab, name, finer(coarse, Measured(fine, abs(fine - before))), **conditions)
 
 
 def calm(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Whether balls still hop after 60/c of the weakest drag: three of each of 16 sets."""
-    reference, rng = sets["reference"], np.random.default_rng(5)
-    unit, tasks = time_unit(reference), []
-    low, high = zip(*STRONG_DRAG.values(), strict=True)
-    for mu, eta, j, kappa, Omega_0 in qmc.scale(qmc.Sobol(len(low), rng=5).random(16), low, high).tolist():
-        p = reference.replace(mu=mu, eta=eta, j=j, c=kappa / unit, omega_0=Omega_0 / unit)
+    reference, rng, tasks = sets["reference"], np.random.default_rng(5), []
+    low, high = np.transpose(list(STRONG_DRAG.values()))
+    for mu, eta, j, kappa, Omega_0 in (low + sobol(len(low), 16, 5) * (high - low)).tolist():
+        p = with_groups(reference, mu, eta, j, reference.r, kappa, Omega_0)
+        lasts = 60.0 * time_unit(p) / STRONG_DRAG["kappa"][0]
         for _ in range(3):
             slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, 3)
             x = State(rng.uniform(0, p.R), 0.0, p.omega_0 * rng.uniform(-0.5, 2), *slips)
-            tasks.append(lab.task(p, x, 60.0 * unit / STRONG_DRAG["kappa"][0], coarse_step(p) / 4, samples=2000))
+            tasks.append(lab.task(p, x, lasts, coarse_step(p) / 4, samples=2000))
     yield from _left_alone(lab, "calm", "strong drag", tasks)
 
 
@@ -278,11 +267,9 @@ def _left_alone(lab: Lab, protocol: str, set: str, tasks: list[Task]) -> Iterato
 
 def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Case and omega_c of what a ball settles to from rest, in a flow above omega_01."""
-    reference, starts = sets["reference"], []
-    unit = math.sqrt(reference.g / reference.R)
-    for name, (mu, eta, j, ratio, kappa, Omega_0) in list(ROUGH.items())[: lab.effort("choice.sets")]:
-        p = reference.replace(mu=mu, eta=eta, j=j, r=ratio * reference.R, c=kappa * unit, omega_0=Omega_0 * unit)
-        starts.append(Start(name, p, "rest", np.zeros(8)))
+    p, starts = sets["reference"], []
+    for name, (mu, eta, j, ratio, *rates) in list(ROUGH.items())[: lab.effort("choice.sets")]:
+        starts.append(Start(name, with_groups(p, mu, eta, j, ratio * p.R, *rates), "rest", np.zeros(8)))
     for start, settled in zip(starts, settle(lab, starts), strict=True):
         if settled.failure:
             yield Missing("choice", start.set, settled.failure)
@@ -292,14 +279,13 @@ def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
 
 
 _HOPS = "hops that last are those of the set hopping"
-_SWINGS = "swings that last are those of reference on a very rough floor"
-_DRAG = "strong drag is tried on sets of its own"
-_ROUGH = "the choice is that of sets of its own with mu > 1"
 PROTOCOLS = (
     Protocol("recurrent", hopping, alone=_HOPS, first=True, cost=5),
     Protocol("stepped", stepped, engine=MOREAU, alone=_HOPS, first=True),
-    Protocol("choice", choice, alone=_ROUGH, first=True),
+    Protocol("choice", choice, alone="the choice is that of sets of its own with mu > 1", first=True),
     Protocol("followed", followed, level=Level.DEFAULT, alone=_HOPS),
-    Protocol("swing", swing, level=Level.DEFAULT, alone=_SWINGS),
-    Protocol("calm", calm, level=Level.DEFAULT, alone=_DRAG),
+    Protocol(
+        "swing", swing, level=Level.DEFAULT, alone="swings that last are those of reference on a very rough floor"
+    ),
+    Protocol("calm", calm, level=Level.DEFAULT, alone="strong drag is tried on sets of its own"),
 )

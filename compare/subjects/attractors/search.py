@@ -1,12 +1,11 @@
 """Where the ball hops for ever: over a box of parameters, and over a plane of starts. Both go on where they stopped.
 
-* A search: every set is a point of a scrambled Sobol sequence over mu, eta, j, r/R, kappa = c sqrt(R/g) and Omega_0 =
-  omega_0 sqrt(R/g), and is started from a few random states. What still hops by time stepping is confirmed by the
-  event-driven simulation (`analytic.orbits.fates`). A chunk of sets is a file, named by the hash of all that
-  determines it; a longer search contains the shorter ones.
-* A map of basins: which attractor the ball comes to from each start of a plane of states, on a fine grid by time
-  stepping and on a coarse one by MuJoCo. They should differ at the boundaries of basins only, where the least error
-  decides: `Basins.differences` says how far away.
+A search screens random starts of sets, the points of a scrambled Sobol sequence over mu, eta, j, r/R, kappa =
+c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g), by time stepping; the event-driven simulation confirms what still hops. A
+chunk of sets is a file, named by the hash of all that determines it; a longer search contains the shorter ones.
+
+A map of basins says where the ball ends from each start of a plane of states, on a fine grid by time stepping and on
+a coarse one by MuJoCo. The two should differ only at the boundaries of basins, where the least error decides.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import dataclasses
 import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass, field
@@ -36,8 +36,9 @@ from compare.kit.statistics import hops
 from compare.kit.sweep import Axis, sobol
 from compare.kit.tasks import Task, sources
 from compare.kit.workers import Workers
+from compare.subjects.attractors.measure import with_groups
 from mjsim import ContactSettings
-from model import Case, Contact, Flow, InputError, Parameters, SimulationError, State, Trajectory
+from model import Case, Contact, Flow, InputError, Parameters, SimulationError, State
 from model.arrays import Array
 from model.files import make_directory, reading_json, write_text
 from model.kinematics import VARIABLES
@@ -89,8 +90,7 @@ class Searched:
     search: Search
     sets: int
     rows: tuple[Mapping[str, Any], ...]
-    """The groups of each, "hops": how many starts hop, "confirmed": the fields of
-    `analytic.orbits.fates.Hopping` by the event-driven simulation, or None."""
+    """The groups of each; "hops", how many starts do; "confirmed", the fields of `fates.Hopping` or None."""
     failed: int
     """Runs that broke down."""
 
@@ -114,9 +114,8 @@ class Searched:
 def parameters(point: Array) -> Parameters:
     """The set at a point; R, g and m are those of the reference, and don't matter."""
     p = Parameters.named("reference")
-    mu, eta, j, size, kappa, Omega_0 = point.tolist()
-    unit = math.sqrt(p.R / p.g)
-    return p.replace(mu=mu, eta=eta, j=j, r=size * p.R, c=kappa / unit, omega_0=Omega_0 / unit)
+    mu, eta, j, ratio, kappa, Omega_0 = point.tolist()
+    return with_groups(p, mu, eta, j, ratio * p.R, kappa, Omega_0)
 
 
 def random_starts(p: Parameters, count: int, seed: Sequence[int]) -> Array:
@@ -158,24 +157,23 @@ def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
 def run(directory: Path, search: Search, count: int, workers: Workers, show: Show) -> Searched:
     """Search `count` sets, rounded up to whole chunks; finished chunks are read."""
     make_directory(directory)
-    chunks = math.ceil(count / CHUNK)
-    points = search.points(chunks * CHUNK).reshape(chunks, CHUNK, -1)
-    paths = [directory / f"{search.key(chunk)}.json" for chunk in range(chunks)]
-    todo = [chunk for chunk in range(chunks) if not paths[chunk].exists()]
-    done = chunks - len(todo)
-    show("search", done * CHUNK, chunks * CHUNK, 0)
+    points = search.points(math.ceil(count / CHUNK) * CHUNK)
+    chunks = points.reshape(-1, CHUNK, len(BOX))
+    paths = [directory / f"{search.key(chunk)}.json" for chunk in range(len(chunks))]
+    todo = [chunk for chunk, path in enumerate(paths) if not path.exists()]
+    show("search", len(points) - len(todo) * CHUNK, len(points), 0)
     executor, at_once = workers.start(), True
     try:
-        for future in as_completed(executor.submit(carry_out, search, k, points[k], paths[k]) for k in todo):
+        running = [executor.submit(carry_out, search, k, chunks[k], paths[k]) for k in todo]
+        for left, future in zip(reversed(range(len(todo))), as_completed(running), strict=True):
             future.result()
-            done += 1
-            show("search", done * CHUNK, chunks * CHUNK, 0)
+            show("search", len(points) - left * CHUNK, len(points), 0)
         at_once = False
     finally:
         workers.stop(executor, at_once)
     rows = [row for path in paths for row in json.loads(path.read_text("utf-8"))["rows"]]
-    groups = (dict(zip(BOX, point, strict=True)) for point in points.reshape(len(rows), -1).tolist())
-    found = tuple(point | row for point, row in zip(groups, rows, strict=True) if row["hops"])
+    sets = [dict(zip(BOX, point, strict=True)) for point in points.tolist()]
+    found = tuple(groups | row for groups, row in zip(sets, rows, strict=True) if row["hops"])
     return Searched(search, len(rows), found, sum(row["failed"] for row in rows))
 
 
@@ -192,6 +190,12 @@ def parts(record: Searched) -> Iterator[tuple[str, float, float, int, int]]:
 
 def page(*searches: Searched) -> str:
     """Results as a page of Markdown: how often the ball hops for ever in each part of the box, with confidence."""
+
+    def share(hits: int, of: int) -> tuple[str, str, str]:
+        """In %, empty for a share of nothing, and the ends of the 95 % interval."""
+        low, high = interval(hits, of)
+        return f"{100 * hits / of:.2f}" if of else "", f"{100 * low:.2f}", f"{100 * high:.2f}"
+
     text = [
         "# Where the ball hops for ever",
         "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: mu and eta are "
@@ -200,37 +204,30 @@ def page(*searches: Searched) -> str:
     ]
     for record in searches:
         search, rows, count = record.search, record.confirmed, len(record.confirmed)
-        periods = [row["confirmed"]["landings"] for row in rows]
-        kinds = [f"{periods.count(n)} with {n}" for n in sorted(set(periods) - {0})]
-        kinds += [f"{periods.count(0)} with no period found"] if 0 in periods else []
+        percent, low, high = share(count, record.sets)
+        periods = Counter(row["confirmed"]["landings"] for row in rows)
+        kinds = [f"{periods[n]} with {n or 'no period found'}" for n in sorted(periods, key=lambda n: (n == 0, n))]
         landings = f"Sets by landings in a period: {', '.join(kinds)}. " if kinds else ""
         others = f", {len(record.rows) - count} of them not confirmed" if len(record.rows) > count else ""
         broken = f" {record.failed} runs broke down." if record.failed else ""
         box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in search.box.items())
-        share, low, high = _share(count, record.sets)
-        ends = [[name, *(f"{end([row[name] for row in rows]):.3g}" for end in (min, max))] for name in BOX if rows]
-        shares = [
-            [name, f"{a:.3g}", f"{b:.3g}", str(n), str(hits), _share(hits, n)[0], " … ".join(_share(hits, n)[1:])]
+        least, most = search.box["kappa"]
+        ends = [[name, *(f"{end(row[name] for row in rows):.3g}" for end in (min, max))] for name in BOX if rows]
+        table = [
+            [name, f"{a:.3g}", f"{b:.3g}", str(n), str(hits), share(hits, n)[0], " … ".join(share(hits, n)[1:])]
             for name, a, b, n, hits in parts(record)
         ]
-        least, most = search.box["kappa"]
         text += [
             f"## Drag from kappa = {least:.3g} to {most:.3g}: {record.sets} sets",
             f"The box is {box}. Each set was started from {search.starts} random states. In {count} sets some start "
-            f"leads to hopping that the event-driven simulation confirms: {share} %, or {low} to {high} % with 95 % "
+            f"leads to hopping that the event-driven simulation confirms: {percent} %, or {low} to {high} % with 95 % "
             f"confidence. That is what {search.starts} starts find: an attractor with a small basin is missed. "
             f"{landings}By time stepping {len(record.rows)} sets still hopped after 60/c{others}.{broken} "
             "In all other sets every ball stopped landing.",
             pages.markdown([["", "smallest with hopping", "largest"], *ends]),
-            pages.markdown([["", "from", "to", "sets", "hopping", "share, %", "95 % interval, %"], *shares]),
+            pages.markdown([["", "from", "to", "sets", "hopping", "share, %", "95 % interval, %"], *table]),
         ]
     return "\n\n".join(text) + "\n"
-
-
-def _share(hits: int, of: int) -> tuple[str, str, str]:
-    """A share in % and the ends of its 95 % interval; no share of nothing."""
-    low, high = interval(hits, of)
-    return f"{100 * hits / of:.2f}" if of else "", f"{100 * low:.2f}", f"{100 * high:.2f}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,27 +301,28 @@ def basins(
     states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
     step = fitting_step(140, p, Flow.steady(p.omega_0), lasts)
-    by_engine = (
-        (MOREAU.name, Settings(method=MOREAU.name, timestep=step), states),
-        (MUJOCO.name, ContactSettings.for_problem(p, timestep), few),
-    )
     tasks = [
         Task(engine=engine, parameters=p, x0=x0, t_end=lasts, settings=settings, sample_interval=lasts / 500)
-        for engine, settings, chosen in by_engine
+        for engine, settings, chosen in (
+            (MOREAU.name, Settings(method=MOREAU.name, timestep=step), states),
+            (MUJOCO.name, ContactSettings.for_problem(p, timestep), few),
+        )
         for x0 in (start_state(x, p, Settings()) for x in chosen.reshape(-1, len(VARIABLES)))
     ]
     broken = {failure.task.key for failure in campaign.complete(tasks)}
-    ends = ["undecided" if task.key in broken else _fate(campaign.load(task.key)) for task in tasks]
-    fine, other = np.split(np.array([FATES.index(end) for end in ends]), [len(y) * len(x)])
+    fates = []
+    for task in tasks:
+        fate = "undecided"
+        if task.key not in broken:
+            run = campaign.load(task.key)
+            case = run.cases[-1]
+            if hops(run, 0.3):
+                fate = "hops"
+            elif case in (Case.RR, Case.SS):
+                fate = case.name
+            elif case is Case.SR or case.A is Contact.N:
+                fate = "off the floor"
+        fates.append(FATES.index(fate))
+    fine, other = np.split(np.array(fates), [len(y) * len(x)])
     maps = fine.reshape(states.shape[:2]), coarse, other.reshape(few.shape[:2])
     return Basins(p, tuple(base.tolist()), across.name, up.name, x, y, *maps, timestep)
-
-
-def _fate(run: Trajectory) -> str:
-    """Where the ball of a whole run ends."""
-    case = run.cases[-1]
-    if hops(run, 0.3):
-        return "hops"
-    if case in (Case.RR, Case.SS):
-        return case.name
-    return "off the floor" if case is Case.SR or case.A is Contact.N else "undecided"

@@ -11,9 +11,12 @@ from compare.claim import Bearing, Claim
 from compare.judge import simulated, theory
 from compare.kit.check import Relation
 from compare.kit.record import Measurement, state
-from compare.subjects.unsteady.measure.jumps import caught_up
-from model import Case, Flow, Parameters
+from compare.subjects.unsteady.measure import caught_up
+from model import Case, Flow
 from model.drag import STOKES
+
+_BY = "analytic.flowmeter"
+_RATE = f"{_BY}.response.rolling_rate"
 
 
 def _at(m: Measurement, name: str = "f") -> float:
@@ -33,9 +36,8 @@ def _slips(rule: str, relation: Relation) -> Bearing:
     def onset(m: Measurement) -> float:
         return theory(pulsation.slip_onset, m.parameters, _at(m), rule)
 
-    return Bearing(
-        "pulsation", "slip_amplitude", onset, relation=relation, by=f"analytic.flowmeter.pulsation.slip_onset, {rule}"
-    )
+    by = f"{_BY}.pulsation.slip_onset, {rule}"
+    return Bearing("pulsation", "slip_amplitude", onset, relation=relation, by=by)
 
 
 def _mean_error(m: Measurement) -> float:
@@ -46,19 +48,16 @@ def _peak(m: Measurement) -> tuple[float, float]:
     return theory(response.peak, m.parameters, Case.SS)
 
 
-def ramp_end(p: Parameters, rate: float, x0: tuple[float, ...]) -> float:
+def _ramp_end(m: Measurement) -> float:
     """The flow at which a ramp ends slipping at both points by theory; LookupError if it doesn't."""
+    p, rate = m.parameters, _at(m, "rate")
     # The ramp goes on three times as far beyond the fold as a slow one overshoots it.
     beyond = analytic.thresholds(p).omega_04 + 3.0 * response.ramp_coefficient(p) * rate ** (2 / 3)
     t_end = (beyond - p.omega_0) / rate
-    end = caught_up(simulated(p, x0, t_end, 5_000, Flow.ramp(p.omega_0, beyond, t_end)))
+    end = caught_up(simulated(p, state(m), t_end, 5_000, Flow.ramp(p.omega_0, beyond, t_end)))
     if math.isnan(end):
         raise LookupError("in theory the ramp doesn't end slipping")
     return end
-
-
-def _ramp_end(m: Measurement) -> float:
-    return theory(ramp_end, m.parameters, _at(m, "rate"), state(m))
 
 
 def _overshoot(m: Measurement) -> float:
@@ -73,18 +72,10 @@ CLAIMS = (
         "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c.",
         (
             Bearing(
-                "pulsation",
-                "gain",
-                lambda m: abs(_ratio(m)),
-                by="analytic.flowmeter.response.transfer, pulsation.first_harmonic",
+                "pulsation", "gain", lambda m: abs(_ratio(m)), by=f"{_BY}.response.transfer, pulsation.first_harmonic"
             ),
             Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_ratio(m)), by="the same"),
-            Bearing(
-                "unsteady",
-                "jump_delay",
-                lambda m: 1 / response.rolling_rate(m.parameters),
-                by="analytic.flowmeter.response.rolling_rate",
-            ),
+            Bearing("unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE),
         ),
     ),
     Claim(
@@ -100,15 +91,15 @@ CLAIMS = (
         "pulsation-mean",
         "(23), (26), Definitions 1-3",
         "A pulsation that makes the ball slip makes its mean reading low.",
-        (Bearing("pulsation", "mean_error", _mean_error, by="analytic.flowmeter.pulsation.mean_error"),),
+        (Bearing("pulsation", "mean_error", _mean_error, by=f"{_BY}.pulsation.mean_error"),),
     ),
     Claim(
         "jump-slipping",
         "(26), (38)-(42)",
         "After a jump of the flow a ball that slips at both points overshoots its new reading and rings.",
         (
-            Bearing("unsteady", "jump_peak", lambda m: _peak(m)[0], by="analytic.flowmeter.response.peak"),
-            Bearing("unsteady", "jump_height", lambda m: _peak(m)[1], by="analytic.flowmeter.response.peak"),
+            Bearing("unsteady", "jump_peak", lambda m: _peak(m)[0], by=f"{_BY}.response.peak"),
+            Bearing("unsteady", "jump_height", lambda m: _peak(m)[1], by=f"{_BY}.response.peak"),
         ),
     ),
     Claim(

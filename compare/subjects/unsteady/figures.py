@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
@@ -18,7 +17,7 @@ from compare.branches import slipping
 from compare.kit import style
 from compare.kit.drawing import Drawing, Material, Motion
 from compare.kit.record import Measurement
-from compare.subjects.unsteady.measure.jumps import JUMP, caught_up, odd_part
+from compare.subjects.unsteady.measure import JUMP, caught_up, odd_part
 from model import Case, Flow, Parameters
 
 SET = "reference"
@@ -45,8 +44,7 @@ class Measurements:
     @property
     def mean(self) -> Parameters:
         """The set, with the mean flow of the pulsations."""
-        own = self.of("gain")
-        return own[0].parameters if own else REFERENCE
+        return next((m.parameters for m in self.of("gain")), REFERENCE)
 
 
 def select(material: Material, figure: str) -> Measurements:
@@ -88,19 +86,15 @@ def draw_pulsation(of: Measurements) -> Figure:
         style.name(gain, f[60], abs(ratio[60]), case.name, (0, -8), style.COLOURS[case])
     frequencies, onsets, errors = _theory(p)
     style.curve(onset, Case.RR, frequencies, onsets)
-    for limit, text, at, shift in (
-        (pulsation.slow_onset(p), "limit of slow pulsations", 1.0, 3),
-        (pulsation.fast_onset(p), "limit of fast pulsations", 0.12, -3),
-    ):
+    for limit, way, at, shift in (pulsation.slow_onset(p), "slow", 1.0, 3), (pulsation.fast_onset(p), "fast", 0.12, -3):
         onset.axhline(limit, **style.GUIDE)
-        style.name(onset, at, limit, text, (0, shift))
+        style.name(onset, at, limit, f"limit of {way} pulsations", (0, shift))
     error.plot(frequencies, errors, ".-", color=style.COLOURS[Case.SS], lw=1.5, ms=5)
     error.axhline(0, **style.GUIDE)
     panels = {"gain": gain, "phase_lag": phase, "slip_amplitude": onset, "mean_error": error}
     for quantity, axes in panels.items():
-        style.points(
-            axes, of.of(quantity), lambda m: float(m.conditions["f"]), unit=180 / math.pi if axes is phase else 1.0
-        )
+        unit = 180 / math.pi if axes is phase else 1.0
+        style.points(axes, of.of(quantity), lambda m: float(m.conditions["f"]), unit=unit)
     gain.set(xscale="log", yscale="log", ylabel="gain $|\\omega_c/\\omega_0|$")
     phase.set(ylabel="phase lag (°)", xlabel="frequency (Hz)")
     onset.set(yscale="log", ylabel="amplitude at which\nslip begins (rad/s)")
@@ -126,7 +120,19 @@ def caption_unsteady(of: Measurements) -> str:
 def draw_unsteady(of: Measurements) -> Figure:
     """Step responses, ramps, overshoot over rate."""
     figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
-    _jumps(jump, of)
+    t = np.linspace(0.0, 4.0, 800)
+    jump.plot(t, response.step_response(REFERENCE, Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")
+    slowest = next((m.parameters.omega_0 for m in of.of("jump_height")), FLOWS[0])
+    for omega_0, shade in zip(sorted([slowest, *FLOWS[1:]]), (0.4, 0.7, 1.0), strict=True):
+        p = REFERENCE.replace(omega_0=omega_0)
+        y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
+        jump.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {omega_0:.3g} rad/s")
+    if len(of.runs) == 2:
+        up, down = (motion.load() for motion in of.runs)
+        shown = np.flatnonzero(up.time <= t[-1])[::5]
+        jump.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="MuJoCo")
+    jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$, 1 in the end")
+    style.legend(jump)
     ends, fold = of.of("ramp_end"), bifurcation.thresholds(REFERENCE).omega_04
     p = ends[0].parameters if ends else REFERENCE.replace(omega_0=34.9)
     slipping(ramp, REFERENCE, lambda slip_x, omega_c: omega_c, unstable=(0.2, (-4, 6)))
@@ -136,8 +142,7 @@ def draw_unsteady(of: Measurements) -> Figure:
         flow = Flow.ramp(p.omega_0, p.omega_0 + 15.0, lasts)
         run = analytic.simulate(p, analytic.solution(p, Case.SS).x, lasts, flow, sample_interval=lasts / 5000)
         passed.append(caught_up(run) - fold)
-        look = {"color": "black", "alpha": shade, "lw": 1.5, "label": f"rising by {rate:g} rad/s²"}
-        ramp.plot(flow(run.time), run.omega_c, **look)
+        ramp.plot(flow(run.time), run.omega_c, "k", alpha=shade, lw=1.5, label=f"rising by {rate:g} rad/s²")
     beyond = np.array([fold - 6, fold + 7])
     style.curve(ramp, Case.NR, beyond, beyond, "NR", (0.9, (-5, 5)))
     ramp.set(xlim=beyond, ylim=(15, 55), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
@@ -154,36 +159,16 @@ def draw_unsteady(of: Measurements) -> Figure:
     return figure
 
 
-def _jumps(axes: Axes, of: Measurements) -> None:
-    t = np.linspace(0.0, 4.0, 800)
-    axes.plot(t, response.step_response(REFERENCE, Case.RR, t), color=style.COLOURS[Case.RR], lw=2, label="RR")
-    measured = of.of("jump_height")
-    flows = [*FLOWS[1:], measured[0].parameters.omega_0 if measured else FLOWS[0]]
-    for omega_0, shade in zip(sorted(flows), (0.4, 0.7, 1.0), strict=True):
-        p = REFERENCE.replace(omega_0=omega_0)
-        y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
-        axes.plot(t, y, color=style.COLOURS[Case.SS], alpha=shade, lw=1.8, label=f"SS, {omega_0:.3g} rad/s")
-    if len(of.runs) == 2:
-        up, down = (motion.load() for motion in of.runs)
-        shown = np.flatnonzero(up.time <= t[-1])[::5]
-        axes.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="MuJoCo")
-    axes.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$, 1 in the end")
-    style.legend(axes)
-
-
 FIGURES = {
-    "pulsation": Drawing(
-        "Unsteady flow: pulsation",
-        partial(select, figure="pulsation"),
-        draw_pulsation,
-        caption_pulsation,
-        ("pulsation-lag", "pulsation-slip", "pulsation-mean"),
-    ),
-    "unsteady": Drawing(
-        "Unsteady flow: jumps and ramps",
-        partial(select, figure="unsteady"),
-        draw_unsteady,
-        caption_unsteady,
-        ("jump-slipping", "ramp-fold"),
-    ),
+    name: Drawing(f"Unsteady flow: {title}", partial(select, figure=name), draw, caption, claims)
+    for name, title, draw, caption, claims in (
+        (
+            "pulsation",
+            "pulsation",
+            draw_pulsation,
+            caption_pulsation,
+            ("pulsation-lag", "pulsation-slip", "pulsation-mean"),
+        ),
+        ("unsteady", "jumps and ramps", draw_unsteady, caption_unsteady, ("jump-slipping", "ramp-fold")),
+    )
 }

@@ -1,10 +1,14 @@
-"""A rolling ball in a pulsating flow: how it follows, at which amplitude it slips, what it then reads on average.
+"""Flows that change: pulsation, jumps, ramps.
 
-The mean flow is a fixed part of that at which two-point rolling ends. A small pulsation shows how the engine's ball
-follows; every other run starts from there, so that it need not settle. With Stokes' law a large pulsation is a small
-one magnified; with another one the amplitude is raised step by step until the ball slips, and each time settled anew.
-Slip is what the engine's contacts show: both slip. Frequencies are powers of two, so that sets of about the same drag
-share batches.
+* A ball rolls in a pulsating flow: how it follows, at which amplitude it slips, what it then reads on average. A small
+  pulsation about a fixed part of the flow at which two-point rolling ends shows how the ball follows; every other run
+  starts from there, so that it need not settle. With Stokes' law the response is linear; with another one the amplitude
+  is raised step by step until the ball slips, and each time settled anew. The ball slips where the engine shows slip at
+  both contacts. Frequencies are powers of two, so that sets of about the same drag share batches.
+* The flow changes once by a small jump. Half the difference of two runs, after a jump up and one down, is free of what
+  goes with the square of the jump.
+* A ramp starts from settled slipping well below the end of it, and ends well above; the ball has left slipping once it
+  lags by half as much as at first.
 """
 
 from __future__ import annotations
@@ -18,23 +22,28 @@ import numpy as np
 
 from compare.kit.brackets import Bracket, Care, Search, narrow
 from compare.kit.lab import Lab, coarse_step
-from compare.kit.record import Measurement, Missing, Records, if_sure, measurement
-from compare.kit.statistics import Measured
+from compare.kit.programme import Protocol
+from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of
+from compare.kit.settling import lasting, settle
+from compare.kit.statistics import Measured, peaks, top
 from compare.kit.tasks import Task
-from compare.kit.trials import known_flow
+from compare.kit.trials import Start, Trial, carry_out, finer, known_flow
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
-PROTOCOL = "pulsation"
 RAISE = 1.5
 """Factor by which the amplitude is raised at a time where the law of drag isn't Stokes'."""
 PERIODS, ROUNDS = 3, 5
-"""Length of a run, and how many follow each other until it is settled, the last with half the step."""
+"""Periods in a run, and successive runs until it is settled, the last with half the step."""
 SAMPLES, LASTS = 256, 5
 """Samples in a period, and how many of them slip must last to count: friction may be full for a moment before."""
 PHASES = 8
-"""Phases of a period at which the motion is started anew from its state, to see whether the mean depends on more."""
+"""Phases of a period at which the motion is started anew from its state."""
+
+
+JUMP = 1e-3
+"""Relative size of a jump."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +57,7 @@ class Pulsation:
     amplitude: float
     """rad s-1"""
     reach: float
-    """How far omega_c may swing in the largest pulsation that is tried, rad s-1."""
+    """Largest amplitude of omega_c that is tried, rad s-1."""
     begin: float = 0.0
     """omega_c less the mean flow as a period begins, divided by the amplitude."""
     power: float = 0.0
@@ -91,15 +100,15 @@ class Pulsation:
 
     def row(self, lab: Lab, quantity: str, value: Measured, tasks: Sequence[Task], **at: float) -> Measurement:
         """A measurement in this pulsation."""
-        return measurement(lab, PROTOCOL, self.set, self.p, quantity, value, tasks, f=self.frequency, **at)
+        return measurement(lab, "pulsation", self.set, self.p, quantity, value, tasks, f=self.frequency, **at)
 
 
-def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
     small = []
     for name, p in sets.items():
         if (end := known_flow(records, name, "omega_01")) is None:
-            yield Missing(PROTOCOL, name, "no flow was measured at which two-point rolling ends by slipping")
+            yield Missing("pulsation", name, "no flow was measured at which two-point rolling ends by slipping")
             continue
         q = p.replace(omega_0=0.85 * end)
         room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
@@ -109,12 +118,12 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for each in followed:
         if not each.rolls:
             at = f"at {each.frequency:g} Hz a ball slips in a pulsation half as large as in a slow one"
-            yield Missing(PROTOCOL, each.set, at)
+            yield Missing("pulsation", each.set, at)
             continue
-        gain, lag = Measured(abs(each.ratio), each.uncertainty), -cmath.phase(each.ratio)
-        yield each.row(lab, "gain", gain, each.tasks, amplitude=each.amplitude)
-        angle = Measured(lag, gain.uncertainty / gain.value)
-        yield each.row(lab, "phase_lag", angle, each.tasks, amplitude=each.amplitude)
+        gain, lag = abs(each.ratio), -cmath.phase(each.ratio)
+        own = {"gain": Measured(gain, each.uncertainty), "phase_lag": Measured(lag, each.uncertainty / gain)}
+        for quantity, value in own.items():
+            yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
     rolling, slipping = _raised(lab, [each for each in followed if each.rolls]), []
     for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
         at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
@@ -122,17 +131,17 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         unseen = (math.pi * LASTS / SAMPLES) ** 2 / 2 * place.value
         onset = Measured(place.value, math.hypot(place.uncertainty, unseen))
         if low is None or high is None:
-            yield Missing(PROTOCOL, each.set, f"in {at} there is slip at no amplitude, or at all")
+            yield Missing("pulsation", each.set, f"in {at} there is slip at no amplitude, or at all")
             continue
         alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
         if alone > 2e-4 * math.sqrt(each.p.g * each.p.R):
-            yield Missing(PROTOCOL, each.set, f"in {at} one contact slips before both do, too little to tell when")
-        else:
-            measured = each.row(lab, "slip_amplitude", onset, bracket.tasks)
-            # What will be predicted may be a tenth smaller than what is measured.
-            yield (row := if_sure(measured, 0.9 * onset.value, f"slip in {at} begins at no definite amplitude"))
-            if isinstance(row, Measurement):
-                slipping.append((each, 1.5 * onset.value))
+            yield Missing("pulsation", each.set, f"in {at} one contact slips before both do, too little to tell when")
+            continue
+        measured = each.row(lab, "slip_amplitude", onset, bracket.tasks)
+        # The predicted amplitude may be a tenth smaller than the measured one.
+        yield (row := if_sure(measured, 0.9 * onset.value, f"slip in {at} begins at no definite amplitude"))
+        if isinstance(row, Measurement):
+            slipping.append((each, 1.5 * onset.value))
     yield from mean_errors(lab, slipping)
 
 
@@ -163,13 +172,13 @@ def _followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     followed, last = [], slice(-2 * SAMPLES, None)
     rounds = _rounds(lab, [(each, each.amplitude) for each in pulsations], 2, SAMPLES, slips=False)
     for each, (earlier, before, _), (later, run, omega_c) in zip(pulsations, *rounds, strict=True):
-        ratios = []
-        for shown in (before, run):
-            phase = 2 * math.pi * each.frequency * shown.time[last]
-            ratios.append(complex(2j * np.mean(shown.omega_c[last] * np.exp(-1j * phase)) / each.amplitude))
-        change, new = abs(ratios[1] - ratios[0]), each.begun(omega_c)
-        tasks, rolls = (earlier, later), rolls_on(run)
-        followed.append(replace(new, ratio=ratios[1], uncertainty=change, rolls=rolls, tasks=tasks))
+        first, ratio = (
+            complex(2j * np.mean(x[last] * np.exp(-2j * math.pi * each.frequency * t[last])) / each.amplitude)
+            for t, x in ((before.time, before.omega_c), (run.time, run.omega_c))
+        )
+        change, rolls = abs(ratio - first), rolls_on(run)
+        new = replace(each.begun(omega_c), ratio=ratio, uncertainty=change, rolls=rolls, tasks=(earlier, later))
+        followed.append(new)
     return followed
 
 
@@ -188,19 +197,19 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     return raised
 
 
-def _search(lab: Lab, pulsation: Pulsation) -> Search:
+def _search(lab: Lab, each: Pulsation) -> Search:
     """For the amplitude at which slip begins, in runs of one period and a half of which the first sixth is left out."""
 
     def task(amplitude: float, bracket: Bracket, care: Care) -> Task:
-        x = pulsation.start(amplitude)
-        return pulsation.task(lab, amplitude, x, 1.5 * care.time, 2 * care.refine, SAMPLES, largest=begin.high)
+        x = each.start(amplitude)
+        return each.task(lab, amplitude, x, 1.5 * care.time, 2 * care.refine, SAMPLES, largest=begin.high)
 
-    if pulsation.p.drag == STOKES:
-        # Where slip begins is not known yet: the least amplitude at which it may is taken for a rough width.
-        largest = pulsation.reach / abs(pulsation.ratio)
+    if each.p.drag == STOKES:
+        # Slip may begin from about half the largest amplitude on: the width is taken relative to that.
+        largest = each.reach / abs(each.ratio)
         begin, size = Bracket(0.0, largest), largest / 2
     else:
-        begin, size = Bracket(0.99 * pulsation.amplitude, RAISE * pulsation.amplitude), pulsation.amplitude
+        begin, size = Bracket(0.99 * each.amplitude, RAISE * each.amplitude), each.amplitude
     return Search(begin, task, rolls_on, lab.effort("pulsation.width") * size)
 
 
@@ -226,13 +235,13 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
     ]
     begun = np.reshape([run.theta[-1] - run.theta[0] for run in lab.run(anew)], (-1, PHASES))
     pairs = zip(slipping, begun, coarse, fine, strict=True)
-    for (each, amplitude), turns, (_, run, _), (task, finer, _) in pairs:
+    for (each, amplitude), turns, (_, run, _), (task, halved, _) in pairs:
         before, usual = (np.diff(run.theta[::samples]) * each.frequency)[-2:].tolist()
-        first, mean = (np.diff(finer.theta[::samples]) * each.frequency)[-2:].tolist()
+        first, mean = (np.diff(halved.theta[::samples]) * each.frequency)[-2:].tolist()
         value = mean - each.p.omega_0
         spread = float(np.abs(turns * each.frequency - usual).max())
         drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
-        # Slip begins and ends within a coarse step: half of that part of the mean error is uncertain.
+        # Slip begins and ends within a coarse step: the mean error is uncertain by half of that part.
         error = Measured(value, drift + abs(value) / round(task.steps / PERIODS))
         row = each.row(lab, "mean_error", error, [task], amplitude=amplitude)
         at = f"the mean reading at {each.frequency:g} Hz"
@@ -243,3 +252,96 @@ def limit(values: Array) -> float:
     """The limit of the last three values of a geometric sequence; the last one if they diverge."""
     first, second = values[-2] - values[-3], values[-1] - values[-2]
     return float(values[-1] + (second**2 / (first - second) if abs(second) < abs(first) else 0.0))
+
+
+def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at which a ramp ends it."""
+    trials: list[Trial] = []
+    starts: list[tuple[tuple[float, float] | None, Start]] = []
+
+    def jump(set: str, p: Parameters, case: Case, x0: State) -> None:
+        sides, known = tuple(p.replace(omega_0=p.omega_0 * (1 + side * JUMP)) for side in (1, -1)), {"case": case.name}
+        motion = Trial(set, p, case.name, x0.stacked(), lasting(p, 48.0), (2, 4), 4000, _jumped, None, sides, known)
+        trials.append(motion)
+
+    for name, p in sets.items():
+        begins, holds, ends = (known_flow(records, name, f"omega_0{n}") for n in (1, 2, 4))
+        if begins is None or holds is None:
+            yield Missing("unsteady", name, "no flows were measured between which the ball slips at both points")
+            continue
+        if p.drag == STOKES:  # with others there is no delay that all small jumps share
+            q = p.replace(omega_0=0.85 * begins)
+            jump(name, q, Case.RR, State(omega_c=q.omega_0))
+        starts.append((None, Start(name, p.replace(omega_0=begins + 0.3 * (holds - begins)), "jump", np.zeros(8))))
+        if ends is None:
+            yield Missing("unsteady", name, "no flow was measured at which slipping at both points ends in a jump")
+        else:
+            span = ends - begins
+            first = p.replace(omega_0=begins + 0.75 * span)
+            starts.append(((span, begins + 1.35 * span), Start(name, first, "ramp", np.zeros(8))))
+    for (ramp, start), state in zip(starts, settle(lab, [start for _, start in starts]), strict=True):
+        if state.failure or state.case is not Case.SS:
+            why = state.failure or state.case.name
+            yield Missing("unsteady", start.set, f"no settled slipping to start from: {why}")
+            continue
+        x0 = State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0)  # at both walls to the last digit
+        if ramp is None:
+            jump(start.set, start.p, Case.SS, x0)
+        else:
+            (span, end), p, x = ramp, start.p, x0.stacked()
+            for rate in lab.effort("unsteady.rates"):
+                rise = rate * p.c * span
+                t_end, known = (end - p.omega_0) / rise, {"rate": rise, **state_of(x[:6])}
+                flow = Flow.ramp(p.omega_0, end, t_end)
+                trials.append(Trial(start.set, p, "ramp", x, t_end, (1, 2), 16000, caught_up, flow, (), known))
+    for result in carry_out(lab, "unsteady", trials):
+        if isinstance(result, Missing):
+            yield result
+            continue
+        trial = result.trial
+        if trial.flow is None:
+            for quantity in ("jump_delay",) if trial.name == Case.RR.name else ("jump_peak", "jump_height"):
+                row = result.row(lab, quantity, finer(result.coarse[quantity].value, result.fine[quantity]))
+                yield if_sure(row, abs(row.value), f"{quantity} in {trial.name}: no peak, or one that is too uncertain")
+        elif math.isfinite(result.coarse) and math.isfinite(result.fine):
+            yield result.row(lab, "ramp_end", finer(result.coarse, Measured(result.fine, 0.0)))
+        else:
+            why = f"a ramp of {trial.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both points"
+            yield Missing("unsteady", trial.set, why)
+
+
+def odd_part(up: Trajectory, down: Trajectory) -> Array:
+    """The part of omega_c (n,) that has the sign of the jump, relative to its last value: from 0 to 1."""
+    odd = up.omega_c - down.omega_c
+    return np.asarray(odd / odd[-1])
+
+
+def _jumped(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
+    """The delay; time and height of the highest peak, nan where there is none in the first half of the runs."""
+    t, y = up.time, odd_part(up, down)
+    # Forces act in the middle of a step: a moment is known to half of the finer one, either way.
+    late = coarse_step(up.header.parameters) / 4 / math.sqrt(12)
+    k, later = peaks(y)
+    highest = (k == y.argmax()) & (k < len(t) // 2)
+    at, height = (np.append(each[highest], math.nan)[0] for each in (t[k] + later * (t[1] - t[0]), top(y, k, later)))
+    return {
+        "jump_delay": Measured(float(np.trapezoid(1 - y, t)), late),
+        "jump_peak": Measured(float(at), late),
+        "jump_height": Measured(float(height), 0.0),
+    }
+
+
+def caught_up(run: Trajectory) -> float:
+    """The flow in rad s-1 at which the lag has fallen to half of what it was at first; nan if it never does."""
+    lag = run.header.flow(run.time) - run.omega_c
+    below = np.flatnonzero(lag < lag[0] / 2)
+    if not len(below):
+        return math.nan
+    near = slice(below[0], below[0] - 2, -1)
+    return float(run.header.flow(np.interp(lag[0] / 2, lag[near], run.time[near])))
+
+
+PROTOCOLS = (
+    Protocol("pulsation", pulsation, ("thresholds",), cost=11),
+    Protocol("unsteady", jumps, ("thresholds",), drawn=lambda m: m.quantity == "jump_height", cost=8),
+)

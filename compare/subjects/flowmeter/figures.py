@@ -1,0 +1,238 @@
+"""Characteristic curves of the flowmeter with settled states, Fig. 13 with its hysteresis, the fall at unloading."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import analytic
+from analytic.bifurcation import diagram as bifurcation
+from analytic.simulation import simulator
+from compare.branches import fold_state, slipping
+from compare.kit import style
+from compare.kit.drawing import Diagram, Drawing, GapError, Material, Motion
+from compare.kit.engines import EVENT, NEWCOMER
+from compare.kit.record import Measurement
+from model import Case, Contact, Parameters
+
+SETS = {"fig-13-left": "reference", "fig-13-right": "high-wall-friction"}
+"""The parameter set of each panel, eta < j and eta > j."""
+_WAYS = {"up": ("^", ", flow raised"), "down": ("v", ", flow lowered")}
+_SETTLED = frozenset({"settled", "newcomer", "hysteresis"})
+"""Protocols whose omega_c is that of a settled state."""
+
+
+def select_curves(material: Material) -> tuple[Diagram, ...]:
+    """The settled states of every engine with the two sets of the paper's kind, without balls that only sink (NS)."""
+    settled = [
+        m
+        for m in material.select("omega_c", "case")
+        if m.protocol in _SETTLED and m.parameters.omega_0 > 0 and m.conditions["case"] != "NS"
+    ]
+    if not any(m.set in SETS.values() for m in settled):
+        raise GapError("no settled states were measured with its parameter sets")
+    return tuple(
+        Diagram(figure, Parameters.named(name), tuple(m for m in settled if m.set == name))
+        for figure, name in SETS.items()
+    )
+
+
+def caption_curves(curves: tuple[Diagram, ...]) -> str:
+    """Of the characteristic curves with all settled states."""
+    sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in zip(("left", "right"), curves, strict=True))
+    states = [m for curve in curves for m in curve.states]
+    own = any(m.engine == NEWCOMER.name for m in states)
+    crosses = ", crosses: MuJoCo's own contact parameters from rest" if own else ""
+    return (
+        f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
+        "dashed where unstable; SR and NR lie on one line. Settled states were measured from rest, going round "
+        f"with the fluid, and high up on the wall{crosses}. Below: relative deviation from the nearest attracting "
+        f"solution; what is below 1e-16 is drawn there.{style.marks(states)}"
+    )
+
+
+def draw_curves(curves: tuple[Diagram, ...]) -> Figure:
+    """Two columns, one a parameter set: the curve above, deviations from the nearest attracting solution below."""
+
+    def nearest(m: Measurement) -> float:
+        omega_c = [float(s.state.omega_c) for s in analytic.stable_solutions(m.parameters)]
+        return min(omega_c, key=lambda w: abs(m.value / w - 1), default=np.nan)
+
+    figure, panels = style.panels(10, 6, 2, len(curves), sharex="col", height_ratios=[3, 1.2])
+    for (above, below), curve in zip(panels.T, curves, strict=True):
+        p = curve.p
+        fastest = max(map(style.omega_0, curve.states), default=_top(p)) * 1.04
+        _theory(above, p, fastest)
+        above.set_title(f"η = {p.eta:g} {'<' if p.eta < p.j else '>'} j = {p.j:g}", fontsize=11)
+        style.points(above, curve.states)
+        above.set(ylim=(0, 1.05 * max([fastest, *(m.value for m in curve.states)])), ylabel=style.OMEGA_C)
+        style.legend(above, loc="upper left", frameon=False)
+        style.dimensionless(above, p, style.FREE_0)
+        above.grid(alpha=0.25)
+        style.deviations(below, curve.states, nearest)
+        below.set(xlabel=style.OMEGA_0)
+    return figure
+
+
+def select_figure_13(material: Material, figure: str) -> Diagram:
+    """The settled states of a panel: left, those of a flow that is raised and lowered in held steps."""
+    if figure == "fig-13-left":
+        rows = [m for m in material.select("omega_c", "side") if m.conditions["side"] in _WAYS]
+        rows += material.select("edge_omega_c")
+    else:
+        rows = [m for m in material.select("omega_c", "case") if m.protocol == "settled"]
+    name = SETS[figure]
+    return Diagram(figure, Parameters.named(name), tuple(m for m in rows if m.set == name))
+
+
+def caption_figure_13(of: Diagram) -> str:
+    """Of either panel."""
+    text = (
+        "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where the flow came from "
+        "(arrows)."
+        if of.p.eta < of.p.j
+        else "The curves of RR, SR and NR lie on one line and are drawn side by side, joined by dots where they begin. "
+        "Black dot: where a ball that is carried by the wall drops when the flow falls, see the figure of its fall."
+    )
+    return style.caption(of.p, "Characteristic curve of the flowmeter.", text, "Dashed: unstable.", states=of.states)
+
+
+def draw_figure_13(of: Diagram) -> Figure:
+    """One panel, with both scales."""
+    p, top = of.p, _top(of.p)
+    figure, axes = style.panels(6.0, 4.3)
+    if p.eta < p.j:
+        t = _theory(axes, p, top)
+        slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
+        look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
+        jumps = (t.omega_04, fold_state(p).omega_c, t.omega_04), (t.omega_02, t.omega_02, slow.state.omega_c)
+        for x, begin, end in jumps:
+            axes.annotate("", (x, float(end)), (x, float(begin)), arrowprops=look)
+        for side, (mark, text) in _WAYS.items():
+            style.points(axes, [m for m in of.states if m.conditions.get("side") == side], way=text, marker=mark)
+        style.points(axes, [m for m in of.states if m.protocol == "edge"], way=", edge", ms=3.5)
+    else:
+        lifts = {case: 0.045 * top * k for k, case in enumerate(("RR", "SR", "NR"))}
+        _theory(axes, p, top, lifts["SR"])
+        own = [m for m in of.states if m.conditions["case"] in lifts]
+        style.points(axes, own, y=lambda m: m.value + lifts[str(m.conditions["case"])])
+    axes.set(xlim=(0, top), ylim=(0, 1.15 * top), ylabel=style.OMEGA_C, xlabel=style.OMEGA_0)
+    style.legend(axes, loc="upper left")
+    style.dimensionless(axes, p, style.FREE_0, style.FREE_C)
+    return figure
+
+
+def _top(p: Parameters) -> float:
+    """The fastest flow shown, rad s-1."""
+    t = bifurcation.thresholds(p)
+    return 1.25 * t.omega_04 if p.eta < p.j else 1.6 * t.omega_03
+
+
+def _theory(axes: Axes, p: Parameters, fastest: float, apart: float = 0.0) -> bifurcation.Thresholds:
+    """All solutions up to the fastest flow, and the thresholds; for eta > j lines that are one are drawn `apart`."""
+    t = bifurcation.thresholds(p)
+    folds = p.eta < p.j
+    rolls, rides = (t.omega_01, t.omega_02) if folds else (t.omega_03, t.omega_03)
+
+    def line(case: Case, begin: float, end: float, text: str, at: float, lift: float = 0.0, side: int = 1) -> None:
+        style.curve(axes, case, [begin, end], [begin + lift, end + lift], text, (at, (-5 * side, 5 * side)))
+
+    line(Case.RR, 0.0, rolls, "RR", 0.45)
+    if folds:
+        slipping(axes, p, lambda _, omega_c: omega_c, (0.5, (0, -7)), (0.5, (38, -14)))
+    if apart:
+        ends = np.array([t.omega_02, t.omega_03])
+        style.curve(axes, Case.SR, ends, ends + apart, line=style.UNSTABLE)
+        line(Case.SR, t.omega_03, fastest, "SR", 0.7, apart, -1)
+        line(Case.NR, t.omega_02, fastest, "NR", 0.5, 2 * apart)
+        for begin, steps in ((t.omega_02, 2), (t.omega_03, 1)):
+            axes.plot([begin, begin], [begin, begin + steps * apart], "k:", lw=1)
+        axes.plot([t.omega_02], [t.omega_02 + 2 * apart], **style.POINT)
+    else:
+        line(Case.SR, rides, fastest, "SR, NR", 0.7)
+    axes.set_xlim(0, fastest)
+    style.guides(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in ((1, 2, 4) if folds else (2, 3))})
+    return t
+
+
+def select_fall(material: Material) -> Motion:
+    """A measured fall, if its run file is there, else that of the event-driven simulation."""
+    for m in material.records.select("unloading", where=lambda m: m.set == SETS["fig-13-right"]):
+        if m.conditions["start"] == "unloading" and (motions := material.motions(m)):
+            return motions[-1]  # with the finest step
+    # Flows held for no longer than 5 s each: longer ones are sampled less densely.
+    p = Parameters.named(SETS["fig-13-right"])
+    return Motion("held", EVENT.name, p, partial(simulator.unloading, p, 5.0))
+
+
+def caption_fall(fall: Motion) -> str:
+    """Of the fall."""
+    return style.caption(
+        fall.p,
+        "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the wall (NS), sinks, "
+        "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the impact, magnified in "
+        "time and height: it stops the sinking at once; after it the gaps show how far the ball hops, if it does. "
+        f"Background: the case, by name above; engine: {fall.engine}.",
+    )
+
+
+def draw_fall(fall: Motion) -> Figure:
+    """Height, velocities and slip around the fall, and 20 ms about the landing: the gaps as high as the ball hops."""
+    run = fall.load()
+    landings = [t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is not Contact.N]
+    if not landings:
+        raise GapError("the ball never landed")
+    lands = landings[0]
+    leaves = run.events.time[(run.events.from_case == Case.NR) & (run.events.time <= lands)]
+    left = leaves[-1] if len(leaves) else run.time[0]
+    figure, panels = style.panels(9, 6, 3, 2, sharex="col", width_ratios=[1.7, 1])
+    whole, close = panels.T
+    around, landing = (left - 0.3, left + 1.7), (lands - 0.02, lands + 0.02)
+    # Axes, span of time, its origin, and the units of time and gaps, in parts of a second and of a metre.
+    for column, span, origin, unit, size in (whole, around, left, 1.0, 1e3), (close, landing, lands, 1e3, 1e6):
+        k = np.flatnonzero((run.time > span[0]) & (run.time < span[1]))
+        k = k[:: max(1, len(k) // 1500)]
+        t = unit * (run.time[k] - origin)
+        gaps, speed, slip = column
+        gaps.plot(t, size * run.y[k], color="black", label="$y$ (floor)")
+        gaps.plot(t, size * run.h[k], color=style.FORCE, ls="--", label="$h$ (wall)")
+        if column is whole:
+            gaps.set_ylabel("gap (mm)")
+            speed.plot(t, run.omega_c[k], color="black", label="$\\omega_c$")
+            speed.plot(t, run.header.flow(run.time[k]), color="0.5", ls="--", label="$\\omega_0$")
+            speed.set_ylabel("$\\omega_c$, $\\omega_0$ (rad/s)")
+            slip.set_xlabel("$t$ after the end of NR (s)")
+        else:
+            hops = run.y[k][run.v_y[k] > 0].max(initial=0.0)
+            highest = 1e6 * max(float(run.h[k].max()), float(hops), 1e-7)
+            gaps.set(ylim=(-0.4 * highest, 1.4 * highest), ylabel="gap (µm)")
+            speed.plot(t, run.v_y[k], color="black")
+            speed.set_ylabel("$v_y$ (m/s)")
+            slip.set_xlabel("$t$ after the landing (ms)")
+        for point, value, line in (("A", run.slip_speed_A, "-"), ("B", run.slip_speed_B, "--")):
+            touches = [case for case in Case if getattr(case, point) is not Contact.N]
+            shown = np.where(np.isin(run.case[k], touches), value[k], np.nan)
+            slip.plot(t, shown, color="black", ls=line, label=f"$|v_{point}|$")
+        slip.set(ylabel="slip speed (m/s)", xlim=(unit * (span[0] - origin), unit * (span[1] - origin)))
+        for axes in column:
+            style.ground(axes, run, span, unit, origin, named=axes is gaps)
+            axes.axvline(unit * (lands - origin), color="0.3", lw=0.8)
+            if column is whole:
+                style.legend(axes, frameon=False)
+    return figure
+
+
+FIGURES = {
+    "characteristic": Drawing("Characteristic curves", select_curves, draw_curves, caption_curves),
+    **{
+        name: Drawing(title, partial(select_figure_13, figure=name), draw_figure_13, caption_figure_13, (name,))
+        for name, title in (
+            ("fig-13-left", "Fig. 13, left: hysteresis, η < j"),
+            ("fig-13-right", "Fig. 13, right: η > j"),
+        )
+    },
+    "unloading": Drawing("Section 5.3: the fall at unloading", select_fall, draw_fall, caption_fall, ("fig-13-right",)),
+}

@@ -1,0 +1,312 @@
+"""The flowmeter: slopes of its characteristic curve omega_c(omega_0), its loop of hysteresis, unloading and pushes.
+
+* For a slope only the flow is changed: at settled states, across the onset of slipping, and on average from there to
+  unloading.
+* For the loop of Fig. 13 the flow rises and falls in held steps, all in one run: a ramp would overshoot the fold of the
+  slipping branch, where settling slows down without bound. The levels are where cases were seen to change, and between.
+* Unloading (section 5.3): a ball rides the wall a little above the floor while the flow suddenly falls below what holds
+  it there. When does it begin to slip, when does it land, how fast, with what impulse?
+* A ball that the wall carries beside the floor is pushed, upwards or by a little more spin: does it stay off the floor,
+  and how high? An engine may follow motions with landings to first order only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from compare.kit.fits import at_zero
+from compare.kit.lab import Lab, coarse_step
+from compare.kit.programme import ONE, TWO, Protocol
+from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of
+from compare.kit.settling import (
+    STEPS_A_SAMPLE,
+    Settled,
+    begin,
+    duration,
+    family,
+    high,
+    judged,
+    lasting,
+    settle_groups,
+    settled_cases,
+)
+from compare.kit.statistics import Measured, settled_case
+from compare.kit.trials import Result, Start, Trial, carry_out
+from model import Case, Flow, Parameters, State, Trajectory
+from model.trajectory import columns
+
+STEP = 1e-3
+"""Relative distance of neighbouring flows; half of it shows what the curvature does."""
+ACROSS = (-1e-3, -5e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)
+"""Distances from the flow at which slipping sets in, relative to it."""
+SHARP = {"neighbours": 0.3, "jump": 0.1, "mean": 1.0}
+"""Factor on the drift limit of settled states, by what is measured: for the jump the states lie close together."""
+LANDING, UNLOADED, UPWARDS, BY_SPIN = "unloading until it lands", "unloading", "push upwards", "push by spin"
+"""Names of the trials."""
+ABOVE, BELOW = 1.02, 0.95
+"""Flows before and after the unloading, in units of the measured omega_02."""
+PUSH = 1e-2
+"""How hard a ball is pushed: speed in units of sqrt(g R), or more spin in units of its spin on the wall."""
+Numbers = dict[tuple[str, str], Measured]
+"""What a run shows, by quantity and event."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Flows of settled states that are joined to a slope."""
+
+    by: str
+    set: str
+    p: Parameters
+    """With the flow at which the slope is wanted."""
+    flows: tuple[float, ...]
+    x0: tuple[float, ...] = (0.0,) * 8
+    noise: float = 0.0
+    """Standard uncertainty of the flow at which slipping sets in, and of others measured so, rad s-1."""
+
+
+def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there to unloading."""
+    most = lab.effort("slope.slipping")
+    curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
+    for by, sharp in SHARP.items():
+        own = [curve for curve in curves if curve.by == by]
+        starts = [[Start(c.set, c.p.replace(omega_0=w), by, np.array(c.x0)) for w in c.flows] for c in own]
+        for curve, states in zip(own, settle_groups(lab, starts, span=24.0, sharp=sharp), strict=True):
+            where = f"{by} at omega_0 = {curve.p.omega_0:.4g} rad/s"
+            if failure := next((each.failure for each in states if each.failure), ""):
+                yield Missing("slope", curve.set, f"{where}: {failure}")
+            elif value := _slope(curve, states):
+                tasks, at = [each.task for each in states], {"case": states[-1].case.name, "by": by}
+                row = measurement(lab, "slope", curve.set, curve.p, "slope", value, tasks, **at)
+                why = f"{where}: the slope is uncertain by {value.uncertainty:.1g}, too much to be of use"
+                yield if_sure(row, 1.0, why)
+            else:
+                cases = ", ".join(each.case.name for each in states)
+                yield Missing("slope", curve.set, f"{where}: the states there are not of one kind ({cases})")
+
+
+def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[Curve]:
+    """Where slopes of a set are wanted.
+
+    Between neighbours of settled states that slip on the floor, at most so many, and of the fastest of the others;
+    across the onset of slipping; and from there to the flow at which the wall begins to carry the ball.
+    """
+    states: dict[Case, dict[float, dict[str, Measurement]]] = {case: {} for case in Case}
+    for m in records.select("settled", where=lambda m: m.set == name and m.quantity != "case"):
+        if m.parameters.omega_0:
+            at = states[family(Case[str(m.conditions["case"])])].setdefault(m.parameters.omega_0, {})
+            at[m.quantity] = m
+    for case in (Case.RR, Case.SS, Case.NR):
+        alike = sorted(states[case].items())
+        few = np.linspace(0, len(alike) - 1, most).round() if case is Case.SS else [len(alike) - 1]
+        for k in sorted({int(n) for n in few if alike}):
+            omega_0, values = alike[k]
+            q, moving = values["omega_c"].parameters, ("v_y", "omega_c", "slip_x", "slip_y", "slip_z")
+            x0 = (high(q) * (case is Case.NR), *(values[each].value for each in moving), 0.0, 0.0)
+            flows = tuple(omega_0 * (1 + d) for d in (-STEP, -STEP / 2, STEP / 2, STEP))
+            yield Curve("neighbours", name, q, flows, x0)
+    slips, holds = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
+    if slips is not None:
+        q, x0 = p.replace(omega_0=slips.value), (0.0, 0.0, slips.value, 0.0, 0.0, 0.0, 0.0, 0.0)
+        around = tuple(slips.value * (1 + d) for d in ACROSS)
+        yield Curve("jump", name, q, around, x0, slips.uncertainty)
+        if holds is not None and holds.value > slips.value:
+            noise = math.hypot(slips.uncertainty, holds.uncertainty)
+            yield Curve("mean", name, q, (*around[:2], holds.value), noise=noise)
+
+
+def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
+    """The slope of a curve, from its settled states; None where these are not of the cases that belong.
+
+    Between neighbours: central differences over two distances, without the error that goes with the distance squared.
+    The jump: slope above less slope below, each at the threshold itself, above by a cubic through four secants. The
+    mean: from where slipping sets in, on the line on which the ball comes there, to the last flow.
+    """
+    cases = [each.case for each in states]
+    f, onset = np.array(curve.flows), curve.p.omega_0
+    w, noises = np.transpose([(v.value, v.uncertainty) for v in (each.values["omega_c"] for each in states)])
+    noise, below = float(noises.max()), (w[1] - w[0]) / (f[1] - f[0])
+    if curve.by == "neighbours" and len(set(map(family, cases))) == 1:
+        wide, near = (w[3] - w[0]) / (f[3] - f[0]), (w[2] - w[1]) / (f[2] - f[1])
+        return Measured(near + (near - wide) / 3, math.hypot((near - wide) / 3, 2 * noise / (f[2] - f[1])))
+    if curve.by == "jump" and cases[1:3] == [Case.RR, Case.SS]:
+        secants, middles = np.diff(w[2:]) / np.diff(f[2:]), (f[2:-1] + f[3:]) / 2 - onset
+        cubic, parabola = np.polyfit(middles, secants, 3), np.polyfit(middles[:3], secants[:3], 2)
+        # Noise of the states, propagated to the secants and from them to the slope: no weight in the cubic exceeds 4.
+        solved = 4 * math.sqrt(2) * noise / (f[3] - f[2])
+        placed = parabola[-2] * curve.noise
+        return Measured(float(cubic[-1] - below), math.hypot(cubic[-1] - parabola[-1], solved, placed))
+    if curve.by == "mean" and cases == [Case.RR, Case.RR, Case.SS]:
+        first, rise = w[1] + (onset - f[1]) * (w[1] - w[0]) / (f[1] - f[0]), f[2] - onset
+        return Measured(float((w[2] - first) / rise), 3 * math.hypot(noise, curve.noise) / rise)
+    return None
+
+
+def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Case and omega_c at every level of the loop, and the case at the level before."""
+    loops, tasks = {}, []
+    for name, p in sets.items():
+        if rise := _levels(name, records, lab.effort("hysteresis.parts")):
+            loops[name] = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
+            flows = [flow for _, flow in loops[name]]
+            q = p.replace(omega_0=flows[0])
+            hold = duration(q, lab.effort("hysteresis.hold"))
+            samples = round(hold / (STEPS_A_SAMPLE * coarse_step(p))) * len(flows)
+            start, flow = State(omega_c=flows[0]), Flow.staircase(flows, hold)
+            tasks.append(lab.task(q, start, hold * len(flows), coarse_step(p), flow=flow, samples=samples))
+        else:
+            yield Missing("hysteresis", name, "no flow at which slipping on the floor gives way to riding the wall")
+    for (name, levels), task, run in zip(loops.items(), tasks, lab.each(tasks), strict=True):
+        if isinstance(run, str):
+            yield Missing("hysteresis", name, f"the run {run}")
+            continue
+        # By how much half the step changes omega_c, relative to omega_0: the largest of all settled states.
+        settled = [m for m in records.select("settled", "omega_c") if m.set == name and m.parameters.omega_0 > 0]
+        certainty = max(m.uncertainty / m.parameters.omega_0 for m in settled)
+        count, before = (len(run.time) - 1) // len(levels), "RR"
+        for k, (side, omega_0) in enumerate(levels):
+            held = slice(k * count, (k + 1) * count)
+            p = task.parameters.replace(omega_0=omega_0)
+            part = replace(run, **{column: getattr(run, column)[held] for column in columns(Trajectory)})
+            ended = judged(Start(name, p, side, part.x[0]), task, part)
+            if ended.failure:
+                where = f"level {k + 1} ({side}, omega_0 = {omega_0:.4g} rad/s)"
+                yield Missing("hysteresis", name, f"{where}: {ended.failure}")
+            else:
+                omega_c = ended.values["omega_c"]
+                sure = Measured(omega_c.value, math.hypot(omega_c.uncertainty, certainty * omega_0))
+                at: dict[str, Condition] = {"case": ended.case.name, "side": side, "level": k + 1.0, "before": before}
+                yield measurement(lab, "hysteresis", name, p, "case", ended.case, [task], **at)
+                yield measurement(lab, "hysteresis", name, p, "omega_c", sure, [task], **at)
+            before = family(ended.case).name
+
+
+def _levels(name: str, records: Records, parts: int) -> list[float]:
+    """Rising flows in rad s-1: one at which the ball rolls, and those about the changes of case.
+
+    Empty unless a ball from rest slips at one flow and rides the wall at the next.
+    """
+    floor, wall = (settled_cases(records, name, how) for how in ("rest", "on the wall"))
+    gives_way = [(a, b) for a, b in pairwise(floor) if (floor[a], floor[b]) == (Case.SS, Case.NR)]
+    if not gives_way:
+        return []
+    takes_up = [(a, b) for a, b in pairwise(wall) if (wall[a], wall[b]) == (Case.NS, Case.NR)]
+    levels = set([flow for flow in floor if floor[flow] is Case.RR][-1:])
+    for a, b in (*takes_up[:1], gives_way[-1]):
+        levels |= {a + (b - a) * k / parts for k in range(parts + 1)}
+    return sorted(levels)
+
+
+def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Settle a ball on the wall of every set that carries it, and begin from there."""
+    starts, trials = [], []
+    for name, p in sets.items():
+        if (limit := records.threshold(name, "omega_02")) is None:
+            yield Missing("unloading", name, "no flow was measured that is the least to hold a ball on the wall")
+            continue
+        # A pushed ball must neither sink nor roll again: the flow is above the end of rolling by lifting, too.
+        lifts = records.threshold(name, "omega_03") or limit
+        flows = ABOVE * limit.value, 1.1 * max(limit.value, lifts.value)
+        starts.append([begin(name, p.replace(omega_0=omega), "on the wall") for omega in flows])
+    for states in settle_groups(lab, starts, loose=lab.effort("thresholds.loose")):
+        for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
+            if state.failure:
+                yield Missing("unloading", state.start.set, f"no ball to begin with on the wall: {state.failure}")
+            else:
+                trials += [_trial(lab, state, name) for name in names]
+    measured: dict[tuple[str, str, str], list[tuple[Result, Measured, float]]] = {}
+    for result in carry_out(lab, "unloading", trials):
+        if isinstance(result, Missing):
+            yield result
+            continue
+        name, (before, coarse), (case, numbers) = result.trial.name, result.coarse, result.fine
+        if name != LANDING and before is case:
+            yield result.row(lab, "case", case)
+        elif name != LANDING:
+            yield Missing("unloading", result.trial.set, f"{name}: with half the time step the ball ends up otherwise")
+        if coarse.keys() != numbers.keys() or (name == LANDING and not numbers):
+            yield Missing("unloading", result.trial.set, f"{name}: the ball does not slip and land")
+            continue
+        for key, fine in numbers.items():
+            change = abs(coarse[key].value / fine.value - 1)
+            measured.setdefault((name, *key), []).append((result, fine, change))
+    for (name, quantity, event), rows in measured.items():
+        # The difference may be small by chance: at least the median of all trials counts.
+        usual = float(np.median([change for *_, change in rows]))
+        for result, fine, change in rows:
+            value = Measured(fine.value, math.hypot(max(change, usual) * fine.value, fine.uncertainty))
+            row = result.row(lab, quantity, value, event=event)
+            yield if_sure(row, abs(row.value), f"{name}: {quantity} is uncertain by {row.uncertainty:.1g}")
+
+
+def _trial(lab: Lab, state: Settled, name: str) -> Trial:
+    """A trial from a ball that rides the wall; one that lands is sampled at every step."""
+    p, x = state.start.p, State.of(state.mean)
+    x0 = State(omega_c=x.omega_c, slip_x=x.slip_x)
+    if name in (LANDING, UNLOADED):
+        p, x0 = p.replace(omega_0=p.omega_0 * BELOW / ABOVE), x0._replace(y=0.2 * p.R)
+    elif name == UPWARDS:
+        x0 = x0._replace(v_y=PUSH * math.sqrt(p.g * p.R))
+    else:
+        x0 = x0._replace(slip_x=x.slip_x + PUSH * (x.slip_x + p.R / p.r * x.omega_c))
+    refine = tuple(times if name == LANDING else times // 4 for times in lab.effort("unloading.refine"))
+    t_end, step = lasting(p, 2.5 if name == LANDING else 6.0), coarse_step(p) / refine[1]
+
+    def read(run: Trajectory) -> tuple[Case, Numbers]:
+        numbers: Numbers = {}
+        if name == LANDING:
+            numbers = _landed(run)
+        elif name == UPWARDS:  # it falls on the floor soon after
+            numbers = {("lift", "first top"): Measured(first_top(run), 0.0)}
+        elif name == BY_SPIN:  # it leaves the floor at a step, up to one late or early, and rises so much less or more
+            numbers = {("lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
+        return family(settled_case(run)), numbers
+
+    known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
+    samples = None if name == LANDING else 1000
+    return Trial(state.start.set, p, name, x0.stacked(), t_end, refine, samples, read, conditions=known)
+
+
+def _landed(run: Trajectory) -> Numbers:
+    """Onset of slip, and landing: time, speed and vertical impulse. Empty where it doesn't come to that."""
+    p, step = run.header.parameters, float(run.time[1] - run.time[0])
+    slip = run.slip_speed_B / math.sqrt(p.g * p.R)
+    touches = np.flatnonzero(run.force_A[:, 1] > 0)
+    # Slip grows as the square of time: its onset is extrapolated from speeds above the noise, but small.
+    growing = np.arange(*np.searchsorted(np.maximum.accumulate(slip), (1e-4, 1e-3)))
+    if not len(touches) or not 1 < touches[0] < len(run.time) - 12 or len(growing) < 10:
+        return {}
+    quadratic, cubic = (at_zero(np.sqrt(slip[growing]), run.time[growing], degree) for degree in (2, 3))
+    k = int(touches[0]) - 1
+    wait = float(run.y[k] / -run.v_y[k])
+    v_y = float(run.v_y[k] + (run.v_y[k] - run.v_y[k - 1]) / step * wait)
+    rest = run.v_y[k + 5 : k + 12]  # by then it must have come to rest on the floor
+    return {
+        ("time", "slip at B"): Measured(cubic, math.hypot(cubic - quadratic, step / math.sqrt(12))),
+        ("time", "landing"): Measured(float(run.time[k]) + wait, step / math.sqrt(12)),
+        ("landing_speed", "landing"): Measured(v_y, 0.0),
+        ("landing_impulse", "landing"): Measured(p.m * (float(rest.mean()) - v_y), p.m * float(np.abs(rest).max())),
+    }
+
+
+def first_top(run: Trajectory) -> float:
+    """Height in m at which v_y first falls to zero, between the samples as under constant acceleration."""
+    k = int(np.argmax(run.v_y < 0))
+    before, after = run.v_y[k - 1], run.v_y[k]
+    wait = (run.time[k] - run.time[k - 1]) * before / (before - after)
+    return float(run.y[k - 1] + before * wait / 2)
+
+
+PROTOCOLS = (
+    Protocol("hysteresis", hysteresis, ("settled",), quick=ONE),
+    Protocol(
+        "unloading", unloading, ("thresholds",), quick=TWO, drawn=lambda m: m.conditions["start"] == UNLOADED, cost=4
+    ),
+    Protocol("slope", slope, ("settled", "thresholds"), cost=6),
+)
