@@ -72,8 +72,6 @@ class Drawing:
     """What is shown, with the parameters."""
     claims: tuple[str, ...] = ()
     """The claims beside which it stands."""
-    background: bool = False
-    """Whether it explains the model rather than showing results."""
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -77,7 +77,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         }
         shown = dict.fromkeys(own, claim.id) | shown  # a figure of several claims stands beside the first
         sections.setdefault(claim.section, []).append(row)
-    apart = [(figures[name], each.background or bool(each.claims)) for name, each in free.items()]
+    apart = [figures[name] for name in free]
     checks = [check for verdict in ran for check in verdict.checks if verdict.claim.section == "Stationary states"]
     orbits = [c for c in checks if c.measurement.quantity == "omega_c" and math.isfinite(c.predicted) and c.scale > 0]
     lead = "Its closed-form theory by Antali and Stépán is held against simulation."
@@ -98,15 +98,14 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         lead=f"A ball rolls and slips round a cylinder. {lead}",
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
         tiles=[*wording.totals(ran), (str(len(measured)), f"simulations with {len(sets)} parameter sets")],
-        figures=[figure for figure, behind in apart if not behind and not figure["gap"]],
-        background=[figure for figure, behind in apart if behind and not figure["gap"]],
+        figures=[figure for figure in apart if not figure["gap"]],
         sections=sections,
         outcomes=sorted({verdict.outcome for verdict in ran}),
         wording=wording,
         run_of=lambda m: next((name for name in m.runs if storage.exists(directory / name)), ""),
         numbers=packed(columns(material.records, {v.claim.id: v.checks for v in ran})),
         not_run=[verdict.claim for verdict in verdicts if verdict.outcome is Outcome.NOT_RUN],
-        not_drawn=[f"{figure['title']}: {figure['gap']}" for figure, _ in apart if figure["gap"]],
+        not_drawn=[f"{figure['title']}: {figure['gap']}" for figure in apart if figure["gap"]],
         command=f"dualball validate --full -o {directory}",
         errata=errata(),
         provenance={

@@ -25,7 +25,7 @@ def few_figures() -> Iterator[None]:
     """Reports with two figures, of which one was not measured: each is drawn in the tests of figures."""
     with pytest.MonkeyPatch.context() as patch:
         fig_9 = FIGURES["fig-9"]
-        lost = dataclasses.replace(fig_9, title="The user's own", select=lacking)
+        lost = dataclasses.replace(fig_9, title="The user's own", select=lacking, claims=())
         patch.setattr(report, "FIGURES", {"lost": lost, "fig-9": fig_9})
         yield
 

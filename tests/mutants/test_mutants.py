@@ -44,7 +44,9 @@ def test_there_are_many_and_each_replaces_a_function_that_exists_and_gives_it_ba
 
 
 @pytest.mark.parametrize(
-    "wrong", [w for w in THEORIES if w.module == "analytic.mechanics.dynamics"], ids=lambda w: w.what
+    "wrong",
+    [w for w in THEORIES if w.module == "analytic.mechanics.dynamics" and w.function != "eigenvalues"],
+    ids=lambda w: w.what,
 )
 def test_wrong_equations_of_motion_are_wrong_and_not_broken(wrong: WrongTheory) -> None:
     """Another number somewhere, and no error: a theory that can't be evaluated would be noticed by anybody."""
