@@ -36,6 +36,8 @@ ONE = ("reference",)
 """For what one ball shows as well as seven, or the paper draws for one."""
 TWO = ("reference", "high-wall-friction")
 """One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
+LAWS = ("reference", "wake", "blunt")
+"""One for each law of drag."""
 SEVEN = (*TWO, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
 """Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride the wall at one flow;
 drag so strong that nothing folds; two other laws of drag; friction of the wall above that of the floor and the inertia.

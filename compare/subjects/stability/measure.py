@@ -21,7 +21,7 @@ import numpy.typing as npt
 from compare.kit.engines import STUDY_SLIP
 from compare.kit.fits import exponents, matched, propagator
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
-from compare.kit.programme import Protocol
+from compare.kit.programme import LAWS, Protocol
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
 from compare.kit.settling import SOLVED, SPIN, family, high
 from compare.kit.statistics import Measured
@@ -264,4 +264,4 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
     return 1 / time_unit(p)
 
 
-PROTOCOLS = (Protocol("rates", measure, ("settled",), cost=10),)
+PROTOCOLS = (Protocol("rates", measure, ("settled",), quick=(*LAWS, "high-wall-friction", "thick-fluid"), cost=7),)

@@ -22,7 +22,7 @@ import numpy as np
 
 from compare.kit.brackets import Bracket, Care, Search, narrow
 from compare.kit.lab import Lab, coarse_step
-from compare.kit.programme import Protocol
+from compare.kit.programme import LAWS, Protocol
 from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of
 from compare.kit.settling import lasting, settle
 from compare.kit.statistics import Measured, peaks, top
@@ -342,6 +342,6 @@ def caught_up(run: Trajectory) -> float:
 
 
 PROTOCOLS = (
-    Protocol("pulsation", pulsation, ("thresholds",), cost=11),
-    Protocol("unsteady", jumps, ("thresholds",), drawn=lambda m: m.quantity == "jump_height", cost=8),
+    Protocol("pulsation", pulsation, ("thresholds",), quick=LAWS, cost=7),
+    Protocol("unsteady", jumps, ("thresholds",), quick=LAWS, drawn=lambda m: m.quantity == "jump_height", cost=5),
 )
