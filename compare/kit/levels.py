@@ -20,8 +20,8 @@ _FLOWS = (
 )
 EFFORT: dict[str, tuple[Any, Any, Any]] = {
     # quick, default, full
-    # settled: flows omega_0 sqrt(R/g), and the share of the drift limit down to which a state goes on. The five flows of
-    # quick were chosen with results in sight, so that on the sets of quick they bracket every threshold.
+    # settled: flows omega_0 sqrt(R/g), and the share of the drift limit down to which a state goes on. The five flows
+    # of quick were chosen with results in sight, so that on the sets of quick they bracket every threshold.
     "settled.flows": ((0.62, 1.4, 1.7, 2.5, 4.2), _FLOWS, _FLOWS),
     "settled.sharp": (1.0, 0.1, 0.1),
     # thresholds: relative widths of the last brackets, of those about a fold, and the factor on the settling tolerance
