@@ -89,8 +89,3 @@ def save(figure: Figure, path: Path) -> None:
 
 Figures = dict[str, Drawing]
 """Figures by their file names."""
-
-
-def figure_of(title: str, module: Any, name: str, *claims: str) -> Drawing:
-    """One of several figures of a module; it stands beside the claim of its own name if no others are named."""
-    return Drawing(title, partial(module.select, figure=name), module.draw, module.caption, claims or (name,))

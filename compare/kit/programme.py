@@ -125,9 +125,8 @@ def run(
     with ThreadPoolExecutor(lab.campaign.at_once) as threads:
         try:
             while order.is_active():
-                for protocol in sorted(
-                    (known[name] for name in order.get_ready()), key=lambda p: (not p.first, protocols.index(p))
-                ):
+                ready = [known[name] for name in order.get_ready()]
+                for protocol in sorted(ready, key=lambda each: (not each.first, -each.cost)):
                     before = sum((found[name] for name in protocol.needs if name in found), Records())
                     running[threads.submit(carry_out, protocol, lab, chosen, before, results)] = protocol
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
