@@ -15,7 +15,7 @@ from enum import StrEnum
 from compare.kit.check import Check, Relation
 from compare.kit.levels import Level
 from compare.kit.quantities import quantity
-from compare.kit.record import Condition, Measurement
+from compare.kit.record import Condition, Measurement, Missing
 from compare.kit.statistics import Measured
 
 When = Callable[[Measurement], bool]
@@ -120,8 +120,8 @@ class Verdict:
     checks: tuple[Check, ...] = ()
     error: str = ""
     """Why it could not be judged."""
-    missing: tuple[str, ...] = ()
-    """What could not be measured, and why."""
+    missing: tuple[Missing, ...] = ()
+    """What its protocols left out, and why."""
 
     @property
     def passed(self) -> bool:
@@ -129,12 +129,18 @@ class Verdict:
         return self.outcome is self.claim.expected
 
     @property
+    def left_out(self) -> int:
+        """Measurements that its protocols left out."""
+        return sum(each.rows for each in self.missing)
+
+    @property
     def resolving_power(self) -> Mapping[str, float]:
-        """By quantity, the relative error of theory that every single check would notice: the largest of all."""
+        """By quantity, the relative error of theory that every check that can tell would notice: the largest of all."""
         power: dict[str, float] = {}
+        fine = {check.measurement.quantity for check in self.checks if check.conclusive}
         for check in self.checks:
             name = check.measurement.quantity
-            if name not in ("case", "cases"):
+            if name not in ("case", "cases") and (check.conclusive or name not in fine):
                 power[name] = max(power.get(name, 0.0), check.resolves)
         return power
 

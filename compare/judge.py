@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import ParamSpec, TypeVar
 
 import analytic
@@ -12,7 +14,7 @@ from analytic.orbits.periodic import NoOrbitError
 from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.kit.check import Check
 from compare.kit.quantities import quantity
-from compare.kit.record import Measurement, Records
+from compare.kit.record import Measurement, Missing, Records
 from compare.kit.statistics import COVERAGE, Measured
 from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
@@ -59,12 +61,15 @@ def forget() -> None:
 def verdict(claim: Claim, records: Records) -> Verdict:
     """Predict, compare, and say what the numbers say.
 
-    Refuted if one check deviates beyond its tolerance; else inconclusive if one is too coarse; else confirmed.
+    Refuted if one check deviates beyond its tolerance; else inconclusive if of a quantity fewer than half of the checks
+    are fine enough to tell; else confirmed. A check that is too coarse confirms nothing, and is counted apart.
     Whatever a prediction raises makes the verdict an error of this claim alone.
     """
-    missing = tuple(
-        dict.fromkeys(f"{each.set}: {each.reason}" for each in records.missing if each.protocol in claim.protocols)
-    )
+    left_out = Counter[Missing]()
+    for each in records.missing:
+        if each.protocol in claim.protocols:
+            left_out[replace(each, rows=0)] += each.rows
+    missing = tuple(replace(each, rows=rows) for each, rows in left_out.items())
     try:
         checks = (
             tuple(claim.algebra())
@@ -78,11 +83,12 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other
         reason = f"{type(error).__name__}: {error}"
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
+    told = Counter(check.measurement.quantity for check in checks if check.conclusive)
     if not checks:
         outcome = Outcome.NOT_RUN
     elif not all(check.agrees for check in checks):
         outcome = Outcome.REFUTED
-    elif not all(check.conclusive for check in checks):
+    elif any(2 * told[name] < count for name, count in Counter(c.measurement.quantity for c in checks).items()):
         outcome = Outcome.INCONCLUSIVE
     else:
         outcome = Outcome.CONFIRMED

@@ -165,7 +165,7 @@ def carry_out(
         strong = {name: p for name, p in sets.items() if name not in weak}
         rows: list[Measurement | Missing] = [Missing(protocol.name, name, why) for name, why in weak.items()]
         if protocol.alone and "reference" not in strong:
-            rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.alone))
+            rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.alone, 0))
         else:
             rows = [*protocol.measure(lab, strong, before), *rows]
         make_directory(path.parent)

@@ -117,6 +117,11 @@ class Missing:
     protocol: str
     set: str
     reason: str
+    rows: int = 1
+    """Measurements that are left out for it; 0 where there is nothing of the kind to measure."""
+
+    def __str__(self) -> str:
+        return f"{self.set}: {self.reason}" + (f" ({self.rows} left out)" if self.rows > 1 else "")
 
 
 @dataclass(frozen=True)

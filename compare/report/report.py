@@ -69,7 +69,10 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
             "mark": "other" if verdict.passed and mark == "fail" else mark,
             "symbol": symbol,
             "predicted": list(dict.fromkeys(bearing.by for bearing in claim.bearings if bearing.by)),
-            "missing": [*verdict.missing[:REASONS], *([f"and {more} more, see {results.SUMMARY}"] if more > 0 else [])],
+            "missing": [
+                *map(str, verdict.missing[:REASONS]),
+                *([f"and {more} more, see {results.SUMMARY}"] if more > 0 else []),
+            ],
             "checks": wording.ranked(verdict.checks)[:ROWS],
             "figures": [figures[name] for name in own if name not in shown],
             "elsewhere": [(figures[name], shown[name]) for name in own if name in shown],

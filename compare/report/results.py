@@ -71,8 +71,9 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
     """What a claim came to, with the numbers of its checks."""
     about = {"id": verdict.claim.id, "verdict": verdict.outcome, "passed": verdict.passed}
     counts = {name: sum(getattr(check, name) for check in verdict.checks) for name in ("agrees", "conclusive")}
+    counts["left_out"] = verdict.left_out
     power = {"resolving_power": dict(verdict.resolving_power), "worst": verdict.worst}
-    less = {"expected": verdict.claim.expected, "missing": list(verdict.missing), "error": verdict.error}
+    less = {"expected": verdict.claim.expected, "missing": [*map(str, verdict.missing)], "error": verdict.error}
     told: dict[str, Any] = plain(about | {"checks": len(verdict.checks)} | counts | power | less)
     return told
 

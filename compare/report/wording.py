@@ -89,6 +89,10 @@ def findings(verdict: Verdict) -> dict[str, str]:
     if alike:
         powers = "; ".join(f"{power} in {', '.join(names)}" for power, names in alike.items())
         found["Would notice"] = f"a relative error of {powers}"
+    if coarse := sum(not each.conclusive for each in verdict.checks):
+        found["Too coarse to tell"] = str(coarse)
+    if verdict.left_out:
+        found["Left out by its protocols"] = str(verdict.left_out)
     return found
 
 
@@ -107,10 +111,13 @@ def headline(ran: Sequence[Verdict]) -> str:
 def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """How many claims and numbers came out how: counts with what they count."""
     checks = [check for verdict in ran for check in verdict.checks]
+    left_out = sum(each.rows for each in {each for verdict in ran for each in verdict.missing})
+    measured = len({id(check.measurement) for check in checks})
     counts = [
         (f"{sum(verdict.passed for verdict in ran)}/{len(ran)}", "claims as expected"),
         (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance"),
         (f"{sum(check.conclusive for check in checks)}/{len(checks)}", "numbers fine enough to tell"),
+        (f"{left_out}/{left_out + measured}", "measurements left out, each with a reason"),
     ]
     if corrected := sum(v.passed and v.claim.text is Text.CORRECTED for v in ran):
         counts.append((str(corrected), "claims confirmed in a corrected form, see the errata"))

@@ -49,10 +49,20 @@ def test_a_verdict_is_computed_from_the_numbers(value: float, uncertainty: float
 
 
 def test_without_measurements_it_was_not_run_and_the_reason_is_kept() -> None:
-    records = Records((), (Missing("settled", "mine", "nothing settles"), Missing("other", "mine", "no matter")))
-    (verdict,) = judge([claim()], records)
+    why, other = Missing("settled", "mine", "nothing settles"), Missing("other", "mine", "no matter")
+    (verdict,) = judge([claim()], Records((), (why, other, why)))
     assert verdict.outcome is Outcome.NOT_RUN
-    assert verdict.missing == ("mine: nothing settles",)
+    assert verdict.missing == (replace(why, rows=2),)
+    assert [str(each) for each in verdict.missing] == ["mine: nothing settles (2 left out)"]
+
+
+@pytest.mark.parametrize(("fine", "expected"), [(2, Outcome.CONFIRMED), (1, Outcome.INCONCLUSIVE)])
+def test_most_numbers_must_be_fine_enough_to_tell(fine: int, expected: Outcome) -> None:
+    sure, coarse = measured(P.omega_0, FINE), measured(P.omega_0, 0.01 * P.omega_0)
+    records = sum([sure] * fine + [coarse] * 2, Records())
+    (verdict,) = judge([claim()], records)
+    assert verdict.outcome is expected
+    assert verdict.resolving_power["omega_c"] < 1e-6
 
 
 def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own_claim_only() -> None:

@@ -151,4 +151,4 @@ def test_the_rate_of_rolling_and_of_spinning_is_measured_with_mujoco(lab: Lab) -
         assert verdicts[name].outcome is Outcome.CONFIRMED
         assert len(verdicts[name].checks) == quantities
     assert verdicts["prop-4-rate"].outcome is Outcome.NOT_RUN
-    assert any("SS" in reason for reason in verdicts["prop-4-rate"].missing)
+    assert any("SS" in each.reason for each in verdicts["prop-4-rate"].missing)

@@ -32,7 +32,7 @@ from compare.kit.check import Check
 from compare.kit.drawing import Drawing, GapError, Material
 from compare.kit.levels import Level
 from compare.kit.pages import readable
-from compare.kit.record import Measurement, Records
+from compare.kit.record import Measurement, Missing, Records
 from compare.kit.workers import spread
 from compare.report import pictures, report, results, wording
 from compare.report.results import Summary
@@ -75,7 +75,7 @@ VERDICTS = (
         claim=claim("broken", "Stability"),
         outcome=Outcome.ERROR,
         error="ValueError: diverged & <so> on",
-        missing=("rough-wall: no flow <at which> it slips",),
+        missing=(Missing("thresholds", "rough-wall", "no flow <at which> it slips"),),
     ),
     Verdict(claim=claim("doubted", expected=Outcome.REFUTED), outcome=Outcome.REFUTED, checks=checks(2, 1e-3)),
     Verdict(claim=claim("deeper", "Laws and cases"), outcome=Outcome.NOT_RUN),
