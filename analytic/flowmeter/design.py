@@ -21,6 +21,7 @@ import numpy.typing as npt
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Thresholds
 from analytic.flowmeter import characteristic as flowmeter
+from analytic.flowmeter import real_fluid
 from analytic.flowmeter.characteristic import OperatingLimit
 from analytic.mechanics import roots
 from analytic.stationary import slipping_branch
@@ -245,6 +246,8 @@ class Design:
     with_inertia: float
     """The worst limit, rad s-1, if the fluid had inertia, which the model leaves out: see
     `bifurcation.thresholds_with_inertia`."""
+    model_error: float
+    """The larger of `real_fluid.model_error` at the slowest and the fastest flow."""
 
     @property
     def choice(self) -> Choice:
@@ -278,6 +281,9 @@ def design(request: Request, seed: int = 0) -> Design:
         spread=threshold_spread(meters),
         sensitivities=sensitivities(request.make, at),
         curve=characteristic(meters, 1.5 * max(request.fastest, chosen.limit.omega_0)),
+        model_error=max(
+            real_fluid.model_error(chosen.p.replace(omega_0=flow)) for flow in (request.slowest, request.fastest)
+        ),
         with_inertia=min(t["omega_02"] if math.isnan(t["omega_01"]) else t["omega_01"] for t in with_inertia),
     )
 

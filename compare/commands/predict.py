@@ -13,11 +13,13 @@ from rich.text import Text
 
 import analytic
 from analytic.bifurcation import diagram
+from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from compare.commands import options
 from compare.kit import pages
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES
+from compare.report import meter
 from model import Case, Parameters
 from model.drag import REYNOLDS, SCHILLER_NAUMANN
 from model.kinematics import UNITS, VARIABLES
@@ -59,8 +61,14 @@ def described(p: Parameters) -> dict[str, Any]:
                 "family": list(s.family),
             }
         )
+    off = real_fluid.model_error(p)
     return {
         "parameters": dataclasses.asdict(p),
+        "model_holds": off <= real_fluid.LIMIT if p.nu_f else None,
+        "model_error": off,
+        "fluid_torque": {
+            by: dataclasses.asdict(real_fluid.rolling(p, by == "boundary layer")) for by in ("Stokes", "boundary layer")
+        },
         "groups": {"kappa": p.kappa, "Omega_0": p.Omega_0},
         "thresholds": dataclasses.asdict(analytic.thresholds(p)),
         "operating_range": limit.omega_0,
@@ -87,7 +95,16 @@ def reading(p: Parameters) -> str:
 
 
 def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
-    """What `described` says of p: thresholds, solutions, the reading and what to mind, for the terminal."""
+    """What `described` says of p: thresholds, solutions, the reading and what to mind, for the terminal.
+
+    Where the model is off for a real fluid that comes first, and the numbers have no more digits than it leaves.
+    """
+    off = data["model_error"]
+
+    def shown_to(value: float, most: int) -> str:
+        return meter.rounded(value, most, off)
+
+    first = [Text(doubt, "bold yellow") for doubt in meter.doubts(off)]
     given = [["", "", ""]]
     for field in p.quantities():
         meta, value = field.metadata, f"{getattr(p, field.name):.8g}"
@@ -99,10 +116,14 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     limits = [["", "value", "what happens there"]]
     for name, value in data["thresholds"].items():
         symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")
-        limits.append([symbol, "does not exist" if math.isnan(value) else f"{value:.12g}{unit}", _MEANING[name]])
+        limits.append(
+            [symbol, "does not exist" if math.isnan(value) else f"{shown_to(value, 12)}{unit}", _MEANING[name]]
+        )
 
     solutions = data["solutions"]
-    rows = [[label, *map(show, solutions)] for label, show in _ROWS.items() if label != "Re" or p.nu_f]
+    rows = [
+        [label, *(show(s, shown_to) for s in solutions)] for label, show in _ROWS.items() if label != "Re" or p.nu_f
+    ]
     shown = pages.table("Stationary solutions", [["", *(s["case"] for s in solutions)], *rows])
     attracting = {s.case.name for s in analytic.stable_solutions(p)}
     for column, s in zip(shown.columns[1:], solutions, strict=True):
@@ -111,10 +132,12 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     reach = f"it has no operating range: {data['operating_range_ends']['because']}"
     if limit := data["operating_range"]:
         end = data["operating_range_ends"]["because"]
-        reach = f"rolling is its only lasting motion up to ω₀ = {limit:.8g} rad/s: there {end}"
+        reach = f"rolling is its only lasting motion up to ω₀ = {shown_to(limit, 8)} rad/s: there {end}"
         if math.isinf(data["reading_range"]):
             reach += "; ω_c = ω₀ holds in every motion, however fast the flow"
     remarks: list[Text | str] = [f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {data['reading']}; {reach}."]
+    if p.c and p.omega_0:
+        remarks.append(meter.torque(p))
     if data["fluid_inertia"]:
         shifts = ", ".join(
             f"{QUANTITIES[name].symbol if name in QUANTITIES else 'the rate at which rolling follows the flow'} "
@@ -125,13 +148,14 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         remarks.append(
             f"Left out is the fluid's inertia (added mass, pressure gradient): it would shift {shifts}; not ω₀₃."
         )
+        remarks.append(meter.AT_WALLS)
     outside = [f"{s['Re']:.3g} in {s['case']}" for s in solutions if s["exists"] and s["drag_law_covers_Re"] is False]
     if outside:
         (low, high), (_, most) = REYNOLDS[p.drag], REYNOLDS[SCHILLER_NAUMANN]
         hint = f" (--drag {SCHILLER_NAUMANN}: up to {most:g})" if p.drag != SCHILLER_NAUMANN else ""
         law = f"the law {p.drag!r} is meant for {low:g} to {high:g}{hint}"
         remarks.append(Text(f"Warning: Re = {', '.join(outside)}, but {law}.", "yellow"))
-    return [head, groups, pages.table("Thresholds", limits, justify="left"), shown, *remarks]
+    return [*first, head, groups, pages.table("Thresholds", limits, justify="left"), shown, *remarks]
 
 
 _MEANING = {
@@ -143,21 +167,23 @@ _MEANING = {
 }
 
 
-_ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
-    "ω_c (rad/s)": lambda s: f"{s['x']['omega_c']:.8g}",
-    "ω̃_x (rad/s)": lambda s: f"{s['x']['slip_x']:.8g}",
-    "ω̃_y (rad/s)": lambda s: f"{s['x']['slip_y']:.8g}",
-    "ω̃_z (rad/s)": lambda s: f"{s['x']['slip_z']:.8g}",
-    "v_y (m/s)": lambda s: f"{s['x']['v_y']:.6g}",
-    "A_y (N)": lambda s: f"{s['force_A'][1]:.6g}",
-    "B_x (N)": lambda s: f"{s['force_B'][0]:.6g}",
-    "forces admissible": lambda s: "yes" if s["exists"] else "no",
-    "within the case": lambda s: s["stability"].removesuffix(" stable"),
-    "against slipping": lambda s: "stable" if s["slip_stable"] else "unstable",
-    "rightmost eigenvalue (1/s)": lambda s: (
-        "{:.4g}".format(s["eigenvalues"][0][0])
-        + (f" ± {abs(s['eigenvalues'][0][1]):.4g}i" if s["eigenvalues"][0][1] else "")
+Shown = Callable[[float, int], str]
+"""A number with so many digits at most."""
+_ROWS: dict[str, Callable[[dict[str, Any], Shown], str]] = {
+    "ω_c (rad/s)": lambda s, shown: shown(s["x"]["omega_c"], 8),
+    "ω̃_x (rad/s)": lambda s, shown: shown(s["x"]["slip_x"], 8),
+    "ω̃_y (rad/s)": lambda s, shown: shown(s["x"]["slip_y"], 8),
+    "ω̃_z (rad/s)": lambda s, shown: shown(s["x"]["slip_z"], 8),
+    "v_y (m/s)": lambda s, shown: shown(s["x"]["v_y"], 6),
+    "A_y (N)": lambda s, shown: shown(s["force_A"][1], 6),
+    "B_x (N)": lambda s, shown: shown(s["force_B"][0], 6),
+    "forces admissible": lambda s, _: "yes" if s["exists"] else "no",
+    "within the case": lambda s, _: s["stability"].removesuffix(" stable"),
+    "against slipping": lambda s, _: "stable" if s["slip_stable"] else "unstable",
+    "rightmost eigenvalue (1/s)": lambda s, shown: (
+        shown(s["eigenvalues"][0][0], 4)
+        + (f" ± {shown(abs(s['eigenvalues'][0][1]), 4)}i" if s["eigenvalues"][0][1] else "")
     ),
-    "free": lambda s: ", ".join(s["family"]) or "-",
-    "Re": lambda s: f"{s['Re']:.4g}",
+    "free": lambda s, _: ", ".join(s["family"]) or "-",
+    "Re": lambda s, shown: shown(s["Re"], 4),
 }

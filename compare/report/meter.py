@@ -11,11 +11,13 @@ import numpy as np
 from rich.table import Table
 
 from analytic.flowmeter import characteristic as flowmeter
+from analytic.flowmeter import real_fluid
 from analytic.flowmeter.characteristic import End
 from analytic.flowmeter.design import THRESHOLDS, Choice, Design
 from analytic.mechanics import drag
 from compare.kit import pages
 from compare.kit.quantities import QUANTITIES
+from model import Parameters
 
 SYMBOLS = {"mu": "μ", "eta": "η", "rho_b": "ρ_b", "rho_f": "ρ_f", "nu_f": "ν_f"}
 SYMBOLS |= {key: QUANTITIES[key].symbol for key in THRESHOLDS}
@@ -23,17 +25,63 @@ UNITS = {"r": "m", "R": "m", "rho_b": "kg/m³", "rho_f": "kg/m³", "nu_f": "m²/
 _NONE = "–"
 
 
+def doubts(off: float) -> list[str]:
+    """The warning that a real fluid does what the model leaves out, if `real_fluid.model_error` is so large."""
+    if off <= real_fluid.LIMIT:
+        return []
+    return [
+        "Warning: the paper's model doesn't hold for this fluid. What it leaves out, above all the fluid's torque on "
+        f"the spinning ball, changes its numbers by up to {off:.0%}, more than {real_fluid.LIMIT:.0%}: they are shown "
+        "with no more digits than that leaves."
+    ]
+
+
+def torque(p: Parameters) -> str:
+    """What the fluid's torque does to the ball that rolls at both points, by Stokes and by its boundary layer."""
+    laws = stokes, layer = [real_fluid.rolling(p, each) for each in (False, True)]
+    stokes_told, layer_told = (
+        f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s ({law.shift:+.0%}), and "
+        f"the friction it takes {law.friction:.2g} of what there is"
+        for law in laws
+    )
+    said = f"At ω₀ = {p.omega_0:g} rad/s the fluid's torque, which is left out, brakes the spin by Stokes at the rate "
+    said += f"8πρ_fνr/(jm) = {stokes_told}"
+    if layer.Re > 8:
+        said += f"; with a boundary layer, as for the spin's Re = {layer.Re:.2g}, at {layer_told}"
+    if max(stokes.friction, layer.friction) > 1:
+        said += ". More than 1 means that the ball can't roll at both points"
+    return said + "." + (" (If a fluid made c by Stokes' drag: which fluid isn't known.)" if not p.nu_f else "")
+
+
+AT_WALLS = (
+    "Left out is what walls add to drag: in slow flow a wall that the ball touches makes c about "
+    f"{real_fluid.AT_A_WALL:.2g} times as large, and η_cr {real_fluid.AT_A_WALL**2:.2g} times."
+)
+
+
+def rounded(value: float, most: int, off: float) -> str:
+    """A number with so many digits at most, the last of them where the first digit of its relative error `off` is."""
+    if not math.isfinite(value):
+        return _NONE
+    left = most
+    if value and off:
+        size = abs(value)
+        left = min(most, max(1, math.floor(math.log10(size)) - math.floor(math.log10(size * off)) + 1))
+    return f"{float(f'{value:.{left}g}'):.{most}g}"
+
+
 def sentences(made: Design) -> list[str]:
     """What the design comes to."""
-    chosen, request, curve, said = made.choice, made.request, made.curve, []
+    chosen, request, curve, off, said = made.choice, made.request, made.curve, made.model_error, []
     if chosen.margin < 1:
         said.append(f"No meter within the bounds covers the flows up to {request.fastest:g} rad/s.")
     said.append(f"Best: {made.material}, {_values(chosen.values)}.")
     if chosen.margin:
         said.append(
             "Rolling at both points is the ball's only lasting motion up to at worst "
-            f"ω₀ = {_number(chosen.worst.omega_0)} rad/s, {_number(chosen.margin)} times the fastest flow, "
-            f"{request.fastest:g} rad/s ({_number(chosen.limit.omega_0)} nominally): there {chosen.worst.end.value}."
+            f"ω₀ = {_number(chosen.worst.omega_0, off)} rad/s, {_number(chosen.margin, off)} times the fastest flow, "
+            f"{request.fastest:g} rad/s ({_number(chosen.limit.omega_0, off)} nominally): there "
+            f"{chosen.worst.end.value}."
         )
     else:
         said.append(f"It has no operating range: {chosen.worst.end.value}.")
@@ -42,10 +90,11 @@ def sentences(made: Design) -> list[str]:
     if chosen.margin:
         said.append(
             "The inertia of the fluid, which the model leaves out, would make the limit at worst about "
-            f"{_number(made.with_inertia)} rad/s."
+            f"{_number(made.with_inertia, off)} rad/s."
         )
+    said += [torque(chosen.p.replace(omega_0=request.fastest)), AT_WALLS]
     if math.isfinite(chosen.response):
-        said.append(f"It follows small changes of the flow with a time constant of {_number(chosen.response)} s.")
+        said.append(f"It follows small changes of the flow with a time constant of {_number(chosen.response, off)} s.")
     if request.slowest > 0:
         turn, ratio = 2 * math.pi / request.slowest, request.fastest / request.slowest
         said.append(f"At the slowest flow, 1/{_number(ratio)} of the fastest, a turn takes {_number(turn)} s.")
@@ -61,25 +110,30 @@ def sentences(made: Design) -> list[str]:
 
 def rows(made: Design) -> dict[str, pages.Rows]:
     """Tables by title, with a column for the best meter of each material, the best of all first, and of thresholds."""
+    off = made.model_error
     best = dict(sorted(made.choices.items(), key=lambda item: -item[1].margin))
     numbers = {
-        **{_named(name): [c.values[name] for c in best.values()] for name in made.choice.values},
         "limit at worst (rad/s)": [c.worst.omega_0 for c in best.values()],
         "nominal limit (rad/s)": [c.limit.omega_0 for c in best.values()],
         "margin at worst": [c.margin for c in best.values()],
         "time constant (s)": [c.response for c in best.values()],
     }
+    limits = {name: [_number(x, off) for x in row] for name, row in numbers.items()}
     spread = {key: [getattr(made.thresholds, key), *made.spread[key]] for key in THRESHOLDS}
+    values = {_named(name): [_number(c.values[name]) for c in best.values()] for name in made.choice.values}
     sensitivities = [["% per %", *(SYMBOLS[key] for key in THRESHOLDS)]]
     for name in made.sensitivities[THRESHOLDS[0]]:
-        values = [made.sensitivities[key][name].value for key in THRESHOLDS]
-        shown = [f"{value:+.3f}" if abs(value) >= 5e-4 else "0" if math.isfinite(value) else _NONE for value in values]
+        slopes = [made.sensitivities[key][name].value for key in THRESHOLDS]
+        # Differences of two widths leave 1e-4 of what should be zero.
+        shown = [
+            _number(value, off) if abs(value) >= 5e-4 else "0" if math.isfinite(value) else _NONE for value in slopes
+        ]
         sensitivities.append([SYMBOLS.get(name, name), *shown])
     return {
-        "The best of each material": [["", *best], *([name, *map(_number, row)] for name, row in numbers.items())],
+        "The best of each material": [["", *best], *([name, *row] for name, row in (values | limits).items())],
         "Thresholds": [
             ["threshold", "nominal (rad/s)", "lowest", "highest"],
-            *([SYMBOLS[key], *map(_number, row)] for key, row in spread.items()),
+            *([SYMBOLS[key], *(_number(x, off) for x in row)] for key, row in spread.items()),
         ],
         "Sensitivities": sensitivities,
     }
@@ -88,7 +142,8 @@ def rows(made: Design) -> dict[str, pages.Rows]:
 def tables(made: Design) -> list[Table | str]:
     """All of it, for the terminal."""
     shown = [pages.table(title, own) for title, own in rows(made).items()]
-    return [*shown, *(f"{name} can't be used: {why}" for name, why in made.refused.items()), *sentences(made)]
+    refused = [f"{name} can't be used: {why}" for name, why in made.refused.items()]
+    return [*doubts(made.model_error), *shown, *refused, *sentences(made)]
 
 
 def described(made: Design) -> dict[str, Any]:
@@ -106,6 +161,8 @@ def described(made: Design) -> dict[str, Any]:
         "meter": meter(made.choice),
         "parameters": dataclasses.asdict(p),
         "covers": made.choice.margin >= 1,
+        "model_error": made.model_error,
+        "model_holds": made.model_error <= real_fluid.LIMIT,
         "worst_limit_with_inertia": made.with_inertia,
         "reading_range": flowmeter.reading_range(p),
         "unloading_limit": flowmeter.unloading_limit(p),
@@ -141,7 +198,13 @@ def page(made: Design) -> str:
         "tolerances": ", ".join(f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()) or "none",
     }
     drawn = [(pictures.svg(draw(made)), caption) for draw, caption in figures.FIGURES]
-    shown = {"sentences": sentences(made), "tables": rows(made).items(), "asked": asked, "figures": drawn}
+    shown = {
+        "doubts": doubts(made.model_error),
+        "sentences": sentences(made),
+        "tables": rows(made).items(),
+        "asked": asked,
+        "figures": drawn,
+    }
     return pages.render("compare.report", "meter.html", made=made, **shown)
 
 
@@ -154,5 +217,5 @@ def _named(name: str) -> str:
     return SYMBOLS.get(name, name) + (f" ({UNITS[name]})" if name in UNITS else "")
 
 
-def _number(x: float) -> str:
-    return f"{x:.4g}" if math.isfinite(x) else _NONE
+def _number(x: float, off: float = 0.0) -> str:
+    return rounded(x, 4, off)

@@ -52,6 +52,20 @@ def test_predict_waits_for_no_heavy_package() -> None:
     assert not {"h5py", "matplotlib", "mujoco", "numba", "scipy"} & set(loaded)
 
 
+def test_predict_doubts_the_model_before_any_threshold(capsys: pytest.CaptureFixture[str]) -> None:
+    """Plastic in oil: the fluid's torque, more than the drag, makes omega_c less than half of omega_0."""
+    assert cli.main(["predict", "--set", "plastic-in-oil"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert shown.startswith("Warning: the paper's model doesn't hold for this fluid.")
+    assert "changes its numbers by up to 60%" in shown
+    assert "ω₀₁ 10 rad/s two-point rolling" in shown
+    assert "would be 3.63 rad/s (-55%)" in shown
+    assert cli.main(["predict", "--set", "plastic-in-oil", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["model_holds"] is False
+    assert list(printed).index("model_holds") < list(printed).index("thresholds")
+
+
 @pytest.mark.parametrize(("law", "covered"), [("stokes", False), ("schiller-naumann", True)])
 def test_predict_says_where_a_law_of_drag_ends(capsys: pytest.CaptureFixture[str], law: str, covered: bool) -> None:
     options = ["predict", "--set", "steel-in-water", "--omega-0", "20", "--drag", law]
@@ -79,6 +93,7 @@ def test_predict_without_a_fluid_knows_no_reynolds_number(capsys: pytest.Capture
     assert cli.main(["predict", "--omega-0", "25", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["fluid_inertia"] is None
+    assert printed["model_holds"] is None
     assert {(s["Re"], s["drag_law_covers_Re"]) for s in printed["solutions"]} == {(None, None)}
 
 

@@ -1,0 +1,53 @@
+"""What the paper leaves out of a real fluid: the torque on the spinning ball."""
+
+import numpy as np
+import pytest
+
+from analytic.flowmeter import real_fluid
+from analytic.mechanics import drag
+from model import Parameters
+
+
+@pytest.mark.parametrize("name", ["steel-in-water", "plastic-in-oil", "air", "reference"])
+@pytest.mark.parametrize("layer", [False, True])
+def test_rolling_with_the_torque_obeys_newton_and_euler(name: str, layer: bool) -> None:
+    """(20) with one torque more, as vectors, with the forces of rolling that the two balances leave."""
+    p = Parameters.named(name)
+    at = real_fluid.rolling(p, layer)
+    inwards, up, _ = np.eye(3)
+    spin = p.R / p.r * at.omega_c * (inwards - up)
+    relative = spin - p.omega_0 * up
+    inertia = p.j * p.m * p.r**2
+    torque = -inertia * at.rate * relative
+    lag = p.R * (at.omega_c - p.omega_0)
+    push = -p.m * drag.coefficient(abs(lag), p) * lag
+    # Moments along x and y give A_z and B_z; the orbit is steady if they hold the fluid's push.
+    A_z, B_z = torque[0] / p.r, -torque[1] / p.r
+    assert A_z + B_z + push == pytest.approx(0, abs=1e-9 * push)
+    for B_y in (0.0, 0.3 * p.m * p.g):
+        A_x = B_y - p.j * p.m * p.R * at.omega_c**2
+        F_A, F_B = np.array([A_x, p.m * p.g - B_y, A_z]), np.array([p.m * p.R * at.omega_c**2 - A_x, B_y, B_z])
+        moment = np.cross(-p.r * up, F_A) + np.cross(-p.r * inwards, F_B) + torque
+        np.testing.assert_allclose(moment, np.cross(at.omega_c * up, inertia * spin), atol=1e-9 * np.abs(moment).max())
+
+
+def test_the_torque_is_of_the_order_of_the_drag_for_every_ball() -> None:
+    """8 pi rho_f nu r/(j m), which is 10/3 of the drag's rate for a uniform ball; the two laws meet at Re = 8."""
+    p = Parameters.named("steel-in-water")
+    rho_f = p.density_ratio * p.m / (4 / 3 * np.pi * p.r**3)
+    stokes = real_fluid.torque_rate(1.0, p, layer=False)
+    assert stokes == pytest.approx(8 * np.pi * rho_f * p.nu_f * p.r / (p.j * p.m))
+    assert stokes == pytest.approx(10 / 3 * p.c)
+    rates = [real_fluid.torque_rate(Re * p.nu_f / p.r**2, p) / stokes for Re in (7.9, 8.0, 8.1, 2000.0)]
+    assert rates[:3] == pytest.approx([1.0] * 3, abs=5e-3)
+    assert rates[3] == pytest.approx(2000 / (16 * np.pi) * (6.45 / np.sqrt(2000) + 32.1 / 2000))
+
+
+def test_the_mirror_image_and_where_nothing_moves() -> None:
+    p = Parameters.named("steel-in-water")
+    there, back = (real_fluid.rolling(p.replace(omega_0=flow)) for flow in (15.0, -15.0))
+    assert back.omega_c == -there.omega_c
+    assert (back.shift, back.friction) == (there.shift, there.friction)
+    assert np.isnan(real_fluid.rolling(p.replace(omega_0=0.0)).shift)
+    assert real_fluid.model_error(p.replace(omega_0=0.0)) > real_fluid.LIMIT  # by the fluid's inertia alone
+    assert real_fluid.model_error(Parameters.named("reference")) == 0.0
