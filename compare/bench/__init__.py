@@ -1,1 +1,6 @@
-"""Engines beside each other: grades of a person's settings, and the league."""
+"""Exact contact cases, engines on trial on them, grades of a person's settings, and the league."""
+
+from compare.bench.exact import cases
+from compare.bench.runner import Result, run
+
+__all__ = ["Result", "cases", "run"]

@@ -1,0 +1,1 @@
+"""Engines that take exact cases; each module is one, see `compare.bench.runner`."""

@@ -1,0 +1,210 @@
+"""An exact contact case as data: one free rigid body in plain geometry whose motion is known to 1e-10.
+
+SI units, world axes with z up. Contacts are rigid, friction is Coulomb's with one coefficient for stick and slip, and
+impacts are plastic (no restitution). The body's friction is nothing of its own: the coefficient of a pair is that of
+the surface.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from model.arrays import Array
+from model.kinematics import rotated
+
+Vector = tuple[float, float, float]
+VERSION = 1
+"""Of the set of cases; a change of any number in it is another version."""
+STEPS = (4e-3, 2e-3, 1e-3)
+"""Time steps at which an engine is asked, s; every sample of a case falls on a step of each."""
+TOLERANCE = 1e-2
+"""Error, in units of the case's scales, up to which an engine passes at the shortest step. A method of first order is
+wrong by about a step divided by the time that the motion takes to change, 1 ms by 0.1 s or more; every wrong answer
+that a case must notice is off by several times as much."""
+FACETS = 64
+"""Planes that stand for a cylinder in MJCF, which has no hollow one."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A fixed surface: a plane, or the inner side of a vertical cylinder."""
+
+    name: str
+    friction: float
+    """Coulomb's coefficient of the pair of it and the body."""
+    point: Vector = (0.0, 0.0, 0.0)
+    """A point of the plane, or of the cylinder's axis, m."""
+    normal: Vector = (0.0, 0.0, 1.0)
+    """Of the plane, towards the body."""
+    radius: float | None = None
+    """Of the cylinder, m; None for a plane."""
+    turning: float = 0.0
+    """Angular velocity of its material about the vertical through `point`, rad/s; a turntable has one."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body and its start; its centre of mass is the middle of its shape."""
+
+    position: Vector
+    """Of the centre at the start, m."""
+    velocity: Vector
+    """m/s"""
+    spin: Vector
+    """Angular velocity, rad/s."""
+    shape: str
+    """``sphere`` or ``box``."""
+    size: tuple[float, ...]
+    """Radius, or the three half edges, m."""
+    mass: float
+    """kg"""
+    inertia: Vector
+    """Principal moments about the centre, kg m2."""
+    orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    """Unit quaternion, the scalar first."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A body, what it touches, what acts on it, and its exact motion."""
+
+    name: str
+    about: str
+    """What happens, in a sentence."""
+    body: Body
+    surfaces: tuple[Surface, ...]
+    times: Array = field(repr=False)
+    """Of the samples, (n,), s."""
+    exact: Array = field(repr=False)
+    """(n, 9): position, velocity and spin of the body at those times."""
+    contacts: tuple[str, ...] = field(repr=False)
+    """For each sample a letter a surface: R sticks or rolls, S slips, N does not touch."""
+    bound: float
+    """Of the error of `exact`, in units of `scales`."""
+    source: str
+    """Where `exact` is from."""
+    scales: tuple[float, float, float]
+    """By what errors of position (m), velocity (m/s) and spin (rad/s) are divided; infinite: not compared."""
+    wrong: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    """Answers that the case must notice: what is wrong, and `exact` as it would then be."""
+    g: float = 9.81
+    """Gravity, along -z, m/s2."""
+    pull: Vector = (0.0, 0.0, 0.0)
+    """A constant force at the centre, N."""
+    growth: Vector = (0.0, 0.0, 0.0)
+    """A force at the centre that grows with time, N/s."""
+    drag: float = 0.0
+    """c of a fluid's drag -m c (v - u), 1/s."""
+    flow: float = 0.0
+    """Angular velocity of that fluid about the z axis: u = flow (-y, x, 0), rad/s."""
+    motion: Any = field(default=None, repr=False)
+    """Of a ball in the study's vessel: its `model.Parameters` and `model.State` at the start."""
+
+    def force(self, t: float, position: Any, velocity: Any) -> Vector:
+        """All that acts at the body's centre at a time in s but gravity and contacts, N; engines set it every step."""
+        (x, y, *_), (v_x, v_y, v_z), mc = position, velocity, self.body.mass * self.drag
+        relative = (v_x + self.flow * y, v_y - self.flow * x, v_z)
+        a, b, c = (p + t * q - mc * w for p, q, w in zip(self.pull, self.growth, relative, strict=True))
+        return float(a), float(b), float(c)
+
+    @property
+    def forced(self) -> bool:
+        """Whether `force` is ever other than zero."""
+        return any((*self.pull, *self.growth, self.drag))
+
+    def error(self, states: Array) -> float:
+        """The largest error of states (n, 9): the length of a difference of vectors divided by its scale."""
+        off = np.linalg.norm((states - self.exact).reshape(-1, 3, 3), axis=2) / self.scales
+        return float(off.max())
+
+    def touching(self, states: Array) -> tuple[Array, Array]:
+        """Gap (m) and slip speed (m/s) of states (n, 9) at each surface, (n, surfaces); a box doesn't turn."""
+        position, velocity, spin = np.split(states, 3, axis=1)
+        gaps, slips = [], []
+        for surface in self.surfaces:
+            away = position - surface.point
+            if surface.radius is None:
+                normal = np.broadcast_to(surface.normal, away.shape)
+                height = np.sum(away * normal, axis=1)
+            else:
+                rho = np.hypot(away[:, 0], away[:, 1])
+                normal = -away * [1, 1, 0] / rho[:, None]
+                height = surface.radius - rho
+            arm = -self.reach(normal)[:, None] * normal
+            moves = surface.turning * np.cross([0.0, 0.0, 1.0], away + arm)
+            slip = velocity + (np.cross(spin, arm) if self.body.shape == "sphere" else 0) - moves
+            slips.append(np.linalg.norm(slip - np.sum(slip * normal, axis=1)[:, None] * normal, axis=1))
+            gaps.append(height - self.reach(normal))
+        return np.stack(gaps, axis=1), np.stack(slips, axis=1)
+
+    def reach(self, normal: Array) -> Array:
+        """How far the body reaches from its centre against normals (n, 3), m."""
+        if self.body.shape == "sphere":
+            return np.full(len(normal), self.body.size[0])
+        w, *axis = self.body.orientation
+        own = rotated(np.array([w, *(-a for a in axis)]), normal)
+        return np.asarray(np.abs(own) @ np.array(self.body.size))
+
+    def in_contact(self, letters: str) -> Array:
+        """Where the exact motion has one of these letters, (n, surfaces)."""
+        return np.array([[letter in letters for letter in sample] for sample in self.contacts])
+
+    def mjcf(self, timestep: float = 1e-3) -> str:
+        """The scene for MuJoCo with all of its contact parameters as they come; `force` is not in it."""
+        body, parts = self.body, []
+        for surface in self.surfaces:
+            friction = f'friction="{surface.friction} 0 0"'
+            if surface.turning:  # a plane can't turn: a disc so heavy that the body doesn't slow it
+                parts.append(
+                    f'<body name="{surface.name}" pos="{_text(surface.point)}"><joint name="table" axis="0 0 1" '
+                    f'armature="1e6"/><geom type="cylinder" size="5 0.5" pos="0 0 -0.5" mass="1" {friction}/></body>'
+                )
+            elif surface.radius is None:
+                pose = f'pos="{_text(surface.point)}" zaxis="{_text(surface.normal)}"'
+                parts.append(f'<geom name="{surface.name}" type="plane" size="0 0 1" {pose} {friction}/>')
+            else:
+                for k in range(FACETS):
+                    inwards = np.array([-math.cos(math.tau * k / FACETS), -math.sin(math.tau * k / FACETS), 0.0])
+                    pose = f'pos="{_text(surface.point - surface.radius * inwards)}" zaxis="{_text(inwards)}"'
+                    parts.append(f'<geom name="{surface.name}{k}" type="plane" size="0 0 1" {pose} {friction}/>')
+        turns = [surface.turning for surface in self.surfaces if surface.turning]
+        inwards = _into(body.orientation, body.spin)  # MuJoCo counts the spin of a free body in its own axes
+        qpos = [*[0.0] * len(turns), *body.position, *body.orientation]
+        qvel = [*turns, *body.velocity, *inwards]
+        return f"""<mujoco model="{self.name}">
+  <option timestep="{timestep}" gravity="0 0 {-self.g}"/>
+  <worldbody>
+    {(chr(10) + "    ").join(parts)}
+    <body name="body" pos="{_text(body.position)}" quat="{_text(body.orientation)}">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="{body.mass}" diaginertia="{_text(body.inertia)}"/>
+      <geom name="body" type="{body.shape}" size="{_text(body.size)}" friction="0 0 0"/>
+    </body>
+  </worldbody>
+  <keyframe><key name="start" qpos="{_text(qpos)}" qvel="{_text(qvel)}"/></keyframe>
+</mujoco>
+"""
+
+    def to_mapping(self) -> dict[str, Any]:
+        """All of it but the MJCF as JSON-able data; scales that are infinite are None."""
+        data = asdict(self) | {"schema": "dualball-case", "version": VERSION, "steps": STEPS, "tolerance": TOLERANCE}
+        data |= {"times": self.times.tolist(), "exact": self.exact.tolist()}
+        data["scales"] = [scale if math.isfinite(scale) else None for scale in self.scales]
+        data["wrong"] = {name: self.error(states) for name, states in self.wrong.items()}
+        del data["motion"]
+        return data
+
+
+def _text(numbers: Any) -> str:
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def _into(orientation: tuple[float, ...], vector: Vector) -> Array:
+    """A vector of the world in the axes of a body."""
+    w, *axis = orientation
+    return rotated(np.array([w, *(-a for a in axis)]), np.array(vector))

@@ -1,0 +1,12 @@
+"""The set of exact cases."""
+
+import functools
+
+from compare.bench import one_contact
+from compare.bench.case import Case
+
+
+@functools.cache
+def cases() -> tuple[Case, ...]:
+    """All of them: those with one contact first."""
+    return one_contact.cases()

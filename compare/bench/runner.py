@@ -1,0 +1,256 @@
+"""An engine on exact cases, in a process of its own: what breaks, hangs or diverges loses a case, not the run.
+
+An engine is anything with three functions, a module most simply:
+
+* ``build(case, timestep)`` makes the scene of a `Case` anew, its body at the start;
+* ``step(n)`` takes n steps of that length, setting ``case.force(t, position, velocity)`` before each where
+  ``case.forced``;
+* ``state()`` returns position, velocity and spin of the body, three numbers each, in SI units and world axes.
+
+``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It may say of itself:
+``NAME``, ``PRECISION`` (``f64`` or ``f32``), ``DECLARED`` (in words, all that isn't a free body in plain geometry under
+the engine's own settings), ``TIMESTEPS`` (its own instead of `STEPS`), ``KNOWN`` (package and version with which it is
+known to work, ``"mujoco 4.0.0"``).
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from compare.bench.case import STEPS, TOLERANCE, Case
+from model import InputError
+from model.arrays import Array
+from model.trajectory import version
+
+LIMIT = 120.0
+"""Longest that a run at one step may take, s of real time."""
+LIFTED = 1e-3
+"""Gap, in units of the body's least size, from which a contact that should last counts as lost."""
+FLOORS = {"f64": 1e-11, "f32": 1e-5}
+"""Errors that are only round-off; there is no order in them."""
+FUNCTIONS = ("build", "step", "state")
+
+
+@dataclass(frozen=True)
+class About:
+    """What an engine says of itself."""
+
+    name: str
+    precision: str = "f64"
+    declared: str = ""
+    version: str = ""
+    """Of its package, and the version with which it is known to work if that is another."""
+    steps: tuple[float, ...] = STEPS
+    missing: str = ""
+    """Why it can't be used here; empty if it can."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """An engine on a case; nan for what isn't known."""
+
+    case: str
+    engine: About
+    steps: tuple[float, ...] = ()
+    errors: tuple[float, ...] = ()
+    """At each step, in units of the case's scales; nan where the run failed."""
+    costs: tuple[float, ...] = ()
+    """Processor time divided by simulated time, at each step."""
+    creep: float = math.nan
+    """Mean slip speed where the body should stick or roll, at the shortest step, m/s."""
+    lost: float = math.nan
+    """Share of samples, at the shortest step, in which a contact that should last is open."""
+    failure: str = ""
+    skipped: str = ""
+    """Why the engine was not tried."""
+
+    @property
+    def error(self) -> float:
+        """At the shortest step."""
+        return self.errors[-1] if self.errors else math.nan
+
+    @property
+    def cost(self) -> float:
+        """At the shortest step."""
+        return self.costs[-1] if self.costs else math.nan
+
+    @property
+    def order(self) -> float:
+        """The power of the step with which the error falls; nan where it is round-off, or where a run failed."""
+        errors, floor = np.array(self.errors), FLOORS.get(self.engine.precision, FLOORS["f64"])
+        if len(errors) < 2 or not (errors > floor).all():
+            return math.nan
+        return float(np.polyfit(np.log(self.steps), np.log(errors), 1)[0])
+
+    @property
+    def passed(self) -> bool:
+        """Whether the error at the shortest step is at most `TOLERANCE`."""
+        return self.error <= TOLERANCE
+
+
+def run(case: Case, engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT) -> Result:
+    """One engine on one case: ``engine`` is the name of a module, ``module:object``, a module or a picklable object.
+
+    ``limit`` is the longest time for one step's run, s. Raises `InputError` if the engine can't be imported.
+    """
+    (result,) = run_all([case], engine, steps, limit)
+    if result.engine.missing:
+        raise InputError(result.engine.missing)
+    return result
+
+
+def run_all(
+    cases: Sequence[Case], engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
+) -> Iterator[Result]:
+    """One engine on many cases, one after the other in one process, that is begun anew where it hangs or dies."""
+    given = engine.__name__ if hasattr(engine, "__spec__") else engine
+    server = _Server(given, limit)
+    try:
+        for case in cases:
+            yield server.result(case, steps)
+    finally:
+        server.stop()
+
+
+class _Server:
+    """A process with an engine in it."""
+
+    def __init__(self, engine: Any, limit: float) -> None:
+        self._engine, self._limit = engine, limit
+        self.about = self._start()
+
+    def _start(self) -> About:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, far = context.Pipe()
+        self._process: Any = context.Process(target=_serve, args=(self._engine, far), daemon=True)
+        self._process.start()
+        far.close()
+        answer = self._answer()
+        name = self._engine if isinstance(self._engine, str) else type(self._engine).__name__
+        return answer if isinstance(answer, About) else About(name, missing=f"{name} {answer}")
+
+    def _answer(self) -> Any:
+        """What the process sends, or in words why it doesn't."""
+        try:
+            if self._pipe.poll(self._limit):
+                return self._pipe.recv()
+            self.stop()
+            return f"took longer than {self._limit:g} s"
+        except (EOFError, OSError):
+            self._process.join()
+            return f"crashed (exit code {self._process.exitcode})"
+
+    def stop(self) -> None:
+        self._process.kill()
+        self._process.join()
+
+    def result(self, case: Case, steps: Sequence[float] | None) -> Result:
+        """Of all steps; later ones are not tried where one hangs."""
+        about, found = self.about, Result(case.name, self.about)
+        if about.missing:
+            return replace(found, skipped=about.missing)
+        runs: list[tuple[Array | None, float, str]] = []
+        chosen = tuple(sorted(steps or about.steps, reverse=True))
+        for step in chosen:
+            if not self._process.is_alive():
+                self._start()
+            self._pipe.send((case, step))
+            answer = self._answer()
+            if isinstance(answer, str):  # it hung or died
+                runs += [(None, math.nan, f"{answer} at a step of {1e3 * step:g} ms")] * (len(chosen) - len(runs))
+                break
+            if isinstance(answer, NotImplementedError):
+                return replace(found, skipped=str(answer))
+            runs.append(answer)
+        states, costs, failures = zip(*runs, strict=True)
+        found = replace(found, steps=chosen, costs=costs, failure=next(filter(None, failures), ""))
+        if found.failure and "known to work" in about.version:
+            found = replace(found, failure=f"{found.failure} ({about.version})")
+        found = replace(found, errors=tuple(math.nan if s is None else case.error(s) for s in states))
+        if (last := states[-1]) is None:
+            return found
+        gaps, slips = case.touching(last)
+        sticks, touches = case.in_contact("R"), case.in_contact("RS")
+        return replace(
+            found,
+            creep=float(slips[sticks].mean()) if sticks.any() else math.nan,
+            lost=float((gaps[touches] > LIFTED * min(case.body.size)).mean()) if touches.any() else math.nan,
+        )
+
+
+def load(engine: Any) -> Any:
+    """The module or object of a name; `InputError` if it isn't there or isn't whole."""
+    if not isinstance(engine, str):
+        return engine
+    module, _, name = engine.partition(":")
+    try:
+        found = importlib.import_module(module)
+        return getattr(found, name) if name else found
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"{engine} can't be imported: {error}") from error
+
+
+def _about(engine: Any) -> About:
+    """What an engine says of itself; `InputError` if it lacks a function."""
+    name = getattr(engine, "NAME", getattr(engine, "__name__", type(engine).__name__))
+    lacking = [function for function in FUNCTIONS if not callable(getattr(engine, function, None))]
+    if lacking:
+        raise InputError(f"{name} has no function {' nor '.join(lacking)}; an engine has {', '.join(FUNCTIONS)}")
+    package, _, known = getattr(engine, "KNOWN", "").partition(" ")
+    here = version(package) if package else ""
+    shown = f"{package} {here}" + (f", known to work: {known}" if known and here != known else "")
+    return About(
+        name=name,
+        precision=getattr(engine, "PRECISION", "f64"),
+        declared=getattr(engine, "DECLARED", ""),
+        version=shown.strip(),
+        steps=tuple(getattr(engine, "TIMESTEPS", STEPS)),
+    )
+
+
+def _serve(engine: Any, pipe: Any) -> None:
+    """The process: cases come in, what the engine makes of them goes out."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)  # engines are talkative
+    try:
+        adapter = load(engine)
+        pipe.send(_about(adapter))
+    except InputError as error:
+        pipe.send(f"can't be used: {error}")
+        return
+    while True:
+        case, step = pipe.recv()
+        pipe.send(_attempt(adapter, case, step))
+
+
+def _attempt(engine: Any, case: Case, step: float) -> Any:
+    """States (n, 9) or None, processor time divided by simulated time, and why there are no states."""
+    states, spent, done = np.empty_like(case.exact), 0.0, 0
+    try:
+        engine.build(case, step)
+        for k, steps in enumerate(np.rint(case.times / step).astype(int).tolist()):
+            begin = time.process_time()
+            if steps > done:
+                engine.step(steps - done)
+            parts = [np.asarray(part, dtype=float) for part in engine.state()]
+            spent, done = spent + time.process_time() - begin, steps
+            shapes = [part.shape for part in parts]
+            if shapes != [(3,)] * 3:
+                return None, math.nan, f"state() must return position, velocity and spin, not shapes {shapes}"
+            states[k] = np.concatenate(parts)
+            if not (np.abs(states[k]) < 1e8).all():
+                return None, math.nan, f"diverged by t = {case.times[k]:g} s at a step of {1e3 * step:g} ms"
+    except NotImplementedError as error:
+        return NotImplementedError(str(error))
+    except Exception as error:  # whatever an engine throws loses the case alone
+        return None, math.nan, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+    return states, spent / float(case.times[-1]), ""
