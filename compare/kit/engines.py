@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property, partial
 from typing import Any
+
+import numpy as np
 
 import analytic
 import mjsim
@@ -17,6 +19,7 @@ from compare.kit.adapters import adapter, drake, loop, pybullet, siconos
 from compare.kit.adapters.adapter import Library
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
+from model.arrays import Array
 from model.errors import suggestion
 from model.trajectory import version
 
@@ -94,6 +97,11 @@ def _rough(step: float) -> ContactSettings:
     return ContactSettings.for_problem(Parameters.named("reference").replace(mu=1.0, eta=0.0), step, STUDY_SLIP)
 
 
+def plain(step: float) -> ContactSettings:
+    """The studies' settings for a step in s, and none of the corrections between the steps."""
+    return replace(_rough(step), servo=0.0, memory=False, order=1)
+
+
 def newcomer(step: float) -> ContactSettings:
     """MuJoCo's own contact parameters on the joints of this study, and none of the corrections between the steps."""
     contacts = ContactSettings(timestep=step, solref=(0.02, 1.0), solreffriction=0.02, solimp=0.9, impratio=1.0)
@@ -154,6 +162,14 @@ MUJOCO = Engine(
     mark="o",
     colour="#0072B2",
 )
+PLAIN = replace(
+    MUJOCO,
+    name="mujoco-plain",
+    configure=lambda given, p: plain(given.get("timestep", ContactSettings.timestep)).suited(p),
+    study=lambda step, p: plain(step).suited(p),
+    mark="P",
+    colour="#56B4E9",
+)
 NEWCOMER = replace(
     MUJOCO,
     name="mujoco-defaults",
@@ -188,7 +204,7 @@ _OTHERS = (
     *_adapted(drake, Library("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
     *_adapted(siconos, siconos.LIBRARY, 1e-3, "p2", "#000000"),
 )
-ENGINES: dict[str, Engine] = {each.name: each for each in (MUJOCO, NEWCOMER, EVENT, MOREAU, *_OTHERS)}
+ENGINES: dict[str, Engine] = {each.name: each for each in (MUJOCO, PLAIN, NEWCOMER, EVENT, MOREAU, *_OTHERS)}
 """Every engine by name."""
 
 
@@ -198,3 +214,18 @@ def engine(name: str) -> Engine:
     if name not in ENGINES:
         raise InputError(f"no engine is called {name!r}{suggestion(name, ENGINES)}; there are {', '.join(ENGINES)}")
     return ENGINES[name]
+
+
+def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
+    """Slip speeds (n,) at A and B, m s-1, less the creep of an engine whose friction yields to any force.
+
+    A contact that rolls creeps at a speed proportional to its friction force, with a factor that the settings give.
+    """
+    m = run.header.parameters.m
+    if ENGINES[run.header.engine].settings is not ContactSettings:
+        return run.slip_speed_A, run.slip_speed_B
+    kept = run.header.settings
+    settings = ContactSettings.from_mapping({f.name: kept[f.name] for f in fields(ContactSettings) if f.name in kept})
+    friction = np.hypot(run.force_A[:, 0], run.force_A[:, 2]), np.hypot(run.force_B[:, 1], run.force_B[:, 2])
+    A, B = (settings.creep_speed(force / m) for force in friction)
+    return np.maximum(run.slip_speed_A - A, 0.0), np.maximum(run.slip_speed_B - B, 0.0)

@@ -27,6 +27,8 @@ class Lab:
     campaign: Campaign
     engine: Engine
     level: Level
+    refine: int = 1
+    """Time steps in one that a protocol asks for: the engine's limit of no step is found with several."""
 
     def effort(self, name: str) -> Any:
         """How much of something is measured at this level, see `compare.kit.levels`."""
@@ -49,7 +51,7 @@ class Lab:
             x0=x0,
             t_end=t_end,
             flow=flow,
-            settings=self.engine.at(step, p),
+            settings=self.engine.at(step / self.refine, p),
             sample_interval=max(step, t_end / samples),
         )
 

@@ -21,6 +21,7 @@ from functools import partial
 import numpy as np
 
 from compare.kit.brackets import Answer, Bracket, Care, Search, narrow
+from compare.kit.engines import sliding_speeds
 from compare.kit.fits import POINTS, initial_slope, straight_line, turning, vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, if_sure, measurement
@@ -213,8 +214,8 @@ def stays_rolling(run: Trajectory) -> bool | None:
     """
     if not presses(run):
         return False
-    middle = run.slip_speed_A[len(run.time) // 2 :]
-    last, before = slip(run.slip_speed_A, run), slip(middle, run, share=1.0)
+    speeds, _ = sliding_speeds(run)
+    last, before = slip(speeds, run), slip(speeds[len(speeds) // 2 :], run, share=1.0)
     if last >= 1:
         return False if last > 0.6 * before else None
     return True if last < 1e-2 else None
@@ -224,7 +225,7 @@ ASKED: dict[str, tuple[float, Answer]] = {
     "rolling": (5, stays_rolling),
     "sinking": (20, lambda run: family(settled_case(run)) is not Case.NR),
     "slipping": (40, lambda run: settles(run) is not False),
-    "riding": (5, lambda run: slip(run.slip_speed_B, run) > 1),
+    "riding": (5, lambda run: slip(sliding_speeds(run)[1], run) > 1),
     "leaning": (20, lambda run: presses(run) and settled_case(run) is Case.RR),
     "fold": (1.4, settles),
 }
@@ -268,7 +269,7 @@ def _rows(
 
     def bisected(quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
         # Slip that is still too small to count may have begun below: it is proportional to the distance.
-        speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in (run.slip_speed_A, run.slip_speed_B))
+        speed = max(slip(speeds, run) for run in of.runs[1:] if run for speeds in sliding_speeds(run))
         unseen = (of.high - of.low) / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         place = Measured(of.place.value, math.hypot(of.place.uncertainty, unseen))
         return row(quantity, place, of.tasks, side, by)
