@@ -25,11 +25,10 @@ from compare.bench import trials
 from compare.bench.trials import APPROACH, HITTING, LANDING, ROLLING, ROUGH, SLIPPING, STATES, Asked, Stationary
 from compare.kit import pages
 from compare.kit.campaign import Campaign
-from compare.kit.engines import ENGINES, NEWCOMER, Engine, Settings, newcomer
+from compare.kit.engines import ENGINES, Engine, Settings
 from compare.kit.pages import Rows
 from compare.kit.statistics import plain
 from compare.kit.tasks import Task, carry_out
-from mjsim import ContactSettings
 from model import Case, Trajectory
 from model.files import write_text
 
@@ -97,11 +96,6 @@ class Entry:
     """By discipline, why."""
 
 
-def as_it_comes(step: float) -> ContactSettings:
-    """MuJoCo's own settings for a free ball in flat facets, as newcomers to the other engines have them."""
-    return replace(newcomer(step), coordinates="free", wall="prism", cone="pyramidal")
-
-
 def contestants(chosen: Sequence[str] | None = None, steps: Sequence[float] = STEPS) -> list[Contestant]:
     """The engines chosen by name, or all, whether installed or not, with each time step that they don't choose."""
 
@@ -110,8 +104,7 @@ def contestants(chosen: Sequence[str] | None = None, steps: Sequence[float] = ST
         for step in steps if "timestep" in engine.options else [None]:
             if chosen is None or engine.name in chosen:
                 given = {"timestep": step} if step else {}
-                own = as_it_comes(step) if engine is NEWCOMER and step else engine.configure(given, SLIPPING.p)
-                those.append(Contestant(engine.name, engine, step, own))
+                those.append(Contestant(engine.name, engine, step, engine.configure(given, SLIPPING.p)))
     return those
 
 

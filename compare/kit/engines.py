@@ -108,6 +108,11 @@ def newcomer(step: float) -> ContactSettings:
     return replace(contacts, servo=0.0, memory=False, order=1)
 
 
+def as_it_comes(step: float) -> ContactSettings:
+    """MuJoCo's own parameters for a free ball in a vessel of flat facets, with its own friction cone, the pyramid."""
+    return replace(newcomer(step), coordinates="free", wall="prism", cone="pyramidal")
+
+
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that contacts hover with these settings is what is shown
@@ -173,7 +178,7 @@ PLAIN = replace(
 NEWCOMER = replace(
     MUJOCO,
     name="mujoco-defaults",
-    configure=lambda given, p: newcomer(given.get("timestep", ContactSettings.timestep)),
+    configure=lambda given, p: as_it_comes(given.get("timestep", 2e-3)),
     study=None,
     stream=_unwarned,
     mark="x",

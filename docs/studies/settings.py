@@ -24,7 +24,7 @@ from compare.bench import figures, league
 from compare.bench.league import CONTACT, ERRORS, OPEN, Contestant, Entry
 from compare.kit import drawing, progress, style
 from compare.kit.campaign import BATCH, Campaign
-from compare.kit.engines import EVENT, MOREAU, NEWCOMER, newcomer
+from compare.kit.engines import EVENT, MOREAU, NEWCOMER, as_it_comes, newcomer
 from compare.kit.tasks import Task
 from mjsim import ContactSettings, Run
 from model.files import make_directory
@@ -59,8 +59,8 @@ def rungs(step: float) -> Ways:
     """From what a newcomer writes to ours, each with one thing more than the one before."""
     theirs = "MuJoCo's defaults"
     return {
-        f"{theirs}, coordinates free, wall prism, cone pyramidal": league.as_it_comes(step),
-        f"{theirs}, coordinates free, cone pyramidal": replace(league.as_it_comes(step), wall=newcomer(step).wall),
+        f"{theirs}, coordinates free, wall prism, cone pyramidal": as_it_comes(step),
+        f"{theirs}, coordinates free, cone pyramidal": replace(as_it_comes(step), wall=newcomer(step).wall),
         f"{theirs}, coordinates free": replace(newcomer(step), coordinates="free"),
         theirs: newcomer(step),
         "ours, memory off, servo 0, order 1": ContactSettings.at(step, memory=False, servo=0.0, order=1),
