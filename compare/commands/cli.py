@@ -20,7 +20,8 @@ from model.trajectory import current_versions
 GROUPS = {
     "study": {"validate": "validate", "judge": "validate", "report": "look", "figures": "look"},
     "the ball": {
-        **{"predict": "predict", "simulate": "simulate", "inspect": "look", "sweep": "simulate", "collect": "simulate"},
+        **{"predict": "predict", "simulate": "simulate", "inspect": "look", "compare": "look"},
+        **{"sweep": "simulate", "collect": "simulate"},
         **{"attractors": "attractors", "basins": "attractors", "search": "attractors", "design": "design"},
         **{"render": "look", "view": "look"},
     },

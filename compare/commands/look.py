@@ -1,4 +1,4 @@
-"""What is stored, shown: ``report``, ``figures``, ``inspect``, ``render``; and ``view``, a live ball."""
+"""What is stored, shown: ``report``, ``figures``, ``inspect``, ``compare``, ``render``; and ``view``, a live ball."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from compare.commands import options, running
-from compare.kit import sweep
+from compare.kit import drawing, sweep
 from compare.report import results
 from compare.view import inspection
 from mjsim import ContactSettings
@@ -32,6 +32,14 @@ def add(commands: options.Commands) -> None:
     command = options.command(commands, "inspect", inspect, "what a trajectory file holds", "run.h5 --plot run.png")
     command.add_argument("file", type=Path, metavar="FILE", help="a run, or a collection of 'dualball collect'")
     command.add_argument("--plot", type=Path, metavar="FILE", help="draw the run (png, svg or pdf)")
+    options.outputs(command)
+
+    summary = "two motions side by side: differences, cases, parameters"
+    command = options.command(commands, "compare", compare, summary, "mine.csv theory.h5 -o difference.png")
+    what = "a run, or time and some of its quantities from CSV or any HDF5 file"
+    for name in ("a", "b"):
+        command.add_argument(name, metavar="FILE", help=what)
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="draw both (png, svg or pdf)")
     options.outputs(command)
 
     summary = "a picture or film of a run: the scene, contact forces, slip, case"
@@ -90,12 +98,24 @@ def inspect(args: argparse.Namespace) -> int:
         options.show(gathered, args.json, sweep.table(gathered))
         return 0
     if args.plot:
-        from compare.kit import drawing
         from compare.view import plot as trajectory  # here, because drawing takes a second to load
 
         drawing.save(trajectory.draw(storage.load(args.file)), args.plot)
     about = inspection.describe(args.file)
     options.show(about, args.json, inspection.table(about))
+    return 0
+
+
+def compare(args: argparse.Namespace) -> int:
+    """Lay two motions side by side."""
+    from compare import testing
+    from compare.view import beside  # here, because drawing takes a second to load
+
+    a, b = testing.read(args.a), testing.read(args.b)
+    about = beside.describe(a, b)
+    if args.output:
+        drawing.save(beside.draw(a, b), args.output)
+    options.show(about, args.json, *beside.tables(about))
     return 0
 
 

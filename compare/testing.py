@@ -1,0 +1,247 @@
+"""Assertions for tests of one's own scene: does the ball settle where it should, does it move as it should?
+
+Of one's own motion no more is needed than times and omega_c: arrays, a CSV file, or an HDF5 file of any program.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+import analytic
+from compare.kit.settling import rotation_scale
+from model import Case, InputError, Parameters, StorageError, Trajectory, storage
+from model.arrays import Array
+from model.errors import suggestion
+from model.parameters import POSITIVE, check_number
+from model.trajectory import AXES, columns
+
+WINDOW = 0.25
+"""Last part of a motion, in which it has to have settled."""
+FEWEST = 10
+"""Samples below which nothing is judged."""
+_COLUMNS = {name: (AXES if meta["shape"] else ("",), meta["units"]) for name, meta in columns(Trajectory).items()}
+UNITS = {name + axis: unit for name, (axes, unit) in _COLUMNS.items() for axis in axes}
+"""Units of what a motion may have, by name: the columns of a trajectory, of its forces each component."""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """A motion, whole or in part; raises `InputError` for values that aren't finite or times that don't increase."""
+
+    name: str
+    time: Array
+    """s, shape (n,)."""
+    values: Mapping[str, Array]
+    """Quantities by the names of `UNITS`, each (n,), SI units."""
+    run: Trajectory | None = None
+    """The trajectory that it is made of, if it was one."""
+
+    def __post_init__(self) -> None:
+        for name, values in {"time": self.time, **self.values}.items():
+            if values.shape != self.time.shape or values.ndim != 1 or not len(values):
+                raise InputError(f"{self.name}: {name} has shape {values.shape}, time {self.time.shape}, not (n,) both")
+            for k in np.flatnonzero(~np.isfinite(values))[:1]:
+                raise InputError(f"{self.name}: {name} is {values[k]} in sample {k}, at t = {self.time[k]:g} s")
+        for k in np.flatnonzero(np.diff(self.time) <= 0)[:1]:
+            raise InputError(
+                f"{self.name}: times must increase, but {self.time[k + 1]:g} s comes after {self.time[k]:g} s"
+            )
+
+    def __getitem__(self, quantity: str) -> Array:
+        """A quantity (n,); raises `InputError` for one that it doesn't have."""
+        if quantity not in self.values:
+            hint = suggestion(quantity, self.values)
+            raise InputError(f"{self.name} has no {quantity}{hint}; it has {', '.join(self.values)}")
+        return self.values[quantity]
+
+
+Source = Series | Trajectory | str | Path | Mapping[str, npt.ArrayLike] | tuple[npt.ArrayLike, npt.ArrayLike]
+"""A motion: what `read` takes."""
+
+
+def read(source: Source, name: str = "") -> Series:
+    """A motion from a trajectory, a file, arrays by name of which one is ``time``, or the pair (time, omega_c).
+
+    Files are dualball's own, other HDF5 files with datasets of such names, or CSV with a head of such names; without
+    one its columns are time and omega_c. `name` is what errors call it. Raises `InputError`.
+    """
+    run = None
+    if isinstance(source, Series):
+        return source
+    if isinstance(source, str | Path):
+        name, path = name or str(source), Path(source)
+        source = _csv(path) if path.suffix.lower() in (".csv", ".txt") else _hdf5(path)
+    if isinstance(source, Trajectory):
+        run, given = source, dict[str, npt.ArrayLike]()
+        for column, (axes, _) in _COLUMNS.items():
+            given |= {column + axis: row for axis, row in zip(axes, np.atleast_2d(getattr(run, column).T), strict=True)}
+    else:
+        given = dict(source if isinstance(source, Mapping) else zip(("time", "omega_c"), source, strict=True))
+    known = {"time" if key == "t" else key: np.asarray(values, float) for key, values in given.items()}
+    name = name or (run.header.engine if run else "the motion")
+    if "time" not in known or not known.keys() & UNITS.keys() - {"time"}:
+        raise InputError(f"{name} needs time and, say, omega_c; it has {', '.join(given) or 'nothing of the kind'}")
+    return Series(name, known.pop("time"), {key: row for key, row in known.items() if key in UNITS}, run)
+
+
+def _csv(path: Path) -> dict[str, Array]:
+    try:
+        lines = [line.partition("#")[0] for line in path.read_text("utf-8-sig").splitlines()]
+        rows = [row for line in lines if (row := line.replace(";", " ").replace(",", " ").replace('"', "").split())]
+        head = rows.pop(0) if rows and {"time", "t"} & set(rows[0]) else ["time", "omega_c"]
+        return dict(zip(head, np.array(rows, float).reshape(-1, len(head)).T, strict=True))
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror}") from error
+    except ValueError as error:
+        raise InputError(f"{path} is no table of numbers under a head of their names: {error}") from error
+
+
+def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
+    """A trajectory; or the columns of another program's file, which names no schema."""
+    try:
+        return storage.load(path)
+    except StorageError as ours:
+        try:
+            with h5py.File(path) as file:
+                if "schema" in file.attrs:
+                    raise
+                return {key: file[key][...] for key in ("t", *UNITS) if isinstance(file.get(key), h5py.Dataset)}
+        except (OSError, RuntimeError):
+            raise ours from None
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far two motions are apart in a quantity, in its SI unit."""
+
+    quantity: str
+    rms: float
+    largest: float
+    at: float
+    """When it is largest, s."""
+    scale: float
+    """Largest absolute value in the second motion."""
+    doubt: float
+    """Rms of what interpolating may have added; 0 where both have samples at the same times."""
+
+
+def common(a: Series, b: Series) -> Array:
+    """Times (n,) at which the one with fewer samples has them while both last; `InputError` for less than `FEWEST`."""
+    begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
+    times: Array = min((t[(begin <= t) & (t <= end)] for t in (a.time, b.time)), key=len)
+    if len(times) < FEWEST:
+        raise InputError(f"{a.name} and {b.name} have {len(times)} samples while both last; {FEWEST} are needed")
+    return times
+
+
+def difference(a: Series, b: Series, quantity: str) -> Difference:
+    """Of a from b at their `common` times, linearly between samples; raises `InputError`."""
+    times, rows, doubts = common(a, b), [], []
+    for t, values in ((each.time, each[quantity]) for each in (a, b)):
+        rows.append(np.interp(times, t, values))
+        # Between every second sample linear interpolation is off by four times as much.
+        coarser = np.interp(t[1::2], t[::2], values[::2]) - values[1::2]
+        doubts.append(0.0 if np.isin(times, t).all() else _rms(coarser) / 4)
+    off = np.abs(rows[0] - rows[1])
+    k = int(off.argmax())
+    return Difference(
+        quantity, _rms(off), float(off[k]), float(times[k]), float(np.abs(rows[1]).max()), math.hypot(*doubts)
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def assert_tracks(mine: Source, reference: Source, *, quantity: str = "omega_c", rms: float) -> None:
+    """Assert that a motion follows a reference, as `analytic.simulate` gives it; both are what `read` takes.
+
+    The root mean square of the difference, divided by the largest value of the reference, must not exceed `rms`.
+
+    Raises
+    ------
+    AssertionError
+        If it does.
+    InputError
+        For fewer than `FEWEST` samples, a reference that ends earlier, samples too far apart to be interpolated.
+    """
+    check_number("rms", rms, "1", POSITIVE)
+    a, b = read(mine), read(reference)
+    off, unit = difference(a, b, quantity), UNITS[quantity]
+    slack = (a.time[-1] - a.time[0]) / 100
+    if b.time[-1] < a.time[-1] - slack or b.time[0] > a.time[0] + slack:
+        spans = [f"{each.name} lasts from {each.time[0]:g} to {each.time[-1]:g} s" for each in (b, a)]
+        raise InputError(f"the reference {spans[0]}, but {spans[1]}")
+    if off.scale == 0:
+        raise InputError(f"{quantity} of the reference {b.name} is zero all the time: there is no scale for an error")
+    if off.doubt > rms * off.scale / 2:
+        raise InputError(
+            f"samples are too far apart: interpolating {quantity} may be off by {off.doubt:.1e} {unit}, while "
+            f"rms = {rms:g} allows {rms * off.scale:.1e} {unit}"
+        )
+    assert off.rms <= rms * off.scale, (
+        f"{quantity} of {a.name} does not track {b.name}: rms {off.rms / off.scale:.2e} > {rms:g} of the largest "
+        f"value, {off.scale:.6g} {unit}; farthest off at t = {off.at:g} s, by {off.largest:.3g} {unit}"
+    )
+
+
+def assert_settles(
+    time: npt.ArrayLike, omega_c: npt.ArrayLike, p: Parameters, *, case: Case | str | None = None, rtol: float
+) -> None:
+    """Assert that a ball settles in a stationary state of theory: of a case, or in any but NS, which sinks.
+
+    In the last quarter of the motion omega_c must stay within `rtol`, relative, of the state's. That doesn't tell apart
+    the states that go round with the fluid (RR, NR, NS).
+
+    Parameters
+    ----------
+    time, omega_c : arrays, shape (n,), s and rad s-1; they may be parts of a longer motion.
+
+    Raises
+    ------
+    AssertionError
+        If it doesn't.
+    InputError
+        If there is no such state, or the motion is too short to judge: before its last quarter three of the slowest
+        time constants must pass, or a ball that started in theory's state might not have left it yet. They are those of
+        a disturbance of the state and of a ball that is taken along from rest, (1 + 2 j)/c.
+    """
+    check_number("rtol", rtol, "1", POSITIVE)
+    motion = read((time, omega_c))
+    if isinstance(case, str) and case not in Case.__members__:
+        raise InputError(f"there is no case {case!r}; there are {', '.join(Case.__members__)}")
+    lasting = analytic.stable_solutions(p, sinking=True) if p.c else []
+    stays = [s for s in lasting if not s.moves]
+    states = stays if case is None else [analytic.solution(p, Case[case] if isinstance(case, str) else case)]
+    if not states or not p.c:
+        raise InputError(f"at c = {p.c:g} s-1, omega_0 = {p.omega_0:g} rad s-1 there is no state to settle in")
+    if len(motion.time) < FEWEST:
+        raise InputError(f"the motion is too short to judge: {len(motion.time)} samples, at least {FEWEST} are needed")
+    t, w = (
+        row[motion.time >= np.quantile(motion.time[[0, -1]], 1 - WINDOW)] for row in (motion.time, motion["omega_c"])
+    )
+    state = min(states, key=lambda s: abs(s.state.omega_c - w.mean()))
+    name, exact = state.case.name, state.state.omega_c
+    slowest = max((1 + 2 * p.j) / p.c, *filter(math.isfinite, [0.0, analytic.slowest_time_constant(state)]))
+    lasts, swing = float(motion.time[-1] - motion.time[0]), float(np.ptp(w))
+    scale, off = abs(exact) or rotation_scale(p), np.abs(w - exact)
+    needed = slowest * (max(3.0, -math.log(rtol)) if off.max() > rtol * scale < swing else 3.0) / (1 - WINDOW)
+    if lasts < needed:
+        raise InputError(
+            f"the motion is too short to judge: it lasts {lasts:.3g} s and should last {needed:.3g} s, since to forget "
+            f"its start takes the ball time constants of {slowest:.3g} s"
+        )
+    elsewhere = [s.case.name for s in lasting if np.all(np.abs(w - s.state.omega_c) <= rtol * scale)]
+    k = int(off.argmax())
+    assert off[k] <= rtol * scale, (
+        f"the ball does not settle in {name}: for the last {WINDOW * lasts:.3g} s omega_c should be within {rtol:g} of "
+        f"{exact:.8g} rad/s, but is off by {off[k] / scale:.2e} at t = {t[k]:g} s (on average {w.mean():.8g} rad/s; it "
+        f"swings by {swing:.1e} rad/s)" + "".join(f"; it settles in {other}" for other in elsewhere[:1])
+    )

@@ -1,0 +1,136 @@
+"""Assertions for one's own motions, and two motions side by side."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+import analytic
+from compare.commands import cli
+from compare.testing import assert_settles, assert_tracks, difference, read
+from model import InputError, Parameters, Trajectory, storage
+
+P = Parameters.named("reference").replace(omega_0=25.0)
+
+
+@pytest.fixture(scope="module")
+def theory() -> Trajectory:
+    return analytic.simulate(P, [0.0] * 6, 12.0)
+
+
+def wrong(run: Trajectory, error: float) -> tuple[Any, Any]:
+    """The motion, some percent too slow."""
+    return run.time[::3], run.omega_c[::3] * (1 - error)
+
+
+@pytest.mark.parametrize("case", [None, "SS"])
+def test_a_ball_that_settles(theory: Trajectory, case: str | None) -> None:
+    assert_settles(*wrong(theory, 0.9e-3), P, case=case, rtol=1e-3)
+    with pytest.raises(AssertionError, match=r"does not settle in SS.* within 0\.001 of 13\.85"):
+        assert_settles(*wrong(theory, 1.1e-3), P, case=case, rtol=1e-3)
+
+
+def test_where_it_settles_instead() -> None:
+    with pytest.raises(AssertionError, match=r"does not settle in SS: .*; it settles in NS"):
+        assert_settles(np.linspace(0, 60, 500), np.full(500, 25.0), P, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"part": slice(400)}, r"too short to judge: it lasts 4\.\d+ s and should last 7\.2 s"),
+        ({"part": slice(0, None, 300)}, "too short to judge: 4 samples"),
+        ({"case": "XS"}, "no case 'XS'"),
+        ({"case": "RR"}, "no stable stationary solution"),
+        ({"p": P.replace(c=0.0)}, "c = 0 s-1"),
+        ({"rtol": -1.0}, "rtol"),
+        ({"spoilt": np.nan}, "omega_c is nan in sample 7, at t = "),
+    ],
+)
+def test_what_cannot_be_judged(theory: Trajectory, given: dict[str, Any], message: str) -> None:
+    part, spoilt, w = given.pop("part", slice(None)), given.pop("spoilt", 0.0), theory.omega_c.copy()
+    w[7] += spoilt
+    with pytest.raises(InputError, match=message):
+        assert_settles(theory.time[part], w[part], **{"p": P, "rtol": 1e-3} | given)
+
+
+def test_tracking(theory: Trajectory) -> None:
+    assert_tracks(wrong(theory, 0.9e-3), theory, rms=1e-3)
+    with pytest.raises(AssertionError, match=r"does not track event: rms .*e-03 > 0.001 .*; farthest off at t = "):
+        assert_tracks(wrong(theory, 1.1e-3), theory, rms=1e-3)
+    with pytest.raises(AssertionError, match="slip_x of x"):
+        assert_tracks(read({"time": theory.time, "slip_x": theory.slip_x + 1}, "x"), theory, quantity="slip_x", rms=0.1)
+    coarse = (theory.time[::40], theory.omega_c[::40])
+    for part, message in ((slice(20, -20, 40), "too far apart"), (slice(5), "5 samples while both last")):
+        with pytest.raises(InputError, match=message):
+            assert_tracks((theory.time[part], theory.omega_c[part]), coarse if part.step else theory, rms=1e-4)
+    with pytest.raises(InputError, match="the reference event lasts from 0 to 12 s, but the motion lasts from 0 to 24"):
+        assert_tracks((theory.time * 2, theory.omega_c), theory, rms=1.0)
+    with pytest.raises(InputError, match=r"no omega_x.*did you mean 'omega_"):
+        assert_tracks(theory, theory, quantity="omega_x", rms=1.0)
+
+
+def test_the_doubt_is_what_interpolation_adds(theory: Trajectory) -> None:
+    """Both are the same motion: all that there is comes from interpolation."""
+    late = slice(300, None)  # after the kinks
+    here = (theory.time[late][::4], theory.omega_c[late][::4])
+    off = difference(read(here), read((theory.time[late][1::4], theory.omega_c[late][1::4])), "omega_c")
+    assert 0 < off.rms < 2 * off.doubt < 20 * off.rms
+
+
+def test_motions_in_files(theory: Trajectory, tmp_path: Path) -> None:
+    own, foreign, table, bare = (tmp_path / name for name in ("own.h5", "foreign.h5", "table.csv", "bare.csv"))
+    storage.save(theory, own)
+    with h5py.File(foreign, "w") as file:
+        file["t"], file["omega_c"] = theory.time, theory.omega_c
+    rows = np.stack([theory.time, theory.omega_c], axis=1).tolist()
+    table.write_text('# mine\n"t"; omega_c\n' + "\n".join(f"{t!r}; {w!r}" for t, w in rows))
+    bare.write_text("\n".join(f"{t!r},{w!r}" for t, w in rows))
+    for path in (own, foreign, table, bare):
+        assert_tracks(path, theory, rms=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.csv", "t,omega_c\n0,1\n1,x\n", "a.csv is no table of numbers"),
+        ("a.csv", "t,omega_c\n0,1\n1\n", "a.csv is no table of numbers"),
+        ("a.csv", "t,omega_c\n0,1\n1,nan\n", "omega_c is nan in sample 1, at t = 1 s"),
+        ("a.csv", "t,omega_c\n1,1\n1,1\n", "times must increase, but 1 s comes after 1 s"),
+        ("a.csv", "t,speed\n1,1\n", "needs time and, say, omega_c; it has t, speed"),
+        ("a.csv", "", "shape"),
+        ("a.h5", "no file of HDF5", "it is not an HDF5 file"),
+        ("a.h5", {"schema": "other"}, "checksum"),
+        ("a.h5", {}, "needs time and, say, omega_c"),
+        ("none.h5", None, "there is no such file"),
+    ],
+)
+def test_files_that_hold_no_motion(tmp_path: Path, name: str, content: Any, message: str) -> None:
+    if isinstance(content, dict):
+        with h5py.File(tmp_path / name, "w") as file:
+            file.attrs.update(content)
+    elif content is not None:
+        (tmp_path / name).write_text(content)
+    with pytest.raises(InputError, match=message):
+        read(tmp_path / name)
+
+
+def test_two_runs_side_by_side(theory: Trajectory, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    a, b, partial, picture = (str(tmp_path / name) for name in ("a.h5", "b.h5", "c.csv", "d.png"))
+    storage.save(theory, a)
+    storage.save(analytic.simulate(P.replace(omega_0=24.0), [0.0] * 6, 9.0), b)
+    Path(partial).write_text("\n".join(f"{t} {w + 0.5}" for t, w in zip(theory.time, theory.omega_c, strict=True)))
+    assert cli.main(["compare", a, b, "-o", picture]) == 0
+    assert Path(picture).stat().st_size > 10_000
+    shown = capsys.readouterr().out
+    assert all(text in shown for text in ("omega_0 = 25.0 in a, 24.0 in b", "RR 0.", "from 0 to 9 s", "force_Bx"))
+    assert cli.main(["compare", partial, a, "--json"]) == 0
+    (difference,) = json.loads(capsys.readouterr().out)["differences"]
+    assert difference["rms"] == pytest.approx(0.5)
+    assert cli.main(["compare", a, str(tmp_path / "none.csv")]) == 2
+    assert "no such file" in capsys.readouterr().err.lower()
