@@ -21,7 +21,7 @@ import multiprocessing
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -110,7 +110,7 @@ def run(case: Case, engine: Any, steps: Sequence[float] | None = None, limit: fl
 
 
 def run_all(
-    cases: Sequence[Case], engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
+    cases: Iterable[Case], engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
 ) -> Iterator[Result]:
     """One engine on many cases, one after the other in one process, that is begun anew where it hangs or dies."""
     given = engine.__name__ if hasattr(engine, "__spec__") else engine

@@ -1,0 +1,86 @@
+"""The plugin for pytest, in runs of its own."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest_plugins = ("pytester",)
+ADAPTER = """
+def build(case, timestep):
+    if case.name == "turntable":
+        raise NotImplementedError("tables don't turn here")
+    globals().update(case=case, now=0.0, timestep=timestep)
+
+def step(n):
+    global now
+    now += n * timestep
+
+def state():
+    if case.name == "cylinder":
+        return [0.0], [0.0], [0.0]
+    k = abs(case.times - now).argmin()
+    return case.exact[k].reshape(3, 3) * (1.2 if case.name == "box-stops" else 1.0)
+"""
+
+
+def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
+    """As where dualball is installed: there an entry point names the package `compare`."""
+    return pytester.runpytest_subprocess("-p", "compare", "-p", "no:cacheprovider", *args)
+
+
+def test_an_engine_on_the_exact_cases(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(adapter=ADAPTER, test_mine="def test_mine(): assert True")
+    known = pytester.makefile(".txt", known="# ours\ncylinder   it has no wall\nblock-rests\n")
+    found = run(pytester, "--dualball-engine", "adapter", "--dualball-known", str(known), "-rx")
+    found.stdout.fnmatch_lines(["*box that is pushed off*errors*allowed is 0.01*", "*exact cases:*"])
+    found.stdout.re_match_lines([r"case +error +order", r"sphere-slides-rolls +0 .* passed", r"box-stops .* failed"])
+    found.stdout.fnmatch_lines(["*XFAIL adapter::cylinder - it has no wall*"])
+    outcomes = found.parseoutcomes()
+    assert (outcomes["failed"], outcomes["xfailed"], outcomes["xpassed"], outcomes["skipped"]) == (1, 1, 1, 1)
+    both = run(pytester, "--dualball-engine", "adapter", "test_mine.py", "-k", "mine or drilling", "-n", "2")
+    both.assert_outcomes(passed=2)
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["--dualball-engine", "nosuch"], "*nosuch can't be used: nosuch can't be imported: No module named 'nosuch'*"),
+        (["--dualball-engine", "half"], "*half has no function state*"),
+        (["--dualball-engine", "half", "--dualball-known", "half.py"], "*no case is called 'build'*"),
+        (["--dualball-engine", "half", "--dualball-known", "none"], "*cannot read none*"),
+    ],
+)
+def test_what_cannot_be_tested(pytester: pytest.Pytester, args: list[str], message: str) -> None:
+    pytester.makepyfile(half="build = step = print")
+    found = run(pytester, *args)
+    assert found.ret != 0
+    (found.stdout if "known" not in args[-2] else found.stderr).fnmatch_lines([message])
+    assert found.parseoutcomes().get("passed", 0) == 0
+
+
+def test_fixtures(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        from model import Parameters
+
+        def test_theory(dualball_theory):
+            p = Parameters.named("reference")
+            assert dualball_theory(p, 1.0) is dualball_theory(p, 1.0)
+
+        def test_case(dualball_case):
+            assert dualball_case.error(dualball_case.exact) == 0
+        """
+    )
+    found = run(pytester, "-k", "theory or drilling")
+    found.assert_outcomes(passed=2, deselected=found.parseoutcomes()["deselected"])
+
+
+@pytest.mark.parametrize("foreign", [False, True])
+def test_runs_that_do_not_use_it(pytester: pytest.Pytester, foreign: bool) -> None:
+    """They load nothing, and a module `compare` of somebody else is no harm."""
+    if foreign:
+        pytester.makepyfile(compare="x = 1")
+    heavy = '{"numpy", "mujoco", "analytic", "compare.bench", "model"}'
+    pytester.makepyfile(f"import sys\ndef test_it(): assert not {heavy} & set(sys.modules)")
+    pytester.syspathinsert()
+    run(pytester).assert_outcomes(passed=1)
