@@ -164,7 +164,7 @@ def _blocks() -> list[Case]:
             pulled,
             {"it creeps from the first": {"mu": 0.0}, "static friction a tenth greater": {"grip": 1.1}},
             until=1.0,
-            scales=(0.2, 1.0, math.inf),
+            scales=(0.1, 0.5, math.inf),
             contacts=lambda t: "R" if t < mu * G / 10.0 else "S",
             source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive",
             growth=(10.0, 0.0, 0.0),

@@ -1,0 +1,188 @@
+"""Exact contact cases: their numbers, checked by other ways, and what they notice."""
+
+import json
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import analytic
+from compare.bench import cases
+from compare.bench.case import STEPS, TOLERANCE, VERSION
+from model import Case as Kinds
+from model.kinematics import to_world
+
+ALL = pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
+IN_THE_VESSEL = pytest.mark.parametrize("case", [c for c in cases() if c.motion], ids=lambda case: case.name)
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@ALL
+def test_a_case_is_whole(case):
+    n = len(case.times)
+    assert case.exact.shape == (n, 9)
+    assert len(case.contacts) == n
+    assert case.bound <= 1e-10
+    assert case.about
+    assert case.source
+    for step in STEPS:  # every sample falls on a step
+        assert np.allclose(case.times / step, np.rint(case.times / step), atol=1e-9)
+    assert case.error(case.exact) == 0
+    gaps, slips = case.touching(case.exact)
+    assert np.abs(gaps[case.in_contact("RS")]).max() < 1e-12
+    assert (gaps[case.in_contact("N")] > 0).all()
+    assert slips[case.in_contact("R")].max(initial=0.0) < 1e-12
+    assert slips[case.in_contact("S")].min(initial=math.inf) > 1e-6
+
+
+@ALL
+def test_wrong_answers_are_noticed(case):
+    assert case.wrong
+    for name, states in case.wrong.items():
+        assert case.error(states) > 2.5 * TOLERANCE, name
+
+
+def test_there_are_enough_cases_of_each_kind():
+    count = [len(case.surfaces) for case in cases()]
+    assert count.count(1) >= 9
+    assert count.count(2) >= 7
+    assert len({case.name for case in cases()}) == len(cases())
+
+
+@ALL
+def test_mjcf_is_the_same_scene_at_the_same_start(case):
+    model = mujoco.MjModel.from_xml_string(case.mjcf())
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    body = data.body("body")
+    velocity = np.empty(6)
+    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, body.id, velocity, 0)
+    assert np.allclose(body.xpos, case.body.position)
+    assert np.allclose(velocity, [*case.body.spin, *case.body.velocity], atol=1e-12)
+    assert model.body_mass[body.id] == case.body.mass
+    touched = {contact.friction[0] for contact in data.contact if abs(contact.dist) < 1e-9}
+    assert touched <= {surface.friction for surface in case.surfaces}
+
+
+def test_data_for_others_are_json_and_versioned():
+    for case in cases():
+        data = json.loads(json.dumps(case.to_mapping(), allow_nan=False))
+        assert data["version"] == VERSION
+        assert data["exact"] == case.exact.tolist()
+
+
+def newton(case, letters):
+    """The rates of a state (9,) by Newton and Euler in world axes, with contact forces from the constraints.
+
+    A second way to the motion that knows nothing of the paper's variables: the forces are solved for from the
+    accelerations of the contact points, least squares where two rolling contacts leave them open.
+    """
+    body = case.body
+
+    def contacts(x):
+        for surface, letter in zip(case.surfaces, letters, strict=True):
+            if letter == "N":
+                continue
+            if surface.radius is None:
+                normal, curvature = np.array(surface.normal), 0.0
+            else:
+                rho = np.hypot(*x[:2])
+                normal = -np.array([x[0], x[1], 0.0]) / rho
+                turn = np.cross(UP, normal)
+                curvature = (x[3:6] @ turn) ** 2 / rho  # of the centre's path along the wall
+            yield surface, letter, normal, curvature, float(case.reach(normal[None])[0])
+
+    def unaccelerated(x, forces, t):
+        """Accelerations of centre and spin under forces at the contacts."""
+        linear = np.array([0.0, 0.0, -case.g]) + np.array(case.force(t, x[:3], x[3:6])) / body.mass
+        angular = np.zeros(3)
+        for (_, _, normal, _, reach), force in zip(contacts(x), forces, strict=True):
+            linear = linear + force / body.mass
+            if body.shape == "sphere":
+                angular = angular + np.cross(-reach * normal, force) / body.inertia[0]
+        return linear, angular
+
+    def rates(t, x):
+        own = list(contacts(x))
+
+        def residual(unknown):
+            linear, angular = unaccelerated(x, unknown.reshape(-1, 3), t)
+            left = []
+            for (surface, letter, normal, curvature, reach), force in zip(own, unknown.reshape(-1, 3), strict=True):
+                left.append(linear @ normal - curvature)
+                arm = -reach * normal
+                spun = np.cross(x[6:], arm) if body.shape == "sphere" else 0.0
+                if letter == "S":
+                    slip = x[3:6] + spun - surface.turning * np.cross(UP, x[:3] + arm)
+                    slip = slip - (slip @ normal) * normal
+                    left += list(force - (force @ normal) * (normal - surface.friction * slip / np.linalg.norm(slip)))
+                    continue
+                turned = np.zeros(3)
+                if surface.radius is not None:  # the normal turns with the body
+                    turned = np.cross(UP, normal) * (x[3:6] @ np.cross(normal, UP)) / np.hypot(*x[:2])
+                moves = np.cross(angular, arm) + np.cross(x[6:], -reach * turned) if body.shape == "sphere" else 0.0
+                table = surface.turning * np.cross(UP, x[3:6] - reach * turned)
+                gives = linear + moves - table
+                left += list(gives - (gives @ normal) * normal)
+            return np.array(left)
+
+        forces = np.zeros((0, 3))
+        if own:
+            at_none = residual(np.zeros(3 * len(own)))
+            matrix = np.stack([residual(row) - at_none for row in np.eye(3 * len(own))], axis=1)
+            forces = np.linalg.lstsq(matrix, -at_none, rcond=1e-12)[0].reshape(-1, 3)
+        linear, angular = unaccelerated(x, forces, t)
+        return np.concatenate([x[3:6], linear, angular])
+
+    return rates
+
+
+def changes(case):
+    """Times of all changes of case, and whether a contact closes or opens there."""
+    if not case.motion:
+        return np.empty(0), []
+    p, x0 = case.motion
+    events = analytic.simulate(p, x0, case.times[-1], rtol=1e-12).events
+    pairs = [(Kinds(a).name, Kinds(b).name) for a, b in zip(events.from_case, events.to_case, strict=True)]
+    return events.time, ["N" in before and before != after for before, after in pairs]
+
+
+@ALL
+def test_integrated_in_world_axes_the_motion_is_the_same(case):
+    """From every third sample to the next, where the contacts are the same all the while and the body moves."""
+    (events, _), checked = changes(case), 0
+    for k in range(1, len(case.times), 3):
+        (begin, end), letters = case.times[k - 1 : k + 1], case.contacts[k]
+        changed = letters != case.contacts[k - 1] or ((begin < events) & (events < end)).any()
+        if changed or not np.any(case.exact[k - 1, 3:]):
+            continue
+        found = solve_ivp(
+            newton(case, letters), (begin, end), case.exact[k - 1], method="DOP853", rtol=1e-11, atol=1e-13
+        )
+        off = np.linalg.norm((found.y[:, -1] - case.exact[k]).reshape(3, 3), axis=1) / case.scales
+        assert off.max() < 1e-9, (end, letters)
+        checked += 1
+    assert checked >= 4 or not np.any(case.exact[-1, 3:])
+
+
+@IN_THE_VESSEL
+def test_no_sample_is_near_an_impact(case):
+    """Where an engine is late by a step, it is not to be wrong by the whole jump."""
+    for time, jumps in zip(*changes(case), strict=True):
+        assert not jumps or np.abs(case.times - time).min() > 5e-3
+
+
+@IN_THE_VESSEL
+def test_the_balls_motion_by_time_stepping_is_the_same(case):
+    p, x0 = case.motion
+    errors = []
+    for step in (2e-4, 5e-5):
+        run = analytic.simulate(
+            p, x0, case.times[-1], method="time-stepping", timestep=step, sample_interval=case.times[-1] / 25
+        )
+        errors.append(case.error(np.concatenate(to_world(run.x, run.theta, p), axis=1)[1:]))
+    assert errors[1] < 1e-3
+    assert errors[1] < errors[0] / 2 or errors[1] < 1e-9
