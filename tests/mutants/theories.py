@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from analytic.bifurcation import diagram as bifurcation
+from analytic.bifurcation.diagram import Exists
 from analytic.orbits.orbit_branch import Place
 from compare.kit.levels import Level
 from model import Case, Flow, Parameters, State
@@ -69,6 +70,15 @@ def _fold_everywhere(curves: dict[str, Any]) -> dict[str, Any]:
     """A fold at omega_02 where there is none."""
     folds, instead = curves["omega_04"], 1.2 * np.nan_to_num(curves["omega_02"])
     return curves | {"omega_04": np.where(np.isnan(folds), instead, folds)}
+
+
+def _without(flag: Exists, there: int = 0) -> Fault:
+    """A plane of parameters without a label, where another one is."""
+
+    def change(plane: Any) -> Any:
+        return np.where((plane & there) == there, plane & ~np.uint8(flag), plane)
+
+    return answer(change)
 
 
 def _hopping(p: Parameters) -> bool:
@@ -140,6 +150,10 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "stationary.solutions._lifting_spin": {"spin of SR and NR with 1 % more weight": given(other(g=1.01))},
     "stationary.solutions._wall_carries": {"(35) with the sign as printed": answer(lambda carries: not carries)},
     "stationary.solutions.stable_solutions": {"a ball on the wall is no attractor": _of(Case.NR, _gone)},
+    "stationary.slipping_branch.branch": {
+        "A_y along SS in closed form 2 % large": answer(fields(A_y=times(1.02))),
+        "B_x along SS in closed form 2 % large": answer(fields(B_x=times(1.02))),
+    },
     "stationary.slipping_branch.eigenvalues_at": {"eigenvalues of SS 3 % large": scaled(1.03)},
     "mechanics.dynamics.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
     "stationary.solutions.leaning_modes": {"leaning rate of SR 5 % large": scaled(1.05, 0)},
@@ -152,6 +166,21 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "ω₀₄ 0.5 % high": answer(entries(omega_04=times(1.005))),
         "a fold below η_cr": answer(_fold_everywhere),
         "ω₀₄ as under Stokes' drag": given(_by_stokes),
+    },
+    "bifurcation.diagram.case_map": {
+        "regions in which SS ends at ω₀₂": _without(Exists.SS, Exists.NR),
+        "regions without SS beyond the fold": _without(Exists.SS_BEYOND_FOLD),
+        "regions without SR": _without(Exists.SR),
+        "regions in which the ball sinks at any flow": answer(lambda plane: plane | Exists.NS),
+    },
+    "bifurcation.diagram.double_points": {
+        "the fold is born at 5 % more η": answer(lambda points: [replace(x, eta=1.05 * x.eta) for x in points]),
+        "double points at 1 % more flow": answer(lambda points: [replace(x, omega_0=1.01 * x.omega_0) for x in points]),
+    },
+    "bifurcation.diagram.thresholds_with_inertia": {
+        "the fluid's inertia leaves j as it is": lambda right: (
+            lambda p: {name: w / np.sqrt(1 - p.density_ratio) for name, w in vars(bifurcation.thresholds(p)).items()}
+        )
     },
     "stationary.slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04)},
     "bifurcation.diagram.critical_drag": {"drag at which a fold is born 3 % high": scaled(1.03)},
@@ -195,6 +224,31 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "flowmeter.characteristic.characteristic_slope": {"slope of the characteristic 5 % large": scaled(1.05)},
     "flowmeter.characteristic.slope_jump": {"the slope jumps by 3 % more": scaled(1.03)},
     "flowmeter.characteristic.unloading_limit": {"unloading 2 % too high": scaled(1.02)},
+    "flowmeter.design.choice": {
+        "a design takes slip for the end of every range": lambda right: (
+            lambda make, values, tolerances, fastest: replace(
+                right(make, values, tolerances, fastest), margin=bifurcation.thresholds(make(**values)).omega_01
+            )
+        )
+    },
+    "flowmeter.design.corners": {
+        "tolerances that only add": lambda right: (
+            lambda make, at, tolerances: [
+                make(**{**at, **{name: at[name] * (1 + t) for name, t in tolerances.items()}})
+            ]
+        )
+    },
+    "flowmeter.design.threshold_spread": {
+        "thresholds spread half as far": answer(
+            lambda ends: {name: (low, (low + high) / 2) for name, (low, high) in ends.items()}
+        )
+    },
+    "flowmeter.design.readings": {
+        "a falling flow is read like a rising one": answer(lambda ends: (ends[0], ends[0])),
+        "readings of a design 0.5 % high": answer(lambda ends: (1.005 * ends[0], 1.005 * ends[1])),
+    },
+    "flowmeter.design.response_time": {"a design's response as in RS": lambda right: lambda p: (1 + p.j) / p.c},
+    "stationary.solutions.slowest_time_constant": {"the slowest time constant 3 % long": scaled(1.03)},
     # Motions
     "simulation.simulator.simulate": {
         "motions of a ball with 2 % more inertia": given(other(j=1.02)),
@@ -216,6 +270,8 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "slip begins 3 % late in a pulsation": scaled(1.03),
         "slip begins 3 % early in a pulsation": scaled(0.97),
     },
+    "flowmeter.pulsation.slow_onset": {"slow pulsations make it slip 3 % late": scaled(1.03)},
+    "flowmeter.pulsation.fast_onset": {"fast pulsations make it slip 3 % late": scaled(1.03)},
     "flowmeter.pulsation.mean_error": {
         "mean reading of a pulsation with 2 % more floor friction": given(other(mu=1.02))
     },

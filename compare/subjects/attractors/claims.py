@@ -63,6 +63,14 @@ def _after_rest(m: Measurement) -> float:
     return float(getattr(run, m.quantity)[-1])
 
 
+def _only(m: Measurement) -> float:
+    """The one stationary motion that lasts by Definitions 1-3; LookupError if there are more."""
+    those = analytic.stable_solutions(m.parameters)
+    if len(those) != 1:
+        raise LookupError(f"{len(those)} motions last")
+    return float(those[0].case if m.quantity == "case" else those[0].state.omega_c)
+
+
 _HOP = "orbit_period", "orbit_omega_c", "orbit_height"
 _RULE = "analytic.simulate, which leaves rolling by Definitions 1-3"
 CLAIMS = (
@@ -70,7 +78,10 @@ CLAIMS = (
         "choice",
         "Definitions 1-3",
         "For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip grows.",
-        tuple(Bearing("choice", quantity, _after_rest, by=_RULE) for quantity in ("case", "omega_c")),
+        (
+            *(Bearing("choice", quantity, _after_rest, by=_RULE) for quantity in ("case", "omega_c")),
+            *(Bearing("choice", quantity, _only, by="analytic.stable_solutions") for quantity in ("case", "omega_c")),
+        ),
     ),
     Claim(
         "hopping",

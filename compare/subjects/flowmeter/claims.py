@@ -8,14 +8,18 @@ from collections.abc import Callable
 import numpy as np
 
 import analytic
+from analytic.flowmeter import design
+from analytic.stationary import solutions as stationary
 from compare.claim import Bearing, Claim, Text, When, every, given, one
 from compare.judge import simulated, theory
+from compare.kit.check import Relation
 from compare.kit.record import Measurement, state
 from compare.kit.settling import family
 from compare.kit.statistics import Measured
 from compare.settled import cases, detected, from_floor, is_in, lasting, lifts_first, natural_size, slips_first
 from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
 from model import Case, Contact, Trajectory
+from model.drag import QUADRATIC, STOKES
 
 RTOL = 1e-9
 """Relative tolerance of simulations of unloading and pushes: the speed of a landing is measured to 1e-6."""
@@ -119,6 +123,44 @@ def _at_event(m: Measurement) -> Measured:
     return Measured(value, 100 * RTOL * abs(value))  # errors of some 100 steps of the integrator may be of one sign
 
 
+TOLERANCES = {"mu": 0.05, "eta": 0.05}
+"""Relative tolerances with which a meter's limit is claimed to be within its spread."""
+
+
+def _limit(end: str, of: Callable[[Measurement], float], relation: Relation = Relation.EQUAL) -> Bearing:
+    """The flow at which the operating range of a meter is measured to end: omega_01 or omega_02."""
+    when = every(slips_first if end == "omega_01" else lifts_first, lambda m: m.parameters.drag == STOKES)
+    return Bearing("thresholds", end, of, when=when, relation=relation, by="analytic.flowmeter.design")
+
+
+def _values(m: Measurement) -> dict[str, float]:
+    return {name: getattr(m.parameters, name) for name in design.INEXACT}
+
+
+def _meant(m: Measurement) -> float:
+    return design.choice(m.parameters.replace, _values(m), {}, fastest=1.0).margin
+
+
+def _at_worst(m: Measurement) -> float:
+    return design.choice(m.parameters.replace, _values(m), TOLERANCES, fastest=1.0).worst.omega_0
+
+
+def _at_most(m: Measurement) -> float:
+    return design.threshold_spread(list(design.corners(m.parameters.replace, _values(m), TOLERANCES)))[m.quantity][1]
+
+
+def _decay(constant: Callable[[Measurement], float], by: str, *cases: Case) -> Bearing:
+    """The slowest decay in some cases, by a time constant."""
+    when = every(given(mode=1), lambda m: Case[str(m.conditions["case"])] in cases and m.parameters.drag != QUADRATIC)
+    return Bearing("rates", "decay_rate", lambda m: 1 / constant(m), when=when, by=f"analytic: {by}")
+
+
+def _between(m: Measurement) -> float:
+    """The reading of a rising or falling flow, from the design's characteristic curve."""
+    low, high = design.readings(m.parameters, m.parameters.omega_0)
+    return float(low if m.conditions["side"] == "up" else high)
+
+
 CLAIMS = (
     Claim(
         "slope-rolling",
@@ -200,6 +242,44 @@ CLAIMS = (
         "section 5.3",
         "A small push lifts the ball from SR to NR, where it stays off the floor.",
         (_ends(UPWARDS, BY_SPIN), Bearing("unloading", "lift", _at_event, by="analytic.simulate")),
+    ),
+    Claim(
+        "design-limit",
+        "extension",
+        "The operating range of a meter ends where a design says, and with friction known to 5 % not before its worst "
+        "limit, nor after its thresholds' spread.",
+        tuple(
+            _limit(end, of, relation)
+            for end in ("omega_01", "omega_02")
+            for of, relation in (
+                (_meant, Relation.EQUAL),
+                (_at_worst, Relation.AT_LEAST),
+                (_at_most, Relation.AT_MOST),
+            )
+        ),
+    ),
+    Claim(
+        "design-reading",
+        "extension, Fig. 13",
+        "A meter reads the lowest of a design's readings while the flow rises, the highest while it falls.",
+        (Bearing("hysteresis", "omega_c", _between, size=natural_size, by="analytic.flowmeter.design.readings"),),
+    ),
+    Claim(
+        "time-constants",
+        "Props. 1, 2, 4, section 5.2",
+        "The slowest disturbance of a motion dies out with its slowest time constant; of rolling, with "
+        "that of a design.",
+        (
+            _decay(lambda m: design.response_time(m.parameters), "design.response_time", Case.RR),
+            _decay(
+                lambda m: stationary.slowest_time_constant(
+                    theory(stationary.solution, m.parameters, Case[str(m.conditions["case"])])
+                ),
+                "solutions.slowest_time_constant",
+                Case.RR,
+                Case.SS,
+            ),
+        ),
     ),
 )
 SECTIONS = {"Flowmeter": CLAIMS}

@@ -23,6 +23,11 @@ def _coefficient(m: Measurement) -> float:
     return m.parameters.mu if m.conditions["contact"] == "A" else m.parameters.eta
 
 
+def _dimension(m: Measurement) -> float:
+    """The dimension of the domain of a case, as Table 4 prints it."""
+    return {"RR": 1.0, "RS": 2.0, "SR": 2.0, "SS": 4.0, "NR": 4.0, "NS": 6.0}[str(m.conditions["case"])]
+
+
 def _sinking(m: Measurement) -> float:
     """v_y in m/s by Stokes' drag, from the properties of fluid and ball."""
     return -drag.sinking_speed(**{name: float(m.conditions[name]) for name in FLUIDS[m.set]})
@@ -62,6 +67,13 @@ LAWS = (
             Bearing("laws", "law_in_motion", lambda m: 0.0, size=one, by="Table 3, (14)-(17)"),
             Bearing("laws", "friction_ratio", _coefficient, by="(14), (15)"),
         ),
+    ),
+    Claim(
+        "table-4",
+        "Table 4, (22)",
+        "A ball that is pushed a little out of a stationary motion has as many ways to move as the domain of its case "
+        "has dimensions.",
+        (Bearing("rates", "modes", _dimension, by="Table 4"),),
     ),
     Claim(
         "eq-10",

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+import analytic
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
 from compare.claim import Bearing, Claim, Outcome, Text, When, every, given, one
@@ -56,6 +57,14 @@ def _gamma(m: Measurement) -> float:
 
 def _gamma_nr(m: Measurement) -> float:
     return float(slip_bounds.gamma_nr(math.atan2(_at(m, "n_y"), _at(m, "n_z")), _x(m), m.parameters))
+
+
+def _lacking(m: Measurement) -> float:
+    """gamma from the forces of NR: friction that rolling takes along the slip less eta times the normal force."""
+    p = m.parameters
+    _, (B_x, B_y, B_z) = analytic.contact_forces(Case.NR, _x(m), p)
+    lacks = B_y * _at(m, "n_z") - B_z * _at(m, "n_y") - p.eta * B_x
+    return float((1 + p.j) / (p.j * p.m * p.r) * lacks)
 
 
 def _greatest_as_printed(m: Measurement) -> float:
@@ -135,6 +144,13 @@ CLAIMS = (
                 by="slip_bounds.steepest_nr",
             ),
         ),
+    ),
+    Claim(
+        "eq-13-gamma",
+        "3.2, last paragraph",
+        "On the wall alone slip grows at a rate in proportion to the friction that rolling takes along it, less what "
+        "Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
+        (_growth(_lacking, _along(_NR_NS, "", "dragged"), "analytic.contact_forces, (13)"),),
     ),
     Claim(
         "eq-61",

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable
 
 import analytic
+from analytic.bifurcation import diagram as bifurcation
+from analytic.bifurcation.diagram import Exists
+from analytic.stationary import slipping_branch
 from compare.claim import Bearing, Claim, Text, When, every, given
 from compare.judge import theory
+from compare.kit.check import Relation
 from compare.kit.record import Measurement
-from compare.kit.settling import FORCES, SUMS
+from compare.kit.settling import FORCES, SUMS, scale
 from compare.settled import cases, detected, from_floor, is_in, lifts_first, natural_size, number, reached, slips_first
 from model import Case
 
@@ -63,6 +68,54 @@ def _with_fluid(when: When = lambda m: True) -> Bearing:
     return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 
 
+def _along_branch(name: str, sign: float = 1.0) -> Callable[[Measurement], float]:
+    """A force along the branch of SS in closed form, N, at the flow and before the fold."""
+
+    def force(m: Measurement) -> float:
+        p = m.parameters
+        return sign * float(getattr(slipping_branch.branch(slipping_branch.points_at(p)[0], p), name)) * p.m * p.g
+
+    return force
+
+
+def _region(m: Measurement) -> Exists:
+    """The region of Fig. 7 or 8."""
+    p = m.parameters
+    return Exists(int(bifurcation.case_map(p, [p.mu], [p.eta], [p.omega_0])[0, 0]))
+
+
+_LASTING = {Exists.RR: Case.RR, Exists.SS: Case.SS, Exists.NR: Case.NR, Exists.NS: Case.NS}
+"""What of a region a ball can settle in, SR counted as NR."""
+
+
+def _in_region(m: Measurement) -> float:
+    """The bit mask of the cases in which a ball can settle, by the labels of the region."""
+    region = _region(m)
+    return float(sum(1 << case for flag, case in _LASTING.items() if flag in region))
+
+
+def _dividing(m: Measurement) -> float:
+    """omega_c of SS beyond the fold; LookupError where the region has none."""
+    if Exists.SS_BEYOND_FOLD not in _region(m):
+        raise LookupError("the region has no SS beyond the fold")
+    return float(theory(analytic.solution, m.parameters, Case.SS, stable=False).state.omega_c)
+
+
+def _leaning(m: Measurement) -> float:
+    """How many modes SR has; LookupError where the region has no SR."""
+    if Exists.SR not in _region(m):
+        raise LookupError("the region has no SR")
+    return 2.0
+
+
+def _born(m: Measurement) -> float:
+    """The drag c at which the point where the fold is born, whose eta goes like c^2, is at the eta of the set."""
+    born = bifurcation.double_points(m.parameters)[0]
+    if born.meets != ("omega_02", "omega_04"):
+        raise LookupError("no fold is born")
+    return m.parameters.c * math.sqrt(m.parameters.eta / born.eta)
+
+
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
 _LEANS = every(_LIFTED, from_floor)
 _STATE = (*MOTION, *FORCES)
@@ -102,6 +155,40 @@ CLAIMS = (
         "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
         "its contact forces are (42)-(44).",
         (*bearings(_STATE, _SLIPS, "(37)-(44)"), _cases(_SLIPS)),
+    ),
+    Claim(
+        "eq-40",
+        "(40), (44)",
+        "A ball that has settled slipping at both points slips inwards at the floor and up the wall, cos α > 0, and "
+        "backwards, sin α < 0: there is no such motion with cos α < 0.",
+        (
+            Bearing(
+                "settled",
+                "slip_z",
+                lambda m: 0.0,
+                when=_SLIPS,
+                size=natural_size,
+                relation=Relation.AT_LEAST,
+                by="(40)",
+            ),
+            Bearing(
+                "settled", "slip_x", lambda m: 0.0, when=_SLIPS, size=natural_size, relation=Relation.AT_MOST, by="(40)"
+            ),
+        ),
+    ),
+    Claim(
+        "eq-42",
+        "(42), (43)",
+        "Slipping at both points, floor and wall press as the closed forms over α say, and friction holds the ball "
+        "back along its orbit.",
+        tuple(
+            Bearing("settled", quantity, predict, when=_SLIPS, size=natural_size, by="slipping_branch.branch")
+            for quantity, predict in (
+                ("force_Ay", _along_branch("A_y")),
+                ("force_Bx", _along_branch("B_x")),
+                ("force_Az", _along_branch("drag", -1.0)),
+            )
+        ),
     ),
     Claim(
         "prop-6",
@@ -157,6 +244,37 @@ DIAGRAMS = (
             ),
         )
         for figure, axis in (("fig-7", "η"), ("fig-8", "μ = η"))
+    ),
+    Claim(
+        "regions",
+        "Figs. 7 and 8, (84)-(90)",
+        "In every region of Figs. 7 and 8 those stationary states exist that it is labelled with: the attracting ones "
+        "and NS take in balls, SS beyond the fold divides two basins, SR is there where a ball leans on the floor.",
+        (
+            Bearing("plane", "cases", _in_region, by="analytic.bifurcation.diagram.case_map"),
+            Bearing(
+                "edge",
+                "edge_omega_c",
+                _dividing,
+                size=lambda m: scale("omega_c", m.parameters),
+                by="case_map, analytic.solution",
+            ),
+            Bearing("rates", "modes", _leaning, when=given(case="SR"), by="case_map"),
+        ),
+    ),
+    Claim(
+        "double-points",
+        "Figs. 7 and 8, black dots",
+        "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j rolling ends at ω₀₃ = √(g/(jR)), where all meet.",
+        (
+            Bearing("birth", "critical_drag", _born, by="analytic.bifurcation.diagram.double_points"),
+            Bearing(
+                "thresholds",
+                "omega_03",
+                lambda m: bifurcation.double_points(m.parameters)[-1].omega_0,
+                by="analytic.bifurcation.diagram.double_points",
+            ),
+        ),
     ),
 )
 SECTIONS = {"Stationary states": CLAIMS, "Bifurcations": DIAGRAMS}

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import dynamics
-from analytic.slipping import slip_bounds
+from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary import slipping_branch
 from compare.claim import Bearing, Claim, Text, When, given
 from compare.judge import theory
@@ -193,6 +193,52 @@ def _pulling() -> Iterator[Check]:
     yield _check("law", "(83): friction with a bound and η ≤ 1", smooth, 0.0)
 
 
+def _on_all_sides() -> Iterator[Check]:
+    """Signs of gamma of a slip at A out of RR, on either side and of any other direction, over a grid with eta > j."""
+    grid = [FORMAL.replace(mu=mu, eta=eta) for mu in np.geomspace(0.05, 3.0, 7) for eta in np.geomspace(0.42, 3.0, 7)]
+    wrong = {"(73): flows above ω₀₃ at which slip dies out on a side": 0, "(73): flows below at which it grows": 0}
+    for p, side, flow in product(grid, (1.0, -1.0), (0.7, 0.99, 1.01, 1.4)):
+        omega = flow * analytic.thresholds(p).omega_03
+        q, n = p.replace(omega_0=omega), np.array([side])
+        grows = bool(slip_stability.gamma(Case.RR, Case.SR, State(omega_c=omega).stacked(), n, q) > 0)
+        stated = bool(slip_bounds.rr_to_sr(q, omega, int(side)).gamma(omega) > 0)
+        above, below = wrong
+        wrong[above if flow > 1 else below] += (grows != (flow > 1)) + (stated != grows)
+    for what, count in wrong.items():
+        yield _check("law", what, count, 0.0)
+
+
+def _sliding() -> Iterator[Check]:
+    """Where the share of (69) is between 0 and 1, and where slip at the wall dies out on both sides, (64)."""
+    wrong = 0
+    for mu, eta, lag in product((0.1, 0.5), np.geomspace(0.05, 2.0, 8), np.linspace(-200.0, 200.0, 41)):
+        p = FORMAL.replace(mu=mu, eta=eta, omega_0=9.0 + lag)
+        dies_out = all(slip_bounds.rr_to_rs(p, 9.0, side).gamma(p.omega_0) < 0 for side in (1, -1))
+        wrong += (0 < slip_bounds.filippov_share(Case.RS, 9.0, p) < 1) != dies_out
+    yield _check("law", "(69), (64): states of which one says stable and the other unstable", wrong, 0.0)
+
+
+def _with_inertia() -> Iterator[Check]:
+    """Flows at which floor and wall can just hold a ball in a fluid with inertia, by its forces themselves."""
+    for eta, ratio in product((0.1, 0.25, 0.6, 1.2), (0.1, 0.3, 0.6)):
+        p = FORMAL.replace(eta=eta, density_ratio=ratio)
+        expected = bifurcation.thresholds_with_inertia(p)
+        carried = (1 - ratio) * p.m * p.R  # the swirl's pressure carries what the displaced fluid would take
+
+        def slack(omega_0: float, p: Parameters = p, carried: float = carried) -> float:
+            """What B_y the wall can give less what the floor needs, N; A_x = B_y - turns, B_x = the load less B_y."""
+            turns = p.j * p.m * p.R * omega_0**2
+            most = p.eta * (carried * omega_0**2 + turns) / (1 + p.eta)
+            return most - (turns - p.mu * p.m * p.g) / (1 - p.mu)
+
+        low, high = 1e-3 * expected["omega_02"], expected["omega_02"]
+        if not math.isnan(expected["omega_01"]):
+            onset = brentq(slack, low, 3 * high, rtol=1e-14)
+            yield _check("omega_01", "forces of rolling", onset, expected["omega_01"])
+        hangs = math.sqrt(p.m * p.g / (p.eta * carried))
+        yield _check("omega_02", "weight on the wall", hangs, expected["omega_02"])
+
+
 def _check(quantity: str, what: str, value: float, predicted: float, uncertainty: float = 0.0) -> Check:
     own = max(uncertainty, ROUND_OFF * (abs(predicted) or 1.0))
     algebra = Measurement(
@@ -224,6 +270,31 @@ FORMAL_CLAIMS = (
         algebra=_pulling,
         text=Text.FORMAL,
         reason="At (83) the wall would have to pull, and at (82) for η > j the floor.",
+    ),
+    Claim(
+        "section-5.2-virtual",
+        "(73), section 5.2",
+        "For η > j and ω₀ > ω₀₃ slip at the floor grows out of rolling at both points on either side, up to ω₀₁ and "
+        "beyond: RR is unstable to SR from all directions; below, it dies out on either.",
+        algebra=_on_all_sides,
+        text=Text.FORMAL,
+        reason="The floor would have to pull: a ball lifts off there.",
+    ),
+    Claim(
+        "eq-69-edge",
+        "after (69)",
+        "0 < δ < 1 exactly where slip at the wall dies out on either side, (64).",
+        algebra=_sliding,
+        text=Text.FORMAL,
+        reason="Where it does not, no ball rolls at both points: δ is measured in between, by eq-69.",
+    ),
+    Claim(
+        "fluid-inertia",
+        "extension",
+        "A fluid with inertia shifts ω₀₁ and ω₀₂ as if mass, inertia and gravity were others; ω₀₃ stays.",
+        algebra=_with_inertia,
+        text=Text.FORMAL,
+        reason="The paper and all simulators leave added mass and the pressure of the swirl out.",
     ),
 )
 SECTIONS = {"Bifurcations": CLAIMS, "Formal": FORMAL_CLAIMS}

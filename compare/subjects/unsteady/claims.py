@@ -7,7 +7,7 @@ import math
 
 import analytic
 from analytic.flowmeter import pulsation, response
-from compare.claim import Bearing, Claim
+from compare.claim import Bearing, Claim, given
 from compare.judge import simulated, theory
 from compare.kit.check import Relation
 from compare.kit.record import Measurement, state
@@ -42,6 +42,17 @@ def _slips(rule: str, relation: Relation) -> Bearing:
 
 def _mean_error(m: Measurement) -> float:
     return theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m))
+
+
+def _slow(m: Measurement) -> float:
+    """The flow at which a very slow pulsation about four fifths of what is measured is greatest as the ball slips."""
+    mean = 0.8 * m.parameters.omega_0
+    return mean + pulsation.slow_onset(m.parameters.replace(omega_0=mean))
+
+
+def _ends_rolling(m: Measurement) -> bool:
+    """Whether a measured omega_01 or omega_03 is what ends rolling."""
+    return m.quantity == ("omega_01" if m.parameters.eta < m.parameters.j else "omega_03")
 
 
 def _peak(m: Measurement) -> tuple[float, float]:
@@ -86,6 +97,32 @@ CLAIMS = (
         "forces allow rolling, mostly the same amplitude. In between Coulomb's law allows both; slip that "
         "lasts below the first or rolling beyond the second would refute it.",
         (_slips("slip-stability", Relation.AT_LEAST), _slips("infeasible", Relation.AT_MOST)),
+    ),
+    Claim(
+        "pulsation-limits",
+        "(66), (67), (82)",
+        "A slow pulsation makes the ball slip where the flow comes to ω₀₁, or ω₀₃; in a fast one the ball stands still "
+        "and slips where the lag alone is too much for it; none takes more than that.",
+        (
+            *(
+                Bearing("thresholds", end, _slow, when=_ends_rolling, by=f"{_BY}.pulsation.slow_onset")
+                for end in ("omega_01", "omega_03")
+            ),
+            Bearing(
+                "bounds",
+                "gamma_zero",
+                lambda m: _at(m, "omega_c") + pulsation.fast_onset(m.parameters.replace(omega_0=_at(m, "omega_c"))),
+                when=given(inner="RR", outer="RS", by="held"),
+                by=f"{_BY}.pulsation.fast_onset",
+            ),
+            Bearing(
+                "pulsation",
+                "slip_amplitude",
+                lambda m: pulsation.fast_onset(m.parameters),
+                relation=Relation.AT_MOST,
+                by=f"{_BY}.pulsation.fast_onset",
+            ),
+        ),
     ),
     Claim(
         "pulsation-mean",
