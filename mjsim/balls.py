@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from mjsim import backend
 from mjsim.contact_settings import ContactSettings
-from mjsim.corrections import Ball, Velocity, corrections, eventful, followed, hovering
+from mjsim.corrections import NO_LIMIT, Ball, Velocity, corrections, eventful, followed, hovering
 from model import Parameters
 from model.arrays import Array
 
@@ -24,8 +24,8 @@ NORMALS = slice(1, None, 14)
 """Where the sensors hold the normal forces."""
 TICKS = 128
 """Finest steps in one of the settings."""
-_GAIN, _FALL, _MEMORY, _LAG, _HOVER = (
-    Ball._fields.index(name) for name in ("gain", "fall", "memory_A", "lag_A", "hover_A")
+_DRAG, _GAIN, _FALL, _MEMORY, _LAG, _HOVER, _WEIGHT, _LIMIT = (
+    Ball._fields.index(name) for name in ("drag", "gain", "fall", "memory_A", "lag_A", "hover_A", "weight", "hover")
 )
 """Rows of `Balls.table`."""
 
@@ -218,6 +218,14 @@ class Balls:
         self.table[_FALL : _FALL + 2, runs] = self._normal[_FALL : _FALL + 2, runs] * scale
         self.damp(runs)
 
+    def lay_down(self, runs: Runs) -> None:
+        """Let runs of which nothing more is wanted rest where the fluid does not move them."""
+        self.resize(runs, np.full(len(runs), TICKS))
+        self.qpos[1:3, runs], self.qvel[:, runs], self.last[:, runs] = 0.0, 0.0, 0.0
+        for table in (self.table, self._normal):
+            table[_DRAG, runs], table[_FALL, runs] = 0.0, np.inf
+        self._ball = Ball(*self._quantities(self.table))
+
     def damp(self, runs: Runs, load: Array | None = None) -> None:
         """Set the damping of friction: in proportion to the number of steps, as far as contacts stay continuous.
 
@@ -236,13 +244,15 @@ class Balls:
         self.margins[:, runs] = np.maximum(self.margins[:, runs] + (self.loads[:, runs] > 0) * less, 0.0)
         reference[:, runs] = self.settings.solreffriction / damping
         self.table[_MEMORY:_LAG, runs] = self._normal[_MEMORY:_LAG, runs] / damping
+        self.table[_HOVER:_WEIGHT, runs] = self._normal[_HOVER:_WEIGHT, runs] * damping
+        self.table[_LIMIT, runs] = self._normal[_LIMIT, runs] if load is None else NO_LIMIT
         if self.settings.friction_lag:
             self.table[_LAG:_HOVER, runs] = (self._normal[_LAG:_HOVER, runs] + 0.5) * times / damping - 0.5
         self._ball = Ball(*self._quantities(self.table))
 
     def hover(self, runs: Runs | slice) -> Array:
         """Loads (2, k) below which contacts hover at the present slip and the damping of the settings, m s-2."""
-        ball = Ball(*self.table[:, runs])
+        ball = Ball(*self._normal[:, runs])
         return np.stack(hovering(Velocity(*self.qvel[:, runs]), ball.R - self.qpos[1, runs], ball))
 
     @property

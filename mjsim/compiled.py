@@ -20,8 +20,8 @@ from mjsim import corrections as source
 from mjsim.corrections import Ball, Velocity
 from model.arrays import Array
 
-for each in (source.slip, source.resistance, source.lands, source.hovering):  # the others call them
-    register_jitable(each)
+for name in ("slip", "resistance", "lands", "hovering", "near_axis", "unbearable"):  # the others call them
+    register_jitable(getattr(source, name))
 _corrections, _eventful, _followed = map(numba.njit(cache=True), (source.corrections, source.eventful, source.followed))
 _BALL, _VELOCITY = len(Ball._fields), len(Velocity._fields)
 _ROWS = types.Array(types.float64, 2, "A")

@@ -37,6 +37,7 @@ _NUMBERS = {
     "solimp": ("1", Range(1e-4, 0.9999)),
     "impratio": ("1", Range(0.1, 1e7)),
     "servo": ("s", NOT_NEGATIVE),
+    "hover": ("1", NOT_NEGATIVE),
     "tolerance": ("1", NOT_NEGATIVE),
     "iterations": ("1", Range(1, whole=True)),
     "noslip_iterations": ("1", Range(0, whole=True)),
@@ -82,6 +83,9 @@ class ContactSettings:
     """Whether the friction force of the last step shifts the surface velocity, so that rolling doesn't creep."""
     servo: float = 0.01
     """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
+    hover: float = 0.05
+    """Largest hover number of a contact under its load: where slip is faster, friction is damped less. 0: as fast as
+    it is. It needs memory or order 2."""
     order: int = 2
     """2: forces are taken in the middle of a step; 1: at its beginning, as MuJoCo does by itself."""
     coordinates: str = "polar"

@@ -22,6 +22,13 @@ Quantity = Any
 
 _SLIDES = 9.0
 """A contact slides if its speed squared exceeds this times that of its change in a step; ending slip changes faster."""
+NO_LIMIT = 1e30
+"""Stands for infinity where that would make infinity times zero."""
+_WALL = 5.0
+"""How many times the hover number of the floor, under the weight, that of the wall may be, under the centrifugal force:
+unlike the floor's load, which falls to nothing as the ball lifts off, that is all it carries."""
+_NEAR = 32.0
+"""Steps to the axis from which on they are shorter: the azimuth turns by up to 1/32 in one."""
 _FEW = 16.0
 """A hovering contact lands from the speed that its load gives it in so many steps; one that only hovers reaches 1.2."""
 
@@ -62,7 +69,9 @@ class Ball(NamedTuple):
     hover_B: Quantity
     """Load (m s-2) per slip speed below which a contact hovers, s-1."""
     weight: Quantity
-    """g, m s-2; inf where there is none."""
+    """g, m s-2; `NO_LIMIT` where there is none."""
+    hover: Quantity
+    """Largest hover number of a contact, `NO_LIMIT` where it is left as it is."""
 
     @classmethod
     def of(cls, p: Parameters, settings: ContactSettings) -> Ball:
@@ -77,7 +86,8 @@ class Ball(NamedTuple):
         return cls(
             p.R, p.r, p.m * p.c, *laws[p.drag], p.m, p.j * p.m * p.r**2, settings.midpoint, settings.servo_gain,
             settings.slowest_fall(p.g), settings.timestep, memory, memory, lag, lag,
-            p.mu * hover, p.eta * hover, p.g or math.inf,
+            p.mu * hover, p.eta * hover, p.g or NO_LIMIT,
+            (settings.shifts_surfaces and settings.hover) or NO_LIMIT,
         )  # fmt: skip
 
 
@@ -154,14 +164,22 @@ def corrections(
     lag_A = ball.lag_A * (_SLIDES * (A_x * A_x + A_z * A_z) < v_Ax * v_Ax + v_Az * v_Az)
     lag_B = ball.lag_B * (_SLIDES * (B_y * B_y + B_z * B_z) < v_By * v_By + v_Bz * v_Bz)
 
+    # Continuous sliding. A contact that slides fast would hover: its surface moves along with the excess, which leaves
+    # the direction of friction as it is, and delays it by as much more as there is less damping.
+    weight, thrown = ball.weight, _WALL * rho * v.omega_c * v.omega_c
+    hover_A, hover_B = hovering(v, rho, ball)
+    less_A = unbearable(hover_A, ball.hover * weight)
+    less_B = unbearable(hover_B, ball.hover * (weight - (weight - thrown) * (thrown < weight)))
+    lag_A, lag_B = lag_A + (lag_A > 0) * less_A / 2, lag_B + (lag_B > 0) * less_B / 2
+
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
     # that speed for the last step's friction f leaves only the change of f to creep. The friction forces follow from
     # contact = (., A_x + B_x, A_y + B_y, -r A_z, r B_z, .).
     (_, inward, upward, about_x, about_y, _), (A_normal, B_normal) = contact, normals
-    floor_z = lag_A * A_z - ball.memory_A / ball.r * about_x
-    floor_x = lag_A * A_x + ball.memory_A * (inward - B_normal)
-    wall_y = lag_B * B_y + ball.memory_B * (upward - A_normal)
-    wall_z = lag_B * B_z + ball.memory_B / ball.r * about_y
+    floor_z = lag_A * A_z + less_A * v_Az - ball.memory_A / ball.r * about_x
+    floor_x = lag_A * A_x + less_A * v_Ax + ball.memory_A * (inward - B_normal)
+    wall_y = lag_B * B_y + less_B * v_By + ball.memory_B * (upward - A_normal)
+    wall_z = lag_B * B_z + less_B * v_Bz + ball.memory_B / ball.r * about_y
 
     forces = rho * (drag_z + inertial_z), drag_h + inertial_h, drag_y, moment_x, 0.0, moment_z
     return forces, (floor_z, floor_x, wall_y, wall_z)
@@ -170,19 +188,31 @@ def corrections(
 def eventful(
     place: Sequence[Quantity], v: Velocity, last: Velocity, normals: Sequence[Quantity], ball: Ball
 ) -> Quantity:
-    """Whether a ball that lacks a contact lands in the coming step, or reaches the vessel's axis."""
+    """Whether a ball that lacks a contact lands in the coming step, or comes near the vessel's axis."""
     (_, h, y), (A_normal, B_normal) = place, normals
     hover_A, hover_B = hovering(v, ball.R - h, ball)
     return (
         (A_normal == 0) & lands(y, v.v_y, last.v_y, hover_A, ball)
-        | (B_normal == 0) & (lands(h, v.v_h, last.v_h, hover_B, ball) | (ball.R - h <= ball.step * v.v_h))
+        | (B_normal == 0) & (lands(h, v.v_h, last.v_h, hover_B, ball) | near_axis(ball.R - h, v, ball))
     )  # fmt: skip
 
 
+def near_axis(rho: Quantity, v: Velocity, ball: Ball) -> Quantity:
+    """Whether a ball at the distance rho from the axis is less than `_NEAR` steps away from it."""
+    along = rho * v.omega_c
+    return rho * rho <= (_NEAR * ball.step) ** 2 * (v.v_h * v.v_h + along * along)
+
+
 def hovering(v: Velocity, rho: Quantity, ball: Ball) -> tuple[Quantity, Quantity]:
-    """Loads, m s-2, below which slipping contacts hover with the damping of the settings."""
+    """Loads, m s-2, below which slipping contacts hover with the present damping."""
     A_x, A_z, B_y, B_z = slip(v, rho, ball.r)
     return ball.hover_A * (A_x * A_x + A_z * A_z) ** 0.5, ball.hover_B * (B_y * B_y + B_z * B_z) ** 0.5
+
+
+def unbearable(hover: Quantity, most: Quantity) -> Quantity:
+    """The share of a slip speed that is too much for a contact to be continuous."""
+    excess = hover - most
+    return excess * (excess > 0) / (hover + (hover == 0))
 
 
 def lands(gap: Quantity, speed: Quantity, last: Quantity, hover: Quantity, ball: Ball) -> Quantity:

@@ -49,8 +49,8 @@ class Run:
     progress : called with the fraction done, from time to time
     build : makes the MuJoCo model, and its MJCF as text, of parameters and settings; `scene.build` if None
 
-    Each iteration yields `Blocks`. A run that diverges or reaches the vessel's axis yields what it has, then empty
-    blocks, and its header says why.
+    Each iteration yields `Blocks`. A run that diverges, or is given up as its steps are divided again and again, yields
+    what it has, then empty blocks, and its header says why.
 
     Raises
     ------
@@ -144,7 +144,7 @@ class Run:
         last = first + len(raw)
         time = np.arange(first, last, dtype=np.float64) * (self._interval * self._settings.timestep)
         sound = np.logical_and.accumulate((np.abs(raw) < _HUGE).all(axis=2)).T
-        sound &= time < self._stepper.axis[:, None]
+        sound &= time < self._stepper.given_up[:, None]
         sound &= np.array([[not header.failure] for header in self.headers])
         blocks = [np.empty(0, SAMPLE)] * len(self.headers)
         for runs in self._alike:
@@ -163,9 +163,9 @@ class Run:
 
     def _reason(self, i: int, time: float, block: npt.NDArray[np.void]) -> str:
         """Why run i has no sample at a time, after those of a block."""
-        axis = self._stepper.axis[i]
-        if axis <= time:
-            return f"reached the vessel's axis at t = {axis:g} s, where polar coordinates end"
+        given_up = self._stepper.given_up[i]
+        if given_up <= time:
+            return f"was given up at t = {given_up:g} s, as a contact opened and closed all the time"
         names = zip(VARIABLES, UNITS, strict=True)
         last = [f"{name} = {block[name][-1]:.6g} {unit}" for name, unit in names] if len(block) else []
         return f"diverged by t = {time:g} s{' after ' * bool(last)}{', '.join(last)}"
@@ -212,7 +212,7 @@ def simulate(
     InputError
         If an argument is out of range.
     SimulationError
-        If the run diverges or reaches the vessel's axis; it carries the samples so far.
+        If the run diverges, or is given up as its steps are divided again and again; it carries the samples so far.
     """
     flows, settings = [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p)
     asked = [p], [x0], t_end, flows, settings

@@ -39,7 +39,7 @@ class Free(Stepper):
         theta_0: float,
     ) -> None:
         self._balls = [_Ball(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
-        self.margins, self.axis = np.zeros((2, len(models))), np.full(len(models), np.inf)
+        self.margins, self.given_up = np.zeros((2, len(models))), np.full(len(models), np.inf)
 
     def advance(self, omega_0: Iterable[Array], row: Array | None = None) -> None:
         for fluid in omega_0:

@@ -17,8 +17,8 @@ from model.parameters import Range, check_number
 def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> None:
     """Refuse a state on or beyond the axis, where polar coordinates end.
 
-    Warn if contact can't be continuous at its slip speeds, taking the load of gravity for both contacts, or if friction
-    at both makes them chatter.
+    Warn if contact can't be continuous at its slip speeds, where nothing keeps it so, taking the load of gravity for
+    both contacts, or if friction at both makes them chatter.
     """
     x = State.one(x0)
     if settings.contact_decay(p.mu, p.eta) > 1:
@@ -27,16 +27,22 @@ def check_start(x0: npt.ArrayLike, p: Parameters, settings: ContactSettings) -> 
             "ContactSettings.suited gives slower contacts",
             stacklevel=4,
         )
-    if settings.coordinates == "polar":
-        check_number("h", x.h, "m", Range(high=p.R, below=True), "to be off the axis it")
+    check_place(x, p, settings.touching(p.g))
     for contact, friction, speed, gap in zip("AB", (p.mu, p.eta), slip_speeds(x, p), (x.y, x.h), strict=True):
         fastest = settings.fastest_slip(p.g, friction)
-        if abs(gap) < settings.touching(p.g) and speed > fastest:
+        kept = settings.hover and settings.shifts_surfaces
+        if abs(gap) < settings.touching(p.g) and speed > fastest and not kept:
             warnings.warn(
                 f"the ball slips at {speed:.3g} m s-1 at {contact} at the start, but with these settings contact "
                 f"is continuous only up to {fastest:.3g} m s-1; ContactSettings.for_problem gives softer ones",
                 stacklevel=4,
             )
+
+
+def check_place(x: State, p: Parameters, depth: float) -> None:
+    """Refuse a ball deeper in floor or wall than `depth`, m, or on the axis, where its orbit has no direction."""
+    check_number("y", x.y, "m", Range(-depth), "to be above the floor it")
+    check_number("h", x.h, "m", Range(-depth, p.R, below=True), "to be between wall and axis it")
 
 
 def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float) -> None:

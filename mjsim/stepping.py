@@ -7,6 +7,8 @@ velocities (leapfrog).
 
 A step in which a ball lands is divided: halved until the landing lies within a finest step, where `mjsim.landing` deals
 with it. From there on the steps are as long as the forces allow that change after an impact, up to the whole.
+
+Polar coordinates end at the vessel's axis: `mjsim.axis` takes a ball past it.
 """
 
 from __future__ import annotations
@@ -17,9 +19,10 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from mjsim import landing, recorder
+from mjsim import axis, landing, recorder
 from mjsim.balls import TICKS, Balls, Runs
 from mjsim.contact_settings import ContactSettings
+from mjsim.corrections import Ball, Velocity, near_axis
 from model import Parameters
 from model.arrays import Array
 
@@ -31,6 +34,11 @@ _CHANGE = 0.25
 """Most that accelerations may change in a divided step, in units of what gravity and the wall's friction do in a whole
 step as the ball goes round. Four times less brings motions through landings no more than a fifth closer to those of a
 tenth of the step: the engine against itself, on random sets (docs/mujoco-settings.md)."""
+_CARRIED = "given_up", "_more", "_passing"
+"""What is carried from one step to the next beside the balls."""
+_SHARE, _MOST = 16, 30_000
+"""A run that takes this many divided steps more than so many in each whole one is given up. Balls that hop take three,
+a contact that opens and closes for ever takes all 128."""
 
 
 class Stepper(Protocol):
@@ -38,8 +46,8 @@ class Stepper(Protocol):
 
     margins: Array
     """Margins of the contacts, shape (2, runs), m."""
-    axis: Array
-    """When each run reached the vessel's axis, s; inf for those that have not."""
+    given_up: Array
+    """When each run was given up, as its steps were divided again and again, s; inf for those that go on."""
 
     def advance(self, omega_0: Iterable[Array], row: Array | None = None) -> None:
         """Take a step for each omega_0 (runs,); write (qpos, qvel, sensors) of the first to row (runs, `COLUMNS`)."""
@@ -70,8 +78,13 @@ class Polar(Stepper):
         self._balls = balls = Balls(models, parameters, settings, batched)
         self.model, self.data = models[0], balls.engine.data
         self.margins = balls.margins
+        self._parameters = parameters
         self._R, self._r = (np.array([getattr(p, name) for p in parameters]) for name in "Rr")
-        self.axis, self._steps = np.full(len(models), np.inf), 0
+        self.given_up, self._steps = np.full(len(models), np.inf), 0
+        self._more, self._counted = np.zeros(len(models)), 0
+        """Divided steps that each run has taken beyond its share, and the whole steps that were counted."""
+        self._passing = np.full((6, len(models)), np.nan)
+        """Acceleration and that of the spin in world axes of balls that pass the axis, m s-2 and rad s-2."""
         start = [recorder.joint_state(x, theta_0, p) for x, p in zip(x0s, parameters, strict=True)]
         balls.qpos[:], balls.qvel[:] = (np.stack(part, axis=-1) for part in zip(*start, strict=True))
         self._whole = True
@@ -93,43 +106,67 @@ class Polar(Stepper):
             self._steps, row = self._steps + 1, None
 
     def _divided(self, fluid: Array, row: Array | None) -> None:
-        """Take a step in which some ball lands or reaches the axis; the others take it in one."""
+        """Take a step in which some ball lands or comes near the axis; the others take it in one."""
         balls = self._balls
         left, taken = np.full(len(balls.ticks), TICKS), np.zeros(len(balls.ticks), dtype=int)
         before = self._rates(slice(None))
+        self._more = np.maximum(self._more - _SHARE * (self._steps - self._counted), 0.0)
+        self._counted = self._steps
         while len(runs := np.flatnonzero(left)):
-            if not balls.drive(fluid, runs, watched=False):
+            if np.isfinite(self._passing[0, runs]).any() or not balls.drive(fluid, runs, watched=False):
                 self._watch(runs, fluid)
                 balls.drive(fluid, runs)
-            balls.step(runs)
+            passes = np.isfinite(self._passing[0, runs])
+            for k in runs[passes]:
+                axis.advance(balls, k, self._parameters[k], self._passing[:, k])
+            if not passes.all():
+                balls.step(runs[~passes])
             if row is not None:
                 first = runs[left[runs] == TICKS]
                 row[first, recorder.SENSORS : -1] = balls.sensors.T[first]
             left[runs] -= balls.ticks[runs]
             taken[runs] += 1
-            judged = runs[((taken[runs] == _JUDGED) | (left[runs] == 0)) & (balls.ticks[runs] < TICKS)]
+            self._more[runs] += 1
+            ends = (taken[runs] == _JUDGED) | (left[runs] == 0)
+            judged = runs[ends & (balls.ticks[runs] < TICKS) & ~passes]
             if len(judged):
                 self._choose_steps(judged, left[judged], before[:, judged], taken[judged])
                 before[:, judged], taken[judged] = self._rates(judged), 0
+        lost = np.flatnonzero(self._more > _MOST)
+        if len(lost):
+            self.given_up[lost], self._more[lost] = self._steps * balls.settings.timestep, 0.0
+            balls.lay_down(lost)
         self._whole = bool((balls.ticks == TICKS).all())
 
     def _watch(self, runs: Runs, fluid: Array) -> None:
-        """See whether a ball reaches the axis within a step, and let those land that do."""
+        """Divide steps in which a ball lands or comes near the axis, and let those land that do."""
         balls = self._balls
-        for k in runs[self._R[runs] - balls.qpos[1, runs] <= (balls.steps * balls.qvel[1])[runs]]:
-            self.axis[k] = min(self.axis[k], self._steps * balls.settings.timestep)
+        gone = runs[np.isfinite(self._passing[0, runs]) & ~self._near(runs)]
+        if len(gone):
+            self._passing[:, gone] = np.nan
+            closed = landing.touching(balls) | (balls.gaps <= 0)
+            landing.restart(balls, gone, np.zeros(len(gone)), closed[:, gone], fluid)
         for _ in range(_LANDINGS):
             moments = landing.moments(balls)
-            first = moments.min(axis=0)
-            due = runs[np.isfinite(first[runs])]
-            if len(due) == 0:
-                return
-            divisible = balls.ticks[due] > 1
-            coarse, fine = due[divisible], due[~divisible]
+            first, near = moments.min(axis=0), self._near(runs)
+            due = np.isfinite(first[runs]) & np.isnan(self._passing[0, runs])
+            fine = balls.ticks[runs] == 1
+            coarse, lands = runs[(due | near) & ~fine], runs[due & fine]
+            if len(coarse) == 0 == len(lands):
+                break
             balls.resize(coarse, balls.ticks[coarse] // 2)
-            if len(fine):
+            if len(lands):
                 closed = (moments == first) | landing.touching(balls)
-                landing.restart(balls, fine, first[fine], closed[:, fine], fluid)
+                landing.restart(balls, lands, first[lands], closed[:, lands], fluid)
+        for k in runs[near & fine & np.isnan(self._passing[0, runs])]:
+            self._passing[:, k] = axis.acceleration(balls, k, self._parameters[k])
+
+    def _near(self, runs: Runs) -> npt.NDArray[np.bool_]:
+        """Which of the runs are so near the axis that their steps are too long."""
+        balls = self._balls
+        rho, ball = self._R[runs] - balls.qpos[1, runs], Ball(*balls.table[:, runs])
+        near: npt.NDArray[np.bool_] = near_axis(rho, Velocity(*balls.qvel[:, runs]), ball) & (balls.loads[1, runs] == 0)
+        return near
 
     def _rates(self, runs: Runs | slice) -> Array:
         """Accelerations in the last step, (6, k), m s-2."""
@@ -153,9 +190,15 @@ class Polar(Stepper):
         balls.resize(runs[~stays], np.where(grows, 2 * ticks, ticks // 2)[~stays])
 
     def state(self) -> dict[str, Array]:
-        return self._balls.state() | {"axis": self.axis.copy(), "steps": np.array(self._steps)}
+        return (
+            self._balls.state()
+            | {"steps": np.array([self._steps, self._counted])}
+            | {name: getattr(self, name).copy() for name in _CARRIED}
+        )
 
     def restore(self, state: dict[str, Array]) -> None:
         self._balls.restore(state)
-        self.axis[:], self._steps = state["axis"], int(state["steps"])
+        self._steps, self._counted = state["steps"].tolist()
+        for name in _CARRIED:
+            getattr(self, name)[:] = state[name]
         self._whole = bool((self._balls.ticks == TICKS).all())

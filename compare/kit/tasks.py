@@ -103,7 +103,7 @@ class Task:
     def batch_key(self) -> str:
         """Tasks of equal batch key can be carried out together."""
         apart = () if self.long else ("parameters", "x0", "flow")
-        shared = {k: v for k, v in self.describe().items() if k not in apart}
+        shared = {k: v for k, v in self.describe().items() if k not in apart} | {"settings": str(self.chosen_settings)}
         return json.dumps(shared, sort_keys=True)
 
 

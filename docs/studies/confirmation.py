@@ -58,7 +58,8 @@ def table() -> list[list[str]]:
 
 def _at(timestep: float, solimp: float, damping: float = 0.5, **changes: float) -> ContactSettings:
     """Settings with the given impedance and friction damping b_f h."""
-    return ContactSettings.at(timestep, solimp=solimp, solreffriction=2 * timestep / (solimp * damping), **changes)
+    friction = 2 * timestep / (solimp * damping)
+    return ContactSettings.at(timestep, solimp=solimp, solreffriction=friction, **{"hover": 0.0} | changes)
 
 
 def _turning(timestep: float) -> float:

@@ -31,7 +31,6 @@ from mjsim.corrections import Ball, resistance
 from model import Flow, Header, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import Motion, frame, from_world, to_world
-from model.parameters import Range, check_number
 from model.trajectory import current_versions, samples
 
 _HUGE = 1e8
@@ -69,7 +68,7 @@ def simulate(
     every, count = limits.sampling(t_end, settings.timestep, sample_interval)
     limits.check_timestep(settings.timestep, p, flow, t_end)
     x, joints = State.one(x0), settings.coordinates == "joints"
-    check_number("h", x.h, "m", Range(high=p.R, below=True), "to be off the axis it")
+    limits.check_place(x, p, p.r / 10)
     ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
     rows, done, failure = np.empty((count, _WIDTH)), 0, ""
     with closing(build(library.load(), p, settings)) as scene:
