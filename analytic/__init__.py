@@ -2,6 +2,11 @@
 
 from typing import TYPE_CHECKING, Any
 
+import model
+
+if not hasattr(model, "Parameters"):
+    raise ImportError(f"{model.__file__} hides the package model of dualball: rename that, or work in another folder")
+
 from analytic.bifurcation.diagram import Thresholds, thresholds
 from analytic.flowmeter.characteristic import (
     OperatingLimit,

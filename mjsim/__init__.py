@@ -1,5 +1,10 @@
 """The dual-point contact ball in MuJoCo; knows no solution of the problem."""
 
+import model
+
+if not hasattr(model, "Parameters"):
+    raise ImportError(f"{model.__file__} hides the package model of dualball: rename that, or work in another folder")
+
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run, simulate, simulate_many
 

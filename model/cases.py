@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
+from model.errors import InputError
+
 
 class Contact(Enum):
     """State of one contact point."""
@@ -26,6 +28,13 @@ class Case(IntEnum):
     NR = 6
     NS = 7
     NN = 8
+
+    @classmethod
+    def _missing_(cls, value: object) -> Case:
+        """``Case("SS")`` is the case of that name; `InputError` for what is none."""
+        if isinstance(value, str) and value in cls.__members__:
+            return cls[value]
+        raise InputError(f"case = {value!r} must be one of {', '.join(cls.__members__)}")
 
     @property
     def A(self) -> Contact:

@@ -45,20 +45,23 @@ class Range:
 ANY = Range()
 POSITIVE = Range(0.0, open=True)
 NOT_NEGATIVE = Range(0.0)
+SIZES = Range(1e-20, 1e20)
+"""Of parameters that aren't 0: what is computed from them stays finite."""
 
 
 def check_number(name: str, value: Any, unit: str, allowed: Range = ANY, meaning: str = "") -> float:
     """Return `value` as a float; `InputError` if it is not a finite real number in the allowed range."""
-    if isinstance(value, bool) or not hasattr(value, "__float__"):
-        raise InputError(f"{name} = {value!r} must be a number in {unit}")
     try:
+        if isinstance(value, bool | str) or not hasattr(value, "__float__"):
+            raise TypeError
         number = float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} = {value!r} must be a number in {unit}") from error
+        raise InputError(f"{name} = {value!r} must be a number{f' in {unit}' * (unit != '1')}") from error
+    of = f" {unit}" * (unit != "1")
     if not math.isfinite(number):
-        raise InputError(f"{name} = {number} {unit} must be finite")
+        raise InputError(f"{name} = {number}{of} must be finite")
     if number not in allowed:
-        raise InputError(f"{name} = {number:g} {unit} is out of range: {f'{meaning} must'.strip()} be {allowed}")
+        raise InputError(f"{name} = {number:g}{of} is out of range: {f'{meaning} must'.strip()} be {allowed}")
     return number
 
 
@@ -67,7 +70,7 @@ def parse_number(name: str, text: str, unit: str, allowed: Range = ANY) -> float
     try:
         number = float(text)
     except ValueError as error:
-        raise InputError(f"{name} = {text!r} must be a number in {unit}") from error
+        raise InputError(f"{name} = {text!r} must be a number{f' in {unit}' * (unit != '1')}") from error
     return check_number(name, number, unit, allowed)
 
 
@@ -101,6 +104,8 @@ def _quantity(symbol: str, unit: str, meaning: str, allowed: Range, **default: A
 class Parameters:
     """Everything the model depends on, in SI units: Table 1 of the paper, and the law of drag (`model.drag`).
 
+    QUANTITIES
+
     Raises
     ------
     InputError
@@ -115,7 +120,7 @@ class Parameters:
     mu: float = _quantity("μ", "1", "friction coefficient between ball and floor (A)", NOT_NEGATIVE)
     eta: float = _quantity("η", "1", "friction coefficient between ball and wall (B)", NOT_NEGATIVE)
     g: float = _quantity("g", "m s-2", "gravitational acceleration reduced by buoyancy", POSITIVE)
-    c: float = _quantity("c", "s-1", "viscous drag coefficient over mass", NOT_NEGATIVE)
+    c: float = _quantity("c", "s-1", "viscous drag coefficient divided by mass", NOT_NEGATIVE)
     omega_0: float = _quantity("ω₀", "rad s-1", "angular velocity of the fluid", ANY)
     nu_f: float = _quantity(
         "ν_f", "m2 s-1", "kinematic viscosity of the fluid (0: not known)", NOT_NEGATIVE, default=0.0
@@ -124,7 +129,7 @@ class Parameters:
     density_ratio: float = _quantity(
         "ρ_f/ρ_b",
         "1",
-        "density of the fluid over that of the ball (0: not known; from 1 on it floats)",
+        "density of the fluid divided by that of the ball (0: not known; from 1 on it floats)",
         Range(0.0, 1.0, below=True),
         default=0.0,
     )
@@ -135,6 +140,8 @@ class Parameters:
         for field in self.quantities():
             unit, allowed, meaning = (field.metadata[key] for key in ("unit", "allowed", "meaning"))
             value = check_number(field.name, getattr(self, field.name), unit, allowed, meaning)
+            if value:
+                check_number(field.name, abs(value), unit, SIZES, "the size of what isn't 0")
             object.__setattr__(self, field.name, value)
         check_choice("drag", self.drag, laws.LAWS)
         if self.drag != laws.STOKES and self.nu_f == 0:
@@ -238,6 +245,18 @@ class Parameters:
             Path(path).write_text(tomli_w.dumps(dataclasses.asdict(self)), "utf-8")
         except OSError as error:
             raise StorageError(f"cannot write parameters to {path}: {error.strerror}") from error
+
+
+def _told(field: dataclasses.Field[float]) -> str:
+    meta, usual = field.metadata, "" if field.default is dataclasses.MISSING else f", default {field.default:g}"
+    said = f"{field.name} : {meta['meaning']}, in {meta['unit']}, {meta['allowed']}{usual}"
+    return said.replace(", in 1", "").replace(", any", "")
+
+
+_TABLE = "\n    ".join(
+    ["Parameters", "----------", *map(_told, Parameters.quantities()), f"drag : one of {', '.join(laws.LAWS)}"]
+)
+Parameters.__doc__ = (Parameters.__doc__ or "").replace("QUANTITIES", _TABLE)
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

@@ -26,6 +26,8 @@ from model.parameters import Parameters
 from model.trajectory import (
     AXES,
     AXIS_ATTRIBUTES,
+    CONVENTIONS,
+    FLUID,
     SAMPLE,
     SCHEMA,
     SCHEMA_VERSION,
@@ -64,21 +66,23 @@ class TrajectoryWriter(WholeFile):
     def __init__(self, path: str | Path, header: Header) -> None:
         super().__init__(path)
         scales = _begin(self.file, SCHEMA, SCHEMA_VERSION)
+        self._flow = header.flow
         self.file.attrs.update(header.attributes())
         self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
         for of, time in ((Trajectory, "time"), (Events, "event_time")):
-            for meta in columns(of).values():
+            for meta in [*columns(of).values(), *([FLUID] if of is Trajectory else [])]:
                 shape = meta["shape"]
                 sizes = {"shape": (0, *shape), "maxshape": (None, *shape), "chunks": (1024, *shape)}
                 _create(self.file, meta, (time, "axis"), scales, **sizes, compression="gzip", shuffle=True)
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
         """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush it."""
-        for name in columns(Trajectory):
+        added = {name: samples[name] for name in columns(Trajectory)} | {"omega_0": self._flow(samples["time"])}
+        for name, values in added.items():
             column = self.file[name]
             n = column.shape[0]
             column.resize(n + len(samples), axis=0)
-            column[n:] = samples[name]
+            column[n:] = values
         self.flush()
 
     def end(self, events: Events, failure: str = "", path: str | Path | None = None) -> None:
@@ -100,10 +104,11 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
     with WholeFile(path) as whole:
         file = whole.file
         scales = _begin(file, BATCH, BATCH_VERSION)
+        file.attrs.update(Conventions=CONVENTIONS, title=f"Motions of dual-point contact balls: {len(runs)} runs")
         file.attrs["versions"] = json.dumps(dict(current_versions()))
         scales["run"] = file.create_dataset("run", data=list(runs), dtype=_TEXT)
         scales["run"].make_scale("run")
-        headers = [json.dumps(run.header.attributes() | {"mjcf": run.header.mjcf}) for run in runs.values()]
+        headers = [json.dumps(run.header.texts() | {"mjcf": run.header.mjcf}) for run in runs.values()]
         file.create_dataset("header", data=headers, dtype=_TEXT).dims[0].attach_scale(scales["run"])
         for dimension, of in (("sample", Trajectory), ("event", Events)):
             tables: list[Any] = [run.events if of is Events else run for run in runs.values()]
@@ -111,7 +116,8 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
             file.create_dataset(f"{dimension}s", data=counts).dims[0].attach_scale(scales["run"])
             scales[dimension] = file.create_dataset(dimension, data=np.arange(max(counts)))
             scales[dimension].make_scale(dimension)
-            for name, meta in columns(of).items():
+            more = {"omega_0": FLUID} if of is Trajectory else {}
+            for name, meta in (columns(of) | more).items():
                 empty = -1 if meta["dtype"] is np.int8 else np.nan
                 values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
                 for row, count, table in zip(values, counts, tables, strict=True):

@@ -32,6 +32,8 @@ AXES = ("x", "y", "z")
 AXIS_ATTRIBUTES = {"units": "1", "long_name": "axes of the co-rotating frame: x inwards, y up, z along"}
 SCHEMA, SCHEMA_VERSION = "dualball-trajectory", 1
 """What a file or an xarray data set of a trajectory says of itself."""
+CONVENTIONS = "CF-1.11"
+"""Those of climate and forecast metadata, which readers such as xarray know."""
 
 
 def _column(
@@ -40,6 +42,10 @@ def _column(
     """Declare a column of a table."""
     about = {"units": units, "long_name": long_name, "equation": equation, "shape": shape, "dtype": dtype}
     return field(repr=False, metadata=about, **more)
+
+
+FLUID: Mapping[str, Any] = {"name": "omega_0", **_column("rad s-1", "angular velocity of the fluid").metadata}
+"""The column of a file that follows from the flow, and isn't read back."""
 
 
 @functools.cache
@@ -91,7 +97,15 @@ class Header:
     created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     """UTC time."""
 
-    def attributes(self) -> dict[str, str]:
+    def attributes(self) -> dict[str, Any]:
+        """What a file says of itself: the conventions it follows, each parameter, and all but the MJCF as text."""
+        about = {
+            "Conventions": CONVENTIONS,
+            "title": f"Motion of a dual-point contact ball, simulated by {self.engine}",
+        }
+        return about | dataclasses.asdict(self.parameters) | self.texts()
+
+    def texts(self) -> dict[str, str]:
         """All but the MJCF as text, mappings as JSON."""
         texts = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "mjcf"}
         mappings = {name: dict(texts[name]) for name in ("settings", "versions")}
@@ -126,6 +140,22 @@ class Trajectory:
     case: npt.NDArray[np.int8] = _column("1", "kinematic case", "Fig. 2", dtype=np.int8)
     events: Events = field(repr=False)
 
+    def __repr__(self) -> str:
+        """Engine, samples, duration, cases and last state, in a line."""
+        if not len(self.time):
+            return f"Trajectory({self.header.engine}: no samples)"
+        phases, last = self.phases(), zip(VARIABLES, self.x[-1], strict=True)
+        cases = " ".join(case.name for case, *_ in phases[:8]) + " …" * (len(phases) > 8)
+        state = ", ".join(f"{name}={value:.6g}" for name, value in last)
+        failed = f"; {self.header.failure}" if self.header.failure else ""
+        span = f"{len(self.time)} samples, {self.time[0]:g} to {self.time[-1]:g} s"
+        return f"Trajectory({self.header.engine}: {span}; cases {cases}; last {state}{failed})"
+
+    @property
+    def omega_0(self) -> Array:
+        """The angular velocity of the fluid at each sample, rad s-1."""
+        return self.header.flow(self.time)
+
     @property
     def x(self) -> Array:
         """The states, shape (n, 8), columns in the order of `State`."""
@@ -156,12 +186,13 @@ class Trajectory:
         try:
             import xarray  # here, because it is optional and takes a second to load
         except ImportError as error:
-            raise InputError("to_xarray() needs xarray: pip install 'dualball[xarray]'") from error
+            raise InputError("to_xarray() needs xarray: pip install xarray h5netcdf") from error
         variables: dict[str, Any] = {"axis": ("axis", list(AXES), AXIS_ATTRIBUTES), "mjcf": ((), self.header.mjcf)}
         for table, time in ((self, "time"), (self.events, "event_time")):
             for name, meta in columns(type(table)).items():
                 values = getattr(table, name)
                 variables[meta["name"]] = ((time, "axis")[: values.ndim], values, attributes(meta))
+        variables["omega_0"] = ("time", self.omega_0, attributes(FLUID))
         schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
         return xarray.Dataset(variables, attrs=schema | self.header.attributes())
 

@@ -45,6 +45,7 @@ def vector_field(case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.Array
 
     Raises `InputError` if x isn't a state of the case (`check_state`).
     """
+    case = Case(case)
     state, fluid = _checked(case, x, p, omega_0)
     return rates(case, state, p, fluid).stacked()[..., : np.shape(x)[-1]]
 
@@ -59,6 +60,7 @@ def contact_forces(
 
     Parameters and errors are those of `vector_field`; also `InputError` for a state of RR that no forces can hold.
     """
+    case = Case(case)
     state, fluid = _checked(case, x, p, omega_0)
     if case is Case.RR:
         best = rolling_forces.least_utilisation(state.omega_c, p, fluid)

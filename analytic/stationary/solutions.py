@@ -102,7 +102,7 @@ def stationary_solutions(p: Parameters, cases: Collection[Case] = tuple(Case)) -
             for s in stationary_solutions(p.replace(omega_0=-p.omega_0), cases)
         ]
     solvers = {Case.RR: _rr, Case.RS: _rs, Case.SR: _sr, Case.SS: _ss, Case.NR: _nr, Case.NS: _ns}
-    return [s for case, solve in solvers.items() if case in cases for s in solve(p)]
+    return [s for case, solve in solvers.items() if case in map(Case, cases) for s in solve(p)]
 
 
 def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = False) -> StationarySolution:
@@ -110,9 +110,10 @@ def solution(p: Parameters, case: Case, *, stable: bool = True, formal: bool = F
 
     `formal` takes it even if its contact forces are inadmissible: NR below omega_02, SR with A_y < 0.
 
-    Raises `InputError` if there is none, or more than one (two are unstable between the Hopf points of a very rough
-    floor).
+    A case may be given by its name. Raises `InputError` if there is none, or more than one (two are unstable between
+    the Hopf points of a very rough floor).
     """
+    case = Case(case)
     those = [s for s in stationary_solutions(p, (case,)) if s.stable == stable and (formal or s.exists)]
     if len(those) != 1:
         raise InputError(

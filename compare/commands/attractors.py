@@ -27,39 +27,39 @@ from compare.subjects.attractors import search
 from compare.subjects.attractors.search import BOX, FATES, Search, Searched
 from model import Parameters, State, Trajectory
 from model.arrays import Array
-from model.files import write_text
+from model.files import check_writable, write_text
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import POSITIVE, Range, check_number
+from model.parameters import POSITIVE
 
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    command = options.command(
-        commands, "attractors", run, "what balls come to from many starts: stationary, periodic, chaotic motions"
-    )
+    summary = "what balls come to from many starts: stationary, periodic, chaotic motions"
+    command = options.command(commands, "attractors", run, summary, "--set hopping --starts 10")
     options.add_parameters(command)
     running.add_engine(command)
     command.set_defaults(engine=EVENT)
     running.add_start(command)
     command.add_argument(
-        "--starts", type=int, default=20, metavar="N", help="random starts (default 20), unless one is given by --start"
+        "--starts", type=options.count, default=20, metavar="N", help="random starts, unless one is given by --start"
     )
-    command.add_argument("--seed", type=int, default=0, help="of the random starts (default 0)")
+    command.add_argument("--seed", type=options.count_or_none, default=0, metavar="N", help="of the random starts")
     command.add_argument(
-        "--time", type=options.number, metavar="s", help=f"how long to follow a run at most (default {LASTING:g}/c)"
+        "--time", type=options.seconds, metavar="s", help=f"how long to follow a run at most (default {LASTING:g}/c)"
     )
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several: grid")
     follow = "follow each periodic motion in a parameter, to where it is born and ends"
     options.add_axes(command, "--follow", follow, "NAME=FROM:TO")
-    command.add_argument("--page", type=Path, metavar="FILE", help="write the tables as Markdown, too")
+    command.add_argument("--page", type=Path, metavar="FILE", help="write the tables as Markdown, too (default: don't)")
     options.outputs(command, shown="print as JSON")
 
-    command = options.command(
-        commands, "search", searched, "where in parameter space the ball hops for ever, resumable"
+    summary = "where in parameter space the ball hops for ever, resumable"
+    command = options.command(commands, "search", searched, summary, "--sets 200 --range mu=0.5:1")
+    command.add_argument("--sets", type=options.count, default=500, metavar="N", help="parameter sets")
+    command.add_argument("--starts", type=options.count, default=5, metavar="N", help="random starts of each")
+    command.add_argument(
+        "--seed", type=options.count_or_none, default=0, metavar="N", help="of the random sets and starts"
     )
-    command.add_argument("--sets", type=int, default=500, metavar="N", help="parameter sets (default 500)")
-    command.add_argument("--starts", type=int, default=5, metavar="N", help="random starts of each (default 5)")
-    command.add_argument("--seed", type=int, default=0)
     options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
     running.add_workers(command)
     command.add_argument("--kept", type=Path, nargs="+", metavar="FILE", help="show what --save wrote instead")
@@ -67,17 +67,17 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--page", type=Path, metavar="FILE", help="write the table as Markdown")
     options.outputs(command, "search", "print the sets with hopping as JSON")
 
-    command = options.command(
-        commands, "basins", plane, "what becomes of the ball from each start of a plane of states, resumable"
-    )
+    summary = "what becomes of the ball from each start of a plane of states, resumable"
+    example = "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21"
+    command = options.command(commands, "basins", plane, summary, example)
     options.add_parameters(command)
     running.add_start(command)
-    for name, example in (("across", "omega_c=0:150:61"), ("up", "slip_x=-900:900:61")):
-        command.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=f"as {example}")
-    command.add_argument(
-        "--mujoco", type=int, default=0, metavar="N", help="MuJoCo, too, on every N-th point both ways"
-    )
-    command.add_argument("--timestep", type=options.number, default=2.5e-4, metavar="s", help="that of MuJoCo")
+    for name in ("across", "up"):
+        text = f"a state variable {name} the plane, and its range"
+        command.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=text)
+    points = "MuJoCo, too, on every N-th point both ways; 0: not at all"
+    command.add_argument("--mujoco", type=options.count_or_none, default=0, metavar="N", help=points)
+    command.add_argument("--timestep", type=options.seconds, default=2.5e-4, metavar="s", help="that of MuJoCo")
     running.add_workers(command)
     command.add_argument("--save", type=Path, metavar="FILE", help="write the map as JSON")
     options.outputs(command, "basins", "print the shares as JSON")
@@ -85,7 +85,9 @@ def add(commands: options.Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Find the attractors of every set of parameters, and show them."""
-    axes, ways = ([Axis.parse(text) for text in texts] for texts in (args.vary, args.follow))
+    if args.page:
+        check_writable(args.page)
+    axes, ways = map(Axis.several, (args.vary, args.follow))
     ranges = {way.name: way.ends for way in ways}
     starts = np.array([running.start(args)]) if args.start else args.starts
 
@@ -211,16 +213,15 @@ def _largest(row: dict[str, Any]) -> float:
 
 def searched(args: argparse.Namespace) -> int:
     """Search what hasn't been searched yet, and show the table."""
+    for path in filter(None, (args.save, args.page)):
+        check_writable(path)
     if args.kept:
         searches = [Searched.load(path) for path in args.kept]
     else:
-        count, starts = (
-            int(check_number(name, getattr(args, name), name, Range(1, whole=True))) for name in ("sets", "starts")
-        )
-        axes = [Axis.parse(text, dict.fromkeys(BOX, "1"), "group", POSITIVE) for text in args.range]
-        asked = Search(BOX | {axis.name: axis.ends for axis in axes}, starts, args.seed)
+        axes = Axis.several(args.range, dict.fromkeys(BOX, "1"), "group", POSITIVE)
+        asked = Search(BOX | {axis.name: axis.ends for axis in axes}, args.starts, args.seed)
         with progress.shown(args.quiet or args.json) as show:
-            searches = [search.run(args.output, asked, count, running.workers(args), show)]
+            searches = [search.run(args.output, asked, args.sets, running.workers(args), show)]
     if args.save:
         searches[0].save(args.save)
     if args.page:
@@ -231,21 +232,22 @@ def searched(args: argparse.Namespace) -> int:
 
 def plane(args: argparse.Namespace) -> int:
     """Map the basins and show their shares."""
-    p = options.parameters(args)
-    coarse = int(check_number("mujoco", args.mujoco, "points", Range(0, whole=True)))
+    p, start = options.parameters(args), running.start(args)
+    if args.save:
+        check_writable(args.save)
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
     with running.campaign(args, "basins") as campaign:
-        mapped = search.basins(campaign, p, running.start(args)._asdict(), across, up, coarse, args.timestep)
+        mapped = search.basins(campaign, p, start._asdict(), across, up, args.mujoco, args.timestep)
     if args.save:
         mapped.save(args.save)
     shares = {fate: mapped.share(fate) for fate in FATES if mapped.share(fate)[0]}
-    differ = mapped.differences().tolist() if coarse else []
+    differ = mapped.differences().tolist() if args.mujoco else []
     said = []
     for fate, (hits, of) in shares.items():
         low, high = interval(hits, of)
         said.append(f"{fate:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to {100 * high:.1f} %)")
     where = f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a boundary: {differ}"
     data = {"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}
-    options.show(data, args.json, *said, *([where] if coarse else []))
+    options.show(data, args.json, *said, *([where] if args.mujoco else []))
     return 0

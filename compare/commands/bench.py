@@ -21,16 +21,23 @@ from compare.kit import engines, pages, progress
 from compare.kit.engines import ENGINES
 from mjsim import ContactSettings
 from model import InputError
-from model.files import check_writable, make_directory, write_text
-from model.parameters import check_names
+from model.files import check_writable, write_text
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names
 
 JSON, PAGE, RUNS = "league.json", "league.html", "league"
-_NUMBERS = {"timestep": float, "impratio": float, "iterations": int, "tolerance": float, "noslip_iterations": int}
-_PAIR: dict[str, tuple[Any, Any, str | None]] = {
-    "solref": (2, ("TIMECONST", "DAMPRATIO"), None),
-    "solreffriction": (2, ("TIMECONST", "DAMPRATIO"), None),
-    "solimp": ("+", "D", "dmin dmax width midpoint power"),
-    "margin": (None, "m", None),
+_FEW = options.Number(allowed=Range(0, 1e5, whole=True))
+_NUMBERS: dict[str, tuple[options.Number, str]] = {
+    "timestep": (options.seconds, "time step"),
+    "impratio": (options.Number(allowed=POSITIVE), "impedance of friction, divided by that of the normal force"),
+    "iterations": (_FEW, "most iterations of the solver"),
+    "tolerance": (options.Number(allowed=NOT_NEGATIVE), "at which the solver stops"),
+    "noslip_iterations": (_FEW, "iterations that suppress slip"),
+}
+_PAIR: dict[str, tuple[Any, Any, str]] = {
+    "solref": (2, ("TIMECONST", "DAMPRATIO"), "spring and damper of a contact"),
+    "solreffriction": (2, ("TIMECONST", "DAMPRATIO"), "the same of its friction"),
+    "solimp": ("+", "D", "impedance: dmin dmax width midpoint power"),
+    "margin": (None, "m", "distance from which on there is a contact"),
 }
 """Numbers of a contact: how many there are, their names, and more help."""
 
@@ -38,25 +45,24 @@ _PAIR: dict[str, tuple[Any, Any, str | None]] = {
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
     summary = "a score card for MuJoCo contact settings: yours, dualball's, MuJoCo's own; or for another engine"
-    command = options.command(commands, "grade", graded, summary)
+    command = options.command(commands, "grade", graded, summary, "mine.xml -o card.html")
     command.add_argument(
         "file", type=Path, nargs="?", metavar="FILE.xml", help="MJCF file with a ball and its contacts"
     )
     group = command.add_argument_group("settings", "as in MJCF; where not given, those of FILE.xml or MuJoCo's own")
-    for name, kind in _NUMBERS.items():
-        option, parse = f"--{name.replace('_', '-')}", options.number if kind is float else kind
-        group.add_argument(option, type=parse, metavar="s" if name == "timestep" else "N")
+    for name, (parse, meaning) in _NUMBERS.items():
+        metavar = "s" if name == "timestep" else "N"
+        group.add_argument(f"--{name.replace('_', '-')}", type=parse, metavar=metavar, help=meaning)
     for name, known in CHOICES.items():
         group.add_argument(f"--{name}", metavar="NAME", help=", ".join(known))
     for name, (count, metavar, meaning) in _PAIR.items():
         group.add_argument(f"--{name}", type=options.number, nargs=count, metavar=metavar, help=meaning)
     running.add_engine_name(command)
-    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write (default: none)")
     options.outputs(command)
 
-    command = options.command(
-        commands, "league", ranked, "all engines that are installed on the same tasks, against theory"
-    )
+    summary = "all engines that are installed on the same tasks, against theory"
+    command = options.command(commands, "league", ranked, summary, "--quick")
     command.add_argument("--quick", action="store_true", help="one time step and fewer tasks: within a minute")
     command.add_argument(
         "--engine", action="append", metavar="NAME", help=f"only this one (repeatable): {', '.join(ENGINES)}"
@@ -129,10 +135,9 @@ def ranked(args: argparse.Namespace) -> int:
     missing = {each.name: each.engine.missing for each in those if each.engine.missing}
     if all(each.name in missing for each in those):
         raise InputError(f"there is nothing to compare: {'; '.join(missing.values())}")
-    for name, why in missing.items():
-        print(f"dualball: {name} is left out: {why}", file=sys.stderr)
-    make_directory(args.output)
     with running.campaign(args, "league", RUNS) as campaign:
+        for name, why in missing.items():
+            print(f"dualball: {name} is left out: {why}", file=sys.stderr)
         entries = league.measure(campaign, those, args.quick)
     data = league.to_mapping(those, entries)
     write_text(args.output / JSON, json.dumps(data, indent=1))

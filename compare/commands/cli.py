@@ -14,6 +14,7 @@ import sys
 import textwrap
 from collections.abc import Sequence
 
+from compare.commands import options
 from model import InputError, SimulationError
 from model.trajectory import current_versions
 
@@ -34,8 +35,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with the given arguments, the process's own for None; return its exit code."""
     # argparse takes -1e-6 and -inf for options, unlike -1: a space in front makes values of them.
     words = [re.sub(r"^-(?=\.?\d|inf|nan)", " -", word) for word in (sys.argv[1:] if argv is None else argv)]
-    args = _parser(words).parse_args(words)
     try:
+        args = _parser(words).parse_args(words)
         args.words = ["dualball", *(word.strip() for word in words)]  # a page says with what it was written
         return int(args.run(args))
     except InputError as error:
@@ -52,9 +53,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+def _parser(words: Sequence[str]) -> options.Parser:
     """The parser of the command that was asked for, or of all of them."""
-    parser = argparse.ArgumentParser(
+    parser = options.Parser(
         prog="dualball",
         usage="dualball [-h] [--version] COMMAND ...",
         description="A physics engine on trial: the dual-point contact ball, in closed form and in MuJoCo.",
@@ -69,7 +70,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     if not asked:
         listed = []
         for title, group in GROUPS.items():
-            listed.append(f"\n{title}:")
+            listed.append(f"\n{title.capitalize()}:")
             for name in group:
                 what, indent = commands.choices[name].description or "", " " * 14
                 listed.append(textwrap.fill(what, 100, initial_indent=f"  {name:<12}", subsequent_indent=indent))

@@ -30,8 +30,10 @@ def add(commands: options.Commands) -> None:
     what = "the best meter for a fluid and a range of flows, within bounds"
     command = options.command(commands, "design", run, what, "meter.toml -o meter.html")
     command.add_argument("file", type=Path, metavar="FILE.toml", help="fluid, flow, bounds, materials, tolerances")
-    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write")
-    command.add_argument("--seed", type=int, default=0, metavar="N", help="of the random numbers of the search")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write (default: none)")
+    command.add_argument(
+        "--seed", type=options.count_or_none, default=0, metavar="N", help="of the random numbers of the search"
+    )
     options.outputs(command, shown="print JSON instead of tables")
 
 
@@ -39,7 +41,6 @@ def run(args: argparse.Namespace) -> int:
     """Design and show; 1 if no meter covers the flows."""
     from compare.report import meter  # here, because nothing else needs it
 
-    check_number("seed", args.seed, "1", NOT_NEGATIVE)
     if args.output:
         check_writable(args.output)
     asked = parameters.read_toml(args.file)

@@ -12,6 +12,7 @@ from compare.report import results
 from compare.view import inspection
 from mjsim import ContactSettings
 from model import Flow, InputError, storage
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range
 
 
 def add(commands: options.Commands) -> None:
@@ -31,7 +32,7 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "inspect", inspect, "what a trajectory file holds", "run.h5 --plot run.png")
     command.add_argument("file", type=Path, metavar="FILE", help="a run, or a collection of 'dualball collect'")
-    command.add_argument("--plot", type=Path, metavar="FILE", help="draw the run (png, svg or pdf)")
+    command.add_argument("--plot", type=Path, metavar="FILE", help="draw the run: png, svg or pdf (default: don't)")
     options.outputs(command)
 
     summary = "two motions side by side: differences, cases, parameters"
@@ -46,25 +47,50 @@ def add(commands: options.Commands) -> None:
     command = options.command(commands, "render", render, summary, "run.h5 -o film.gif --from 1 --seconds 10")
     command.add_argument("file", type=Path, metavar="FILE", help="a run")
     command.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="picture.png or film.gif")
-    command.add_argument("--width", type=int, metavar="PIXELS", help="default 960 for a picture, 640 for a film")
-    command.add_argument("--at", type=options.number, metavar="s", help="time of a picture (default: the end)")
-    for option, name, usual, unit, meaning in (
-        ("from", "start", 0.0, "s", "start of a film, in the time of the run"),
-        ("seconds", "seconds", 6.0, "s", "length of a film; shorter if the run ends before"),
-        ("speed", "speed", 0.25, "NUMBER", "of a film; 1 is real time"),
-        ("force-arrow", "force_arrow", 3.0, "RADII", "length of the arrow of a force m g, radii of the ball"),
-        ("slip-arrow", "slip_arrow", 3.0, "RADII", "length of the arrow of the fastest slip, radii of the ball"),
+    command.add_argument(
+        "--width",
+        type=options.Number("1", Range(16, 8192, whole=True)),
+        metavar="PIXELS",
+        help="width (default 960 for a picture, 640 for a film)",
+    )
+    command.add_argument("--at", type=options.moment, metavar="s", help="time of a picture (default: the end)")
+    for option, name, usual, allowed, unit, meaning in (
+        ("from", "start", 0.0, NOT_NEGATIVE, "s", "start of a film, in the time of the run"),
+        ("seconds", "seconds", 6.0, POSITIVE, "s", "length of a film; shorter if the run ends before"),
+        ("speed", "speed", 0.25, POSITIVE, "NUMBER", "speed of a film; 1 is real time"),
+        (
+            "force-arrow",
+            "force_arrow",
+            3.0,
+            NOT_NEGATIVE,
+            "RADII",
+            "length of the arrow of a force m g, radii of the ball",
+        ),
+        (
+            "slip-arrow",
+            "slip_arrow",
+            3.0,
+            NOT_NEGATIVE,
+            "RADII",
+            "length of the arrow of the fastest slip, radii of the ball",
+        ),
     ):
-        command.add_argument(f"--{option}", dest=name, type=options.number, default=usual, metavar=unit, help=meaning)
-    command.add_argument("--rate", type=int, default=20, metavar="N", help="frames a second")
+        command.add_argument(
+            f"--{option}", dest=name, type=options.Number("1", allowed), default=usual, metavar=unit, help=meaning
+        )
+    command.add_argument(
+        "--rate", type=options.Number("1", Range(1, 1000, whole=True)), default=20, metavar="N", help="frames a second"
+    )
 
     summary = "the ball in MuJoCo's viewer, driven by the study's own loop"
     command = options.command(commands, "view", view, summary, "--omega-0 25 --speed 0.5")
     options.add_parameters(command)
     running.add_flow(command)
     running.add_start(command)
-    command.add_argument("--timestep", type=options.number, metavar="s", help="time step (default: that of the study)")
-    command.add_argument("--speed", type=options.number, default=1.0, metavar="NUMBER", help="1 is real time")
+    command.add_argument("--timestep", type=options.seconds, metavar="s", help="time step (default: that of the study)")
+    command.add_argument(
+        "--speed", type=options.Number("1", POSITIVE), default=1.0, metavar="NUMBER", help="1 is real time"
+    )
 
 
 def report(args: argparse.Namespace) -> int:

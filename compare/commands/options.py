@@ -5,19 +5,65 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
+import sys
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from rich.console import Console
 
 from compare.kit.pages import readable
 from compare.kit.statistics import plain
-from model import Parameters, drag
+from model import InputError, Parameters, drag
+from model.parameters import ANY, NOT_NEGATIVE, Range
 
-Parser = argparse.ArgumentParser
 Commands = Any
 """What `argparse` calls the sub-parsers of a program."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Raises `InputError`, one line, where argparse would print the usage and exit."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message}; see '{self.prog} --help'")
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of the command line in its range, for argparse: an int if it must be whole."""
+
+    unit: str = "1"
+    allowed: Range = ANY
+
+    def __call__(self, text: str) -> float:
+        try:
+            number = float(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(f"{text.strip()!r} is not a number") from error
+        if not math.isfinite(number) or number not in self.allowed:
+            said = f"{number:g} {readable(self.unit)}".rstrip()
+            limits = "finite" if self.allowed == ANY else self.allowed
+            raise argparse.ArgumentTypeError(f"{said} is out of range: it must be {limits}")
+        return int(number) if self.allowed.whole else number
+
+
+_LARGE = 2.0
+"""Lengths of a meter, m, beyond which it is asked whether they are in millimetres."""
+number = Number()
+count = Number(allowed=Range(1, 1e6, whole=True))
+count_or_none = Number(allowed=Range(0, 1e6, whole=True))
+seconds = Number("s", Range(1e-9, 1e9))
+"""A duration, or a time step."""
+moment = Number("s", NOT_NEGATIVE)
+
+
+def hdf5(text: str) -> Path:
+    """A file to be written as HDF5, for argparse: other names would promise another format."""
+    if Path(text).suffix not in (".h5", ".hdf5", ".nc"):
+        raise argparse.ArgumentTypeError(f"{text!r} would hold HDF5: its name must end in .h5, .hdf5 or .nc")
+    return Path(text)
 
 
 class _Help(argparse.HelpFormatter):
@@ -66,34 +112,29 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:
     """Options that choose a parameter set and change some of its values."""
-    group = parser.add_argument_group("parameters", "a set, and values that replace its own")
+    group = parser.add_argument_group("parameters", "a set, and values that are given in place of its own")
     source = group.add_mutually_exclusive_group()
     source.add_argument("--set", metavar="NAME", default="reference", help=f"one of {', '.join(Parameters.names())}")
     source.add_argument("--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table")
     for field in Parameters.quantities():
         meta, option = field.metadata, f"--{field.name.replace('_', '-')}"
         unit, allowed = readable(meta["unit"]) or "NUMBER", f", {meta['allowed']}".replace(", any", "")
-        group.add_argument(
-            option, dest=f"parameter_{field.name}", metavar=unit, type=number, help=meta["meaning"] + allowed
-        )
+        parse = Number(meta["unit"], meta["allowed"])
+        text = meta["meaning"] + allowed
+        group.add_argument(option, dest=f"parameter_{field.name}", metavar=unit, type=parse, help=text)
     group.add_argument("--drag", dest="parameter_drag", metavar="LAW", help=f"law of drag: {', '.join(drag.LAWS)}")
 
 
 def parameters(args: argparse.Namespace) -> Parameters:
     """The parameters that the options of `add_parameters` name."""
     chosen = Parameters.load(args.parameters) if args.parameters else Parameters.named(args.set)
-    return chosen.replace(**given(args, [field.name for field in dataclasses.fields(Parameters)], "parameter_"))
+    p = chosen.replace(**given(args, [field.name for field in dataclasses.fields(Parameters)], "parameter_"))
+    if max(p.r, p.R) > _LARGE:
+        print(f"dualball: warning: r = {p.r:g} m, R = {p.R:g} m: were millimetres meant?", file=sys.stderr)
+    return p
 
 
 def given(args: argparse.Namespace, names: Iterable[str], prefix: str = "") -> dict[str, Any]:
     """The options of these names that were given, with their values."""
     values = {name: getattr(args, prefix + name) for name in names}
     return {name: value for name, value in values.items() if value is not None}
-
-
-def number(text: str) -> float:
-    """A number of the command line, for argparse."""
-    try:
-        return float(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from error

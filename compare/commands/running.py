@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from compare.commands.options import given, number
+from compare.commands.options import count_or_none, given, number, seconds
 from compare.kit import engines, progress
 from compare.kit.campaign import Campaign
 from compare.kit.engines import Settings
@@ -27,12 +27,14 @@ def add_flow(parser: argparse.ArgumentParser) -> None:
     choice = group.add_mutually_exclusive_group()
     ramp = "rises or falls evenly within so many seconds, and stays"
     choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp)
-    choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help="each level held HOLD s")
+    choice.add_argument(
+        "--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help="levels, each held HOLD s"
+    )
     wave = "a mean with waves on it, frequencies in Hz"
     choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
     choice.add_argument("--flow", type=Path, metavar="FILE", help="measured, as CSV: time, omega_0 on each line")
     longest = "longest time between lines of --flow (default: ten times the usual one)"
-    group.add_argument("--longest-interval", type=number, metavar="s", help=longest)
+    group.add_argument("--longest-interval", type=seconds, metavar="s", help=longest)
 
 
 def flow(args: argparse.Namespace) -> Flow | None:
@@ -60,9 +62,11 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     """Options that choose an engine and its accuracy."""
     group = parser.add_argument_group("engine")
     add_engine_name(group)
-    group.add_argument("--timestep", type=number, metavar="s", help="time step (default: the engine's; event has none)")
-    group.add_argument("--rtol", type=number, metavar="NUMBER", help="relative tolerance of event")
-    restitution = "coefficient of restitution of event and time-stepping"
+    group.add_argument(
+        "--timestep", type=seconds, metavar="s", help="time step (default: the engine's; event has none)"
+    )
+    group.add_argument("--rtol", type=number, metavar="NUMBER", help="relative tolerance of event (default 1e-9)")
+    restitution = "coefficient of restitution of event and time-stepping (default 0)"
     group.add_argument("--restitution", type=number, metavar="NUMBER", help=restitution)
 
 
@@ -75,7 +79,7 @@ def add_engine_name(parser: argparse._ActionsContainer) -> None:
         except InputError as error:
             raise argparse.ArgumentTypeError(str(error)) from error
 
-    known = f"{', '.join(engines.ENGINES)}; analytic is event"
+    known = f"engine: {', '.join(engines.ENGINES)}; analytic is event"
     parser.add_argument("--engine", type=engine, default=engines.MUJOCO, metavar="NAME", help=known)
 
 
@@ -100,13 +104,13 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     add_processes(choice)
     choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
     longest = "longest real time a run may take (default: no limit)"
-    group.add_argument("--limit", type=number, default=math.inf, metavar="s", help=longest)
+    group.add_argument("--limit", type=seconds, default=math.inf, metavar="s", help=longest)
 
 
 def add_processes(options: Any) -> None:
     """The option that says how many processes of this machine take part, for a parser or a group of one."""
     here, all_of_them = "processes of this machine; 0: this one", os.cpu_count() or 1
-    options.add_argument("--workers", type=int, default=all_of_them, metavar="N", help=here)
+    options.add_argument("--workers", type=count_or_none, default=all_of_them, metavar="N", help=here)
 
 
 def workers(args: argparse.Namespace) -> Workers:
@@ -128,7 +132,7 @@ def add_start(parser: argparse.ArgumentParser) -> None:
     """Option for the initial state."""
     units = ", ".join(f"{name} in {unit}" for name, unit in zip(VARIABLES, UNITS, strict=True))
     meaning = f"initial state: {units}; zero (at rest against the wall) where not named"
-    parser.add_argument("--start", nargs="*", default=[], metavar="NAME=VALUE", help=meaning)
+    parser.add_argument("--start", nargs="+", default=[], metavar="NAME=VALUE", help=meaning)
 
 
 def start(args: argparse.Namespace) -> State:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import json
 import sys
 import tempfile
 from pathlib import Path
@@ -12,53 +14,71 @@ from compare.kit import campaign, sweep
 from compare.kit.tasks import failed_path, journal_path, store
 from compare.kit.workers import interrupts
 from compare.view import inspection
-from model import Flow
-from model.files import check_writable
+from model import Flow, InputError, Parameters
+from model.files import check_writable, make_directory, reading_json, write_text
+from model.parameters import Range, check_number
 
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    command = options.command(commands, "simulate", run, "one run with any engine, into an HDF5 file")
+    command = options.command(
+        commands, "simulate", run, "one run with any engine, into an HDF5 file", "--omega-0 25 -o run.h5"
+    )
     running.add_engine(command)
     options.add_parameters(command)
     running.add_flow(command)
     running.add_start(command)
-    command.add_argument("--time", type=options.number, default=10.0, metavar="s", help="duration (default 10)")
+    command.add_argument("--time", type=options.seconds, default=10.0, metavar="s", help="duration")
     command.add_argument(
-        "--sample-interval", type=options.number, metavar="s", help="default: a thousandth of the duration"
+        "--sample-interval",
+        type=options.seconds,
+        metavar="s",
+        help="time between samples (default: a thousandth of the duration)",
     )
-    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HDF5 file to write")
-    options.outputs(command, shown="print the last state as JSON")
+    command.add_argument("-o", "--output", type=options.hdf5, metavar="FILE", help="HDF5 file to write (default: none)")
+    options.outputs(command, shown="print the description as JSON")
 
-    command = options.command(commands, "sweep", grid, "many runs over ranges of parameters, resumable")
+    command = options.command(
+        commands, "sweep", grid, "many runs over ranges of parameters, resumable", "--vary omega_0=10:30:21"
+    )
     options.add_parameters(command)
     running.add_start(command)
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
-    command.add_argument("--random", type=int, metavar="N", help="N points that fill the ranges NAME=FROM:TO instead")
-    command.add_argument("--seed", type=int, default=0)
+    command.add_argument(
+        "--random", type=options.count, metavar="N", help="N points that fill the ranges NAME=FROM:TO instead"
+    )
+    command.add_argument("--seed", type=options.count_or_none, default=0, metavar="N", help="of the points of --random")
     command.add_argument(
         "--direction",
         choices=("held", "up", "down", "both"),
         default="held",
         help="held: a run for each point; up, down, both: omega_0 in steps within one run (shows hysteresis)",
     )
-    command.add_argument(
-        "--hold", type=options.number, default=20.0, metavar="s", help="time at each step (default 20)"
-    )
+    command.add_argument("--hold", type=options.seconds, default=20.0, metavar="s", help="time at each step")
     running.add_engine(command)
-    command.add_argument("--time", type=options.number, default=30.0, metavar="s", help="duration (default 30)")
+    command.add_argument(
+        "--time", type=options.seconds, default=30.0, metavar="s", help="duration of a run that is held"
+    )
     running.add_workers(command)
-    command.add_argument("--batch", type=int, default=campaign.BATCH, metavar="N", help="runs in one MuJoCo batch")
+    command.add_argument(
+        "--batch", type=options.count, default=campaign.BATCH, metavar="N", help="runs in one MuJoCo batch"
+    )
     options.outputs(command, "sweep", "print a summary as JSON")
 
-    command = options.command(commands, "collect", collect, "gather the runs of a directory into one file for xarray")
-    command.add_argument("directory", type=Path, metavar="DIR")
-    command.add_argument("-o", "--output", type=Path, default=Path("sweep.h5"), metavar="FILE")
+    command = options.command(
+        commands, "collect", collect, "gather the runs of a directory into one file for xarray", "sweep -o sweep.h5"
+    )
+    command.add_argument("directory", type=Path, metavar="DIR", help="what sweep has filled")
+    command.add_argument(
+        "-o", "--output", type=options.hdf5, default=Path("sweep.h5"), metavar="FILE", help="HDF5 file to write"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, keep what there is, and show it."""
     task = running.task(args, options.parameters(args), flow=running.flow(args), sample_interval=args.sample_interval)
+    if args.sample_interval is not None:
+        check_number("sample_interval", args.sample_interval, "s", Range(high=args.time), "with this --time it")
     if args.output:
         check_writable(args.output)
     with tempfile.TemporaryDirectory() as scratch, interrupts() as interrupted:
@@ -84,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
 
 def grid(args: argparse.Namespace) -> int:
     """Carry out the runs that are not done yet and say which failed."""
-    p, axes = options.parameters(args), [sweep.Axis.parse(text) for text in args.vary]
+    p, axes = options.parameters(args), sweep.Axis.several(args.vary)
     if args.direction != "held":
         omegas = sweep.levels(axes, args.direction)
         flow, lasts = Flow.staircase(omegas, args.hold), args.hold * len(omegas)
@@ -92,6 +112,7 @@ def grid(args: argparse.Namespace) -> int:
     else:
         sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
         tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
+    _keep_apart(args, p)
     with running.campaign(args, "sweep", batch=args.batch) as work:
         failures = work.complete(tasks)
     whole = len(tasks) - len(failures)
@@ -104,6 +125,21 @@ def grid(args: argparse.Namespace) -> int:
         for failure in failures:
             print(f"failed: {failure.task.key}: {failure.reason}", file=sys.stderr)
     return 1 if failures else 0
+
+
+def _keep_apart(args: argparse.Namespace, p: Parameters) -> None:
+    """Raise `InputError` if the directory holds another sweep, with which `collect` would mix this one."""
+    names = ("vary", "random", "seed", "direction", "hold", "start", "time", "timestep", "rtol", "restitution")
+    asked = {name: getattr(args, name) for name in names} | {"engine": args.engine.name} | dataclasses.asdict(p)
+    make_directory(args.output)
+    if (path := args.output / "sweep.json").exists():
+        with reading_json(path, "sweep") as held:
+            differ = [f"{name} = {held[name]}, not {value}" for name, value in asked.items() if held[name] != value]
+        if differ:
+            raise InputError(
+                f"{args.output} holds another sweep ({'; '.join(differ)}): choose another directory with --output"
+            )
+    write_text(path, json.dumps(asked))
 
 
 def collect(args: argparse.Namespace) -> int:

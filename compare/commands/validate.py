@@ -24,10 +24,20 @@ _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    command = options.command(commands, "validate", run, "hold simulation against theory, claim by claim; the main job")
+    command = options.command(
+        commands, "validate", run, "hold simulation against theory, claim by claim; the main job", "--quick"
+    )
     level = command.add_mutually_exclusive_group()
-    level.add_argument("--quick", dest="level", action="store_const", const=Level.QUICK, default=Level.DEFAULT)
-    level.add_argument("--full", dest="level", action="store_const", const=Level.FULL, help="everything")
+    level.add_argument(
+        "--quick", dest="level", action="store_const", const=Level.QUICK, default=Level.DEFAULT, help="a minute or two"
+    )
+    level.add_argument(
+        "--full",
+        dest="level",
+        action="store_const",
+        const=Level.FULL,
+        help="everything, in an hour or more (default: in between)",
+    )
     own = command.add_mutually_exclusive_group()
     own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
     own.add_argument("--parameters", type=Path, metavar="FILE", help="your own set, a TOML file, instead of many")
@@ -35,12 +45,16 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     running.add_workers(command)
 
-    again = options.command(commands, "judge", judge, "judge the stored measurements of a validation again")
-    again.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR")
+    again = options.command(
+        commands, "judge", judge, "judge the stored measurements of a validation again", "results --claim prop-1"
+    )
+    again.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="of a validation")
     running.add_processes(again)
 
     for each, directory in ((command, "results"), (again, "")):
-        each.add_argument("--claim", action="append", metavar="ID", help="only this claim (may be repeated)")
+        each.add_argument(
+            "--claim", action="append", metavar="ID", help="only this claim; may be repeated (default: all)"
+        )
         each.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
         options.outputs(each, directory, "print the verdicts as JSON")
 

@@ -19,15 +19,19 @@ import numpy as np
 import numpy.typing as npt
 from rich.table import Table
 
+import analytic
 from compare.kit import pages
 from compare.kit.statistics import settled_case, tail, window_mean
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.arrays import Array
 from model.files import WholeFile, check_writable, column, dataset, reading, write_columns
-from model.kinematics import UNITS, VARIABLES
+from model.kinematics import VARIABLES
 from model.parameters import ANY, Range, check_names, check_number, parse_number
+from model.trajectory import CONVENTIONS, attributes, columns
 
 SCHEMA, SCHEMA_VERSION = "dualball-collection", 1
+MOST = 100_000
+"""Most runs of a sweep."""
 NAMED = 5
 """Most files that can't be gathered, and most runs of a file, that are named one by one."""
 FIELDS = {field.name: field.metadata["unit"] for field in Parameters.quantities()}
@@ -47,7 +51,10 @@ class Axis:
         name, _, rest = text.partition("=")
         check_names([name], list(units), kind)
         if ":" not in rest:
-            return cls(name, tuple(parse_number(name, part, units[name], allowed) for part in rest.split(",")))
+            values = tuple(parse_number(name, part, units[name], allowed) for part in rest.split(","))
+            if len(set(values)) < len(values):
+                raise InputError(f"{name} = {rest} names a value twice")
+            return cls(name, values)
         low, high, *count = rest.split(":")
         if len(count) > 1:
             raise InputError(f"{text!r} is no range: write {name}=from:to:count")
@@ -58,8 +65,18 @@ class Axis:
             )
         if not count:
             return cls(name, (first, last))
-        points = int(parse_number(f"count of {name}", count[0], "points", Range(2, whole=True)))
+        points = int(parse_number(f"count of {name}", count[0], "points", Range(2, MOST, whole=True)))
         return cls(name, tuple(np.linspace(first, last, points).tolist()))
+
+    @classmethod
+    def several(cls, texts: Sequence[str], *kind: Any) -> list[Axis]:
+        """Read each as `parse` does; raises `InputError`, for a name that comes twice, too."""
+        axes = [cls.parse(text, *kind) for text in texts]
+        names = [axis.name for axis in axes]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"{name} is given {names.count(name)} ranges: one is enough")
+        return axes
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -70,14 +87,15 @@ class Axis:
 
 
 def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
-    """Every combination of the axes' values, the last axis fastest."""
+    """Every combination of the axes' values, the last axis fastest; `InputError` if there are more than `MOST`."""
+    check_number("the grid", math.prod(len(axis.values) for axis in axes), "runs", Range(1, MOST))
     for values in itertools.product(*(axis.values for axis in axes)):
         yield p.replace(**dict(zip((axis.name for axis in axes), values, strict=True)))
 
 
 def random(p: Parameters, axes: Sequence[Axis], count: int, seed: int) -> Iterator[Parameters]:
     """`count` points that fill the box of the axes' ranges evenly."""
-    check_number("random", count, "points", Range(1, whole=True))
+    check_number("random", count, "points", Range(1, MOST, whole=True))
     low, high = np.array([axis.ends for axis in axes]).T
     for row in (low + sobol(len(axes), count, seed) * (high - low)).tolist():
         yield p.replace(**dict(zip((axis.name for axis in axes), row, strict=True)))
@@ -130,25 +148,45 @@ def collect(directory: Path, output: Path) -> int:
         raise StorageError("; ".join(problems[:NAMED]) + more)
     if not rows:
         raise StorageError(f"there are no runs in {directory}")
-    units = {f.name: f.metadata["unit"] for f in Parameters.quantities()} | {"duration": "s"}
-    for name, unit in zip(VARIABLES, UNITS, strict=True):
-        units |= {name: unit, f"{name}_uncertainty": unit}
-    columns = {name: [row[name] for row in rows] for name in rows[0]}
-    coordinates = varied(columns)
+    table = {name: [row[name] for row in rows] for name in rows[0]}
+    coordinates, about = varied(table), _attributes()
     with WholeFile(output) as whole:
-        whole.file.attrs.update(schema=SCHEMA, schema_version=SCHEMA_VERSION)
-        for name, stored in write_columns(whole.file, columns, "run").items():
-            if units.get(name):
-                stored.attrs["units"] = units[name]
+        title = f"What {len(rows)} balls settled to, measured over the last part of each run"
+        whole.file.attrs.update(Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION)
+        for name, stored in write_columns(whole.file, table, "run").items():
+            stored.attrs.update(about[name])
             if coordinates and name not in ("run", *coordinates):
                 stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
         whole.finish()
     return len(rows)
 
 
-def varied(columns: Mapping[str, Any]) -> list[str]:
+def _attributes() -> dict[str, dict[str, Any]]:
+    """Of each column of a collection: units, long_name, and of the case its flags."""
+    about: dict[str, dict[str, Any]] = {
+        f.name: {"units": f.metadata["unit"], "long_name": f.metadata["meaning"]} for f in Parameters.quantities()
+    }
+    texts = {
+        "run": "file and name of the run",
+        "engine": "engine",
+        "drag": "law of drag",
+        "failure": "why it broke down",
+    }
+    about |= {name: {"long_name": text} for name, text in texts.items()}
+    about["duration"] = {"units": "s", "long_name": "duration of the run"}
+    stored = columns(Trajectory)
+    for name in VARIABLES:
+        units, meaning = (stored[name][key] for key in ("units", "long_name"))
+        about[name] = {"units": units, "long_name": f"{meaning}, mean"}
+        about[f"{name}_uncertainty"] = {"units": units, "long_name": f"{meaning}, standard uncertainty of the mean"}
+        about[f"{name}_theory"] = {"units": units, "long_name": f"{meaning}, stationary solution of the case"}
+    about["case"] = attributes(stored["case"])  # -1: none prevails
+    return about
+
+
+def varied(of: Mapping[str, Any]) -> list[str]:
     """The parameters that have several values; older files have no law of drag."""
-    return [f.name for f in dataclasses.fields(Parameters) if len(set(columns.get(f.name, ()))) > 1]
+    return [f.name for f in dataclasses.fields(Parameters) if len(set(of.get(f.name, ()))) > 1]
 
 
 def is_collection(path: Path) -> bool:
@@ -174,18 +212,18 @@ def describe(path: Path) -> dict[str, Any]:
     return described({name: np.array([row[name] for row in rows]) for name in rows[0]})
 
 
-def described(columns: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
+def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
     """As `describe`, for the columns of a collection by name; `drag` is missing in older ones."""
-    codes, counts = np.unique(columns["case"], return_counts=True)
-    finite = {name: values[np.isfinite(values)] for name, values in columns.items() if values.dtype.kind == "f"}
+    codes, counts = np.unique(of["case"], return_counts=True)
+    finite = {name: values[np.isfinite(values)] for name, values in of.items() if values.dtype.kind == "f"}
     return {
-        "runs": len(columns["run"]),
-        "names": columns["run"].tolist(),
-        "engines": sorted(set(columns["engine"].tolist())),
+        "runs": len(of["run"]),
+        "names": of["run"].tolist(),
+        "engines": sorted(set(of["engine"].tolist())),
         "cases": {Case(code).name: int(count) for code, count in zip(codes, counts, strict=True) if code >= 0},
-        "failures": [text for text in columns["failure"].tolist() if text],
-        "drag": sorted(set(columns["drag"].tolist())) if "drag" in columns else [],
-        "varied": varied(columns),
+        "failures": [text for text in of["failure"].tolist() if text],
+        "drag": sorted(set(of["drag"].tolist())) if "drag" in of else [],
+        "varied": varied(of),
         "ranges": {name: [float(v.min()), float(v.max())] for name, v in finite.items() if len(v)},
     }
 
@@ -222,4 +260,17 @@ def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
             row |= {variable: np.nan, f"{variable}_uncertainty": np.nan}
         else:
             row |= {variable: mean.value, f"{variable}_uncertainty": mean.uncertainty}
-    return row | {"case": int(settled_case(trajectory)) if len(trajectory.case) else -1}
+    case = int(settled_case(trajectory)) if len(trajectory.case) else -1
+    return row | _theory(trajectory, case) | {"case": case}
+
+
+def _theory(run: Trajectory, case: int) -> dict[str, float]:
+    """The stable stationary solution of the case; nan where there is none, where it is free, and in unsteady flow."""
+    theory = dict.fromkeys((f"{name}_theory" for name in VARIABLES), math.nan)
+    if case >= 0 and run.header.flow.is_steady:
+        try:
+            of = analytic.solution(run.header.parameters, Case(case))
+        except InputError:  # it has none, or not one
+            return theory
+        theory |= {f"{n}_theory": float(x) for n, x in of.state._asdict().items() if n not in of.family}
+    return theory

@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy.typing as npt
 
 import mjsim
@@ -21,6 +22,10 @@ from compare.kit import engines
 from compare.kit.engines import Engine, Settings
 from mjsim.journal import Journal
 from model import Flow, InputError, Parameters, State, Trajectory, storage
+
+# MuJoCo would print each of its warnings, and write them to MUJOCO_LOG.TXT in the current directory; a run that
+# diverges says so itself.
+mujoco.set_mju_user_warning(lambda text: None)
 
 LONG = 1e6
 """Steps from which on a run that hands out its samples keeps a journal and is simulated alone, outside a batch."""

@@ -168,7 +168,7 @@ def dask(address: str) -> Workers:
     try:
         from distributed import Client, KilledWorker
     except ImportError as error:
-        raise InputError("--scheduler needs Dask: pip install 'dualball[cluster]'") from error
+        raise InputError("--scheduler needs Dask: pip install distributed") from error
     try:
         client: Any = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:

@@ -219,7 +219,7 @@ def test_a_ball_locked_in_the_corner_does_not_rebound(method):
         ({"sample_interval": 0.0}, "sample_interval = 0 s"),
         ({"sample_interval": 1e-12}, "sample_interval = 1e-12 s .* samples"),
         ({"theta_0": math.nan}, "theta_0 = nan"),
-        ({"rtol": 1e-16}, r"rtol = 1e-16 1 is out of range: must be >= 2\.22\d*e-14 and <= 0\.01"),
+        ({"rtol": 1e-16}, r"rtol = 1e-16 is out of range: must be >= 2\.22\d*e-14 and <= 0\.01"),
         ({"restitution": 1.5}, "restitution = 1.5 .* <= 1"),
         ({"restitution": -0.1}, "restitution = -0.1"),
         ({"timestep": 0.0}, "timestep = 0 s"),

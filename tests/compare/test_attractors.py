@@ -47,7 +47,6 @@ def test_undecided_with_what_it_did_last(capsys: pytest.CaptureFixture[str], tmp
         (["--start", "y=-1"], "y = -1 m is out of range"),
         (["--follow", "omega_0=60"], "omega_0=from:to"),
         (["--follow", "omega=60:70"], "unknown parameter 'omega'"),
-        (["--starts", "0"], "starts = 0"),
         (["--c", "0", "--starts", "1"], "say how long"),
     ],
 )

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
-from compare.commands import cli
+import analytic
+from compare.commands import cli, options
 from compare.kit.sweep import FIELDS
 from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
@@ -31,12 +35,12 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
 
 
 def test_predict_says_what_the_ball_does_and_what_ends_the_operating_range(capsys: pytest.CaptureFixture[str]) -> None:
-    for options, words in (
+    for given, words in (
         ("--omega-0 25", "the ball slips (SS)"),
         ("--set reference", "slip at both points"),
         ("--set high-wall-friction", "the wall can carry it"),
     ):
-        assert cli.main(["predict", *options.split()]) == 0
+        assert cli.main(["predict", *given.split()]) == 0
         assert words in " ".join(capsys.readouterr().out.split())
     assert cli.main(["predict", "--mu", "0", "--json"]) == 0
     described = json.loads(capsys.readouterr().out)
@@ -64,6 +68,16 @@ def test_predict_doubts_the_model_before_any_threshold(capsys: pytest.CaptureFix
     printed = json.loads(capsys.readouterr().out)
     assert printed["model_holds"] is False
     assert list(printed).index("model_holds") < list(printed).index("thresholds")
+
+
+@pytest.mark.parametrize("package", ["analytic", "mjsim", "compare"])
+def test_a_foreign_model_is_named(tmp_path: Path, package: str) -> None:
+    (tmp_path / "model.py").touch()
+    where = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{Path(cli.__file__).parents[2]}"}
+    command = [sys.executable, "-c", f"import {package}"]
+    failed = subprocess.run(command, env=where, cwd=tmp_path, capture_output=True, text=True)
+    last = failed.stderr.splitlines()[-1]
+    assert last.startswith(f"ImportError: {tmp_path / 'model.py'} hides the package model of dualball: rename that")
 
 
 @pytest.mark.parametrize(("law", "covered"), [("stokes", False), ("schiller-naumann", True)])
@@ -137,7 +151,11 @@ def test_sweep_and_collect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
         assert sorted(set(data.omega_0.values)) == [5.0, 7.5, 10.0]
         assert np.isfinite(data.omega_c).all()
         assert data.omega_c.units == "rad s-1"
+        assert all(data[name].long_name for name in data.variables)
+        assert data.case.flag_meanings.startswith("RR ")
     capsys.readouterr()
+    assert "holds another sweep (vary = " in refused(capsys, "sweep", "--vary", "eta=0.1:0.5", "--random", "3", *where)
+    where[1] += "-random"
     assert cli.main(["sweep", "--vary", "eta=0.1:0.5", "--random", "3", "--json", *where]) == 0
     assert json.loads(capsys.readouterr().out)["whole"] == 3
 
@@ -236,18 +254,103 @@ def test_claims_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(name in shown for name in ("prop-1", "prop-4"))
 
 
-def test_help_names_every_command_in_groups_and_says_every_default(capsys: pytest.CaptureFixture[str]) -> None:
+def parser_of(command: str) -> options.Parser:
+    return cli._parser([command])._subparsers._group_actions[0].choices[command]
+
+
+COMMANDS = [name for group in cli.GROUPS.values() for name in group]
+
+
+def test_help_names_every_command_in_groups_with_meanings_defaults_and_an_example(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     with pytest.raises(SystemExit, match="0"):
         cli.main(["--help"])
     shown = capsys.readouterr().out
     for title, names in cli.GROUPS.items():
-        assert f"{title}:" in shown
+        assert f"{title.capitalize()}:" in shown
         assert all(f"\n  {name} " in shown for name in names)
-    for name in ("predict", "design", "report", "figures", "inspect", "render", "view"):
-        parser = cli._parser([name])._subparsers._group_actions[0].choices[name]
-        assert all(action.help for action in parser._actions)
-        assert f"Example: dualball {name} " in parser.format_help()
-    assert "(default 6)" in cli._parser(["render"])._subparsers._group_actions[0].choices["render"].format_help()
+    lacking = []
+    for name in COMMANDS:
+        told = " ".join(parser_of(name).format_help().split())
+        actions = [each for each in parser_of(name)._actions if each.dest != "help"]
+        lacking += [f"{name} {each.dest}: meaning" for each in actions if not each.help]
+        lacking += [
+            f"{name} {each.dest}: default"
+            for each in actions
+            if each.nargs != 0
+            and isinstance(each.default, int | float)
+            and each.default
+            and "(default" not in (each.help or "")
+            if f"(default {each.default:g})" not in told
+        ]
+        lacking += [f"{name}: example"] * (f"Example: dualball {name}" not in told)
+    assert not lacking
+
+
+NEEDED = {
+    "basins": "--across y=0:1:2 --up h=0:0.01:2",
+    "collect": "runs",
+    "compare": "run.h5 run.h5",
+    "design": "meter.toml",
+    "inspect": "run.h5",
+    "render": "run.h5 -o film.gif",
+    "sweep": "--vary eta=0.1,0.2 --time 0.01 --workers 0",
+}
+"""What a command can't do without."""
+NUMBERS = ("x", "nan", "inf", "-1", "0", "1e300", "1e-300", "1" * 400)
+
+
+def drawn(command: str) -> Iterator[list[str]]:
+    """Bad inputs by a command's own parser: of each option a wrong type, sign, size, nothing, or what isn't there."""
+    yield ["--nonsense"]
+    for action in parser_of(command)._actions:
+        if action.nargs == 0:
+            continue
+        option = action.option_strings[-1:]
+        values = [[]] if option else []
+        if isinstance(action.type, options.Number):
+            bad = [text for text in NUMBERS if refuses(action.type, text)]
+            bad += ["1e300", "1e-300"] if action.dest.startswith("parameter_") else []
+            values += [[text] * (action.nargs if isinstance(action.nargs, int) else 1) for text in bad]
+        else:
+            values.append(["file/absent.h5" if action.type in (Path, options.hdf5) else "no such thing"])
+        yield from ([*option, *value] for value in values)
+
+
+def refuses(parse: options.Number, text: str) -> bool:
+    try:
+        parse(text)
+    except argparse.ArgumentTypeError:
+        return True
+    return False
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_bad_inputs_drawn_from_the_parsers(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each is refused in a line, within 10 s, and leaves no file; there are more than a thousand."""
+    monkeypatch.chdir(tmp_path)
+    Path("file").touch()
+    Path("runs").mkdir()
+    storage.save(analytic.simulate(Parameters.named("reference"), [0] * 6, 0.1), "run.h5")
+    before, given = sorted(Path().rglob("*")), NEEDED.get(command, "").split()
+
+    def late(*_: object) -> None:
+        pytest.fail(f"{words} took more than 10 s")
+
+    signal.signal(signal.SIGALRM, late)
+    count = 0
+    for words in drawn(command):
+        signal.alarm(10)
+        try:
+            refused(capsys, command, *(given if words[0].startswith("-") else []), *words)
+        finally:
+            signal.alarm(0)
+        assert sorted(Path().rglob("*")) == before, words
+        count += 1
+    assert count > 1
 
 
 @pytest.mark.parametrize(
@@ -258,44 +361,37 @@ def test_help_names_every_command_in_groups_and_says_every_default(capsys: pytes
         ("predict --parameters unknown.toml", "unknown.toml: unknown parameter 'muu' (did you mean 'mu'?)"),
         ("predict --parameters text.toml", "text.toml: m = 'heavy' must be a number in kg"),
         ("predict --set referense", "no parameter set is named 'referense' (did you mean 'reference'?)"),
-        ("predict --j 0.7", "j = 0.7 1 is out of range: dimensionless moment of inertia must be > 0 and <= 2/3"),
-        ("predict --c=-1", "c = -1 s-1 is out of range"),
-        ("predict --nu-f -1e-6", "nu_f = -1e-06 m2 s-1 is out of range"),
-        ("predict --mu -.5e0", "mu = -0.5 1 is out of range"),
-        ("predict --R -inf", "R = -inf m must be finite"),
+        ("predict --j 0.7", "argument --j: 0.7 is out of range: it must be > 0 and <= 2/3"),
+        ("predict --nu-f -1e-6", "argument --nu-f: -1e-06 m²/s is out of range: it must be >= 0"),
+        ("predict --omega-0 1e155", "omega_0 = 1e+155 rad s-1 is out of range"),
+        ("predict --R -inf", "argument --R: -inf m is out of range: it must be > 0"),
         ("simulate --ramp 1 -2e0 -1E-3", "duration = -0.001 s is out of range"),
         ("simulate --start slip=3", "unknown state variable 'slip' (did you mean 'slip_z'?)"),
         ("simulate --start omega_c=fast", "omega_c = 'fast' must be a number in rad s-1"),
-        ("simulate --start omega_c=nan", "omega_c = nan rad s-1 must be finite"),
-        ("simulate --time=-1", "time = -1 s is out of range"),
-        ("simulate --timestep=-1", "timestep"),
+        ("simulate --sample-interval 100 --time 1", "sample_interval = 100 s is out of range: with this --time"),
         ("simulate --sample-interval=1e-9", "sample_interval = 1e-09 s is out of range"),
+        ("simulate -o run.csv", "'run.csv' would hold HDF5: its name must end in .h5"),
         ("simulate --engine event --timestep 0.1", "drake-defaults, siconos, siconos-defaults, not for event"),
         ("simulate --restitution 0.5", "--restitution is for event, time-stepping, not for mujoco"),
-        ("simulate --engine event --restitution 1.5", "restitution = 1.5 1 is out of range"),
+        ("simulate --engine event --restitution 1.5", "restitution = 1.5 is out of range"),
         ("simulate --flow absent.txt", "cannot read the flow from absent.txt"),
         ("simulate --flow broken.toml", "broken.toml has no line with a time and a value"),
-        ("simulate --ramp 1 2 0", "duration = 0 s is out of range"),
         ("simulate --omega-0 5 --ramp 1 2 3", "--omega-0 is for a steady flow, and can't be given beside --ramp"),
         ("figures --results absent", "cannot read absent: there is no such directory"),
         ("simulate --longest-interval 3", "--longest-interval is for --flow"),
         ("simulate -o absent/run.h5", "cannot write absent/run.h5: there is no directory absent"),
         ("sweep --vary omega_0=30:10:5", "omega_0 = 30:10 rad s-1 is in the wrong order"),
         ("sweep --vary omega0=10:30:5", "unknown parameter 'omega0' (did you mean 'omega_0'?)"),
-        ("sweep --vary omega_0=10:30:1", "count of omega_0 = 1 points is out of range: must be a whole number >= 2"),
         ("sweep --vary omega_0=10:30:2.5", "count of omega_0 = 2.5 points is out of range"),
-        ("sweep --vary omega_0=10:30:many", "count of omega_0 = 'many' must be a number in points"),
+        ("sweep --vary omega_0=1:2:1000000000", "count of omega_0 = 1e+09 points is out of range: must be a whole"),
+        ("sweep --vary eta=1:2:400 --vary mu=1:2:400", "the grid = 160000 runs is out of range: must be >= 1 and <= 1"),
+        ("sweep --vary eta=1:2:3 --vary eta=1:2:3", "eta is given 2 ranges: one is enough"),
+        ("sweep --vary eta=1,1", "eta = 1,1 names a value twice"),
         ("sweep --vary omega_0=10:30:3:4", "'omega_0=10:30:3:4' is no range"),
-        ("sweep --vary eta=0.1:0.2 --random 0", "random = 0 points is out of range: must be a whole number >= 1"),
-        ("sweep --vary eta=0.1,0.2 --limit 0", "limit = 0 s is out of range: must be > 0"),
-        ("sweep --vary omega_0=a:b:3", "omega_0 = 'a' must be a number in rad s-1"),
         ("sweep --vary eta=0.1:0.2:3 --direction up", "vary omega_0 and nothing else"),
         ("sweep --vary eta=0.1,0.2,0.3 --random 4", "here eta needs a range: write eta=from:to"),
-        ("collect absent", "cannot read absent: there is no such directory"),
-        ("inspect absent.h5", "cannot read absent.h5: there is no such file"),
         ("inspect broken.toml", "cannot read broken.toml: it is not an HDF5 file"),
         ("validate --claim prop1", "no claim is called 'prop1'"),
-        ("validate -o broken.toml", "cannot write to broken.toml"),
         ("report absent", "cannot read absent/summary.json: No such file or directory"),
     ],
 )

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
+import analytic
 from compare.commands import cli
 from compare.kit import sweep
 from compare.kit.campaign import Campaign
@@ -62,6 +63,21 @@ def test_the_law_of_drag_is_kept(tmp_path: Path) -> None:
     with reading(tmp_path / "all.h5") as file:
         older = {name: column(dataset(file, name)) for name in file if name != "drag"}
     assert sweep.described(older)["varied"] == ["nu_f"]
+
+
+def test_theory_stands_beside_what_was_measured(tmp_path: Path) -> None:
+    """For a ball that slips at both points; its height, which is free in flight along the wall, has no prediction."""
+    sets = {"SS": P.replace(omega_0=25.0), "NR": P.replace(omega_0=40.0)}
+    states = {name: analytic.solution(p, name).state for name, p in sets.items()}
+    states["NR"] = states["NR"]._replace(y=0.01)
+    with Campaign(tmp_path / "runs", workers=0) as campaign:
+        tasks = [Task(engine="event", parameters=p, x0=states[name], t_end=1.0) for name, p in sets.items()]
+        assert not campaign.complete(tasks)
+    sweep.collect(tmp_path / "runs", tmp_path / "all.h5")
+    with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
+        data = data.sortby("omega_0")
+        np.testing.assert_allclose(data.slip_z, data.slip_z_theory, atol=1e-8)
+        np.testing.assert_array_equal(np.isnan(data.y_theory), [False, True])
 
 
 def test_a_single_run_varies_nothing(runs: Path, tmp_path: Path) -> None:

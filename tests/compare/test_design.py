@@ -103,7 +103,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"material": [{"rho_b": 200}]}, "missing property of a material 'name'"),
     ({"material": [{"name": "a", "rho_b": 2e3}] * 2}, "material.name = 'a' must be a text, and no other material's"),
     ({"material": {"name": "a"}}, "material must be a list of tables"),
-    ({"tolerances": {"mu": 1.5}}, "tolerances.mu = 1.5 1 is out of range: must be >= 0 and < 1"),
+    ({"tolerances": {"mu": 1.5}}, "tolerances.mu = 1.5 is out of range: must be >= 0 and < 1"),
     ({"tolerances": {"j": 0.1}}, "unknown entry of [tolerances] 'j'; known: mu, eta, r, R"),
     ({"tables": {}}, "unknown table 'tables'"),
 ]

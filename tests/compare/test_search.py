@@ -166,8 +166,6 @@ def test_command_basins(capsys, tmp_path):
         ("search --range mu=2:1", "wrong order"),
         ("search --range mu=2", "write mu=from:to"),
         ("search --range mu=-1:1", "mu = -1"),
-        ("search --sets 0", "sets = 0"),
-        ("search --workers -1", "workers = -1"),
         ("basins --across omega=5:45:2 --up slip_x=0:1:2", "unknown state variable 'omega'"),
     ],
 )

@@ -18,7 +18,7 @@ P = Parameters.named("reference")
     [
         ({"timestep": 0.0}, r"timestep = 0 s is out of range: must be > 0"),
         ({"timestep": 2e-3}, r"timestep = 0.002 s is too large for the contact settings: .* at most 0.001 s"),
-        ({"solimp": 1.0}, r"solimp = 1 1 is out of range"),
+        ({"solimp": 1.0}, r"solimp = 1 is out of range"),
         ({"impratio": 1e9}, r"impratio = 1e\+09"),
         ({"solref": (0.1,)}, r"solref = .* must be two numbers"),
         ({"cone": "eliptic"}, r"cone = 'eliptic' must be one of .*did you mean 'elliptic'"),

@@ -14,20 +14,26 @@ from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, Range, check_number, p
 
 FIELDS = [f.name for f in Parameters.quantities()]
 positive = st.floats(1e-9, 1e9)
+
+
+def zero_or(most: float) -> st.SearchStrategy[float]:
+    return st.just(0.0) | st.floats(1e-9, most)
+
+
 valid = st.builds(
     Parameters,
     m=positive,
     r=positive,
     R=positive,
     j=st.floats(1e-9, 2 / 3),
-    mu=st.floats(0, 10),
-    eta=st.floats(0, 10),
+    mu=zero_or(10),
+    eta=zero_or(10),
     g=positive,
-    c=st.floats(0, 1e3),
-    omega_0=st.floats(-1e6, 1e6),
+    c=zero_or(1e3),
+    omega_0=zero_or(1e6) | st.floats(-1e6, -1e-9),
     nu_f=st.floats(1e-9, 1e3),
     C_D=st.floats(1e-3, 1e3),
-    density_ratio=st.floats(0, 0.999),
+    density_ratio=zero_or(0.999),
     drag=st.sampled_from(LAWS),
 )
 
@@ -118,14 +124,14 @@ def test_a_bad_value_is_named_with_unit_and_range(name: str, reference: Paramete
         with pytest.raises(InputError) as caught:
             reference.replace(**{name: value})
         message = str(caught.value)
-        assert message.startswith(f"{name} = {value:g} {field.metadata['unit']}")
+        assert message.startswith(f"{name} = {value:g} {field.metadata['unit']}".removesuffix(" 1"))
         assert str(field.metadata["allowed"]) in message
         assert "\n" not in message
     for value in (math.nan, math.inf, -math.inf):
         with pytest.raises(InputError, match=rf"^{name} = .*must be finite"):
             reference.replace(**{name: value})
     for value in ("0.2", None, True, [0.2], 1j):
-        with pytest.raises(InputError, match=f"^{name} = .*must be a number in"):
+        with pytest.raises(InputError, match=f"^{name} = .*must be a number"):
             reference.replace(**{name: value})
 
 

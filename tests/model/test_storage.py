@@ -27,6 +27,7 @@ def make(n: int = 50, events: int = 2, failure: str = "") -> Trajectory:
         settings={"rtol": 1e-9, "method": "event"},
         mjcf="<mujoco/>",
         failure=failure,
+        created="2026-01-01T00:00:00+00:00",
     )
     happened = Events(
         time=np.arange(events, dtype=float),
@@ -75,7 +76,13 @@ def test_xarray_opens_it_with_axes_units_and_cases(tmp_path: Path) -> None:
         assert all({"units", "long_name"} <= set(data[name].attrs) for name in columns(Trajectory))
         names = data.case.flag_meanings.split()
         assert [names[code] for code in data.case.values] == [case.name for case in trajectory.cases]
-        assert json.loads(data.parameters) == dataclasses.asdict(trajectory.header.parameters)
+        parameters = dataclasses.asdict(trajectory.header.parameters)
+        assert json.loads(data.parameters) == parameters == {name: data.attrs[name] for name in parameters}
+        assert data.title
+        assert data.Conventions
+        np.testing.assert_array_equal(data.omega_0, trajectory.header.flow(trajectory.time))
+    said = repr(trajectory)
+    assert all(part in said for part in ("event: 50 samples", "last y=", trajectory.cases[0].name))
 
 
 @pytest.mark.parametrize(("n", "events", "failure"), [(50, 2, ""), (0, 0, "diverged"), (1, 0, "")])
@@ -89,7 +96,7 @@ def test_in_memory_xarray_sees_what_it_reads_from_the_file(tmp_path: Path, n: in
 
 def test_without_xarray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match=r"pip install 'dualball\[xarray\]'"):
+    with pytest.raises(InputError, match="pip install xarray h5netcdf"):
         make().to_xarray()
 
 

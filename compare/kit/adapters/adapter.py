@@ -33,7 +33,7 @@ class Library:
     def missing(self) -> str:
         """Why it can't be used here, and what to do about it; empty if it can."""
         there = importlib.util.find_spec(self.module.split(".")[0])
-        return "" if there else f'{self.name} is not installed: pip install "dualball[engines]"'
+        return "" if there else f"{self.name} is not installed: pip install {self.name}"
 
     @property
     def version(self) -> str:
