@@ -99,15 +99,16 @@ def check(bearing: Bearing, m: Measurement) -> Check:
     """One measurement beside its prediction; what must be equal to the last digit has no scale but 1."""
     try:
         prediction = bearing.predict(m)
+        size = bearing.size(m) if bearing.size else None
     except UNKNOWN:
-        prediction = math.nan
+        prediction, size = math.nan, 1.0
     own = prediction if isinstance(prediction, Measured) else Measured(float(prediction), 0.0)
     exact = quantity(m.quantity).resolves == 0
     return Check(
         measurement=m,
         predicted=own.value,
         tolerance=COVERAGE * math.hypot(m.uncertainty, own.uncertainty),
-        scale=1.0 if exact else bearing.size(m) if bearing.size else abs(own.value),
+        scale=1.0 if exact else abs(own.value) if size is None else size,
         relation=bearing.relation,
     )
 

@@ -90,12 +90,15 @@ def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters)
 def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
     """omega_c in rad s-1 at which the ball begins to lift, at states else like x that go round with the fluid.
 
-    Looked for between a tenth and ten times that of x; nan where it lifts at both or at none.
+    Out of SR slip_x is in proportion to omega_c. Looked for between a tenth and ten times omega_c of x; nan where it
+    lifts at both or at none.
     """
     state = dynamics.check_state(inner, x, p)
 
     def rise(omega_c: float) -> float:
-        return lift_acceleration(inner, outer, state._replace(omega_c=omega_c), p.replace(omega_0=omega_c))
+        slip_x = state.slip_x * omega_c / state.omega_c if inner is Case.SR else state.slip_x
+        there = state._replace(omega_c=omega_c, slip_x=slip_x)
+        return lift_acceleration(inner, outer, there, p.replace(omega_0=omega_c))
 
     low, high = 0.1 * float(state.omega_c), 10 * float(state.omega_c)
     if rise(low) * rise(high) > 0:
@@ -132,9 +135,11 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
 def neutral_flow(case: Case, p: Parameters) -> float:
     """The flow in rad s-1 at which a stationary motion is neutral (Definition 3), between stable and unstable.
 
-    Looked for within a tenth of p.omega_0, by bisection down to round-off; nan if it is the same on both sides.
+    Looked for between a thousandth and a thousand times sqrt(g/R), by bisection down to round-off; nan if it is the
+    same at both. p.omega_0 plays no part.
     """
-    low, high = 0.9 * p.omega_0, 1.1 * p.omega_0
+    unit = float(np.sqrt(p.g / p.R))
+    low, high = 1e-3 * unit, 1e3 * unit
     below, above = (stability(case, p.replace(omega_0=flow)) for flow in (low, high))
     if below is above:
         return float("nan")

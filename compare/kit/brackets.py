@@ -40,6 +40,8 @@ class Bracket:
     tasks: tuple[Task, ...] = ()
     shift: float = 0.0
     """How far the place moves with half the time step."""
+    said: tuple[tuple[float, bool | None], ...] = ()
+    """All that was asked so far: values and answers."""
 
     @property
     def place(self) -> Measured:
@@ -88,7 +90,9 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             no = said.index(False)
             yes = max(m for m in range(no) if said[m])
             by = tuple(tasks[inside][max(yes - 1, 0) : no])
-            before[k], brackets[k] = brackets[k], Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by)
+            all_said = *brackets[k].said, *zip(values[k][1:-1], answers[inside], strict=True)
+            new = Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by, said=all_said)
+            before[k], brackets[k] = brackets[k], new
         todo = [k for k in todo if brackets[k].high - brackets[k].low < (before[k].high - before[k].low) / 2]
     if careful:
         asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in (b.low, b.high)]

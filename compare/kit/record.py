@@ -94,10 +94,9 @@ def sure_enough(name: str, value: Measured, scale: float) -> bool:
     return COVERAGE * value.uncertainty <= quantity(name).resolves * scale
 
 
-def if_sure(row: Measurement, scale: float, why: str) -> Measurement | Missing:
-    """A measurement that is `sure_enough`, or else why it is missing."""
-    sure = sure_enough(row.quantity, Measured(row.value, row.uncertainty), scale)
-    return row if sure else Missing(row.protocol, row.set, why)
+def if_found(row: Measurement, why: str) -> Measurement | Missing:
+    """A measurement, however coarse: the judge says whether it can tell; or why no number came out."""
+    return row if np.isfinite([row.value, row.uncertainty]).all() else Missing(row.protocol, row.set, why)
 
 
 def state_of(x: Array) -> dict[str, float]:

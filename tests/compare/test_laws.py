@@ -47,10 +47,8 @@ def values(run: Trajectory) -> dict[tuple[str, str], float]:
 
 def test_a_motion_that_obeys_the_laws_shows_no_deviation() -> None:
     worst = values(sliding())
-    for contact, coefficient, number in (("A", P.mu, "(14)"), ("B", P.eta, "(15)")):
-        assert worst["(12)", contact] == 0.0
-        assert worst["(13)", contact] <= laws.ROUNDING
-        assert worst[number, contact] <= laws.ROUNDING
+    for contact, coefficient in (("A", P.mu), ("B", P.eta)):
+        assert worst["(14), (15)", contact] <= laws.ROUNDING
         assert worst["friction over normal force", contact] == pytest.approx(coefficient, rel=laws.ROUNDING)
         # Nothing rolls: that law has no samples.
         assert np.isnan(worst["where it rolls it doesn't slip", contact])
@@ -58,16 +56,13 @@ def test_a_motion_that_obeys_the_laws_shows_no_deviation() -> None:
 
 def test_every_deviation_is_measured() -> None:
     run = sliding()
-    weight = P.m * P.g
-    pulling = run.force_A.copy()
-    pulling[7, 1] = -0.1 * weight
-    assert values(sliding(force_A=pulling))["(12)", "A"] == pytest.approx(0.1)
     strong = values(sliding(force_B=run.force_B * [1.0, 1.01, 1.01]))
     assert strong["friction over normal force", "B"] == pytest.approx(1.01 * P.eta)
-    assert strong["(13)", "B"] > 1e-3 * P.eta
     weak = values(sliding(force_A=run.force_A * [0.99, 1.0, 0.99]))
     assert weak["friction over normal force", "A"] == pytest.approx(0.99 * P.mu)
-    assert values(sliding(force_B=run.force_B * [1.0, -1.0, 1.0]))["(15)", "B"] > 0.1 * P.eta
+    turned = run.force_B.copy()
+    turned[7, 1] *= -1.0  # one sample is enough
+    assert values(sliding(force_B=turned))["(14), (15)", "B"] > 0.1 * P.eta
     assert values(sliding(gap_A=np.full(SAMPLES, 1e-3 * P.R)))["where it is closed there is no gap", "A"] == (
         pytest.approx(1e-3)
     )
@@ -84,10 +79,9 @@ def verdict_of(name: str, records: Records) -> Verdict:
 
 
 def test_laws_are_judged() -> None:
-    good = (law("law", 0.0, 1e-14), law("friction_ratio", P.mu, 1e-9), law("friction_ratio", P.eta, 1e-9, "B"))
+    good = (law("friction_ratio", P.mu, 1e-9), law("friction_ratio", P.eta, 1e-9, "B"))
     assert verdict_of("table-3", Records(good)).outcome is Outcome.CONFIRMED
     for bad in (
-        law("law", 1e-6, 1e-14),
         law("law_in_motion", 1e-3, 1e-5),
         law("friction_ratio", 1.01 * P.mu, 1e-9),
         law("friction_ratio", P.mu, 1e-9, "B"),

@@ -148,9 +148,9 @@ def test_protocol_on_a_set_without_fold(lab, flows):
     known = Records(tuple(_settled(name, p, flows)))
     records = Records.of(thresholds.measure(lab, {name: p}, known))
     kinds = {(m.quantity, m.conditions.get("by")) for m in records.measurements}
-    assert len(kinds) == 6
-    assert {quantity for quantity, _ in kinds} == {"omega_01", "omega_02", "folds"}
-    assert any("no omega_04" in each.reason for each in records.missing)
+    assert len(kinds) == 7
+    assert {quantity for quantity, _ in kinds} == {"omega_01", "omega_02", "lifts", "folds"}
+    assert not records.missing
     verdicts = {v.claim.id: v for v in judge(bifurcations.CLAIMS, records)}
     for claim in ("table-5-P3", "table-5-P2", "table-5-F", "eta-critical"):
         assert all(check.agrees for check in verdicts[claim].checks), claim

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,18 @@ import pytest
 from scipy.linalg import block_diag, expm
 
 import analytic
+from analytic.mechanics import dynamics
 from compare.claim import Outcome
 from compare.judge import judge
 from compare.kit.fits import exponents, matched, propagator
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, coarse_step, state_units, time_unit
 from compare.kit.record import Records
 from compare.kit.trials import Start
 from compare.subjects.stability import claims as stability
 from compare.subjects.stability import measure as rates
 from model import Case, Parameters
 from model.arrays import Array
+from model.cases import TRAITS
 from model.kinematics import VARIABLES
 from tests.measured import measured
 
@@ -110,11 +113,19 @@ def spectra() -> Records:
         values = [*solution.eigenvalues, *([0.0j] if case is Case.NS else [])]
         row = partial(measured, "rates", p=p, set="mine", case=case.name)
         rows.append(row("modes", len(values), 0.0))
-        slowest_first = sorted((v for v in values if v.imag >= 0), key=lambda v: -v.real)
-        for mode, value in enumerate(slowest_first, start=1):
+        values = [complex(v.real, v.imag if abs(v.imag) > 1e-9 * abs(v) else 0.0) for v in values]
+        in_order = sorted((v for v in values if v.imag >= 0), key=lambda v: (v.imag, -v.real))
+        for mode, value in enumerate(in_order, start=1):
             sure = 1e-4 * (abs(value) or 1.0)
-            rows.append(row("decay_rate", -value.real, sure, mode=mode, frequency=value.imag))
-            rows.append(row("frequency", value.imag, sure, mode=mode, decay_rate=-value.real))
+            rows.append(row("decay_rate", -value.real, sure, mode=mode))
+            rows.append(row("frequency", value.imag, sure, mode=mode))
+        slowest = 1 / analytic.slowest_time_constant(solution)
+        rows.append(row("slowest_decay", slowest, 1e-4 * slowest))
+        units, J = state_units(p), dynamics.jacobian(case, solution.state, p)
+        moved, names = expm(0.02 * J), TRAITS[case].active
+        for (i, of), (j, by) in product(enumerate(names), enumerate(names)):
+            scale = units[VARIABLES.index(by)] / units[VARIABLES.index(of)]
+            rows.append(row("response", moved[i, j] * scale, 1e-4, time=0.02, of=of, pushed=by))
     return Records(tuple(rows))
 
 
@@ -141,13 +152,24 @@ def test_wrong_spectra_are_noticed(
     assert {each.claim.id for each in judge(stability.CLAIMS, spectra) if each.outcome is Outcome.REFUTED} >= ids
 
 
+@pytest.mark.parametrize("order", [[1, 0], [0, 1]])
+def test_exchanged_leaning_modes_are_noticed(
+    spectra: Records, monkeypatch: pytest.MonkeyPatch, order: list[int]
+) -> None:
+    """The values exchanged, or the vectors."""
+    right = analytic.leaning_modes
+    vectors = order[::-1]
+    monkeypatch.setattr(analytic, "leaning_modes", lambda p: (right(p)[0][order], right(p)[1][vectors]))
+    assert {v.claim.id for v in judge(stability.CLAIMS, spectra) if v.outcome is Outcome.REFUTED} == {"prop-3-rate"}
+
+
 def test_the_rate_of_rolling_and_of_spinning_is_measured_with_mujoco(lab: Lab) -> None:
     p = P.replace(omega_0=0.6 / time_unit(P))
     values = {name: p.omega_0 if name == "omega_c" else 0.0 for name in VARIABLES[1:6]}
     before = [measured("settled", name, w, p=p, set="mine", case="RR", start="rest") for name, w in values.items()]
     records = Records.of(rates.measure(lab, {"mine": P}, Records(tuple(before))))
     verdicts = {verdict.claim.id: verdict for verdict in judge(stability.CLAIMS, records)}
-    for name, quantities in (("prop-1-rate", 3), ("prop-2", 5)):
+    for name, quantities in (("prop-1-rate", 5), ("prop-2", 10)):
         assert verdicts[name].outcome is Outcome.CONFIRMED
         assert len(verdicts[name].checks) == quantities
     assert verdicts["prop-4-rate"].outcome is Outcome.NOT_RUN

@@ -20,7 +20,7 @@ from compare.kit.engines import MOREAU
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.programme import Protocol
-from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of
+from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import settle
 from compare.kit.short import constrained
 from compare.kit.statistics import Measured, hops, peaks, top
@@ -129,7 +129,7 @@ def _staircase(
             slow, fast, later = (hop_map(tops(run, begin + after, end - LAST).x, q)[0] for run, after in parts)
             factor = finer(slow, Measured(fast, abs(fast - later)))
             row = measurement(lab, protocol, SET, q, "orbit_multiplier", factor, result.tasks, **conditions)
-            yield if_sure(row, 1.0, f"how disturbances shrink {at} is too uncertain")
+            yield if_found(row, f"no disturbance is seen to shrink {at}")
     if len(heights) >= 3:
         coarse_birth, fine_birth = (birth(flows[: len(heights)], each) for each in zip(*heights, strict=True))
         yield result.row(lab, "orbit_birth", finer(coarse_birth.value, fine_birth))

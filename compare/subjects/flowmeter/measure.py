@@ -22,7 +22,7 @@ import numpy as np
 from compare.kit.fits import at_zero
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import ONE, TWO, Protocol
-from compare.kit.record import Condition, Measurement, Missing, Records, if_sure, measurement, state_of
+from compare.kit.record import Condition, Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import (
     STEPS_A_SAMPLE,
     Settled,
@@ -84,8 +84,7 @@ def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             elif value := _slope(curve, states):
                 tasks, at = [each.task for each in states], {"case": states[-1].case.name, "by": by}
                 row = measurement(lab, "slope", curve.set, curve.p, "slope", value, tasks, **at)
-                why = f"{where}: the slope is uncertain by {value.uncertainty:.1g}, too much to be of use"
-                yield if_sure(row, 1.0, why)
+                yield if_found(row, f"{where}: no slope")
             else:
                 cases = ", ".join(each.case.name for each in states)
                 yield Missing("slope", curve.set, f"{where}: the states there are not of one kind ({cases})")
@@ -241,8 +240,7 @@ def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
         usual = float(np.median([change for *_, change in rows]))
         for result, fine, change in rows:
             value = Measured(fine.value, math.hypot(max(change, usual) * fine.value, fine.uncertainty))
-            row = result.row(lab, quantity, value, event=event)
-            yield if_sure(row, abs(row.value), f"{name}: {quantity} is uncertain by {row.uncertainty:.1g}")
+            yield if_found(result.row(lab, quantity, value, event=event), f"{name}: no {quantity}")
 
 
 def _trial(lab: Lab, state: Settled, name: str) -> Trial:

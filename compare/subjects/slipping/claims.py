@@ -11,11 +11,13 @@ import analytic
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
 from compare.claim import Bearing, Claim, Outcome, Text, When, every, given, one
+from compare.judge import simulated
 from compare.kit.check import Relation
 from compare.kit.record import Measurement, state
 from compare.kit.short import slip_unit
 from model import Case
 from model.arrays import Array
+from model.kinematics import SLIP_XYZ
 
 _NR_NS, _RR_RS, _RR_SR, _RR_SS = (Case.NR, Case.NS), (Case.RR, Case.RS), (Case.RR, Case.SR), (Case.RR, Case.SS)
 
@@ -53,6 +55,18 @@ def _growth(
 def _gamma(m: Measurement) -> float:
     n = [_at(m, f"n_{name[-1]}") for name in slip_stability.normals(*_arrow(m))]
     return float(slip_stability.gamma(*_arrow(m), _x(m), np.array(n), m.parameters))
+
+
+def _strays(protocol: str, when: When) -> Bearing:
+    """The case into which a slip passes that doesn't last."""
+
+    def case(m: Measurement) -> float:
+        n = np.array([_at(m, name) for name in ("n_x", "n_y", "n_z")])
+        x = _x(m)
+        x[SLIP_XYZ] += _at(m, "slip") * n
+        return float(simulated(m.parameters, tuple(x.tolist()), _at(m, "time")).case[-1])
+
+    return Bearing(protocol, "case", case, when=when, by="analytic.simulate")
 
 
 def _gamma_nr(m: Measurement) -> float:
@@ -96,7 +110,7 @@ def _neutral(quantity: str, case: Case, by: str) -> Bearing:
     return Bearing(
         "thresholds",
         quantity,
-        lambda m: slip_stability.neutral_flow(case, m.parameters),
+        lambda m: slip_stability.neutral_flow(case, m.parameters.replace(omega_0=1.0)),
         when=given(by=by),
         by="slip_stability.neutral_flow",
     )
@@ -122,11 +136,17 @@ CLAIMS = (
         Claim(
             f"slip-{arrow[0].name}-{arrow[1].name}",
             "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
-            f"Out of any state of {arrow[0].name} a slip along any direction of {arrow[1].name} grows at the rate γ.",
-            tuple(
-                _growth(predict, _along(arrow, "", "dragged"), by)
-                for by, predict in (("slip_stability.gamma", _gamma), ("slip_bounds.gamma_nr", _gamma_nr))
-                if predict is _gamma or arrow == _NR_NS
+            f"Out of any state of {arrow[0].name} a slip along any direction of {arrow[1].name} grows at the rate γ "
+            "while the forces admit it; else it passes into another case, as the equations of motion say.",
+            (
+                _growth(_gamma, _along(arrow, "", "dragged")),
+                *(
+                    [_growth(_gamma_nr, _along(arrow, "", "dragged"), "slip_bounds.gamma_nr")]
+                    if arrow == _NR_NS
+                    else []
+                ),
+                _strays("growth", _along(arrow, "", "dragged", "rest", "sideways")),
+                _strays("bounds", _along(arrow, "held", "stationary")),
             ),
         )
         for arrow in slip_stability.SLIP_ARROWS

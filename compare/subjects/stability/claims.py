@@ -4,68 +4,108 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+import numpy as np
+
 import analytic
-from compare.claim import Bearing, Claim, Text, When, every, given
+from analytic import StationarySolution
+from analytic.mechanics import dynamics
+from compare.claim import Bearing, Claim, Text, When, given, one
 from compare.judge import theory
-from compare.kit.check import Relation
+from compare.kit.lab import state_units
 from compare.kit.record import Measurement
 from compare.subjects.stability.measure import natural_size
-from model import Case
+from model import Case, Parameters, State
+from model.arrays import Array
+from model.cases import TRAITS
+from model.kinematics import VARIABLES
 
 _JACOBIAN = "analytic.stationary_solutions: eigenvalues of the exact Jacobian"
 
 
-def _spectrum(m: Measurement) -> tuple[complex, ...]:
-    """The eigenvalues of the stationary state of a case, rad s-1; LookupError if theory has none, or no stable one.
-
-    In NS y is cyclic, (48): it adds a zero to the eigenvalues of the reduced field. SR may be unstable.
-    """
+def _stationary(m: Measurement) -> StationarySolution:
+    """The stationary state of a case; LookupError if theory has none, or no stable one. SR may be unstable."""
     p, case = m.parameters, Case[str(m.conditions["case"])]
     found = theory(analytic.stationary_solutions, p)
     those = [s for s in found if s.exists and s.case is case and (s.stable or case is Case.SR)]
     if len(those) != 1:
         raise LookupError(f"{case.name} has {len(those)} stationary states at omega_0 = {p.omega_0:g} rad/s")
-    return (*([0.0] if case is Case.NS else []), *(complex(value) for value in those[0].eigenvalues))
+    return those[0]
 
 
-def _other(m: Measurement) -> float:
-    """The other part of the measured eigenvalue: the frequency of a decay rate, the decay rate of a frequency."""
-    return float(m.conditions["frequency" if m.quantity == "decay_rate" else "decay_rate"])
+def _spectrum(m: Measurement) -> tuple[complex, ...]:
+    """The eigenvalues of the stationary state, rad s-1; in NS y is cyclic, (48), which adds a zero."""
+    state = _stationary(m)
+    return (*([0.0] if state.case is Case.NS else []), *(complex(value) for value in state.eigenvalues))
+
+
+def _mode(m: Measurement, eigenvalues: Callable[[Measurement], Iterable[complex]] = _spectrum) -> complex:
+    """The eigenvalue that belongs to a measured one: each to one, in the order of frequency and decay."""
+    values = [complex(v) for v in eigenvalues(m)]
+    real = 1e-9 * max(map(abs, values))  # round-off in the imaginary part of one that is real
+    upper = sorted((v.imag if v.imag > real else 0.0, -v.real) for v in values if v.imag > -real)
+    if not (mode := int(m.conditions["mode"])) <= len(upper):
+        raise LookupError(f"theory has {len(upper)} modes")
+    frequency, decay = upper[mode - 1]
+    return complex(-decay, frequency)
 
 
 def _size(m: Measurement) -> float:
-    return natural_size(m.value, _other(m), m.parameters)
+    value = _mode(m)
+    parts = (-value.real, value.imag)
+    return natural_size(*(parts if m.quantity == "decay_rate" else parts[::-1]), m.parameters)
 
 
 def _rate(
     quantity: str, when: When, eigenvalues: Callable[[Measurement], Iterable[complex]] = _spectrum, by: str = _JACOBIAN
 ) -> Bearing:
-    """Decay rates or frequencies, by that eigenvalue with Im >= 0 which is nearest to the measured one."""
+    """Decay rates or frequencies."""
 
     def predict(m: Measurement) -> float:
-        measured = complex(-m.value, _other(m)) if quantity == "decay_rate" else complex(-_other(m), m.value)
-        nearest = min((complex(v.real, abs(v.imag)) for v in eigenvalues(m)), key=lambda value: abs(value - measured))
-        return -nearest.real if quantity == "decay_rate" else nearest.imag
+        value = _mode(m, eigenvalues)
+        return -value.real if quantity == "decay_rate" else value.imag
 
     return Bearing("rates", quantity, predict, when=when, size=_size, by=by)
+
+
+def _response(m: Measurement) -> float:
+    """How a linear motion follows a push, in natural units: by the exact Jacobian; of SR by its leaning modes."""
+    p, case, time = m.parameters, (stationary := _stationary(m)).case, float(m.conditions["time"])
+    names = TRAITS[case].active
+    i, j = (names.index(str(m.conditions[name])) for name in ("of", "pushed"))
+    if case is Case.SR:
+        values, rows = theory(analytic.leaning_modes, p)
+        moved = (rows.T * np.exp(values * time)) @ np.linalg.inv(rows.T)
+    else:
+        moved = theory(_moved, case, tuple(stationary.x), p, time)
+    units = state_units(p)[[VARIABLES.index(name) for name in names]]
+    return float(moved[i, j].real * units[j] / units[i])
+
+
+def _moved(case: Case, x: tuple[float, ...], p: Parameters, time: float) -> Array:
+    from scipy.linalg import expm  # here, because it takes long to load
+
+    return np.asarray(expm(time * dynamics.jacobian(case, State.of(np.array(x)), p)))
 
 
 def _bearings(case: Case) -> tuple[Bearing, ...]:
     """The whole spectrum of the state of a case."""
     when = given(case=case.name)
     count = Bearing("rates", "modes", lambda m: float(len(_spectrum(m))), when=when, by=_JACOBIAN)
-    return _rate("decay_rate", when), _rate("frequency", when), count
+    by = "analytic.leaning_modes" if case is Case.SR else "exponential of the exact Jacobian"
+    answers = Bearing("rates", "response", _response, when=when, size=one, by=by)
+    slowest = Bearing("rates", "slowest_decay", _slowest_decay, when=when, by="analytic.slowest_time_constant")
+    return _rate("decay_rate", when), _rate("frequency", when), count, answers, slowest
 
 
-def _slowest(grows: bool) -> Bearing:
-    """The slowest decay of SR is one above omega_03 and none below."""
+def _slowest_decay(m: Measurement) -> float:
+    """The slowest of the decays, whatever grows or stays besides."""
+    return 1 / analytic.slowest_time_constant(_stationary(m))
 
-    def there(m: Measurement) -> bool:
-        return bool(m.parameters.omega_0 < theory(analytic.thresholds, m.parameters).omega_03) is grows
 
-    when = every(given(case="SR", mode=1), there)
-    relation, by = Relation.AT_MOST if grows else Relation.AT_LEAST, "analytic.thresholds: omega_03"
-    return Bearing("rates", "decay_rate", lambda m: 0.0, when=when, size=_size, relation=relation, by=by)
+def _slowest(m: Measurement) -> float:
+    """The slowest decay of SR: that of leaning below omega_03, where it grows."""
+    p, decay = m.parameters, -theory(analytic.leaning_modes, m.parameters)[0].real
+    return float(decay[0] if p.omega_0 < theory(analytic.thresholds, p).omega_03 else min(decay))
 
 
 CLAIMS = (
@@ -89,14 +129,7 @@ CLAIMS = (
         "below, at the rates of the eigenvalues of f_SR.",
         (
             *_bearings(Case.SR),
-            _slowest(grows=False),
-            _slowest(grows=True),
-            _rate(
-                "decay_rate",
-                given(case="SR"),
-                lambda m: theory(analytic.leaning_modes, m.parameters)[0],
-                "analytic.leaning_modes",
-            ),
+            Bearing("rates", "decay_rate", _slowest, when=given(case="SR", mode=1), size=_size, by="leaning_modes"),
         ),
         text=Text.CORRECTED,
         reason="With A_y = 0 the state is on the border to NR: the eigenvalues show on the side where the ball leans "

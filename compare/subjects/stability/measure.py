@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +23,10 @@ from compare.kit.engines import STUDY_SLIP
 from compare.kit.fits import exponents, matched, propagator
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
 from compare.kit.programme import LAWS, Protocol
-from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
+from compare.kit.quantities import quantity
+from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.kit.settling import SOLVED, SPIN, family, high
-from compare.kit.statistics import Measured
+from compare.kit.statistics import COVERAGE, Measured
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory
@@ -101,44 +103,44 @@ class Pushed:
                     tasks.append(lab.task(p, x, lasts * step, step / refined, samples=samples))
         return tasks
 
-    def missing(self, why: str) -> Missing:
-        """That its rates were not measured."""
+    def missing(self, why: str, rows: int) -> Missing:
+        """That its rates, decay and frequency of each, were not measured."""
         at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
-        return Missing(PROTOCOL, self.start.set, f"{at}: {why}")
+        return Missing(PROTOCOL, self.start.set, f"{at}: {why}", rows)
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
-    states = [state for name, p in sets.items() for state in chosen(records, name, p, lab.effort("rates.more"))]
+    found = [each for name, p in sets.items() for each in chosen(records, name, p, lab.effort("rates.more"))]
+    yield from (each for each in found if isinstance(each, Missing))
+    states = [each for each in found if isinstance(each, Pushed)]
     tasks = [state.tasks(lab) for state in states]
     lab.complete([task for own in tasks for task in own])
     for state, own in zip(states, tasks, strict=True):
         runs, step = lab.attempt(own), coarse_step(state.start.p) / lab.effort("rates.refined")[1]
         if isinstance(runs, str):
-            yield state.missing(f"a run {runs}")
+            yield state.missing(f"a run {runs}", 2 * len(state.active))
             continue
         count = 2 * len(state.active)
         answers = [answer(state, size, runs[k * count : (k + 1) * count]) for k, size in enumerate(state.sizes)]
         if min(map(len, answers)) < LEAST.get(state.case, 8):
-            yield state.missing("pushed, the ball doesn't stay in this case")
+            yield state.missing("pushed, the ball doesn't stay in this case", 2 * len(state.active))
         else:
             yield from _rows(lab, state, *spectrum(state, answers, step), step, own[-count:])
-    for name in sets:
-        for case in STATES:
-            if case not in {state.case for state in states if state.start.set == name}:
-                at = f"the ball settles in {case.name} at no flow that was tried"
-                yield Missing(PROTOCOL, name, f"{at}, or slips too slowly or too fast there")
+            yield from _responses(lab, state, answers, own[-count:])
 
 
-def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed]:
+def chosen(records: Records, name: str, p: Parameters, more: int) -> Iterator[Pushed | Missing]:
     """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
+
+    Where fewer than that can be pushed, as far as there are any, the rest is missing.
 
     One on the wall alone is pushed high up, and where it only just touches the floor. Contacts must slip neither so
     slowly that a push turns the slip, or friction stops it within a few steps, nor so fast that they hover.
     """
     unit = time_unit(p)
     spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
-    kept = [Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)]
+    yield Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
         values.setdefault((m.parameters, family(Case[str(m.conditions["case"])])), {})[m.quantity] = m.value
@@ -151,8 +153,8 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed
     if p.drag == QUADRATIC:  # it settles no ball that goes round with the fluid; but one that begins so goes on so
         states.append((p.replace(omega_0=0.5 / unit), Case.RR, State(omega_c=0.5 / unit)))
     for case, most in STATES.items():
-        alike = []
-        for q, _, x in sorted((s for s in states if s[1] is case), key=lambda s: s[0].omega_0):
+        alike, of = [], sorted((s for s in states if s[1] is case), key=lambda s: s[0].omega_0)
+        for q, _, x in of:
             turned = math.sqrt(q.g * q.R) * max(SLOWEST, 2 * PUSH.get(case, 0.0))
             contacts = zip(
                 case.name, slip_speeds(x.stacked(), q), (q.mu, q.eta), (q.g, q.R * x.omega_c**2), strict=True
@@ -167,8 +169,10 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> list[Pushed
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
         places = {int((k + 0.5) * len(alike) / (more * most)) for k in range(more * most)} if alike else set()
-        kept += [alike[k] for k in sorted(places)]
-    return kept
+        yield from (alike[k] for k in sorted(places))
+        if (lacking := min(more * most, len(of)) - len(places)) > 0 or not of:
+            why = f"{len(alike)} of {len(of)} settled states of {case.name} slip as fast as a push needs"
+            yield Missing(PROTOCOL, name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
 
 
 def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
@@ -234,23 +238,47 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
 def _rows(
     lab: Lab, state: Pushed, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
 ) -> Iterator[Measurement | Missing]:
-    """One of each pair of conjugates, in the order of their decay, slowest first; and how many there are in all."""
-    start, rows = state.start, []
+    """One of each pair of conjugates, in the order of frequency and decay, slowest first; and how many there are."""
+    start, parts = state.start, []
     at: dict[str, Condition] = {"case": state.case.name, **state_of(start.x0)}
     yield measurement(lab, PROTOCOL, start.set, start.p, "modes", len(exponents), tasks, **at)
-    for mode, k in enumerate((k for k in np.argsort(-exponents.real) if exponents[k].imag >= 0), start=1):
+    order = np.lexsort((-exponents.real, exponents.imag))
+    for mode, k in enumerate((k for k in order if exponents[k].imag >= 0), start=1):
         if abs(exponents[k]) * step > RESOLVED:
-            yield state.missing(f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step")
+            yield state.missing(f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step", 2)
             continue
-        parts = {"decay_rate": -float(exponents[k].real), "frequency": float(exponents[k].imag)}
-        for (quantity, value), (name, other) in zip(parts.items(), reversed(parts.items()), strict=True):
-            sure, which = Measured(value, float(uncertainty[k])), {"mode": mode, name: other}
-            # They come from one propagator: where one is too vague for a check, the others aren't to be trusted either.
-            if not sure_enough(quantity, sure, natural_size(value, other, start.p)):
-                yield state.missing(f"one of its exponents, {value:.3g} 1/s, is uncertain by {sure.uncertainty:.1g}")
-                return
-            rows.append(measurement(lab, PROTOCOL, start.set, start.p, quantity, sure, tasks, **at, **which))
-    yield from rows
+        rate, frequency = -float(exponents[k].real), float(exponents[k].imag)
+        for name, value, other in (("decay_rate", rate, frequency), ("frequency", frequency, rate)):
+            parts.append((name, mode, value, natural_size(value, other, start.p), float(uncertainty[k])))
+    # They come from one propagator: where one is too vague for a check, the others aren't to be trusted more.
+    vague = max(COVERAGE * sure / size / quantity(name).resolves for name, *_, size, sure in parts)
+    decays = [part for part in parts if part[0] == "decay_rate" and part[2] > REST * start.p.c]
+    if decays:
+        parts.append(("slowest_decay", *min(decays, key=lambda part: part[2])[1:]))
+    for name, mode, value, size, sure in parts:
+        least = vague * quantity(name).resolves * size / COVERAGE if vague > 1 else 0.0
+        row = Measured(value, max(sure, least))
+        yield measurement(lab, PROTOCOL, start.set, start.p, name, row, tasks, **at, mode=mode)
+
+
+def _responses(lab: Lab, state: Pushed, answers: Sequence[Array], tasks: Sequence[Task]) -> Iterator[Measurement]:
+    """How each active variable follows a push of each, in `units`, at the end of the first third of the record.
+
+    This shows the directions of the motions, not only their rates. Extrapolated as `spectrum` does, to a vanishing push
+    and step.
+    """
+    start, names = state.start, TRAITS[state.case].active
+    lasts, samples = BRIEF.get(state.case, RECORD)
+    k = min(map(len, answers)) // 3
+    coarse, large, small = answers[0][k], answers[1][k], answers[-1][k]
+    bent, step = (small - large) / (2 ** ORDER.get(state.case, 2) - 1), (small - coarse) / 3
+    value, solved = small + bent + step, SOLVED / min(state.sizes)
+    sure = float(np.sqrt(np.max(np.abs(bent)) ** 2 + np.max(np.abs(step)) ** 2 + solved**2))
+    at: dict[str, Condition] = {"case": state.case.name, **state_of(start.x0)}
+    at["time"] = (k + 1) * lasts * coarse_step(start.p) / samples
+    for (i, of), (j, by) in product(enumerate(names), enumerate(names)):
+        row = Measured(float(value[i, j]), sure)
+        yield measurement(lab, PROTOCOL, start.set, start.p, "response", row, tasks, **at, of=of, pushed=by)
 
 
 def natural_size(rate: float, other: float, p: Parameters) -> float:

@@ -39,14 +39,14 @@ def case(m: Measurement) -> float:
 
 
 def rolling(m: Measurement) -> float:
-    """RR as long as it exists, (84) and (86); beyond, anything but RR."""
+    """RR as long as it exists, (84) and (86); beyond, a case that lasts, which RR is not."""
     t = theory(analytic.thresholds, m.parameters)
     limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
     if m.parameters.omega_0 < limit:
         return float(Case.RR)
     if detected(m) is Case.RR:
         raise LookupError("RR has ended")
-    return m.value
+    return case(m)
 
 
 def bearings(quantities: Iterable[str], when: When, by: str, of: Case | None = None) -> tuple[Bearing, ...]:

@@ -38,12 +38,14 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         spinning = State(slip_y=SPIN / time_unit(p) * p.R / p.r)
         starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
     ended = settle(lab, starts, sharp=sharp)
-    yield from _unsettled(ended)
-    sure: list[Settled] = []
-    slack: list[Missing] = []
+    groups: dict[tuple[str, float, int], list[Settled]] = {}
+    without: dict[tuple[str, float, int], Missing] = {}
     for state in ended:
-        p = state.start.p
+        p, named = state.start.p, f"{state.case.name} at omega_0 = {state.start.p.omega_0:.4g} rad/s"
+        key = state.start.set, p.omega_0, int(family(state.case))
         if state.failure:
+            yield _unsettled(state, 1)
+            without[key] = Missing(PROTOCOL, state.start.set, f"{named}: no values of it", len(state.values))
             continue
         yield _record(lab, state, "case", state.case)
         rate = p.c  # at which the fluid would stop a free ball: in proportion to the lag under the quadratic law
@@ -52,25 +54,25 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             Re = 2 * p.r / p.nu_f * math.hypot(v_y, p.R * (omega_c - p.omega_0))
             rate *= p.C_D / 24 * Re
         if rate * duration(p) < LIVELY:
-            what = f"{state.case.name} at omega_0 = {p.omega_0:.4g} rad/s"
-            why = f"{what}: a slight lag is one for ever under the quadratic law"
-            slack.append(Missing(PROTOCOL, state.start.set, why))
+            why = f"{named}: a slight lag is one for ever under the quadratic law"
+            without[key] = Missing(PROTOCOL, state.start.set, why, len(state.values))
         else:
-            sure.append(state)
-    yield from slack
-    groups: dict[tuple[str, float, int], list[Settled]] = {}
-    for state in sure:
-        key = state.start.set, state.start.p.omega_0, int(family(state.case))
-        groups.setdefault(key, []).append(state)
+            groups.setdefault(key, []).append(state)
+    yield from (each for key, each in without.items() if key not in groups)
     alike = [groups[key] for key in sorted(groups)]
     again = []  # with half the step, from the mean, at the height from which it started
     for state, *_ in alike:
         x0 = State.of(state.mean)._replace(y=max(State.of(state.start.x0).y, 0.0))
         again.append(replace(state.start, x0=x0.stacked()))
     refined = settle(lab, again, refine=2, span=20.0, sharp=sharp)
-    yield from _unsettled(refined)
     for same, fine in zip(alike, refined, strict=True):
-        if not fine.failure and family(fine.case) is family(same[0].case):
+        if fine.failure:
+            yield _unsettled(fine, len(fine.values))
+        elif family(fine.case) is not family(same[0].case):
+            at = f"omega_0 = {fine.start.p.omega_0:.4g} rad/s"
+            why = f"{same[0].case.name} at {at} is {fine.case.name} with half the time step"
+            yield Missing(PROTOCOL, fine.start.set, why, len(fine.values))
+        else:
             for group in GROUPS:  # what step and start change is added to the uncertainty, the largest in the group
                 sizes = {n: scale(n, fine.start.p) for n in group if all(n in each.values for each in (fine, *same))}
                 changes = [abs(s.values[n].value - fine.values[n].value) / sizes[n] for s in same for n in sizes]
@@ -103,13 +105,11 @@ def _flows(lab: Lab, p: Parameters) -> list[Parameters]:
     return [p.replace(omega_0=flow / time_unit(p)) for flow in lab.effort("settled.flows")]
 
 
-def _unsettled(states: list[Settled]) -> Iterator[Missing]:
-    """Those that did not settle, each with what it did last."""
-    for each in states:
-        if each.failure:
-            p = each.start.p
-            at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
-            yield Missing(PROTOCOL, each.start.set, f"not settled from {each.start.name} at {at}: {each.failure}")
+def _unsettled(each: Settled, rows: int) -> Missing:
+    """That a start did not settle, and what it did last."""
+    p = each.start.p
+    at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
+    return Missing(PROTOCOL, each.start.set, f"not settled from {each.start.name} at {at}: {each.failure}", rows)
 
 
 def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> Measurement:

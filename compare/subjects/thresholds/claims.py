@@ -19,7 +19,7 @@ from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary import slipping_branch
 from compare.claim import Bearing, Claim, Text, When, given
 from compare.judge import theory
-from compare.kit.check import Check
+from compare.kit.check import Check, Relation
 from compare.kit.record import Measurement
 from compare.kit.settling import scale
 from compare.kit.statistics import COVERAGE
@@ -36,10 +36,15 @@ def _at(quantity: str, when: When = lambda m: m.conditions["by"] != SLIPPING, pr
     return Bearing(
         protocol,
         quantity,
-        lambda m: float(getattr(theory(analytic.thresholds, m.parameters), quantity)),
+        lambda m: float(getattr(_known(m), quantity)),
         when=when,
         by=f"analytic.thresholds: {quantity}",
     )
+
+
+def _known(m: Measurement) -> analytic.Thresholds:
+    """The thresholds of a set, without the flow at which one was measured."""
+    return theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))
 
 
 def _edge(name: str) -> Bearing:
@@ -55,10 +60,9 @@ def _edge(name: str) -> Bearing:
 
 def _folds(m: Measurement) -> float:
     """1 where theory has a fold in reach, by (87); LookupError where it has no branch of slipping."""
-    p = m.parameters
-    if not p.eta < p.j:
+    if not m.parameters.eta < m.parameters.j:
         raise LookupError("no branch of slipping at both points for eta > j")
-    return float(p.eta > theory(analytic.thresholds, p).eta_cr)
+    return float(m.parameters.eta > _known(m).eta_cr)
 
 
 CLAIMS = (
@@ -84,7 +88,12 @@ CLAIMS = (
         "table-5-NT1",
         "Table 5, NT1",
         "With η > j two-point rolling ends at ω₀₃: below, it takes in a ball pressed to the floor; above, it is lost.",
-        (_at("omega_03", given(side="from below")), _at("omega_03", given(side="from above"))),
+        (
+            _at("omega_03"),
+            Bearing(
+                "thresholds", "lifts", lambda m: math.isnan(_known(m).omega_01), by="analytic.thresholds: omega_01"
+            ),
+        ),
     ),
     Claim(
         "table-5-F",
@@ -95,7 +104,7 @@ CLAIMS = (
             Bearing(
                 "thresholds",
                 "folds",
-                lambda m: math.isfinite(theory(analytic.thresholds, m.parameters).omega_04),
+                lambda m: math.isfinite(_known(m).omega_04),
                 by="analytic.thresholds: omega_04",
             ),
         ),
@@ -127,6 +136,13 @@ CLAIMS = (
         "after Prop. 7",
         "There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
         (
+            Bearing(
+                "thresholds",
+                "omega_04",
+                lambda m: max(_known(m).omega_01, _known(m).omega_02),
+                relation=Relation.AT_LEAST,
+                by="analytic.thresholds: omega_01, omega_02",
+            ),
             Bearing(
                 "thresholds",
                 "folds",

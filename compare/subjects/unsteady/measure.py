@@ -23,7 +23,7 @@ import numpy as np
 from compare.kit.brackets import Bracket, Care, Search, narrow
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import LAWS, Protocol
-from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of
+from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of, sure_enough
 from compare.kit.settling import lasting, settle
 from compare.kit.statistics import Measured, peaks, top
 from compare.kit.tasks import Task
@@ -139,9 +139,11 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
             continue
         measured = each.row(lab, "slip_amplitude", onset, bracket.tasks)
         # The predicted amplitude may be a tenth smaller than the measured one.
-        yield (row := if_sure(measured, 0.9 * onset.value, f"slip in {at} begins at no definite amplitude"))
-        if isinstance(row, Measurement):
+        yield measured
+        if sure_enough("slip_amplitude", onset, 0.9 * onset.value):
             slipping.append((each, 1.5 * onset.value))
+        else:
+            yield Missing("pulsation", each.set, f"slip in {at} begins at no definite amplitude: no mean reading there")
     yield from mean_errors(lab, slipping)
 
 
@@ -245,7 +247,7 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
         error = Measured(value, drift + abs(value) / round(task.steps / PERIODS))
         row = each.row(lab, "mean_error", error, [task], amplitude=amplitude)
         at = f"the mean reading at {each.frequency:g} Hz"
-        yield if_sure(row, 0.9 * abs(value), f"{at} doesn't settle, or depends on more than the state")
+        yield if_found(row, f"{at} is none")
 
 
 def limit(values: Array) -> float:
@@ -302,7 +304,7 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         if trial.flow is None:
             for quantity in ("jump_delay",) if trial.name == Case.RR.name else ("jump_peak", "jump_height"):
                 row = result.row(lab, quantity, finer(result.coarse[quantity].value, result.fine[quantity]))
-                yield if_sure(row, abs(row.value), f"{quantity} in {trial.name}: no peak, or one that is too uncertain")
+                yield if_found(row, f"{quantity} in {trial.name}: no peak")
         elif math.isfinite(result.coarse) and math.isfinite(result.fine):
             yield result.row(lab, "ramp_end", finer(result.coarse, Measured(result.fine, 0.0)))
         else:

@@ -19,7 +19,7 @@ from itertools import product
 import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
-from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of, sure_enough
+from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.kit.settling import PRESSES
 from compare.kit.short import (
     DOUBT,
@@ -120,14 +120,15 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             if window is None:
                 continue
             values = _values(case, window, start.p)
-            kept[start.set, case] += bool(values)
+            kept[start.set, case] += 1
             for what, value in values.items():
                 at = state_of(window[0, STATE])
                 yield measurement(lab, "field", start.set, start.p, what, value, pair, case=case.name, **at)
     for name, case in product(sets, Case):
-        if not kept[name, case]:
-            why = f"no random start moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
-            yield Missing("field", name, why)
+        if lacking := lab.effort("field.kept") - kept[name, case]:
+            why = f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
+            rows = len(_moving(case)) + len(_forces(case, np.zeros(6)))
+            yield Missing("field", name, why, lacking * rows)
 
 
 def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
@@ -169,9 +170,9 @@ def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
     """Quantities with uncertainties, from what the extrapolation and the degree of the polynomials change.
 
     The largest relative change of the rates, or of the forces, stands for all of them: that of one may vanish by
-    chance. Empty where it is more than a check may have.
+    chance.
     """
-    moving = [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
+    moving = _moving(case)
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
     scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
     forces = [_forces(case, row) for row in window[:, FORCES]]
@@ -180,11 +181,13 @@ def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
         for rows in ((window[:, RATES] / scales)[:, moving], [[w / weight for w in each.values()] for each in forces])
     )
     rate_change, force_change = max(rate_change, lag_error(p) * (1 + p.j) / p.j), max(force_change, lag_error(p))
-    # Where the ball slips fast and hardly presses, contact comes and goes.
-    if not sure_enough("rate_v_y", Measured(0.0, max(rate_change, force_change)), 1.0):
-        return {}
     rates = {f"rate_{VARIABLES[k]}": Measured(window[0, RATES][k], rate_change * scales[k]) for k in moving}
     return rates | {f"moving_force_{name}": Measured(w, force_change * weight) for name, w in forces[0].items()}
+
+
+def _moving(case: Case) -> list[int]:
+    """The variables whose rates of change are measured."""
+    return [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
 
 
 def _forces(case: Case, forces: Array) -> dict[str, float]:
@@ -202,15 +205,19 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     tasks = []
     for start in starts:
         step = coarse_step(start.p) / REFINED
-        count = round(LASTS * time_unit(start.p) / step)
-        tasks.append(lab.task(start.p, start.x0, count * step, step, samples=count))
-    seen = set[tuple[str, Case]]()
+        steps = round(LASTS * time_unit(start.p) / step)
+        tasks.append(lab.task(start.p, start.x0, steps * step, step, samples=steps))
+    seen, count = set[tuple[str, Case]](), lab.effort("motions.pieces")
     for start, task, run in zip(starts, tasks, lab.each(tasks), strict=True):
         name, p = start.set, start.p
         if isinstance(run, str):
-            yield Missing("motions", name, f"a motion {run}")
+            yield Missing("motions", name, f"a motion {run}", count)
             continue
-        for first in pieces(run, lab.effort("motions.pieces")):
+        chosen = pieces(run, count)
+        if lacking := count - len(chosen):
+            why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips by a trace"
+            yield Missing("motions", name, why, lacking)
+        for first in chosen:
             last = first + LENGTH
             case = Case(int(run.case[last]))
             seen.add((name, case))
@@ -220,7 +227,7 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for name in sets:
         unseen = [case.name for case in Case if (name, case) not in seen]
         if unseen:
-            yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}")
+            yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
@@ -274,7 +281,7 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + AFTER
         if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
             why = f"{start.name}: the contact did not close for good within {LANDED:g} sqrt(R/g)"
-            yield Missing("impacts", start.set, why)
+            yield Missing("impacts", start.set, why, len(NAMES))
             continue
         p, units = start.p, state_units(start.p)
         changed = [VARIABLES.index(name) for name in NAMES]

@@ -19,11 +19,10 @@ import numpy as np
 
 from compare.kit.fits import straight_line, vanishing, zero_and_slope
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
-from compare.kit.quantities import quantity
-from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, state_of, sure_enough
+from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import begin, settle_groups
 from compare.kit.short import DOUBT, LIMIT, REFINED, lag_error, polynomials, slip_unit
-from compare.kit.statistics import COVERAGE, Measured
+from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from compare.subjects.slipping.measure.growth import SMOOTH, Push, without_size
@@ -114,12 +113,14 @@ def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
         pushes = (Push(Start(name, q, "stationary", x), Case.NR, Case.NS, np.array([0, 0, 1])) for q, x in rides)
         lines.append(Crossing(tuple(pushes)))
     first = list(_points(lab, [line.pushes[:2] for line in lines]))
-    around = _points(lab, [line.around(points[1]) for line, (points, _) in zip(lines, first, strict=True)])
-    for line, (points, tasks), (more, others) in zip(lines, first, around, strict=True):
+    around = _points(lab, [line.around(points[1]) for line, (points, *_) in zip(lines, first, strict=True)])
+    for line, (points, tasks, strays), (more, others, _) in zip(lines, first, around, strict=True):
         push, square, tasks = line.pushes[0], "_square" if line.power == 2 else "", [*tasks, *others]
         name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
         if np.isnan(points[1]).any():
-            yield Missing("bounds", name, f"slips {slips} did not stay in {push.outer.name}")
+            yield from strays
+            if not strays:
+                yield Missing("bounds", name, f"slips {slips} pass through several cases", 2)
             continue
         least = points[2].max()  # what the step changes may be little by chance at one of the flows
         points = np.concatenate([points, more], axis=1)
@@ -132,18 +133,15 @@ def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
             _, slope = straight_line(q, gamma, noise)
             zero, _ = straight_line(q, gamma, noise * math.sqrt(len(q)))
         growth = f"growth of slip {slips}, {push.start.name},"
-        if not sure_enough("gamma_slope", slope, abs(slope.value)):
-            yield Missing("bounds", name, f"{growth} changes too little with the flow, or is too uncertain")
-            continue
         if abs(zero.value) <= BEYOND * np.abs(q).max():
-            row = push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks)
-            natural = (push.start.p.g / push.start.p.R) ** (line.power / 2)
-            yield if_sure(row, max(abs(zero.value), natural), f"{growth} has too uncertain a zero")
-        yield push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks)
+            yield if_found(push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")
+        else:
+            yield Missing("bounds", name, f"{growth} has its zero far beyond the flows at which the ball stays")
+        yield if_found(push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
 
 
-def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, list[Task]]]:
-    """Flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2, of every row of pushes, and the runs.
+def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, list[Task], list[Measurement]]]:
+    """Flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2, of every row of pushes, the runs, and the strays.
 
     gamma is for a vanishing step and size of slip, from two sizes with the shorter step, and one with the longer one;
     it is uncertain by what the step and the degree of the polynomials change, and nan if the case was another.
@@ -154,14 +152,18 @@ def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, l
         tasks.append([*push.pair(lab, large_size), push.pair(lab, small_size)[1]])
     runs, todo = lab.groups(tasks), iter(tasks)
     for pushes in rows:
-        points, own = [], [task for _ in pushes for task in next(todo)]
-        for push in pushes:
-            coarse, large, small = (push.rates(run) for run in next(runs))
+        points, strays, own = [], [], [next(todo) for _ in pushes]
+        for push, pair in zip(pushes, own, strict=True):
+            records = next(runs)
+            size = MEDIUM[0] if push.inner is Case.NR else push.sizes[0]
+            strays.append(push.stray(lab, "bounds", size, pair[:2], records[:2]))
+            coarse, large, small = (push.rates(run) for run in records)
             best, change = without_size(np.array([large, small])), (large - coarse)[0]
             p = push.start.p
             noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p) * slip_unit(p))
             points.append((p.omega_0, best[0] + change * LIMIT, noise))
-        yield np.reshape(points, (-1, 3)).T, own
+        tasks_of_row = [task for each in own for task in each]
+        yield np.reshape(points, (-1, 3)).T, tasks_of_row, [stray for stray in strays if stray]
 
 
 def _rolling(name: str, p: Parameters) -> Iterator[Crossing]:
@@ -210,7 +212,7 @@ class Arrow:
         return self.lab.task(*self.start(omega_c), STEPS * step, step, samples=STEPS)
 
     def row(self, quantity: str, omega_c: float, value: Measured | float, tasks: Sequence[Task]) -> Measurement:
-        """What was measured along it, with the state at an orbit."""
+        """What was measured along it, with the state at one orbit."""
         p, x0 = self.start(omega_c)
         at = {"inner": self.inner.name, "outer": self.outer.name} | state_of(x0)
         return measurement(self.lab, "lift", self.set, p, quantity, value, tasks, **at)
@@ -246,7 +248,7 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
             why = f"where the ball leaves {arrow.inner.name} the floor's contact comes and goes"
             yield Missing("lift", arrow.set, why)
         else:
-            yield arrow.row("lift_onset", value.value, value, tasks)
+            yield arrow.row("lift_onset", 1 / time_unit(arrow.p), value, tasks)
 
 
 def _force(run: Trajectory) -> Measured | None:
@@ -271,6 +273,6 @@ def _onset(runs: Sequence[Trajectory]) -> Measured | None:
         change = fine.value - coarse.value
         forces.append(Measured(fine.value + change * LIMIT, math.hypot(fine.uncertainty, change * DOUBT)))
     square = vanishing(squares, forces) if forces else Measured(0.0, math.inf)
-    if not 0 < COVERAGE * square.uncertainty < 2 * quantity("lift_onset").resolves * square.value:
+    if not square.value > 0 or math.isinf(square.uncertainty):
         return None
     return Measured(math.sqrt(square.value), square.uncertainty / (2 * math.sqrt(square.value)))

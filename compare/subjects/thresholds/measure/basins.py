@@ -10,7 +10,6 @@ for a while near the unstable state. The mean of their states while they are tog
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,8 +24,8 @@ from compare.kit.brackets import Bracket, Care, Search, narrow
 from compare.kit.fits import vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
-from compare.kit.record import Measurement, Missing, Records, if_sure, measurement, sure_enough
-from compare.kit.settling import LOOSE, begin, family, lasting, rotation_scale, settle_groups, taper
+from compare.kit.record import Measurement, Missing, Records, if_found, measurement
+from compare.kit.settling import LOOSE, begin, family, lasting, settle_groups, taper
 from compare.kit.statistics import Measured, tail
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
@@ -171,21 +170,27 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 crossed = replace(lines[k], bracket=bracket, missed=0)
                 moves = (*edge.moves, np.abs(crossed.crossing - edge.crossing)) if edge.bracket else ()
                 edges[k] = replace(crossed, moves=moves)
-    edges = [edge for edge in edges if edge.moves]  # crossed by the last line, and by one before
     for edge in edges:
-        yield from _rows(lab, edge)
+        if edge.moves:  # crossed by the last line, and by one before
+            yield from _rows(lab, edge)
+        else:
+            at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
+            yield Missing("edge", edge.set, f"{at} the last lines missed the border between the two attractors", 5)
+    edges = [edge for edge in edges if edge.moves]
     for name, (low, high) in limits.items():  # the edge meets the lifted ball where they don't differ in omega_c
         last = low + (max(CLOSING) + 1e-6) * (high - low)
         near = [edge for edge in edges if edge.set == name and edge.p.omega_0 < last]
         if len(near) < len(CLOSING):
+            if name == soonest or lab.level > Level.QUICK:
+                yield Missing("edge", name, "too few crossings to follow the edge to where it meets the lifted ball")
             continue
         noise = max(float(_uncertainty(edge)[2]) for edge in near)
         apart = [Measured(float((edge.crossing - edge.lifted)[2]), noise) for edge in near]
         place = vanishing(np.array([edge.p.omega_0 for edge in near]), apart)
-        if math.isfinite(place.uncertainty) and sure_enough("omega_02", place, place.value):
-            tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
-            q, at = near[0].p.replace(omega_0=place.value), {"by": "unstable slipping meets the lifted ball"}
-            yield measurement(lab, "edge", name, q, "omega_02", place, tasks, side="from above", **at)
+        tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
+        q, by = sets[name].replace(omega_0=place.value), "unstable slipping meets the lifted ball"
+        row = measurement(lab, "edge", name, q, "omega_02", place, tasks, side="from above", by=by)
+        yield if_found(row, "the edge points to no flow at which it meets the lifted ball")
 
 
 def _grounded(x: Array) -> Array:
@@ -246,16 +251,13 @@ def _uncertainty(edge: Edge) -> Array:
     return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
 
 
-def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement | Missing]:
-    """omega_c, the slips and the spin on the wall, as far as they are sure enough; the uncertainties are alike."""
+def _rows(lab: Lab, edge: Edge) -> Iterator[Measurement]:
+    """omega_c, the slips and the spin on the wall; the uncertainties are alike."""
     assert edge.bracket is not None
-    x, sure, p = State.of(edge.crossing), State.of(_uncertainty(edge)), edge.p
-    roll, values = p.R / p.r, {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")}
+    x, sure = State.of(edge.crossing), State.of(_uncertainty(edge))
+    roll, values = edge.p.R / edge.p.r, {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")}
     values["wall_spin"] = x.slip_x + roll * x.omega_c
     slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
     for name, value in values.items():
-        unit = 1.0 if name == "omega_c" else roll
         of = Measured(value, slips / roll if name == "omega_c" else slips)
-        row = measurement(lab, "edge", edge.set, p, f"edge_{name}", of, edge.bracket.tasks, case="SS")
-        why = f"{name} on the edge at omega_0 = {p.omega_0:.4g} rad/s is uncertain by {of.uncertainty:.1g} rad/s"
-        yield if_sure(row, rotation_scale(p) * unit, why)
+        yield measurement(lab, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS")

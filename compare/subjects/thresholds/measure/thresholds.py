@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from compare.kit.brackets import Answer, Bracket, Care, Search, narrow
 from compare.kit.engines import sliding_speeds
 from compare.kit.fits import POINTS, initial_slope, straight_line, turning, vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
-from compare.kit.record import Measurement, Missing, Records, if_sure, measurement
+from compare.kit.record import Measurement, Missing, Records, if_found, measurement
 from compare.kit.settling import (
     PRESSES,
     Settled,
@@ -113,13 +114,16 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     brackets |= _narrowed(lab, searches)
 
     # The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
-    # the branch. There is no fold where the floor's force on it vanishes just where the wall begins to carry it.
-    folds, searches = {}, {}
+    # the branch. There is no fold where the floor's force on it vanishes just where the wall begins to carry it, and
+    # the slip ends no sooner.
+    folds, smooth, searches = {}, set(), {}
     for name, p in sets.items():
         turned, held = states.get((name, "turning"), []), brackets.get((name, "riding"))
         top, unloaded = extrapolated(turned, "slip_x", turning), extrapolated(turned, "force_Ay", vanishing)
         off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
-        if top and not (held and off < narrowest * held.high):
+        if held and off < narrowest * held.high:
+            smooth.add(name)
+        elif top:
             folds[name], half = top, max(narrowest, 5.0 * top.uncertainty / top.value)
             change = Bracket(top.value * (1 - half), top.value * (1 + half))
             # At a fold all slows down, like the root of the distance.
@@ -129,7 +133,15 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for name, p in sets.items():
         shown = {kind: b for (one, kind), b in brackets.items() if one == name and None not in b.runs}
         beside = {kind: settled for (one, kind), settled in states.items() if one == name}
-        yield from _rows(lab, name, p, shown, beside, folds.get(name))
+        ends = _ends(seen[name, "slipping"], brackets.get((name, "slipping"))) if (name, "turning") in states else 0
+        yield from _rows(lab, name, p, shown, beside, folds.get(name), ends, name in smooth)
+
+
+def _ends(cases: Mapping[float, Case], bracket: Bracket | None) -> int:
+    """How often, the flow rising over all that were tried, a ball from rest ceases to settle slipping at both."""
+    said = {flow: case is Case.SS for flow, case in cases.items()} | dict(bracket.said if bracket else ())
+    settles = [said[flow] for flow in sorted(said)]
+    return sum(bool(before) and after is False for before, after in pairwise(settles))
 
 
 def _settled_beside(lab: Lab, sets: Mapping[str, Parameters], of: Mapping[Key, Bracket]) -> dict[Key, list[Settled]]:
@@ -256,16 +268,20 @@ def _rows(
     brackets: Mapping[str, Bracket],
     states: Mapping[str, Sequence[Settled]],
     top: Measured | None,
+    ends: int,
+    smooth: bool,
 ) -> Iterator[Measurement | Missing]:
-    """What was measured on one set: the end of rolling, the begin of riding, and the end of slipping on both."""
+    """What was measured on one set: the end of rolling, the begin of riding, and the end of slipping on both.
+
+    `ends` says at how many flows slipping ends; `top` where by a jump, and `smooth` that it ends once without one.
+    """
     tasks = {kind: [state.task for state in settled] for kind, settled in states.items()}
     missing = partial(Missing, PROTOCOL, name)
 
     def row(quantity: str, at: Measured | None, tasks: Sequence[Task], side: str, by: str) -> Measurement | Missing:
         if at is None:
             return missing(f"too few states settled for {quantity} by {by}, or they point nowhere")
-        row = measurement(lab, PROTOCOL, name, p.replace(omega_0=at.value), quantity, at, tasks, side=side, by=by)
-        return if_sure(row, at.value, f"{quantity} by {by} is uncertain by {at.uncertainty:.1g} rad/s")
+        return measurement(lab, PROTOCOL, name, p.replace(omega_0=at.value), quantity, at, tasks, side=side, by=by)
 
     def bisected(quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
         # Slip that is still too small to count may have begun below: it is proportional to the distance.
@@ -283,14 +299,16 @@ def _rows(
     if not rolling:
         yield missing(f"{none} ends two-point rolling")
     elif lifts(rolling):
-        yield missing("two-point rolling ends by losing the floor, not by slipping: there is no omega_01")
+        yield measurement(lab, PROTOCOL, name, p, "lifts", 1.0, rolling.tasks)
         yield bisected("omega_03", rolling, "from below", "loss of the floor")
         if leaning:
             yield bisected("omega_03", leaning, "from above", "return to rolling when pressed")
         else:
-            yield missing("a lifted ball did not settle, and could not be pressed back to the floor")
+            yield missing(
+                "a lifted ball did not settle, and could not be pressed back to the floor: no second omega_03"
+            )
     else:
-        yield missing("two-point rolling ends by slipping before the ball is lifted: there is no omega_03")
+        yield measurement(lab, PROTOCOL, name, p, "lifts", 0.0, rolling.tasks)
         yield bisected("omega_01", rolling, "from below", "onset of slip")
         yield from vanishes("slipping", "lag", "omega_01", "from above", "lag of settled slipping")
     if riding:
@@ -298,21 +316,21 @@ def _rows(
     else:
         yield missing(f"{none} is the least to hold a ball on the wall")
     yield from vanishes("sinking", "v_y", "omega_02", "from below", "speed of settled sinking")
-    if not states.get("turning"):
-        yield missing("a ball that slips at both points settles at no flow: there is no omega_04")
-    elif top is None:
-        yield missing("slipping at both points passes to the wall without a jump: there is no omega_04")
+    if "turning" not in states:
+        if rolling and not lifts(rolling):
+            yield missing("no end of slipping at both points was found", 3)
+        return
+    yield measurement(lab, PROTOCOL, name, p, "folds", ends - smooth, tasks["turning"])
+    if smooth:
         yield from vanishes("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
-        yield measurement(lab, PROTOCOL, name, p, "folds", 0.0, tasks["turning"])
+    elif top is None:
+        yield missing("settled slipping points to no flow at which it ends", 2)
     else:
         yield row("omega_04", top, tasks["turning"], "from below", "maximum of omega_0 along the branch")
         if fold:
             yield bisected("omega_04", fold, "from below", "last settled slipping")
         else:
             yield missing("the end of slipping at both points could be extrapolated, but not be bracketed")
-        last = fold.low if fold else states["turning"][0].start.p.omega_0
-        if riding and last > riding.high:
-            yield measurement(lab, PROTOCOL, name, p, "folds", 1.0, tasks["turning"])
 
 
 def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -352,5 +370,6 @@ def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         else:
             drag = Measured(1 / lags[name].value, lags[name].uncertainty / lags[name].value ** 2)
             tasks = [state.task for *_, settled in slopes[name] for state in settled]
-            row = measurement(lab, "birth", name, p.replace(c=drag.value), "critical_drag", drag, tasks)
-            yield if_sure(row, drag.value, f"the drag where the fold is born is too vague: {drag.uncertainty:.2g} 1/s")
+            yield if_found(
+                measurement(lab, "birth", name, p, "critical_drag", drag, tasks), "no drag gives birth to a fold"
+            )
