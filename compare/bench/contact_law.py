@@ -1,0 +1,297 @@
+"""The law of MuJoCo's contacts, for those of any settled model: depth, creep, hovering, and small motions.
+
+Formulas and their derivation: docs/friction.md. The engine says where contacts are, what they carry, and how it
+estimates their inverse mass; the rest is computed from parameters, so that it can be computed for other ones, too.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+import scipy.sparse
+
+Array = npt.NDArray[Any]
+"""Of floats, or of marks and numbers that choose contacts."""
+LARGEST, CONE = 1.0, 0.999
+"""Steps are tried up to this, s; from this share of the cone on a contact slides."""
+SOLREF = (0.02, 1.0)
+"""What the engine takes for a solref of which one number is positive and the other is not."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contacts:
+    """The n contacts of a settled model: its options and their parameters, which advice may change, and their loads."""
+
+    timestep: float
+    impratio: float
+    pyramidal: bool
+    integrator: int
+    noslip: bool
+    refsafe: bool
+    solref: Array
+    """Shape (n, 2); also that of `solreffriction`, in which zeros mean: as `solref`."""
+    solreffriction: Array
+    solimp: Array
+    """Shape (n, 5)."""
+    geoms: Array
+    dim: Array
+    friction: Array
+    """Shape (n, 5): two of slipping, spinning, two of rolling; m for the last three."""
+    inverse_mass: Array
+    """What a normal row sees by the engine's estimate, 1/kg."""
+    margin: Array
+    force: Array
+    """Shape (n, 6): along the normal and the directions of `friction`, N and N m."""
+    slip: Array
+    """Shape (n, 5): as found, m/s and rad/s."""
+    rows: Array
+    """Jacobian, shape (n, 6, nv), in units in which the mass matrix is one; zeros beyond `dim`."""
+
+    @property
+    def discrete(self) -> bool:
+        """Whether springs and dampers are taken at the end of a step."""
+        return bool(self.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE)
+
+    @property
+    def cone(self) -> Array:
+        """Share of the friction cone, or pyramid, in use."""
+        used = np.abs(self.force[:, 1:]) / self.friction * self._frictional
+        share: Array = (used.sum(1) if self.pyramidal else np.hypot.reduce(used, 1)) / self.force[:, 0]
+        return share
+
+    @property
+    def _frictional(self) -> Array:
+        return np.arange(1, 6) < self.dim[:, None]
+
+    def impedance(self, depth: Array) -> Array:
+        """d at a depth below the margin."""
+        low, high = np.clip(self.solimp[:, :2], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
+        width, middle, power = np.maximum(self.solimp[:, 2], 1e-15), self.solimp[:, 3], self.solimp[:, 4]
+        middle, power = np.clip(middle, mujoco.mjMINIMP, mujoco.mjMAXIMP), np.maximum(power, 1)
+        x = np.minimum(depth / width, 1)
+        rising = x**power / middle ** (power - 1)
+        falling = (1 - x) ** power / (1 - middle) ** (power - 1)
+        d: Array = low + (high - low) * np.where(x <= middle, rising, 1 - falling)
+        return d
+
+    def reference(self, solref: Array) -> tuple[Array, Array]:
+        """Stiffness for an impedance of one, s-2, and damping, s-1, of rows, after what the engine replaces."""
+        high = np.clip(self.solimp[:, 1], mujoco.mjMINIMP, mujoco.mjMAXIMP)
+        ref = np.where(((solref > 0).sum(1) == 1)[:, None], SOLREF, solref)
+        time, ratio = ref.T
+        if self.refsafe and self.discrete:
+            time = np.where((time > 0) & (time * ratio < self.timestep), self.timestep / (np.sqrt(high) * ratio), time)
+        elif self.refsafe:
+            time = np.where(time > 0, np.maximum(time, 2 * self.timestep), time)
+        positive = time > 0
+        stiffness = np.where(positive, 1 / (high * time * ratio) ** 2, -time / high**2)
+        return stiffness, np.where(positive, 2 / (high * time), -ratio / high)
+
+    def law(self) -> Law:
+        """What the contacts do under their loads."""
+        with np.errstate(all="ignore"):  # a contact without stiffness or friction divides by zero
+            return self._law()
+
+    def _law(self) -> Law:
+        h, load = self.timestep, np.maximum(self.force[:, 0], 0)
+        spring, b = self.reference(self.solref)
+        own = self.solreffriction.any(1) & (not self.pyramidal)
+        b_f = np.where(own, self.reference(self.solreffriction)[1], b)
+        mu, frictional = self.friction, self._frictional
+        edges = np.maximum(self.dim - 1, 1)
+        estimate = self.inverse_mass
+        if self.pyramidal:  # an edge is the normal and mu times a direction of friction
+            estimate = estimate * np.where(self.dim > 1, 2 * mu[:, 0] ** 2 * (1 + mu[:, 0] ** 2) / self.impratio, 1)
+        slides = self.cone >= CONE
+        wanted = np.where(frictional, np.abs(self.force[:, 1:]) / mu, 0)  # friction divided by its coefficient
+
+        def rows(depth: Array) -> tuple[Array, Array, Array]:
+            """Softness of a row, its stiffness, and the damping of friction as a steady state sees it."""
+            d = self.impedance(depth)
+            softness, k = (1 - d) / d * estimate, spring * d
+            if not self.discrete:
+                return softness, k, b_f
+            return softness, k, b + k * h if self.pyramidal else b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
+
+        def excess(depth: Array) -> Array:
+            """Load at a depth, less the load that there is."""
+            softness, k, damping = rows(depth)
+            x = k * depth / softness
+            sliding = damping[:, None] * mu * np.abs(self.slip) / softness[:, None] * frictional
+            if self.pyramidal:
+                edge = np.maximum(2 * x[:, None], np.where(slides[:, None], x[:, None] + sliding, wanted))
+                return np.where(self.dim > 1, (edge * frictional).sum(1), x) - load
+            kept = mu[:, 0] ** 2 / self.impratio * load
+            return x + np.where(slides, np.maximum(np.hypot.reduce(sliding, 1) - kept, 0), 0) - load
+
+        low = np.zeros(len(load))
+        softness, k, _ = rows(low)
+        high = 1.01 * softness * load / k
+        for _ in range(100):
+            middle = (low + high) / 2
+            above = excess(middle) > 0
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+        depth = (low + high) / 2
+        softness, k, damping = rows(depth)
+        first, _, first_damping = rows(np.zeros(len(load)))
+        if self.pyramidal:
+            x = (k * depth / softness)[:, None]
+            creep = softness[:, None] * np.where(wanted <= 2 * x, wanted / 2, wanted - x) / (mu * damping[:, None])
+            hover = first * load / (first_damping * np.hypot(mu[:, 0], mu[:, 1]))
+            inertia = np.where(self.dim > 1, 2 * edges, 1) / softness
+            sideways = 2 * mu**2 / softness[:, None]
+        else:
+            soft = softness[:, None] / self.impratio * (mu[:, :1] / mu) ** 2
+            creep = soft * np.abs(self.force[:, 1:]) / damping[:, None]
+            largest = mu[:, :2].max(1)
+            hover = (1 + mu[:, 0] ** 2 / self.impratio) * first * load / (largest * first_damping)
+            inertia, sideways = 1 / softness, 1 / soft
+        if self.noslip:  # it corrects friction alone, after normal forces were found beside friction at no creep
+            creep, sticks = np.zeros_like(creep), frictional & ~slides[:, None]
+            along, soft = self.rows[:, 1:][sticks], 1 / sideways[sticks]
+            lacking = np.linalg.solve(along @ along.T + np.diag(soft), soft * self.force[:, 1:][sticks])
+            depth = depth - self.rows[:, 0] @ (along.T @ lacking) / k
+        creep = np.where(frictional, creep, 0)
+        sideways = np.where(frictional & ~slides[:, None], sideways, 0)
+        return Law(
+            depth=depth - self.margin,
+            creep=np.where(slides, np.nan, np.hypot(creep[:, 0], creep[:, 1])),
+            turning=np.where(slides, np.nan, np.hypot.reduce(creep[:, 2:], 1)),
+            hover=np.where(self.dim > 1, hover, np.inf),
+            slides=slides,
+            weight=np.column_stack([inertia, sideways]),
+            stiffness=k,
+            damping=np.column_stack([b, *[b_f] * 5]),
+        )
+
+    def only(self, which: Array) -> Contacts:
+        """Some of the contacts, in the coordinates that they move."""
+        n = len(self.dim)
+        chosen = {
+            f.name: v[which] for f in dataclasses.fields(self) if np.ndim(v := getattr(self, f.name)) and len(v) == n
+        }
+        flat = chosen["rows"].reshape(-1, self.rows.shape[2])
+        _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
+        chosen["rows"] = chosen["rows"] @ directions[sizes > 1e-9 * sizes[0]].T
+        return dataclasses.replace(self, **chosen)
+
+    def matrices(self) -> tuple[Array, Array, Array]:
+        """Of ``mass a + damping v + stiffness x = 0``, small motions about the settled state."""
+        law, flat = self.law(), self.rows.reshape(-1, self.rows.shape[2])
+        weight = law.weight * (np.arange(6) < self.dim[:, None])
+
+        def within(values: Array) -> Array:
+            product: Array = (flat.T * np.nan_to_num(values).ravel()) @ flat
+            return product
+
+        stiffness = np.zeros_like(weight)
+        stiffness[:, 0] = weight[:, 0] * law.stiffness
+        return np.eye(flat.shape[1]) + within(weight), within(weight * law.damping), within(stiffness)
+
+    def stable(self, timestep: float) -> bool:
+        """Whether small motions die out at a time step: the first that doesn't changes sign in every step."""
+        if self.discrete:
+            return True
+        mass, damping, stiffness = dataclasses.replace(self, timestep=timestep).matrices()
+        forms = [4 * mass - 2 * timestep * damping - timestep**2 * stiffness]
+        if self.integrator == mujoco.mjtIntegrator.mjINT_RK4:  # its region ends at -2.785 and 2.83 i
+            forms = [7.757 * mass - 2.785 * timestep * damping + timestep**2 * stiffness]
+            forms += [8 * mass - timestep**2 * stiffness]
+        return all(np.linalg.eigvalsh(form)[0] > 0 for form in forms)
+
+    def largest_step(self, below: float = LARGEST) -> float:
+        """Largest stable time step, s, to 1 %; inf if there is none up to `below`."""
+        if self.stable(below):
+            return math.inf
+        low, high = math.log(1e-6), math.log(below)
+        while high - low > 0.01:
+            middle = (low + high) / 2
+            low, high = (middle, high) if self.stable(math.exp(middle)) else (low, middle)
+        return math.exp(low)
+
+    def decay(self) -> float:
+        """Rate, s-1, at which the slowest small motion dies out; 0 if it doesn't, inf if it is gone after a step."""
+        mass, damping, stiffness = self.matrices()
+        h, n = self.timestep, len(mass)
+        if self.discrete:
+            mass, damping = mass + h * damping + h**2 * stiffness, damping + h * stiffness
+        acceleration = np.linalg.solve(mass, -np.hstack([damping, stiffness]))
+        speed = np.hstack([np.eye(n), np.zeros((n, n))]) + h * acceleration
+        left = np.linalg.eigvals(np.vstack([speed, np.hstack([np.zeros((n, n)), np.eye(n)]) + h * speed]))
+        largest = np.abs(left[np.abs(left - 1) > 1e-6]).max(initial=0)  # where it slips to, it stays
+        return math.inf if largest == 0 else max(-math.log(largest) / h, 0.0)
+
+
+@dataclass(frozen=True)
+class Law:
+    """What n contacts do under their loads, nan where a contact slides; and what makes up their small motions."""
+
+    depth: Array
+    creep: Array
+    turning: Array
+    hover: Array
+    slides: Array
+    weight: Array
+    """Force per acceleration of each row, kg."""
+    stiffness: Array
+    damping: Array
+
+
+def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
+    """The contacts that carry a load at a state, and their numbers in `data`."""
+    twin = copy.copy(model)  # in it each row is a direction of a contact, whatever the cone and the integrator
+    twin.opt.cone, twin.opt.integrator = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtIntegrator.mjINT_EULER
+    twin.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+    state = mujoco.MjData(twin)
+    mujoco.mj_copyData(state, twin, data)
+    mujoco.mj_forward(twin, state)
+    mujoco.mj_forward(model, data)
+    found, mass = data.contact, np.zeros((model.nv, model.nv))
+    number = np.flatnonzero((state.contact.efc_address >= 0) & (found.exclude == 0) & (found.geom >= 0).all(1))
+    force = np.zeros((len(number), 6))
+    for k, each in enumerate(number):
+        mujoco.mj_contactForce(model, data, each, force[k])
+    number, force = number[force[:, 0] > 0], force[force[:, 0] > 0]
+    first, dim = state.contact.efc_address[number], found.dim[number]
+    row = np.minimum(first[:, None] + np.arange(6), max(state.nefc - 1, 0))
+    there = np.arange(6) < dim[:, None]
+    rows = np.zeros((len(number), 6, model.nv))
+    if len(number):
+        mujoco.mj_fullM(model, data, mass)
+        start = np.append(state.efc_J_rowadr, state.nJ)
+        jacobian = scipy.sparse.csr_array((state.efc_J, state.efc_J_colind, start), (state.nefc, model.nv)).toarray()
+        whitened = scipy.linalg.solve_triangular(np.linalg.cholesky(mass), jacobian.T, lower=True).T
+        rows = whitened[row] * there[..., None]
+    described = Contacts(
+        inverse_mass=state.efc_diagA[first],
+        margin=state.efc_margin[first],
+        force=force,
+        slip=np.where(there, state.efc_vel[row] if state.nefc else 0, 0)[:, 1:],
+        rows=rows,
+        geoms=found.geom[number],
+        dim=dim,
+        **parameters(model, data, number),
+    )
+    return described, number
+
+
+def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
+    """Of contacts with these numbers: all that options of the model decide, by the names in `Contacts`."""
+    option = model.opt
+    return {
+        "timestep": option.timestep,
+        "impratio": option.impratio,
+        "pyramidal": option.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
+        "integrator": option.integrator,
+        "noslip": option.noslip_iterations > 0,
+        "refsafe": not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE,
+        **{name: getattr(data.contact, name)[number] for name in ("solref", "solreffriction", "solimp", "friction")},
+    }

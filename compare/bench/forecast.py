@@ -1,0 +1,441 @@
+"""What the contacts of any MuJoCo model will do, beside what they measurably do, and the one option to change.
+
+The engine settles the model and says what its contacts carry. From that `compare.bench.contact_law` computes depth,
+creep and the rest; measured are the places of bodies before and after the next tenth of a second.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from compare.bench.contact_law import SOLREF, Array, Contacts, contacts, parameters
+from compare.kit import pages
+from model import InputError, StorageError
+
+CREEP, DEPTH = 1e-5, 0.01
+"""What passes for good where nobody says: creep in m/s; depth divided by the radius of the smaller body."""
+STEADY, STILL = 2e-3, 1e-8
+"""A speed that changes by less than this share, or by this (m/s), from one window to the next has settled."""
+RESTLESS, TURNING = 0.05, 0.05
+"""A body moves on if its speed changes by this share from window to window, or if it turns by this in one, rad."""
+WINDOW, WINDOW_STEPS = 0.1, 50
+"""A window is so long, s, and of so many steps."""
+BAD = ("QPOS", "QVEL", "QACC")
+"""What the engine warns of when a model diverges."""
+SHOWN = 20
+"""Pairs in a table; the rest are counted."""
+QUANTITIES = {
+    "creep": ("creep", 1e6, "µm/s"),
+    "depth": ("depth", 1e6, "µm"),
+    "hover": ("speed from which it hovers", 1e3, "mm/s"),
+    "decay": ("rate at which a disturbance dies out", 1.0, "1/s"),
+    "largest_step": ("largest stable step", 1e3, "ms"),
+}
+"""What may be wrong with a pair, in words, its unit and how many of it are one of SI."""
+
+
+class UnsettledError(RuntimeError):
+    """A model that diverges, or of which all that touches still moves."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two geoms in contact, at the worst of their contacts: what is predicted of them, and what was measured."""
+
+    name: str
+    members: tuple[int, ...]
+    """Its contacts, by number among all."""
+    load: float
+    """N."""
+    depth: float
+    depth_measured: float
+    creep: float
+    """m/s; nan if the pair slides, or has no friction."""
+    creep_measured: float
+    turning: float
+    """Creep of spinning and rolling friction, rad/s."""
+    turning_measured: float
+    cone: float
+    """Share of the friction cone, or pyramid, in use."""
+    slides: bool
+    hover: float
+    """Slip speed from which contact is lost again and again, m/s."""
+    decay: float
+    """Rate at which the slowest disturbance dies out, s-1."""
+    largest_step: float
+    """Largest stable time step, s; inf if there is none below one second."""
+    replaced: tuple[str, ...]
+    """What the engine takes in the place of what the model says."""
+    harm: Mapping[str, float]
+    """For each of `QUANTITIES`, how many times what passes for good."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """The one option to change, and what that does to the worst pair."""
+
+    option: str
+    value: tuple[float, ...]
+    pair: str
+    quantity: str
+    before: float
+    after: float
+    """Predicted."""
+    found: float = math.nan
+    """Measured, if it was tried."""
+
+    @property
+    def written(self) -> str:
+        """As in MJCF."""
+        return f'{self.option}="{"elliptic" if self.option == "cone" else " ".join(f"{v:g}" for v in self.value)}"'
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Of a settled model: pairs in contact, the worst first, and what to do."""
+
+    pairs: tuple[Pair, ...]
+    timestep: float
+    largest_step: float
+    """Of all contacts together, s."""
+    moving: tuple[str, ...]
+    """Bodies that have not settled, in words; their pairs are left out."""
+    notes: tuple[str, ...]
+    change: Change | None
+    memory: bool
+    """Whether creep is harmful, and stays so with any single option."""
+
+
+def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
+    """A model and its state, at a keyframe by name or number.
+
+    Raises `StorageError` for a file that isn't there, `InputError` for one that MuJoCo refuses and for a keyframe that
+    doesn't exist.
+    """
+    if not path.is_file():
+        raise StorageError(f"cannot read {path}: there is no such file")
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise InputError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}") from error
+    data, names = mujoco.MjData(model), [model.key(k).name or str(k) for k in range(model.nkey)]
+    if keyframe is not None:
+        if keyframe not in names and keyframe not in map(str, range(model.nkey)):
+            raise InputError(f"{path} has no keyframe {keyframe!r}, but {', '.join(names) or 'none at all'}")
+        mujoco.mj_resetDataKeyframe(model, data, names.index(keyframe) if keyframe in names else int(keyframe))
+    return model, data
+
+
+def settle(model: Any, data: Any, limit: float) -> dict[int, str]:
+    """Step until velocities no longer change, for at most `limit` s; of each body that still moves, how, in words.
+
+    Raises `UnsettledError` if the model diverges.
+    """
+    radius = _radius(model)
+    scale = np.where(np.isfinite(radius), radius, 0)[:, None] ** [0, 0, 0, 1, 1, 1]
+    last = np.full((model.nbody, 6), 1e9)
+    begin, restless, speed = data.time, np.zeros(model.nbody, bool), np.zeros(model.nbody)
+    while data.time < begin + limit:
+        start, velocity = data.time, _advance(model, data)
+        speed, change = np.hypot.reduce(velocity * scale, 1), np.hypot.reduce((velocity - last) * scale, 1)
+        turned, last = np.hypot.reduce(velocity[:, 3:], 1) * (data.time - start), velocity
+        restless = (change > RESTLESS * speed + 1e2 * STILL) | (turned > TURNING)
+        if (change <= STEADY * speed + STILL).all():
+            break
+    return {int(b): f"{_body(model, int(b))} at {speed[b]:.2g} m/s" for b in np.flatnonzero(restless)}
+
+
+def forecast(
+    model: Any, data: Any, moving: Mapping[int, str], creep: float = CREEP, depth: float | None = None
+) -> Forecast:
+    """The forecast for a settled state; what moves is measured over a window, at the end of which `data` is left.
+
+    `moving` are bodies to leave out, as `settle` finds them; `creep` (m/s) and `depth` (m; by default a hundredth of a
+    body's radius) are what passes for good. Raises `InputError` if nothing touches, `UnsettledError` if all that
+    touches moves.
+    """
+    those, number = contacts(model, data)
+    bodies = model.geom_bodyid[those.geoms]
+    soft = int((data.contact.geom < 0).any(1).sum())
+    notes = (f"{soft} contacts of flexible bodies are left out",) if soft else ()
+    if not len(number):
+        also = [*notes, *(f"{each} after {data.time:.3g} s" for each in list(moving.values())[:1])]
+        raise InputError("; ".join(["nothing touches: the model has no contact under load", *also]))
+    kept = np.array([moving.keys().isdisjoint(both) for both in bodies.tolist()], bool)
+    if not kept.any():
+        raise UnsettledError(f"after {data.time:.3g} s what touches still moves: {', '.join(moving.values())}")
+    those, number, bodies = those.only(kept), number[kept], bodies[kept]
+    start, radius = copy.copy(data), _radius(model)[bodies].min(1)
+    good = np.full(len(number), depth) if depth else DEPTH * radius
+    found = _measured(model, data, those, number, bodies)
+    law, harm = those.law(), _harm(those, radius, good, creep)
+    names = [model.geom(g).name or f"geom {g} of {_body(model, model.geom_bodyid[g])}" for g in range(model.ngeom)]
+    geoms, belongs = np.unique(those.geoms, axis=0, return_inverse=True)
+    pairs = []
+    for k, (first, second) in enumerate(geoms):
+        part = belongs.ravel() == k
+        own = those.only(part)
+        rate, step = own.decay(), own.largest_step()
+        pairs.append(
+            Pair(
+                name=f"{names[first]} / {names[second]}",
+                members=tuple(np.flatnonzero(part).tolist()),
+                load=float(own.force[:, 0].sum()),
+                cone=float(own.cone.max()),
+                slides=bool(law.slides[part].any()),
+                hover=float(law.hover[part].min()),
+                decay=rate,
+                largest_step=step,
+                replaced=tuple(_replaced(model, own, names)),
+                harm={name: float(values[part].max()) for name, values in harm.items()}
+                | {"decay": 1 / rate if rate else math.inf, "largest_step": those.timestep / step},
+                **{name: float(getattr(law, name)[part].max()) for name in ("depth", "creep", "turning")},
+                **{name: float(values[part].max()) for name, values in found.items()},
+            )
+        )
+    pairs.sort(key=lambda pair: -max(pair.harm.values()))
+    step = those.largest_step(min(1.0, *(pair.largest_step for pair in pairs)))
+    best, left = _change(model, start, those, number, lambda c: _harm(c, radius, good, creep), pairs[0])
+    memory = max(pair.harm["creep"] for pair in pairs) > 1 and left["creep"].max() > 1
+    return Forecast(tuple(pairs), model.opt.timestep, step, tuple(moving.values()), notes, best, memory)
+
+
+def _measured(model: Any, data: Any, c: Contacts, number: Array, bodies: Array) -> dict[str, Array]:
+    """How deep each contact is, and how fast its two material points and its two bodies part within a window."""
+    found, axes, begin = data.contact, data.xmat.reshape(-1, 3, 3), data.time
+    depth, drift, frames = -found.dist[number], found.surfacevel[number, :2], found.frame[number].reshape(-1, 3, 3)
+    local = np.einsum("nbji,nbj->nbi", axes[bodies], found.pos[number][:, None] - data.xpos[bodies])
+    turning = np.diff(_advance(model, data)[bodies, 3:], axis=1)[:, 0]
+    place = data.xpos[bodies] + np.einsum("nbij,nbj->nbi", axes[bodies], local)
+    slip = np.einsum("nij,nj->ni", frames[:, 1:], place[:, 1] - place[:, 0]) / (data.time - begin) + drift
+    return {
+        "depth_measured": depth,
+        "creep_measured": np.where(c.dim > 1, np.hypot(*slip.T), np.nan),
+        "turning_measured": np.where(c.dim > 3, np.hypot.reduce(turning, 1), 0),
+    }
+
+
+def _harm(c: Contacts, radius: Array, good: Array, creep: float) -> dict[str, Array]:
+    """By what may be wrong with each contact: how many times what passes for good."""
+    law = c.law()
+    speed = np.nan_to_num(np.fmax(law.creep, law.turning * np.where(c.dim > 3, radius, 0)))
+    rate = c.impedance(law.depth + c.margin) * law.damping[:, 0] / 2
+    return {
+        "creep": speed / creep,
+        "depth": law.depth / good,
+        "hover": np.where(law.slides, np.hypot(*c.slip[:, :2].T) / law.hover, 0),
+        "decay": np.divide(1, rate, out=np.full(len(rate), math.inf), where=rate > 0),
+        "largest_step": np.full(len(rate), 0.0 if c.stable(c.timestep) else 2.0),
+    }
+
+
+def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Options that may help the contacts of a pair, and their values, the mildest first."""
+    largest = 10 if c.pyramidal else 1e4  # edges that are harder still push the pair apart
+    for power, digit in itertools.product((10, 100, 1e3, 1e4), (1, 2, 5)):
+        if c.impratio < power * digit <= largest:
+            yield "impratio", (power * digit,)
+    if c.pyramidal:
+        yield "cone", (int(mujoco.mjtCone.mjCONE_ELLIPTIC),)
+    time, ratio = c.solref[0]
+    for share in (0.7, 0.5, 0.35, 0.25, 0.2, 0.15, 0.1):
+        if time > 0 and share * time >= 2 * c.timestep:
+            yield "solref", (_rounded(share * time), ratio)
+        elif time < 0:
+            yield "solref", (_rounded(time / share**2), _rounded(ratio / share))
+    if time < 0:
+        yield "solref", (time, _rounded(-2 * math.sqrt(-time)))  # damped critically
+    for impedance in (0.95, 0.98, 0.99, 0.995, 0.998, 0.999):
+        if c.solimp[0, 0] < impedance:
+            yield "solimp", (impedance, max(impedance, c.solimp[0, 1]))
+    for share in (0.7, 0.5, 0.35, 0.2, 0.1):
+        yield "timestep", (_rounded(share * c.timestep),)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.2g}")
+
+
+def apply(model: Any, option: str, value: Sequence[float]) -> None:
+    """Change one option of a model; those of contacts for all geoms and pairs that are softer."""
+    if option in ("impratio", "cone", "timestep"):
+        setattr(model.opt, option, value[0])
+    for kind in ("geom", "pair"):
+        if option == "solref":
+            own = model.geom_solref if kind == "geom" else model.pair_solref
+            own[own[:, 0] > value[0] if value[0] > 0 else own[:, 0] < 0] = value
+        elif option == "solimp":
+            own = model.geom_solimp if kind == "geom" else model.pair_solimp
+            own[:, :2] = np.maximum(own[:, :2], value)
+
+
+def _change(
+    model: Any, data: Any, c: Contacts, number: Array, harm: Callable[[Contacts], dict[str, Array]], pair: Pair
+) -> tuple[Change | None, dict[str, Array]]:
+    """The first option, in its mildest value, that makes all contacts good, or else the one that helps most.
+
+    Also the harm that is left then.
+    """
+    what = max(pair.harm, key=lambda name: pair.harm[name])
+    best, rest, least = None, harm(c), pair.harm[what] / 1.4
+    part = np.isin(np.arange(len(c.dim)), pair.members)
+    for option, value in _options(c.only(part)) if pair.harm[what] > 1 else ():
+        other, state = copy.copy(model), copy.copy(data)
+        apply(other, option, value)
+        mujoco.mj_fwdPosition(other, state)
+        changed = dataclasses.replace(c, **parameters(other, state, number))
+        harms = harm(changed)
+        left = max(float(each.max()) for each in harms.values())
+        if left < least:
+            effect = [_of(each, part, what) for each in (c, changed)]
+            least, rest, best = left, harms, Change(option, value, pair.name, what, *effect)
+        if left <= 1:
+            break
+    return best, rest
+
+
+def _of(c: Contacts, part: Array, quantity: str) -> float:
+    """Creep, depth, or another of `QUANTITIES`, at the worst of some contacts."""
+    if quantity in ("decay", "largest_step"):
+        return float(getattr(c.only(part), quantity)())
+    values = getattr(c.law(), quantity)[part]
+    return float(values.min() if quantity == "hover" else values.max())
+
+
+def _replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[str]:
+    """What the engine takes in the place of what the model says, for the contacts of one pair."""
+    asked, imp, limits = c.solref[0], c.solimp[0], (mujoco.mjMINIMP, mujoco.mjMAXIMP)
+    if (asked > 0).sum() == 1:
+        yield f"solref {asked[0]:g} {asked[1]:g} is of neither format: {SOLREF[0]:g} {SOLREF[1]:g} is taken"
+    for name in ("solref", "solreffriction"):
+        ref = getattr(c, name)
+        if (ref[0] > 0).all() and (taken := 2 / (c.reference(ref)[1][0] * np.clip(imp[1], *limits))) > 1.000001 * ref[
+            0, 0
+        ]:
+            yield f"{name} {ref[0, 0]:g} s is too short for the time step: {taken:.3g} s is taken (refsafe)"
+    if c.solreffriction.any() and c.pyramidal:
+        yield "solreffriction is ignored by the pyramidal cone"
+    if (clipped := np.clip(imp[:2], *limits) != imp[:2]).any():
+        yield f"impedance {imp[:2][clipped][0]:g} is outside {limits[0]:g} … {limits[1]:g}: the limit is taken"
+    for name, mixed in (("solref", asked), ("solimp", imp), ("friction", c.friction[0, [0, 2, 3]])):
+        own = getattr(model, f"geom_{name}")[c.geoms[0]]
+        if not np.allclose(own[0], own[1]):
+            first, second, taken = (" ".join(f"{v:g}" for v in each) for each in (*own, mixed))
+            yield f"{name} {first} ({names[c.geoms[0, 0]]}) and {second} ({names[c.geoms[0, 1]]}): {taken} is taken"
+
+
+def _advance(model: Any, data: Any) -> Array:
+    """Mean velocities of the bodies in a window, shape (nbody, 6): of the centre of mass, m/s, and turning, rad/s.
+
+    Raises `UnsettledError` if the model diverges.
+    """
+    mujoco.mj_forward(model, data)
+    place, axes, begin = data.xipos.copy(), data.xmat.reshape(-1, 3, 3).copy(), data.time
+    steps = max(WINDOW_STEPS, math.ceil(WINDOW / model.opt.timestep))
+    mujoco.mj_step(model, data, steps)
+    bad = [w for name in BAD if (w := data.warning[getattr(mujoco.mjtWarning, f"mjWARN_BAD{name}")]).number]
+    if bad:
+        body = _body(model, model.dof_bodyid[min(bad[0].lastinfo, model.nv - 1)])
+        raise UnsettledError(f"the model diverges before {begin + steps * model.opt.timestep:.3g} s, {body} first")
+    mujoco.mj_forward(model, data)
+    turn = data.xmat.reshape(-1, 3, 3) @ axes.transpose(0, 2, 1)
+    turned = np.column_stack([turn[:, i, j] - turn[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))]) / 2
+    mean: Array = np.hstack([data.xipos - place, turned]) / (steps * model.opt.timestep)
+    return mean
+
+
+def _body(model: Any, body: int) -> str:
+    return f"body {model.body(body).name or body!r}"
+
+
+def _radius(model: Any) -> Array:
+    """Of each body, m: that of its largest geom; infinite where none has a size."""
+    radius = np.zeros(model.nbody)
+    np.maximum.at(radius, model.geom_bodyid, model.geom_rbound)
+    return np.where(radius > 0, radius, np.inf)
+
+
+def tried(model: Any, data: Any, before: Forecast, limit: float, **good: Any) -> tuple[Forecast, Forecast]:
+    """The forecast with what was found after the advised change, and that of the changed model, settled anew."""
+    assert before.change
+    apply(model, before.change.option, before.change.value)
+    after = forecast(model, data, settle(model, data, limit), **good)
+    what = before.change.quantity
+    for pair in after.pairs:
+        if pair.name == before.change.pair:
+            found = getattr(pair, f"{what}_measured" if what in ("creep", "depth") else what)
+            before = dataclasses.replace(before, change=dataclasses.replace(before.change, found=found))
+    return before, after
+
+
+def sentences(f: Forecast) -> Iterator[str]:
+    """What to do, what was found when it was tried, and what else should be known, in words."""
+    sliding = [pair.name for pair in f.pairs if pair.slides]
+    if f.change:
+        name, factor, unit = QUANTITIES[f.change.quantity]
+        before, after, found = (f"{factor * v:.3g}" for v in (f.change.before, f.change.after, f.change.found))
+        done = "" if found == "nan" else f" Tried: {found} {unit}."
+        yield f"Set {f.change.written}: the {name} of {f.change.pair} goes from {before} to {after} {unit}.{done}"
+    if f.memory:
+        yield (
+            "No single option cures the creep. Step the model with mjsim.FrictionMemory(model).step(data): what holds "
+            "then stays where it is, and slips at the same force as before."
+        )
+    if sliding:
+        yield f"Friction is used up, so these slide: {_few(sliding)}. Only more friction or less load would hold them."
+    if f.moving:
+        yield f"Not settled, and left out: {_few(f.moving)}."
+    if not (f.change or f.memory or sliding):
+        yield "Nothing needs to change."
+    replaced: dict[str, list[str]] = {}
+    for pair in f.pairs:
+        for line in pair.replaced:
+            replaced.setdefault(line, []).append(pair.name)
+    for line, names in replaced.items():
+        yield f"MuJoCo replaces something at {_few(names)}: {line}."
+    if math.isfinite(f.largest_step):
+        yield f"The contacts are stable up to a step of {1e3 * f.largest_step:.3g} ms (now {1e3 * f.timestep:g} ms)."
+    yield from (f"{note}." for note in f.notes)
+
+
+def _few(names: Sequence[str]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+
+
+def rows(f: Forecast) -> list[list[str]]:
+    """The pairs as a table, its head first, the worst next; what was measured is called found."""
+
+    def number(value: float, factor: float = 1) -> str:
+        if not math.isfinite(value):
+            return "any" if math.isinf(value) else "–"
+        return f"{factor * value:.0f}" if abs(factor * value) >= 1e3 else f"{factor * value:.3g}"
+
+    head = ["pair", "load N", "depth µm", "found", "creep µm/s", "found", "mm/ min", "cone %", "hovers mm/s"]
+    table = [[*head, "dies out 1/s", "step ms"]]
+    for p in f.pairs[:SHOWN]:
+        micro = [number(v, 1e6) for v in (p.depth, p.depth_measured, p.creep, p.creep_measured)]
+        rest = number(p.creep_measured, 6e4), number(p.cone, 100), number(p.hover, 1e3), number(p.decay)
+        table.append([p.name, number(p.load), *micro, *rest, number(p.largest_step, 1e3)])
+    return table
+
+
+def title(f: Forecast) -> str:
+    """What the table holds."""
+    rest = f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else ""
+    return f"{len(f.pairs)} pair{'s' * (len(f.pairs) > 1)} in contact{rest}"
+
+
+def html(f: Forecast, after: Forecast | None, file: str) -> str:
+    """The forecast, and that after the change, as one self-contained page."""
+    tables = [(title(each), rows(each)) for each in (f, after) if each]
+    return pages.render("compare.bench", "forecast.html", file=file, tables=tables, sentences=list(sentences(f)))
