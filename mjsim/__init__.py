@@ -1,4 +1,4 @@
-"""The dual-point contact ball in MuJoCo; knows no solution of the problem."""
+"""The dual-point contact ball in MuJoCo, and a friction memory for any model; knows no solution of the problem."""
 
 import model
 
@@ -7,5 +7,6 @@ if not hasattr(model, "Parameters"):
 
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run, simulate, simulate_many
+from mjsim.memory import FrictionMemory
 
-__all__ = ["ContactSettings", "Run", "simulate", "simulate_many"]
+__all__ = ["ContactSettings", "FrictionMemory", "Run", "simulate", "simulate_many"]

@@ -1,0 +1,132 @@
+"""Friction that holds: what Coulomb's law says exactly of one body, on any MuJoCo model."""
+
+from __future__ import annotations
+
+import threading
+
+import mujoco
+import numpy as np
+import pytest
+
+from mjsim import FrictionMemory
+from mjsim.memory import edges
+from model import InputError
+
+G = 9.81
+BOX = '<geom type="box" size=".05 .05 .05" mass="1"/>'
+BALL = '<geom type="sphere" size=".05" mass="1"/>'
+CONES = pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+
+
+def scene(slope=0.0, mu=0.6, cone="elliptic", boxes=1, geom=BOX, option="", friction=".005 .0001", condim=3):
+    """Bodies one on top of the other on a plane that is tilted by `slope`, rad; gravity is turned instead."""
+    bodies = "".join(f'<body pos="0 0 {0.05 + 0.1 * i}"><freejoint/>{geom}</body>' for i in range(boxes))
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option cone="{cone}" gravity="{G * np.sin(slope)} 0 {-G * np.cos(slope)}" {option}/>'
+        f'<default><geom friction="{mu} {friction}" condim="{condim}"/></default>'
+        f'<worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
+    )
+    return model, mujoco.MjData(model)
+
+
+@CONES
+@pytest.mark.parametrize(
+    ("boxes", "option", "more"),
+    [
+        (1, "", {}),
+        (1, 'integrator="implicitfast"', {}),
+        (1, 'integrator="implicit" impratio="10"', {}),
+        (1, 'solver="CG"', {}),
+        (1, "", {"condim": 4}),
+        (1, "", {"condim": 6}),
+        (1, "", {"condim": 6, "friction": ".005 .02", "geom": BALL}),
+        (4, "", {}),
+    ],
+)
+def test_nothing_creeps(cone, boxes, option, more):
+    """Nothing moves inside the cone, nor a ball inside that of rolling friction, .02 m of a radius of .05 m.
+
+    What is left is the solver's: with its default tolerance, 1e-8, about 1e-12 m/s, with implicit integrators 1e-10.
+    """
+    model, data = scene(np.radians(10), cone=cone, boxes=boxes, option=f'tolerance="1e-14" {option}', **more)
+    memory = FrictionMemory(model)
+    memory.step(data, 1500)
+    place = data.xpos.copy()
+    memory.step(data, 500)
+    assert np.abs(data.xpos - place).max() < 1e-12  # in a second
+
+
+@CONES
+def test_breaks_away_at_the_limit(cone):
+    model, data = scene(cone=cone)
+    memory = FrictionMemory(model)
+    for share in [*np.linspace(0, 0.95, 500), *np.linspace(0.95, 1.05, 1000)]:
+        data.qfrc_applied[0] = share * 0.6 * G
+        memory.step(data)
+        if share > 0.97 and data.qvel[0] > 1e-5:
+            break
+    assert share == pytest.approx(1, abs=5e-3)
+
+
+@CONES
+def test_fast_sliding_is_the_engines_own(cone):
+    model, data = scene(np.radians(30), mu=0.3, cone=cone)
+    mujoco.mj_step(model, data, 100)
+    plain = mujoco.MjData(model)
+    mujoco.mj_copyData(plain, model, data)
+    FrictionMemory(model).step(data, 400)
+    mujoco.mj_step(model, plain, 400)
+    assert data.qpos == pytest.approx(plain.qpos, rel=1e-12)
+
+
+def test_states_threads_and_neighbours():
+    """Memories are independent, and one that is restored goes on to the bit."""
+    model, data = scene(np.radians(15), boxes=2)
+    memory = FrictionMemory(model)
+    memory.step(data, 60)
+    kept, copies = memory.state(), [mujoco.MjData(model) for _ in range(3)]
+    others = [FrictionMemory(model) for _ in copies]
+    for other, copied in zip(others, copies, strict=True):
+        mujoco.mj_copyData(copied, model, data)
+        other.restore(kept)
+    memory.step(data, 60)
+    threads = [threading.Thread(target=o.step, args=(c, 60)) for o, c in zip(others, copies, strict=True)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all((copied.qpos == data.qpos).all() for copied in copies)
+
+
+def test_what_is_refused():
+    model, _ = scene()
+    with pytest.raises(InputError, match="another MjModel"):
+        FrictionMemory(model).step(scene()[1])
+    for integrator in ("RK4", "discrete"):
+        with pytest.raises(InputError, match=f"integrator = {integrator.upper()} .* needs Euler"):
+            FrictionMemory(scene(option=f'integrator="{integrator}"')[0])
+
+
+@CONES
+@pytest.mark.parametrize(("condim", "solref"), [(1, (0.02, 1)), (3, (-1000, 0))])
+def test_contacts_without_friction_or_damping_are_left_alone(cone, condim, solref):
+    model, data = scene(0.1, cone=cone, condim=condim, geom=BALL)
+    model.geom_solref[:] = solref
+    plain = mujoco.MjData(model)
+    FrictionMemory(model).step(data, 300)
+    mujoco.mj_step(model, plain, 300)
+    assert data.qpos == pytest.approx(plain.qpos, rel=1e-12)
+
+
+def test_edges_bear_what_they_should():
+    """They are never negative, add up to the normal force, and give the row forces, as far as the cone goes."""
+    rng = np.random.default_rng(1)
+    friction, load = rng.uniform(0.1, 1, (50, 5)), rng.uniform(0.1, 9, 50)
+    own = np.arange(5) < rng.choice([2, 3, 5], 50)[:, None]
+    force = rng.normal(size=(50, 5)) * own * friction
+    force *= (load / (np.abs(force) / friction).sum(axis=1) * rng.uniform(0, 1, 50))[:, None]
+    mean = (load / (2 * own.sum(axis=1)))[:, None]
+    plus, minus = (np.where(own, side + mean, 0) for side in edges(force, load, friction, own))
+    assert min(plus.min(), minus.min()) > -1e-12
+    assert (plus + minus).sum(axis=1) == pytest.approx(load)
+    assert friction * (plus - minus) == pytest.approx(force)
