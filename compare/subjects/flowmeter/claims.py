@@ -9,7 +9,6 @@ import numpy as np
 
 import analytic
 from analytic.flowmeter import design
-from analytic.stationary import solutions as stationary
 from compare.claim import Bearing, Claim, Text, When, every, given, one
 from compare.judge import simulated, theory
 from compare.kit.check import Relation
@@ -149,12 +148,6 @@ def _at_most(m: Measurement) -> float:
     return design.threshold_spread(list(design.corners(m.parameters.replace, _values(m), TOLERANCES)))[m.quantity][1]
 
 
-def _decay(constant: Callable[[Measurement], float], by: str, *cases: Case) -> Bearing:
-    """The slowest decay in some cases, by a time constant."""
-    when = every(given(mode=1), lambda m: Case[str(m.conditions["case"])] in cases and m.parameters.drag != QUADRATIC)
-    return Bearing("rates", "decay_rate", lambda m: 1 / constant(m), when=when, by=f"analytic: {by}")
-
-
 def _between(m: Measurement) -> float:
     """The reading of a rising or falling flow, from the design's characteristic curve."""
     low, high = design.readings(m.parameters, m.parameters.omega_0)
@@ -266,18 +259,15 @@ CLAIMS = (
     ),
     Claim(
         "time-constants",
-        "Props. 1, 2, 4, section 5.2",
-        "The slowest disturbance of a motion dies out with its slowest time constant; of rolling, with "
-        "that of a design.",
+        "Prop. 1, section 5.2",
+        "The slowest disturbance of rolling dies out with the response time of a design.",
         (
-            _decay(lambda m: design.response_time(m.parameters), "design.response_time", Case.RR),
-            _decay(
-                lambda m: stationary.slowest_time_constant(
-                    theory(stationary.solution, m.parameters, Case[str(m.conditions["case"])])
-                ),
-                "solutions.slowest_time_constant",
-                Case.RR,
-                Case.SS,
+            Bearing(
+                "rates",
+                "slowest_decay",
+                lambda m: 1 / design.response_time(m.parameters),
+                when=every(given(case="RR"), lambda m: m.parameters.drag != QUADRATIC),
+                by="analytic.flowmeter.design.response_time",
             ),
         ),
     ),

@@ -42,7 +42,7 @@ def _mode(m: Measurement, eigenvalues: Callable[[Measurement], Iterable[complex]
     """The eigenvalue that belongs to a measured one: each to one, in the order of frequency and decay."""
     values = [complex(v) for v in eigenvalues(m)]
     real = 1e-9 * max(map(abs, values))  # round-off in the imaginary part of one that is real
-    upper = sorted((v.imag if v.imag > real else 0.0, -v.real) for v in values if v.imag > -real)
+    upper = sorted((v.imag if v.imag > real else 0.0, -v.real) for v in values if v.imag >= -real)
     if not (mode := int(m.conditions["mode"])) <= len(upper):
         raise LookupError(f"theory has {len(upper)} modes")
     frequency, decay = upper[mode - 1]

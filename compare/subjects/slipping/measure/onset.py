@@ -129,9 +129,8 @@ def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
         if line.bent:
             zero, slope = zero_and_slope(q, gamma, noise)
         else:
-            # The points share their errors: that of their mean, and so of the zero, is no smaller; the slope has none.
-            _, slope = straight_line(q, gamma, noise)
-            zero, _ = straight_line(q, gamma, noise * math.sqrt(len(q)))
+            # The points share causes of errors: more of them make neither zero nor slope surer.
+            zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
         growth = f"growth of slip {slips}, {push.start.name},"
         if abs(zero.value) <= BEYOND * np.abs(q).max():
             yield if_found(push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")

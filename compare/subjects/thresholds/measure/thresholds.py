@@ -222,7 +222,8 @@ def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
 def stays_rolling(run: Trajectory) -> bool | None:
     """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip still dies out.
 
-    Slip dies out that has fallen below 0.6 of what it was in the second half; a hundredth of what counts is none.
+    Slip dies out that has fallen below 0.6 of what it was in the second half (moved from 0.9 after results had been
+    seen); a hundredth of what counts is none.
     """
     if not presses(run):
         return False
