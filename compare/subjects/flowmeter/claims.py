@@ -15,7 +15,7 @@ from compare.kit.check import Relation
 from compare.kit.record import Measurement, state
 from compare.kit.settling import family
 from compare.kit.statistics import Measured
-from compare.settled import cases, detected, from_floor, is_in, lasting, lifts_first, natural_size, slips_first
+from compare.settled import cases, detected, from_floor, is_in, lasting, lifts_first, natural_size, reached, slips_first
 from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
 from model import Case, Contact, Trajectory
 from model.drag import QUADRATIC, STOKES
@@ -43,19 +43,20 @@ def _only_rolling(m: Measurement) -> float:
     if m.parameters.omega_0 < analytic.operating_range(m.parameters):
         return float(Case.RR)
     # The start from which it shows that the range has ended: the ball slips on the floor, or stays on the wall.
-    if m.conditions["start"] == ("rest" if slips_first(m) else "on the wall") and detected(m) is Case.RR:
+    ended = m.conditions["start"] == ("rest" if slips_first(m) else "on the wall")
+    if detected(m) not in cases(m.parameters) - ({Case.RR} if ended else set()):
         raise LookupError("beyond the range, rolling is not the only motion that lasts")
     return m.value
 
 
 def _reads_flow(m: Measurement) -> float:
-    """omega_0 within the reading range; beyond it, less on the floor."""
+    """omega_0 within the reading range; beyond it, that of slipping on the floor, which is less."""
     p = m.parameters
     if p.omega_0 < analytic.reading_range(p) or detected(m) is Case.NR:
         return p.omega_0
-    if m.value > p.omega_0 - 3 * m.uncertainty:
+    if (reads := float(reached(m).state.omega_c)) >= p.omega_0:
         raise LookupError("beyond the range a ball on the floor lags")
-    return m.value
+    return reads
 
 
 def _unloads(m: Measurement) -> float:
