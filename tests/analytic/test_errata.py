@@ -30,6 +30,45 @@ def test_table_1_drag() -> None:
     assert Parameters.__dataclass_fields__["c"].metadata["unit"] == "s-1"
 
 
+def test_section_1_1() -> None:
+    """In a fluid at rest a ball may spin on the spot away from the wall: nothing moves, and the floor alone presses."""
+    x = [0.0, 0.0, 0.0, 0.0, 30.0, 0.0, 0.02, 0.0]
+    still = P.replace(omega_0=0.0)
+    np.testing.assert_array_equal(vector_field(Case.RN, x, still), np.zeros(8))
+    F_A, F_B = contact_forces(Case.RN, x, still)
+    np.testing.assert_array_equal([F_A, F_B], [[0.0, P.m * P.g, 0.0], [0.0] * 3])
+
+
+def test_section_1_3() -> None:
+    """Steel in water by (10)."""
+    water = {"nu_f": 1.004e-6, "rho_f": 998.2, "rho_b": 7850.0, "R": 0.025, "mu": 0.2, "eta": 0.2}
+    assert Parameters.from_fluid(r=2e-3, **water).c == pytest.approx(0.144, abs=1e-3)
+    assert Parameters.from_fluid(r=7.5e-3, **water).c == pytest.approx(1e-2, rel=0.03)
+
+
+def test_section_5_1() -> None:
+    """eta_cr mu^2 = c^2 R/(4 g) isn't below 1e-6, and eta_cr may be above eta."""
+    steel = Parameters.named("steel-in-water")
+    small = Parameters.from_fluid(nu_f=1.004e-6, rho_f=998.2, rho_b=7850.0, r=2e-3, R=0.025, mu=0.2, eta=0.2)
+    plastic = Parameters.named("plastic-in-oil")
+    values = [thresholds(p).eta_cr * p.mu**2 for p in (steel, small, plastic)]
+    assert values == pytest.approx([3.9e-7, 1.5e-5, 2.0e-2], rel=0.03)
+    assert thresholds(plastic).eta_cr > 0.87 > plastic.eta
+
+
+def test_equation_40() -> None:
+    """Where cos alpha < 0 the spin can't be steady about both the radius and the tangent: (45), rows 4 and 5."""
+    for omega_c in np.geomspace(0.5, 60.0, 15):
+        for alpha in np.linspace(0.5 * np.pi, 1.5 * np.pi, 99)[1:-1]:
+            unit = [0.0, 0.0, omega_c, np.sin(alpha), 0.0, np.cos(alpha), 0.0, 0.0]
+            F_A, F_B = contact_forces(Case.SS, unit, P)  # they depend on the directions of slip alone
+            slip_z = -F_A[2] / (P.j * P.m * P.r * omega_c)
+            size = slip_z / np.cos(alpha)
+            if F_A[1] >= 0 and F_B[0] >= 0 and size > 0:
+                turning = P.R / P.r * omega_c**2 + omega_c * size * np.sin(alpha)
+                assert turning + (F_A[0] - F_B[1]) / (P.j * P.m * P.r) > 0
+
+
 def test_equation_6() -> None:
     x = states()
     v_A, _ = slip_velocities(x, P)
