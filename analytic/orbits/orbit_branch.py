@@ -16,7 +16,18 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic.orbits.periodic import Changes, Loop, NoOrbitError, Orbit, close, closed, defect_jacobian, extent, lands
+from analytic.orbits.periodic import (
+    RESTITUTION,
+    Changes,
+    Loop,
+    NoOrbitError,
+    Orbit,
+    close,
+    closed,
+    defect_jacobian,
+    extent,
+    lands,
+)
 from model import InputError, Parameters, State
 from model.arrays import Array
 from model.parameters import check_names, check_number
@@ -77,7 +88,7 @@ class OrbitBranch:
     """Orbits along a branch, from one end to the other."""
 
     name: str
-    """The parameter that varies."""
+    """The parameter that varies, or `RESTITUTION`."""
     orbits: tuple[Orbit, ...]
     places: tuple[Place, ...]
     """Where something happens, in order; the first and the last are its ends."""
@@ -85,7 +96,7 @@ class OrbitBranch:
     @property
     def values(self) -> Array:
         """The parameter at the orbits, SI, shape (n,)."""
-        return np.array([getattr(orbit.p, self.name) for orbit in self.orbits])
+        return np.array([orbit.loop.value(self.name) for orbit in self.orbits])
 
     @property
     def stable(self) -> npt.NDArray[np.bool_]:
@@ -98,9 +109,9 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
 
     Raises `InputError` if there is no such parameter, or the orbit isn't within the range.
     """
-    check_names([name], [field.name for field in Parameters.quantities()], "parameter")
+    check_names([name], [*(field.name for field in Parameters.quantities()), RESTITUTION], "parameter")
     low, high = check_number(f"lowest {name}", low, "SI"), check_number(f"highest {name}", high, "SI")
-    if not low <= (value := getattr(start.p, name)) <= high or value == 0:
+    if not low <= (value := start.loop.value(name)) <= high or value == 0:
         raise InputError(f"{name} = {value:g} of the orbit is out of range: must be within {low:g} … {high:g}, not 0")
     down, up = ([*_way(start, name, (low, high), sign, most)] for sign in (-1.0, 1.0))
     every: list[Orbit | Place] = [*down[::-1], start, *up]
@@ -119,7 +130,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
         try:
             matrix = defect_jacobian(here.loop, here.derivative, name)
         except NoOrbitError as error:
-            yield Place(Bifurcation.LOST, getattr(here.p, name), here, str(error))
+            yield Place(Bifurcation.LOST, here.loop.value(name), here, str(error))
             return
         tangent = np.linalg.svd(matrix)[2][-1]
         along = tangent if tangent @ along >= 0 else -tangent
@@ -130,18 +141,19 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
             except NoOrbitError as error:
                 step, reason = step / 2, str(error)
         if there is None:
-            yield Place(Bifurcation.LOST, getattr(here.p, name), here, reason)
+            yield Place(Bifurcation.LOST, here.loop.value(name), here, reason)
             return
         met = _between(here, there, step * along, name, matrix)
         yield from (place for place in met if span[0] <= place.value <= span[1])
-        if not span[0] <= getattr(there.p, name) <= span[1]:
+        if not span[0] <= there.loop.value(name) <= span[1]:
             # The orbit where the branch leaves the range, between the last within it and the first outside.
-            inside, outside = getattr(here.p, name), getattr(there.p, name)
+            inside, outside = here.loop.value(name), there.loop.value(name)
             value = min(max(outside, span[0]), span[1])
             share = (value - inside) / (outside - inside)
-            x, period = (a + share * (b - a) for a, b in ((here.loop.x, there.loop.x), (here.period, there.period)))
+            x, period = here.loop.x + share * (there.loop.x - here.loop.x), (1 - share) * here.period
             try:
-                orbit = close(replace(here.loop, p=here.p.replace(**{name: value}), x=x, period=period))
+                loop = here.loop.with_value(name, value)
+                orbit = close(replace(loop, x=x, period=period + share * there.period))
             except NoOrbitError as error:
                 yield Place(Bifurcation.LOST, inside, here, str(error))
             else:
@@ -153,7 +165,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
         if State.of(there.loop.x).y > 0:
             here = replace(there, loop=replace(there.loop, extent=extent(there.cycle)))
         else:
-            here = close(Loop.of(there.p, there.loop.x, there.period))
+            here = close(Loop.of(there.p, there.loop.x, there.period, there.loop.restitution))
             if (here.loop.case, here.loop.fixed) != (there.loop.case, there.loop.fixed):
                 # The section is another: the parameter alone says which way the branch goes on.
                 along = np.append(np.zeros(len(here.loop.free)), along[-1])
@@ -162,10 +174,10 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
             # The extent will be zero where a parabola through the last three orbits says.
             last, (kind, power) = before[-3:], (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2)
             sizes = np.array([each.loop.extent for each in last]) ** power
-            values = np.array([getattr(each.p, name) for each in last])
+            values = np.array([each.loop.value(name) for each in last])
             yield Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), here)
             return
-    yield Place(Bifurcation.LOST, getattr(here.p, name), here, f"not followed beyond {most} orbits")
+    yield Place(Bifurcation.LOST, here.loop.value(name), here, f"not followed beyond {most} orbits")
 
 
 def _beside(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
@@ -190,7 +202,7 @@ def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -
             orbit = _beside(here, brentq(test, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix)
         except (NoOrbitError, ValueError):  # where the sequence of cases changes, too, the test may jump
             orbit = there
-        yield Place(kind, getattr(orbit.p, name), orbit)
+        yield Place(kind, orbit.loop.value(name), orbit)
     before = _sequence(here.changes)
     if before == _sequence(there.changes):
         return
@@ -211,7 +223,7 @@ def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -
     except NoOrbitError:  # disturbances there land where others don't
         nearest = there
     kind = Bifurcation.PERSISTENCE if _landings(here.changes) == _landings(there.changes) else Bifurcation.GRAZING
-    yield Place(kind, getattr(loop.p, name), nearest)
+    yield Place(kind, loop.value(name), nearest)
 
 
 def _sequence(changes: Changes) -> Changes:

@@ -21,7 +21,7 @@ from scipy.integrate import solve_ivp
 
 from analytic.mechanics import dynamics
 from analytic.simulation.motion import natural_units
-from analytic.simulation.simulator import simulate
+from analytic.simulation.simulator import Settings, simulate
 from model import Case, Contact, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -37,6 +37,8 @@ ITERATIONS = 8
 """Steps of Newton's method after which an orbit is given up."""
 FAST = 10.0
 """Factor by which a step must reduce the defect for the derivatives of a neighbour to be used once more."""
+RESTITUTION = "restitution"
+"""What an orbit may be followed in beside parameters."""
 ORBIT_SAMPLES = 4000
 """Samples of a period from which means and extremes are taken: a parabola's top is then good to 1e-6 of its height."""
 
@@ -70,21 +72,23 @@ class Loop:
     """Index of the variable that has one value on the section."""
     extent: float
     """Of the motion in natural units: the largest range of a variable over a period."""
+    restitution: float = 0.0
+    """Of landings, as in `Settings`."""
 
     @classmethod
-    def of(cls, p: Parameters, x: npt.ArrayLike, period: float) -> Loop:
+    def of(cls, p: Parameters, x: npt.ArrayLike, period: float, restitution: float = 0.0) -> Loop:
         """A good section of a motion that passes a state (6 or 8 entries) and has about this period, s.
 
         Of a ball that hops the top of its highest hop, v_y = 0. On the floor, within the middle half of the longest
         stretch in one case other than RR, where the case's fastest variable is fastest, in natural units.
         """
-        run = _simulated(p, x, 2 * period, ORBIT_SAMPLES)
+        run = _simulated(p, x, 2 * period, ORBIT_SAMPLES, restitution)
         size, y = extent(run), run.y
         tops = 1 + np.flatnonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:]))
         if len(tops):
             top = int(tops[np.argmax(y[tops])])
             state = State.of(run.x[top])._replace(v_y=0.0)
-            return cls(p, run.cases[top], state.stacked(), period, VARIABLES.index("v_y"), size)
+            return cls(p, run.cases[top], state.stacked(), period, VARIABLES.index("v_y"), size, restitution)
         stretches = [each for each in run.phases() if each[0] is not Case.RR]
         if not stretches:
             raise NoOrbitError(f"the ball rolls at both points all the time (period {period:g} s)")
@@ -93,7 +97,19 @@ class Loop:
         rates = np.abs([dynamics.rates(case, z, p, p.omega_0) for z in run.x[inner].tolist()]) / scale(p)
         active = _active(case)
         at, fixed = np.unravel_index(np.argmax(rates[:, active]), (len(rates), len(active)))
-        return cls(p, case, run.x[inner][at], period, active[int(fixed)], size)
+        return cls(p, case, run.x[inner][at], period, active[int(fixed)], size, restitution)
+
+    def value(self, name: str) -> float:
+        """A parameter, or the coefficient of restitution."""
+        return self.restitution if name == RESTITUTION else float(getattr(self.p, name))
+
+    def with_value(self, name: str, value: float) -> Loop:
+        """The same with another value of a parameter, or of the coefficient of restitution."""
+        return (
+            replace(self, restitution=value)
+            if name == RESTITUTION
+            else replace(self, p=self.p.replace(**{name: value}))
+        )
 
     @property
     def free(self) -> list[int]:
@@ -109,16 +125,15 @@ class Loop:
 
         Raises `NoOrbitError` where that leads out of the range of the parameter.
         """
-        p, x = self.p, self.x.copy()
-        x[self.free] += by[: len(self.free)] * scale(p)[self.free]
+        x = self.x.copy()
+        x[self.free] += by[: len(self.free)] * scale(self.p)[self.free]
         if self.case is Case.RN:
-            x = State.of(x)._replace(slip_z=-State.of(x).v_h / p.r).stacked()
-        if varied:
-            try:
-                p = p.replace(**{varied: getattr(p, varied) * math.exp(by[-1])})
-            except InputError as error:
-                raise NoOrbitError(str(error)) from error
-        return replace(self, p=p, x=x)
+            x = State.of(x)._replace(slip_z=-State.of(x).v_h / self.p.r).stacked()
+        moved = replace(self, x=x)
+        try:
+            return moved.with_value(varied, self.value(varied) * math.exp(by[-1])) if varied else moved
+        except InputError as error:
+            raise NoOrbitError(str(error)) from error
 
     def back(self) -> Return:
         """The motion up to its return to the section; `NoOrbitError` if it doesn't come back.
@@ -130,7 +145,8 @@ class Loop:
         def rates(t: float, z: Array) -> list[float]:
             return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))
 
-        run, tolerance = _simulated(self.p, self.x, self.period, 1), RETURN_RTOL * scale(self.p)
+        run = _simulated(self.p, self.x, self.period, 1, self.restitution)
+        tolerance = RETURN_RTOL * scale(self.p)
         if run.cases[-1] is not self.case:
             raise NoOrbitError(f"after {self.period:g} s the ball is in {run.cases[-1].name}, not in {self.case.name}")
         x, late = run.x[-1], 0.0
@@ -211,7 +227,7 @@ class Orbit:
     @cached_property
     def cycle(self) -> Trajectory:
         """One period, `ORBIT_SAMPLES` equal parts of it."""
-        return _simulated(self.p, self.loop.x, self.period, ORBIT_SAMPLES)
+        return _simulated(self.p, self.loop.x, self.period, ORBIT_SAMPLES, self.loop.restitution)
 
     @property
     def mean(self) -> Array:
@@ -221,15 +237,15 @@ class Orbit:
         return mean
 
 
-def refine(p: Parameters, x: npt.ArrayLike, period: float) -> Orbit:
+def refine(p: Parameters, x: npt.ArrayLike, period: float, restitution: float = 0.0) -> Orbit:
     """The closed orbit near a state x (6 or 8 entries) with about this period, s, by Newton's method.
 
-    The guess may be off by some percent of the orbit.
+    `restitution` as in `Settings`. The guess may be off by some percent of the orbit.
 
     Raises `NoOrbitError` if Newton's method does not converge to `CLOSED` within `ITERATIONS` steps, or the ball
     doesn't come back from beside the orbit, so that the return map has no derivative.
     """
-    return close(Loop.of(p, x, period))
+    return close(Loop.of(p, x, period, restitution))
 
 
 def close(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> Orbit:
@@ -279,10 +295,11 @@ def scale(p: Parameters) -> Array:
     return np.array([p.R, speed, 1 / time, spin, spin, spin, p.R, speed])
 
 
-def _simulated(p: Parameters, x: npt.ArrayLike, duration: float, samples: int) -> Trajectory:
+def _simulated(p: Parameters, x: npt.ArrayLike, duration: float, samples: int, restitution: float) -> Trajectory:
     """The motion from a state; `NoOrbitError` if it breaks down or can't begin."""
     try:
-        return simulate(p, x, duration, sample_interval=duration / samples, rtol=RETURN_RTOL)
+        settings = Settings(rtol=RETURN_RTOL, restitution=restitution)
+        return simulate(p, x, duration, None, settings, sample_interval=duration / samples)
     except (SimulationError, InputError) as error:
         raise NoOrbitError(f"no motion for {duration:g} s: {error}") from error
 

@@ -280,6 +280,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
 _FAULTS_OF_ATTRACTORS: dict[str, dict[str, Fault]] = {
     "orbits.periodic.refine": {
         "a swing with 0.1 % more floor friction": where(lambda p: p.mu > 1, given(other(mu=1.001))),
+        "hops without restitution": lambda right: lambda p, x, period, restitution=0.0: right(p, x, period),
         "Floquet multipliers of two periods": answer(fields(derivative=lambda derivative: derivative @ derivative)),
     },
     "bifurcation.diagram.thresholds": {

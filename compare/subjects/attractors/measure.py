@@ -3,6 +3,7 @@
 * A ball hops while the flow is lowered in held steps. The tops of its hops give period, height, orbit, and by what
   factor disturbances shrink from hop to hop; the flow at which hops would have no height is extrapolated.
 * The hop is followed along rougher walls to where disturbances grow; on both sides of that wall balls are left alone.
+* Balls that rebound from floor and wall hop, too: they are followed from one coefficient of restitution to the next.
 * A ball swings beside a Hopf point: it slips at both points, and goes round now faster and now slower.
 * Balls in strong drag are followed until drag has had its time: do they go on hopping?
 * On floors so rough (mu > 1) that forces allow rolling and slipping both: what does the ball settle to?
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +45,11 @@ SAMPLE = 1e-3
 WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
 """Friction of the walls along which the hop is followed, in units of that of the set. The first steps are short, as the
 start is extrapolated from one or two hops, and few balls beside a hop come to it."""
+REBOUNDS = tuple(round(0.04 * k, 2) for k in range(18))
+"""Coefficients of restitution along which it is followed."""
+LONG, LEFT, FINER = (0.0, 0.2, 0.4, 0.48), 20.0, 40
+"""Those at which a ball is left alone, as at the first at which it hops no more; for how long, s; and time steps in one
+of `coarse_step`. With steps so long the smallest hops, beyond 0.5, may end early."""
 NEAR = 4
 """The last walls, among which disturbances come to grow."""
 FOLLOWED, ALONE = 10.0, 60.0
@@ -203,6 +210,36 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     yield from _left_alone(lab, "followed", SET, again)
 
 
+def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Whether balls that rebound hop on, followed from one coefficient of restitution to the next.
+
+    By time stepping: MuJoCo's contacts have no such coefficient.
+    """
+    p, states = Parameters.named(SET), [TOP.stacked()]
+
+    def task(x: Array, lasts: float, restitution: float) -> Task:
+        step = coarse_step(p) / FINER
+        settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
+        return replace(lab.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings)
+
+    for k, e in enumerate(REBOUNDS):
+        # The first of them are so close that the last hop of one begins the next.
+        ahead = states[-1] if k < 2 else 2 * states[-1] - states[-2]
+        (run,) = lab.run([task(ahead, LAST, e)])
+        if hops(run):
+            last = tops(run, 0.0, LAST)
+            states.append(last.x[-1])
+        elif not k:
+            yield Missing("rebounding", SET, "the ball does not hop")
+            return
+        if not hops(run) or e in LONG:
+            (run,) = lab.run([alone := task(states[-1], LEFT, e)])
+            at = last.conditions(p) | {"restitution": e, "duration": LEFT}
+            yield measurement(lab, "rebounding", SET, p, "hops", hops(run), [alone], **at)
+            if not hops(run):
+                return
+
+
 def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured:
     """The wall at which disturbances neither grow nor shrink, by lines through eta (n,) and factors (n, 3).
 
@@ -284,6 +321,7 @@ PROTOCOLS = (
     Protocol("stepped", stepped, engine=MOREAU, alone=_HOPS, first=True),
     Protocol("choice", choice, alone="the choice is that of sets of its own with mu > 1", first=True),
     Protocol("followed", followed, level=Level.DEFAULT, alone=_HOPS),
+    Protocol("rebounding", rebounding, engine=MOREAU, level=Level.DEFAULT, alone=_HOPS),
     Protocol(
         "swing", swing, level=Level.DEFAULT, alone="swings that last are those of reference on a very rough floor"
     ),
