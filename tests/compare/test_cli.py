@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -21,6 +22,8 @@ from compare.kit.sweep import FIELDS
 from mjsim import ContactSettings
 from model import Parameters, Trajectory, storage
 from model.trajectory import columns
+
+ROOT = Path(cli.__file__).parents[2]
 
 
 def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
@@ -70,10 +73,16 @@ def test_predict_doubts_the_model_before_any_threshold(capsys: pytest.CaptureFix
     assert list(printed).index("model_holds") < list(printed).index("thresholds")
 
 
+def test_the_first_lines_of_the_readme_print_what_it_says(capsys: pytest.CaptureFixture[str]) -> None:
+    code, printed = re.findall(r"```(?:python)?\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)[:2]
+    exec(code, {})
+    assert capsys.readouterr().out == printed
+
+
 @pytest.mark.parametrize("package", ["analytic", "mjsim", "compare"])
 def test_a_foreign_model_is_named(tmp_path: Path, package: str) -> None:
     (tmp_path / "model.py").touch()
-    where = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{Path(cli.__file__).parents[2]}"}
+    where = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
     command = [sys.executable, "-c", f"import {package}"]
     failed = subprocess.run(command, env=where, cwd=tmp_path, capture_output=True, text=True)
     last = failed.stderr.splitlines()[-1]
