@@ -123,7 +123,8 @@ def line(verdict: Verdict) -> Text:
 def summary(verdicts: Sequence[Verdict]) -> Text:
     """How many claims and numbers came out how."""
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
-    return Text("; ".join([wording.headline(ran), *map(" ".join, wording.totals(ran))]), "bold")
+    said = "; ".join([wording.headline(ran), *map(" ".join, wording.totals(ran))])
+    return Text(f"{said}. {wording.missing(ran)}".strip(), "bold")
 
 
 def checks(verdict: Verdict) -> Table:

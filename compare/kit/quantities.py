@@ -102,7 +102,7 @@ _ALL = (
     Quantity("swing_omega_c", "mean ω_c of a swing", "rad s-1", 1e-5),
     Quantity("swing_size", "swing of ω_c", "rad s-1", 2e-2),
     Quantity("lift", "height of a lifted ball", "m", 5e-2),
-    Quantity("gain", "ω_c over ω₀", "1", 5e-3),
+    Quantity("gain", "ω_c/ω₀", "1", 5e-3),
     Quantity("phase_lag", "phase lag", "rad", 5e-3),
     Quantity("slip_amplitude", "amplitude at which slip begins", "rad s-1", 1e-2),
     Quantity("mean_error", "mean of ω_c − ω₀", "rad s-1", 2e-2),

@@ -127,9 +127,10 @@ def curve(
     text: str = "",
     place: Place | None = None,
     line: Line = STABLE,
+    width: float = 2,
 ) -> None:
     """A line of theory (n,) in the colour of its case, where y is a number, and its name if that has a place."""
-    axes.plot(x, y, color=COLOURS[case], ls=line, lw=2)
+    axes.plot(x, y, color=COLOURS[case], ls=line, lw=width)
     if place:
         points, (at, offset) = np.transpose([x, y]), place
         steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))

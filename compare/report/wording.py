@@ -108,16 +108,21 @@ def headline(ran: Sequence[Verdict]) -> str:
     return "The paper and the engine agree: " + ", ".join(f"{n} {name}" for name, n in counts.most_common())
 
 
+def missing(ran: Sequence[Verdict]) -> str:
+    """What the verdicts don't rest on, and what follows, in a sentence; empty if nothing is missing."""
+    coarse = sum(not check.conclusive for verdict in ran for check in verdict.checks)
+    left_out = sum(each.rows for each in {each for verdict in ran for each in verdict.missing})
+    parts = [f"{coarse} of these numbers are too coarse to tell"] * (coarse > 0)
+    parts += [f"{left_out} more could not be measured, each for a reason that is given"] * (left_out > 0)
+    return f"{' and '.join(parts)}: an error of theory there alone would go unnoticed." if parts else ""
+
+
 def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """How many claims and numbers came out how: counts with what they count."""
     checks = [check for verdict in ran for check in verdict.checks]
-    left_out = sum(each.rows for each in {each for verdict in ran for each in verdict.missing})
-    measured = len({id(check.measurement) for check in checks})
     counts = [
         (f"{sum(verdict.passed for verdict in ran)}/{len(ran)}", "claims as expected"),
         (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance"),
-        (f"{sum(check.conclusive for check in checks)}/{len(checks)}", "numbers fine enough to tell"),
-        (f"{left_out}/{left_out + measured}", "measurements left out, each with a reason"),
     ]
     if corrected := sum(v.passed and v.claim.text is Text.CORRECTED for v in ran):
         counts.append((str(corrected), "claims confirmed in a corrected form, see the errata"))

@@ -205,7 +205,7 @@ def test_deviations_are_drawn_over_tolerance() -> None:
 def test_the_fall_shows_cases_and_impact() -> None:
     figure = FIGURES["unloading"].draw(FIGURES["unloading"].select(Material()))
     assert {"NR", "NS", "SR", "RR"} <= {text.get_text() for text in figure.axes[0].texts}
-    assert {"$v_y$ (m/s)", "gap (µm)"} <= {axes.get_ylabel() for axes in figure.axes}
+    assert {"$v_y$ (µm/s)", "gap (µm)"} <= {axes.get_ylabel() for axes in figure.axes}
 
 
 def test_a_fall_that_did_not_happen_is_a_gap() -> None:

@@ -168,6 +168,8 @@ def test_verdicts_are_said_alike_in_the_terminal_and_on_the_page(page: Path) -> 
             assert found in row(text, verdict.claim.id)
     summary = validate.summary(VERDICTS).plain
     assert wording.headline(RAN) in summary
+    assert wording.missing(RAN) in summary
+    assert wording.missing(RAN) in text
     for count, what in wording.totals(RAN):
         assert f"{count} {what}" in summary
         assert f"<b>{count}</b>{what}" in text

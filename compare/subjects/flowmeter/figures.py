@@ -94,7 +94,7 @@ def caption_figure_13(of: Diagram) -> str:
         "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where the flow came from "
         "(arrows)."
         if of.p.eta < of.p.j
-        else "The curves of RR, SR and NR lie on one line and are drawn side by side, joined by dots where they begin. "
+        else "The curves of RR, SR and NR lie on one line: the widest is NR, the narrowest RR. "
         "Black dot: where a ball that is carried by the wall drops when the flow falls, see the figure of its fall."
     )
     return style.caption(of.p, "Characteristic curve of the flowmeter.", text, "Dashed: unstable.", states=of.states)
@@ -115,10 +115,18 @@ def draw_figure_13(of: Diagram) -> Figure:
             style.points(axes, [m for m in of.states if m.conditions.get("side") == side], way=text, marker=mark)
         style.points(axes, [m for m in of.states if m.protocol == "edge"], way=", edge", ms=3.5)
     else:
-        lifts = {case: 0.045 * top * k for k, case in enumerate(("RR", "SR", "NR"))}
-        _theory(axes, p, top, lifts["SR"])
-        own = [m for m in of.states if m.conditions["case"] in lifts]
-        style.points(axes, own, y=lambda m: m.value + lifts[str(m.conditions["case"])])
+        t = bifurcation.thresholds(p)
+        for case, ends, width, line, at in (
+            (Case.NR, (t.omega_02, top), 9, style.STABLE, (0.75, (12, -12))),
+            (Case.SR, (t.omega_03, top), 5, style.STABLE, (0.4, (-12, 12))),
+            (Case.SR, (t.omega_02, t.omega_03), 5, (0, (1.5, 0.8)), (0.1, (-30, 20))),
+            (Case.RR, (0.0, t.omega_03), 2, style.STABLE, (0.45, (-5, 5))),
+        ):
+            text = case.name if line == style.STABLE else f"{case.name}, unstable"
+            style.curve(axes, case, ends, ends, text, at, line, width)
+        axes.plot([t.omega_02], [t.omega_02], **style.POINT)
+        style.points(axes, [m for m in of.states if m.conditions["case"] in ("RR", "SR", "NR")], ms=4)
+        style.guides(axes, {"omega_02": t.omega_02, "omega_03": t.omega_03})
     axes.set(xlim=(0, top), ylim=(0, 1.15 * top), ylabel=style.OMEGA_C, xlabel=style.OMEGA_0)
     style.legend(axes, loc="upper left")
     style.dimensionless(axes, p, style.FREE_0, style.FREE_C)
@@ -131,28 +139,16 @@ def _top(p: Parameters) -> float:
     return 1.25 * t.omega_04 if p.eta < p.j else 1.6 * t.omega_03
 
 
-def _theory(axes: Axes, p: Parameters, fastest: float, apart: float = 0.0) -> bifurcation.Thresholds:
-    """All solutions up to the fastest flow, and the thresholds; for eta > j lines that are one are drawn `apart`."""
+def _theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
+    """All solutions up to the fastest flow, and the thresholds; for eta > j RR, SR and NR are one line."""
     t = bifurcation.thresholds(p)
     folds = p.eta < p.j
     rolls, rides = (t.omega_01, t.omega_02) if folds else (t.omega_03, t.omega_03)
 
-    def line(case: Case, begin: float, end: float, text: str, at: float, lift: float = 0.0, side: int = 1) -> None:
-        style.curve(axes, case, [begin, end], [begin + lift, end + lift], text, (at, (-5 * side, 5 * side)))
-
-    line(Case.RR, 0.0, rolls, "RR", 0.45)
+    for case, ends, text, at in ((Case.RR, (0.0, rolls), "RR", 0.45), (Case.SR, (rides, fastest), "SR, NR", 0.7)):
+        style.curve(axes, case, ends, ends, text, (at, (-5, 5)))
     if folds:
         slipping(axes, p, lambda _, omega_c: omega_c, (0.5, (0, -7)), (0.5, (38, -14)))
-    if apart:
-        ends = np.array([t.omega_02, t.omega_03])
-        style.curve(axes, Case.SR, ends, ends + apart, line=style.UNSTABLE)
-        line(Case.SR, t.omega_03, fastest, "SR", 0.7, apart, -1)
-        line(Case.NR, t.omega_02, fastest, "NR", 0.5, 2 * apart)
-        for begin, steps in ((t.omega_02, 2), (t.omega_03, 1)):
-            axes.plot([begin, begin], [begin, begin + steps * apart], "k:", lw=1)
-        axes.plot([t.omega_02], [t.omega_02 + 2 * apart], **style.POINT)
-    else:
-        line(Case.SR, rides, fastest, "SR, NR", 0.7)
     axes.set_xlim(0, fastest)
     style.guides(axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in ((1, 2, 4) if folds else (2, 3))})
     return t
@@ -209,8 +205,8 @@ def draw_fall(fall: Motion) -> Figure:
             hops = run.y[k][run.v_y[k] > 0].max(initial=0.0)
             highest = 1e6 * max(float(run.h[k].max()), float(hops), 1e-7)
             gaps.set(ylim=(-0.4 * highest, 1.4 * highest), ylabel="gap (µm)")
-            speed.plot(t, run.v_y[k], color="black")
-            speed.set_ylabel("$v_y$ (m/s)")
+            speed.plot(t, 1e6 * run.v_y[k], color="black")
+            speed.set_ylabel("$v_y$ (µm/s)")
             slip.set_xlabel("$t$ after the landing (ms)")
         for point, value, line in (("A", run.slip_speed_A, "-"), ("B", run.slip_speed_B, "--")):
             touches = [case for case in Case if getattr(case, point) is not Contact.N]
