@@ -1,0 +1,106 @@
+"""What adapters of engines share: one free body, planes for walls, the force set before each step."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from compare.bench.case import FACETS, Case, Surface, Vector
+from model.arrays import Array
+
+State = tuple[Any, Any, Any]
+"""Position, velocity and spin in world axes."""
+
+
+class Free(ABC):
+    """An engine with a free body; `best` settings and a wall that moves along, or the engine as it comes with facets."""
+
+    PRECISION = "f32"
+    KNOWN = ""
+    NOTE = ""
+    """What is worst, and why, in a sentence."""
+
+    def __init__(self, name: str, best: str = "") -> None:
+        """`best` declares the settings other than the engine's own; empty for those."""
+        self.NAME, self.best = name, bool(best)
+        wall = "one plane, set tangent before each step, for a cylinder" if best else f"{FACETS} planes for a cylinder"
+        self.DECLARED = "; ".join(filter(None, (wall, best)))
+        self.case: Case
+        self.timestep = self.now = 0.0
+
+    def build(self, case: Case, timestep: float) -> None:
+        """The scene at its start; raises `NotImplementedError` for one that the engine can't have."""
+        self.case, self.timestep, self.now = case, timestep, 0.0
+        self.make()
+
+    def step(self, n: int) -> None:
+        """Take n steps."""
+        case = self.case
+        turns = self.best and any(surface.radius for surface in case.surfaces)
+        for _ in range(n):
+            if case.forced or turns:
+                position, velocity, _ = self.state()
+                if case.forced:
+                    self.push(case.force(self.now, position, velocity))
+                for surface in case.surfaces if turns else ():
+                    if surface.radius:
+                        # Halfway through the step: then its way is a chord of the cylinder.
+                        x, y = (at + self.timestep / 2 * rate for at, rate in zip(position[:2], velocity[:2], strict=True))
+                        self.turn(*tangent(surface, math.atan2(y - surface.point[1], x - surface.point[0])))
+            self.advance()
+            self.now += self.timestep
+
+    def planes(self) -> Iterator[tuple[Surface, Array, Array]]:
+        """Each surface with a point and the normal of a plane; a cylinder's are many, or the one that moves along."""
+        for surface in self.case.surfaces:
+            if surface.radius is None:
+                yield surface, np.array(surface.point), np.array(surface.normal)
+            else:
+                for k in range(1 if self.best else FACETS):
+                    yield surface, *tangent(surface, math.tau * k / FACETS)
+
+    @abstractmethod
+    def make(self) -> None:
+        """The scene of `case`, with steps of `timestep`."""
+
+    @abstractmethod
+    def advance(self) -> None:
+        """Take a step."""
+
+    @abstractmethod
+    def state(self) -> State:
+        """As it is now."""
+
+    def push(self, force: Vector) -> None:
+        """Set the force on the centre for the next step, N."""
+        raise NotImplementedError("it takes no forces")
+
+    def turn(self, point: Array, normal: Array) -> None:
+        """Move the plane that stands for the cylinder."""
+        raise NotImplementedError("its planes can't be moved")
+
+
+def tangent(surface: Surface, azimuth: float) -> tuple[Array, Array]:
+    """Point and inward normal of the plane that touches a cylinder there."""
+    inwards = -np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    return surface.point - (surface.radius or 0.0) * inwards, inwards
+
+
+def turned(orientation: Any, vector: Any) -> Array:
+    """A vector (3,) turned by a unit quaternion, the scalar first."""
+    w, axis = orientation[0], np.asarray(orientation[1:], float)
+    across = 2 * np.cross(axis, vector)
+    return np.asarray(vector + w * across + np.cross(axis, across))
+
+
+def upright(normal: Any) -> tuple[float, float, float, float]:
+    """The shortest turn, a unit quaternion, that takes z to a normal."""
+    x, y, z = normal
+    if z < -1 + 1e-12:
+        return 0.0, 1.0, 0.0, 0.0
+    w = math.sqrt((1 + z) / 2)
+    return w, -y / (2 * w), x / (2 * w), 0.0
