@@ -33,8 +33,7 @@ class Rapier(Free):
             )
         shape = engine.Collider.ball(*body.size) if body.shape == "sphere" else engine.Collider.cuboid(*body.size)
         shape = shape.density(0.0).friction(1.0).friction_combine_rule(engine.CoefficientCombineRule.MULTIPLY)
-        w, x, y, z = body.orientation
-        start = engine.RigidBody.dynamic().position(engine.Isometry3(body.position, engine.Quaternion(x, y, z, w)))
+        start = engine.RigidBody.dynamic().position(engine.Isometry3(body.position, engine.Quaternion(*body.orientation)))
         start = start.linvel(body.velocity).angvel(body.spin)
         start = start.additional_mass_properties(engine.MassProperties((0, 0, 0), body.mass, body.inertia))
         self.body = self.world.add_body(start, [shape])
