@@ -49,7 +49,9 @@ class Free(ABC):
                 for surface in case.surfaces if turns else ():
                     if surface.radius:
                         # Halfway through the step: then its way is a chord of the cylinder.
-                        x, y = (at + self.timestep / 2 * rate for at, rate in zip(position[:2], velocity[:2], strict=True))
+                        x, y = (
+                            at + self.timestep / 2 * rate for at, rate in zip(position[:2], velocity[:2], strict=True)
+                        )
                         self.turn(*tangent(surface, math.atan2(y - surface.point[1], x - surface.point[0])))
             self.advance()
             self.now += self.timestep
