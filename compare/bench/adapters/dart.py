@@ -11,7 +11,7 @@ from typing import Any
 import dartpy as engine
 import numpy as np
 
-from compare.bench.adapters.free import Free, State, turned
+from compare.bench.adapters.free import CHORD, Free, State, turned
 from compare.bench.case import Vector
 from model.arrays import Array
 
@@ -19,12 +19,10 @@ from model.arrays import Array
 class Dart(Free):
     """As in `Free`."""
 
-    PRECISION = "f64"
     KNOWN = "dartpy 6.20.0"
     NOTE = (
-        "as it comes worst with boxes, whose contacts FCL places anew in every step, so that they rock and creep; set well "
-        "it is of first order in everything, and worst where a ball goes round: each step ends along a chord, and the next "
-        "one takes away what then points into the wall, omega^2 h/2 of the speed a second"
+        "as it comes worst with boxes, whose contacts FCL places anew in every step, so that they rock and creep; set "
+        f"well of first order in everything, and worst where a ball goes round: {CHORD}"
     )
 
     def make(self) -> None:

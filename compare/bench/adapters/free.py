@@ -12,17 +12,23 @@ import numpy as np
 from compare.bench.case import FACETS, Case, Surface, Vector
 from model.arrays import Array
 
+CHORD = (
+    "each step ends along a chord, and the next one takes away what then points into the wall, omega^2 h/2 of the "
+    "speed a second"
+)
+"""Why every engine with velocities in world axes slows what goes round."""
 State = tuple[Any, Any, Any]
 """Position, velocity and spin in world axes."""
 
 
 class Free(ABC):
-    """An engine with a free body; `best` settings and a wall that moves along, or the engine as it comes with facets."""
+    """A free body in an engine: in the best settings, with a wall that moves along, or as it comes, with facets."""
 
-    PRECISION = "f32"
+    PRECISION = "f64"
     KNOWN = ""
+    """Package and version with which it is known to work."""
     NOTE = ""
-    """What is worst, and why, in a sentence."""
+    """What is worst, and why."""
 
     def __init__(self, name: str, best: str = "") -> None:
         """`best` declares the settings other than the engine's own; empty for those."""

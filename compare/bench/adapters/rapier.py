@@ -11,7 +11,7 @@ import math
 
 import rapier3d as engine
 
-from compare.bench.adapters.free import Free, State
+from compare.bench.adapters.free import CHORD, Free, State
 from compare.bench.case import Vector
 from model.arrays import Array
 
@@ -21,10 +21,7 @@ class Rapier(Free):
 
     PRECISION = "f32"
     KNOWN = "rapier3d 0.36.1"
-    NOTE = (
-        "worst round the cylinder and where the wall carries the ball: each step ends along a chord, and the next one "
-        "takes away what then points into the wall, omega^2 h/2 of the speed a second"
-    )
+    NOTE = f"worst round the cylinder and where the wall carries the ball: {CHORD}"
 
     def make(self) -> None:
         """As in `Free`."""

@@ -1,0 +1,118 @@
+"""Drake with a free body: a discrete plant with point contact; its traps are told in `compare.kit.adapters.drake`."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+from typing import Any
+
+import numpy as np
+import pydrake.all as engine
+
+from compare.bench.adapters.free import CHORD, Free, State
+from compare.bench.case import Vector
+from model.arrays import Array
+
+logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
+HEAVY = 1e6
+"""Moment of inertia of a table divided by its mass, m2, so that nothing slows it."""
+
+
+class Drake(Free):
+    """As in `Free`."""
+
+    KNOWN = "drake 1.51.1"
+    NOTE = (
+        "as it comes worst with boxes, which touch a plane at one point at a time and tumble from corner to corner; "
+        f"spheres at the corners cure it; set well of first order, and worst round the cylinder: {CHORD}"
+    )
+
+    def make(self) -> None:
+        """As in `Free`."""
+        case, body = self.case, self.case.body
+        builder = engine.DiagramBuilder()
+        plant, _ = engine.AddMultibodyPlantSceneGraph(builder, engine.MultibodyPlant(self.timestep))
+        plant.set_contact_model(engine.ContactModel.kPoint)
+        if self.best:
+            plant.set_discrete_contact_approximation(engine.DiscreteContactApproximation.kTamsi)
+        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -case.g])
+        plant.SetUseSampledOutputPorts(False)
+        moments, most = np.array(body.inertia) / body.mass, max(surface.friction for surface in case.surfaces)
+        ball = plant.AddRigidBody("body", engine.SpatialInertia(body.mass, np.zeros(3), engine.UnitInertia(*moments)))
+        for k, (place, shape) in enumerate(self.shapes()):
+            self.add(plant, ball, place, shape, f"body{k}", most)
+        self.wall, hinges = None, []
+        facets = max((surface.radius or 0.0) for surface in case.surfaces) if not self.best else 0.0
+        for k, (surface, point, normal) in enumerate(self.planes()):
+            of, pose, shape = plant.world_body(), engine.HalfSpace.MakePose(normal, point), engine.HalfSpace()
+            if facets:  # a half space among a dozen of shapes crashes the engine
+                size = 100.0 * facets
+                turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
+                pose, shape = engine.RigidTransform(turn, point - size / 2 * normal), engine.Box(size, size, size)
+            elif surface.radius or surface.turning:
+                inertia = engine.SpatialInertia(body.mass, np.zeros(3), engine.UnitInertia(HEAVY, HEAVY, HEAVY))
+                of = plant.AddRigidBody(surface.name, inertia)
+                frames = plant.world_body().body_frame(), of.body_frame()
+                hinges.append((surface, plant.AddJoint(engine.RevoluteJoint(surface.name, *frames, [0.0, 0.0, 1.0]))))
+            own = most * surface.friction / (2 * most - surface.friction)  # their harmonic mean is the pair's
+            self.add(plant, of, pose, shape, f"{surface.name}{k}", own)
+        plant.Finalize()
+        if self.best:
+            plant.set_stiction_tolerance(1e-8)
+        self.diagram, self.plant = builder.Build(), plant
+        self.root = self.diagram.CreateDefaultContext()
+        self.context = plant.GetMyMutableContextFromRoot(self.root)
+        self.input, self.force = plant.get_applied_generalized_force_input_port(), np.zeros(plant.num_velocities())
+        self.input.FixValue(self.context, self.force)
+        self.q, self.v = ball.floating_positions_start(), plant.num_positions() + ball.floating_velocities_start_in_v()
+        self.x = plant.GetPositionsAndVelocities(self.context)
+        self.x[self.q : self.q + 7] = [*body.orientation, *body.position]
+        self.x[self.v : self.v + 6] = [*body.spin, *body.velocity]
+        for surface, joint in hinges:
+            if surface.turning:
+                self.x[plant.num_positions() + joint.velocity_start()] = surface.turning
+            else:
+                joint.Lock(self.context)
+                self.wall = joint.position_start()
+
+    def shapes(self) -> list[tuple[Any, Any]]:
+        """The shape of the body; a box in the best settings is its corners."""
+        body = self.case.body
+        if body.shape == "sphere":
+            return [(engine.RigidTransform(), engine.Sphere(*body.size))]
+        if not self.best:
+            return [(engine.RigidTransform(), engine.Box(*(2 * np.array(body.size))))]
+        corners = itertools.product(*((-half, half) for half in body.size))
+        return [(engine.RigidTransform(np.array(corner)), engine.Sphere(1e-9)) for corner in corners]
+
+    def add(self, plant: Any, of: Any, place: Any, shape: Any, name: str, friction: float) -> None:
+        """A shape that touches others."""
+        springs = {"dissipation": 100.0, "point_stiffness": 1e10} if self.best else {}
+        material, coefficient = engine.ProximityProperties(), engine.CoulombFriction(friction, friction)
+        engine.AddContactMaterial(**springs, friction=coefficient, properties=material)
+        plant.RegisterCollisionGeometry(of, place, shape, name, material)
+
+    def advance(self) -> None:
+        """As in `Free`."""
+        self.plant.SetPositionsAndVelocities(self.context, self.x)
+        self.x = self.plant.EvalUniquePeriodicDiscreteUpdate(self.context).get_vector(0).CopyToVector()
+
+    def state(self) -> State:
+        """As in `Free`."""
+        spin, velocity = self.x[self.v : self.v + 3], self.x[self.v + 3 : self.v + 6]
+        return self.x[self.q + 4 : self.q + 7], velocity, spin
+
+    def push(self, force: Vector) -> None:
+        """As in `Free`."""
+        start = self.v - self.plant.num_positions() + 3
+        self.force[start : start + 3] = force
+        self.input.FixValue(self.context, self.force)
+
+    def turn(self, point: Array, normal: Array) -> None:
+        """As in `Free`."""
+        self.x[self.wall] = math.atan2(-normal[1], -normal[0])
+
+
+defaults = Drake("drake-defaults")
+free = Drake("drake", "TAMSI, 1e10 N/m, stiction tolerance 1e-8 m/s; a box touches by its corners")

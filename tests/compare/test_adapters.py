@@ -1,0 +1,41 @@
+"""Adapters of other engines with a free body, as far as they are installed."""
+
+from __future__ import annotations
+
+import importlib
+
+import pytest
+
+from compare.bench import cases, run
+from compare.bench.adapters.free import turned, upright
+from model import InputError
+
+CASES = {case.name: case for case in cases()}
+OWN = "compare.bench.adapters"
+
+
+@pytest.mark.parametrize("name", ["dart", "drake", "pybullet", "rapier", "sapien"])
+def test_an_engine_reaches_its_order(name: str) -> None:
+    """Semi-implicit steps are of first order where a sphere slides; a block that friction can hold rests."""
+    try:
+        module = importlib.import_module(f"{OWN}.{name}")
+    except ImportError as error:
+        pytest.skip(str(error))
+    best = "free" if hasattr(module, "free") else "best"
+    falls = run(CASES["sphere-slips-down"], f"{OWN}.{name}:{best}")
+    assert falls.passed
+    assert 0.9 < falls.order < 1.7  # substeps of Rapier
+    assert run(CASES["block-rests"], f"{OWN}.{name}:{best}").passed
+    turns = run(CASES["cylinder"], f"{OWN}.{name}:{best}", steps=(2e-3, 1e-3))
+    assert turns.error < 0.08  # of the orbit: omega^2 h/2 a second
+    assert run(CASES["lands"], f"{OWN}.{name}:defaults", steps=(2e-3,)).error < 2
+
+
+def test_engines_that_are_not_installed() -> None:
+    with pytest.raises(InputError, match="No module named 'nosuchengine'"):
+        run(CASES["block-rests"], "nosuchengine")
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (-1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)])
+def test_turns(normal: tuple[float, float, float]) -> None:
+    assert turned(upright(normal), [0, 0, 1]) == pytest.approx(normal)
