@@ -181,7 +181,7 @@ class Case:
             if surface.turning:  # a plane can't turn: a disc so heavy that the body doesn't slow it
                 parts.append(
                     f'<body name="{surface.name}" pos="{_text(surface.point)}"><joint name="table" axis="0 0 1" '
-                    f'armature="1e6"/><geom type="cylinder" size="5 0.5" pos="0 0 -0.5" mass="1" {friction}/></body>'
+                    f'armature="1e6"/><geom name="{surface.name}" type="cylinder" size="5 0.5" pos="0 0 -0.5" mass="1" {friction}/></body>'
                 )
             elif surface.radius is None:
                 pose = f'pos="{_text(surface.point)}" zaxis="{_text(surface.normal)}"'

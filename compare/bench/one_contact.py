@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from compare.bench.case import Body, Case, Surface, Vector
+from model import Parameters, State
 from model.arrays import Array
 
 G, J = 9.81, 0.4
@@ -314,4 +315,11 @@ def _cylinder() -> Case:
         scales=(1.0, 8.0, 80.0),
         contacts=lambda t: "R",
         source="Newton and Euler in the turning frame: the spin along the radius changes with height",
+        motion=_high_up(orbit, turns),
     )
+
+
+def _high_up(orbit: float, turns: float) -> tuple[Parameters, State]:
+    """The same in the study's vessel, far above its floor and without drag."""
+    p = Parameters(m=1.0, r=BALL, R=orbit, j=J, mu=1.0, eta=1.0, g=G, c=0.0, omega_0=0.0)
+    return p, State(y=10.0, omega_c=turns, slip_x=-turns * orbit / BALL)

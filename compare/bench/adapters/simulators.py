@@ -1,0 +1,80 @@
+"""Simulators that know the study's ball alone: in its vessel on joints, other cases left to an engine for free bodies.
+
+What runs is what `compare.kit.engines` runs: the theory's two simulators, MuJoCo with its settings, and the engines of
+`compare.kit.adapters` in theirs.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from compare.bench.adapters import mujoco_free
+from compare.bench.case import STEPS, Case
+from compare.kit.engines import ENGINES, engine
+from compare.kit.tasks import Task, carry_out
+from model import InputError
+from model.arrays import Array
+from model.kinematics import to_world
+
+
+class Simulated:
+    """An engine of the study by name, and what takes the cases without a vessel."""
+
+    def __init__(self, name: str, declared: str = "", free: Any = None) -> None:
+        self.NAME, self.DECLARED, self._free = name, declared, free
+        if "timestep" not in ENGINES[name].options:
+            self.TIMESTEPS = STEPS[-1:]
+        self._states: Array | None = None
+
+    def build(self, case: Case, timestep: float) -> None:
+        """The task, or the scene of the other engine."""
+        self._case, self._at, self._states = case, 0, None
+        if not case.motion:
+            if self._free is None:
+                raise NotImplementedError("only for a ball in a vessel")
+            self._free.build(case, timestep)
+            return
+        (p, x0), chosen = case.motion, engine(self.NAME)
+        if chosen.missing:
+            raise NotImplementedError(chosen.missing)
+        self._task = Task(
+            engine=self.NAME,
+            parameters=p,
+            x0=x0,
+            t_end=float(case.times[-1]),
+            settings=chosen.at(timestep, p),
+            sample_interval=timestep,
+        )
+
+    def step(self, n: int) -> None:
+        """Go on by n steps; the first time the whole motion is simulated."""
+        if not self._case.motion:
+            self._free.step(n)
+            return
+        if self._states is None:
+            (run,) = carry_out([self._task])
+            if run.header.failure:
+                raise InputError(run.header.failure)
+            p, _ = self._case.motion
+            self._states = np.stack(to_world(run.x, run.theta, p), axis=1)
+            self._states[:, 0] += np.array(self._case.body.position) - self._states[0, 0]
+        self._at += n
+
+    def state(self) -> Any:
+        """Position, velocity and spin."""
+        if not self._case.motion:
+            return self._free.state()
+        assert self._states is not None
+        return tuple(self._states[self._at])
+
+
+JOINTS = "in the vessel on joints: azimuth, radius, height, spin"
+SETTINGS = "contact settings of the study, elliptic cone"
+mujoco = Simulated("mujoco", f"{SETTINGS}; {JOINTS}, with corrections between the steps", mujoco_free.Bodies(tuned=True))
+mujoco_plain = Simulated("mujoco-plain", f"{SETTINGS}; {JOINTS}", mujoco_free.Bodies(tuned=True))
+event = Simulated("event", "equations of the paper, no scene; its own steps")
+time_stepping = Simulated("time-stepping", "equations of the paper, no scene")
+siconos = Simulated("siconos", "equations of motion in turning axes, no scene")
+siconos_defaults = Simulated("siconos-defaults", "equations of motion, no scene")
