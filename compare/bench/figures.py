@@ -1,48 +1,58 @@
-"""Error against cost, of the engines in the league or of other ways to simulate."""
+"""Error against cost of the engines in the league."""
 
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from matplotlib.figure import Figure
 
-from compare.bench.league import CASES, COST, CREEP, ROLLING_ENDS, WALL, Entry
+from compare.bench.case import TOLERANCE
+from compare.bench.exact import cases
+from compare.bench.league import KINDS, kind
+from compare.bench.runner import Result
 from compare.kit import style
 
-COLUMNS = 3
-LEAST = 1e-16
-"""Smaller errors are drawn here: an error may be zero."""
+LEAST = 1e-11
+"""Smaller errors are drawn here."""
 
 
-def draw_league(entries: Sequence[Entry]) -> Figure:
-    """A panel for each error of omega_c in the league, a line for each engine."""
-    return draw_error_over_cost(entries, {entry.name: style.mark_of(entry.name) for entry in entries})
-
-
-def draw_error_over_cost(entries: Sequence[Entry], looks: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """A panel for each error of omega_c; entries of one name at several time steps are joined, with its looks."""
-    other = (CREEP, ROLLING_ENDS, WALL, CASES, COST)  # no errors of omega_c
-    shown = [name for name in dict.fromkeys(n for e in entries for n in e.scores) if name not in other]
-    lines = -(-len(shown) // COLUMNS)
-    figure = style.figure(11, 0.9 + 3.0 * lines)
-    panels = figure.subplots(lines, COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
-    for axes, discipline in zip(panels, shown, strict=False):
-        for name, look in looks.items():
-            own = [e for e in entries if e.name == name and math.isfinite(e.scores.get(discipline, math.nan))]
-            own.sort(key=lambda entry: entry.scores[COST])
-            x, y = [e.scores[COST] for e in own], [max(e.scores[discipline], LEAST) for e in own]
-            axes.plot(x, y, ms=6, lw=1, label=name, **look)
-        axes.set(xscale="log", yscale="log")
-        axes.set_title(discipline, fontsize=10)
+def draw_league(league: Mapping[str, Sequence[Result]]) -> Figure:
+    """A panel for each kind of case: the median of an engine's errors over that of its costs, its steps joined."""
+    kinds = {case.name: kind(case) for case in cases()}
+    figure, panels = style.panels(10, 8.4, 2, 2, sharex=True, sharey=True)
+    tried = {name: [r for r in results if r.errors] for name, results in league.items()}
+    families = list(dict.fromkeys(name.removesuffix("-defaults") for name, own in tried.items() if own))
+    for axes, each in zip(panels.ravel(), KINDS, strict=True):
+        for name, results in tried.items():
+            own = [r for r in results if kinds[r.case] == each]
+            if not own:
+                continue
+            number = families.index(name.removesuffix("-defaults"))
+            points = []
+            for k in range(len(own[0].steps)):
+                known = [(r.costs[k], r.errors[k]) for r in own if math.isfinite(r.errors[k])]
+                if len(known) > len(own) / 2:  # the median is known
+                    points.append([statistics.median(column) for column in zip(*known, strict=True)])
+            x, y = zip(*points, strict=True) if points else ((), ())
+            axes.plot(
+                x,
+                [max(error, LEAST) for error in y],
+                marker="osv^DPX*<>phd"[number % 13],
+                color=style.CYCLE[number % len(style.CYCLE)],
+                mfc="white" if name.endswith("-defaults") else None,
+                ls=":" if name.endswith("-defaults") else "-",
+                ms=6,
+                lw=1,
+                label=name,
+            )
+        axes.axhline(TOLERANCE, color="0.5", lw=0.8)
+        axes.set(xscale="log", yscale="log", title=each)
         axes.grid(alpha=0.3)
-    for k, axes in enumerate(panels):
-        axes.set_visible(k < len(shown))
-        if k % COLUMNS == 0:
-            axes.set_ylabel("relative error")
-        if k >= len(shown) - COLUMNS:
-            axes.set_xlabel("processor time divided by simulated time")
-            axes.tick_params(labelbottom=True)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("error, in units of the case's scales")
+    for axes in panels[1]:
+        axes.set_xlabel("processor time divided by simulated time")
     style.legend(figure, loc="outside lower center", ncols=4)
     return figure
