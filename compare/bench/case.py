@@ -142,7 +142,10 @@ class Case:
         return float(off.max())
 
     def touching(self, states: Array) -> tuple[Array, Array]:
-        """Gap (m) and slip speed (m/s) of states (n, 9) at each surface, (n, surfaces); a box doesn't turn."""
+        """Gap (m) and slip speed (m/s) of states (n, 9) at each surface, (n, surfaces); a box doesn't turn.
+
+        Where a soft contact lets the body sink in, it touches halfway between its own surface and the other.
+        """
         position, velocity, spin = np.split(states, 3, axis=1)
         gaps, slips = [], []
         for surface in self.surfaces:
@@ -154,11 +157,12 @@ class Case:
                 rho = np.hypot(away[:, 0], away[:, 1])
                 normal = -away * [1, 1, 0] / rho[:, None]
                 height = surface.radius - rho
-            arm = -self.reach(normal)[:, None] * normal
+            gap = height - self.reach(normal)
+            arm = -(self.reach(normal) + np.minimum(gap, 0.0) / 2)[:, None] * normal
             moves = surface.turning * np.cross([0.0, 0.0, 1.0], away + arm)
             slip = velocity + (np.cross(spin, arm) if self.body.shape == "sphere" else 0) - moves
             slips.append(np.linalg.norm(slip - np.sum(slip * normal, axis=1)[:, None] * normal, axis=1))
-            gaps.append(height - self.reach(normal))
+            gaps.append(gap)
         return np.stack(gaps, axis=1), np.stack(slips, axis=1)
 
     def reach(self, normal: Array) -> Array:
@@ -181,7 +185,8 @@ class Case:
             if surface.turning:  # a plane can't turn: a disc so heavy that the body doesn't slow it
                 parts.append(
                     f'<body name="{surface.name}" pos="{_text(surface.point)}"><joint name="table" axis="0 0 1" '
-                    f'armature="1e6"/><geom name="{surface.name}" type="cylinder" size="5 0.5" pos="0 0 -0.5" mass="1" {friction}/></body>'
+                    f'armature="1e6"/><geom name="{surface.name}" type="cylinder" size="5 0.5" pos="0 0 -0.5" mass="1" '
+                    f"{friction}/></body>"
                 )
             elif surface.radius is None:
                 pose = f'pos="{_text(surface.point)}" zaxis="{_text(surface.normal)}"'

@@ -16,6 +16,10 @@ from compare.kit import style
 
 LEAST = 1e-11
 """Smaller errors are drawn here."""
+MARKS, COLOURS = (
+    "osv^DPX*<>phd",
+    ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B"),
+)
 
 
 def draw_league(league: Mapping[str, Sequence[Result]]) -> Figure:
@@ -39,8 +43,8 @@ def draw_league(league: Mapping[str, Sequence[Result]]) -> Figure:
             axes.plot(
                 x,
                 [max(error, LEAST) for error in y],
-                marker="osv^DPX*<>phd"[number % 13],
-                color=style.CYCLE[number % len(style.CYCLE)],
+                marker=MARKS[number % len(MARKS)],
+                color=COLOURS[number % len(COLOURS)],
                 mfc="white" if name.endswith("-defaults") else None,
                 ls=":" if name.endswith("-defaults") else "-",
                 ms=6,

@@ -1,8 +1,7 @@
-"""A score card for contact settings: what a ball that rolls and slips does under them, and what it should do.
+"""A score card for contact settings: what they make of every exact case, beside what other settings do.
 
-MuJoCo's settings run as they are in the study's scene, driven by its drag and wall but without its corrections; another
-engine runs in its own loop. Every number stands against closed-form theory or the event-driven simulation, and beside
-what other settings give.
+MuJoCo's settings run on free bodies and, for the ball in the vessel, in the study's scene on joints, driven by its drag
+and wall but without its corrections; another engine runs as in the league.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,28 +18,28 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from compare.bench import league, trials
-from compare.bench.league import Contestant
+import analytic
+from compare.bench import league
+from compare.bench.adapters import mujoco_free, simulators
+from compare.bench.adapters.simulators import Simulated
+from compare.bench.case import TOLERANCE
+from compare.bench.exact import cases
 from compare.bench.native import Native
-from compare.bench.trials import AGREES, APPROACH, ROLLING, SLIPPING, STATES, Asked, Held, Stationary
+from compare.bench.runner import Result, run_all
+from compare.bench.two_contacts import SMOOTH
 from compare.kit import pages
-from compare.kit.engines import ENGINES, MUJOCO, NEWCOMER
+from compare.kit.engines import ENGINES, NEWCOMER, Engine
 from compare.kit.progress import Show
 from compare.kit.statistics import plain
-from compare.kit.tasks import carry_out
 from mjsim import ContactSettings
-from model import Case, Trajectory
+from model import Case as Kinds
 from model.kinematics import slip_speeds
 
-GOOD, GOOD_SPEED = 1e-3, 1e-4
-"""Relative error, and error of a speed in m/s, up to which a number is shown as good."""
-FINE = 10_000
-"""Samples of a run into a stationary state: enough of them at its end to see how often contact is lost."""
-TIMED = 10 * APPROACH.lasts
-"""How long a run lasts whose cost is measured, s."""
+GOOD_SPEED = 1e-4
+"""Creep up to which a number is shown as good, m/s."""
 CAPTION = (
-    "dualball: the study's settings. MuJoCo: its defaults, in the study's scene. newcomer: its defaults, a free joint, "
-    "a wall of flat facets."
+    "dualball: the study's settings. MuJoCo: its defaults, the ball in the vessel in the study's scene. newcomer: its "
+    "defaults, a free ball in a wall of flat facets."
 )
 Cell = tuple[str, bool | None]
 """A text, and whether what it says is good; None: neither."""
@@ -48,18 +47,23 @@ Row = tuple[str, str, list[Cell]]
 """One line of the card: its group, what it is, and a cell for each column."""
 
 
-def contestant(name: str, native: Native, **loop: Any) -> Contestant:
-    """MuJoCo with settings of its own, in the study's loop without corrections, whose other settings are `loop`."""
-    assert NEWCOMER.stream
-    stream = functools.partial(NEWCOMER.stream, build=native.build)
-    engine = dataclasses.replace(NEWCOMER, name=name, stream=stream)
-    return Contestant(name, engine, native.timestep, native.loop(**loop))
+class Graded(Simulated):
+    """MuJoCo with settings of its own: the ball in the vessel on the study's joints, other bodies free."""
 
+    def __init__(self, native: Native) -> None:
+        super().__init__(NEWCOMER.name, free=mujoco_free.Bodies(native.tune))
+        self._native = native
 
-OURS = Contestant("dualball", MUJOCO, ContactSettings.timestep, ContactSettings())
-PLAIN = contestant("MuJoCo", Native())
-FREE = contestant("newcomer", Native(), coordinates="free", wall="prism")
-"""What a newcomer might write: MuJoCo's defaults, a free ball, and a wall of flat facets."""
+    def engine(self, timestep: float) -> Engine:
+        """The study's loop without corrections round a scene with these settings."""
+        native = dataclasses.replace(self._native, timestep=timestep)
+        assert NEWCOMER.stream
+        stream = functools.partial(NEWCOMER.stream, build=native.build)
+        made = dataclasses.replace(
+            NEWCOMER, name="graded", stream=stream, configure=lambda given, p: native.loop(), study=None
+        )
+        ENGINES[made.name] = made  # tasks name their engines; this process has no other
+        return made
 
 
 @dataclass(frozen=True)
@@ -68,86 +72,58 @@ class Column:
 
     name: str
     timestep: float
-    cases: dict[str, float]
-    """By case: share of samples in the case in which the event-driven simulation is."""
-    stationary: tuple[Held, ...]
-    omega_01: float
-    """Relative error of the threshold where rolling is lost; nan if slip doesn't begin near it."""
-    transient: float
-    """Relative rms error of omega_c over the transient; nan if the run diverged."""
-    cost: float
-    """Time of a step, divided by that of our defaults."""
+    results: tuple[Result, ...]
+    """Of the exact cases, in their order."""
     advice: tuple[str, ...] = ()
 
     @property
-    def reproduced(self) -> list[str]:
-        """The cases that are reproduced."""
-        return [name for name, share in self.cases.items() if share >= AGREES]
+    def passed(self) -> list[str]:
+        """The cases that are passed."""
+        return [result.case for result in self.results if result.passed]
 
     @property
-    def cost_of_a_second(self) -> float:
-        """Time of a simulated second, divided by that of our defaults."""
-        return self.cost * ContactSettings.timestep / self.timestep
+    def cost(self) -> float:
+        """Processor time divided by simulated time, the median over the cases."""
+        return float(np.median([result.cost for result in self.results if math.isfinite(result.cost)] or [math.nan]))
 
-    def of(self, state: Stationary) -> Held:
-        """What was measured of a state."""
-        return next(each for each in self.stationary if each.name == state.name)
+    def of(self, case: str) -> Result:
+        """What was measured in a case."""
+        return next(result for result in self.results if result.case == case)
 
     def to_mapping(self) -> dict[str, Any]:
         """JSON-able data; None for what is missing."""
-        more = {"reproduced": self.reproduced, "cost_of_a_second": self.cost_of_a_second}
-        return dict(plain(dataclasses.asdict(self) | more))
+        return dict(plain(dataclasses.asdict(self) | {"passed": self.passed, "cost": self.cost}))
 
 
-def grade(
-    yours: Native | None,
-    others: Sequence[Contestant] = (OURS, PLAIN, FREE),
-    show: Show = lambda what, done, total, failed: None,
-) -> list[Column]:
-    """Columns of the score card: the given settings first, with advice, then the others.
+def contestants(yours: Native | None) -> dict[str, tuple[Any, float]]:
+    """The columns of a card of MuJoCo's settings, and their time steps."""
+    own = {"yours": (Graded(yours), yours.timestep)} if yours else {}
+    return own | {
+        "dualball": (simulators.mujoco, ContactSettings.timestep),
+        "MuJoCo": (Graded(Native()), Native.timestep),
+        "newcomer": (mujoco_free, Native.timestep),
+    }
+
+
+def grade(those: Mapping[str, tuple[Any, float]], show: Show, yours: Native | None = None) -> list[Column]:
+    """Columns of the score card, with advice for `yours` in the first.
 
     Raises `InputError` if MuJoCo refuses the settings.
     """
-    those = [*([contestant("yours", yours)] if yours else []), *others]
-    added = {each.name: each.engine for each in those if each.engine.name not in ENGINES}
-    ENGINES.update(added)  # tasks name their engines
-    try:
-        spent, columns = _cost(OURS), []
-        for k, each in enumerate(those):
-            show(f"grade {each.name}", k, len(those), 0)
-            columns.append(_column(each, spent))
-    finally:
-        for name in added:
-            del ENGINES[name]
     if yours:
-        ours = columns[0]
-        said = advice(yours, ours.of(ROLLING).creep, ours.of(SLIPPING).open)
-        columns[0] = dataclasses.replace(ours, advice=tuple(said))
+        yours.build(SMOOTH, yours.loop())
+    columns: list[Column] = []
+    for name, (engine, step) in those.items():
+        found = []
+        for result in run_all(cases(), engine, [step]):
+            found.append(result)
+            show(f"grade {name}", len(columns) * len(cases()) + len(found), len(those) * len(cases()), 0)
+        columns.append(Column(name, step, tuple(found)))
+    if yours:
+        own = columns[0]
+        said = advice(yours, own.of("rolls-on-both").creep, own.of("slips-on-both").lost)
+        columns[0] = dataclasses.replace(own, advice=tuple(said))
     return columns
-
-
-def _cost(each: Contestant) -> float:
-    """Processor time of a step, in s times the length of a step."""
-    return league.cost(each.task((APPROACH.p, APPROACH.x0, TIMED, TIMED / 100))) * (each.step or math.nan)
-
-
-def _column(each: Contestant, ours: float) -> Column:
-    """What is measured of a contestant, with its cost in units of ours."""
-
-    def run(asked: Asked) -> Trajectory:
-        (carried_out,) = carry_out([each.task(asked)])
-        return carried_out
-
-    passing = run(APPROACH.run)
-    return Column(
-        name=each.name,
-        timestep=each.step or math.nan,
-        cases={case.name: trials.share(run(trials.scenario(case)), case) for case in Case},
-        stationary=tuple(state.held(run((*state.run[:3], state.settles / FINE))) for state in STATES),
-        omega_01=trials.onset([run(state.run) for state in trials.beyond_rolling()]),
-        transient=APPROACH.errors(passing.time, passing.x)[0] if passing.complete else math.nan,
-        cost=1.0 if each is OURS else _cost(each) / ours,
-    )
 
 
 def advice(native: Native, creep: float, chatter: float) -> Iterator[str]:
@@ -155,7 +131,8 @@ def advice(native: Native, creep: float, chatter: float) -> Iterator[str]:
 
     `creep` (m s-1) was measured in rolling, `chatter`, the share of open steps, in fast slipping.
     """
-    p, slipping = SLIPPING.p, SLIPPING.solution
+    p = SMOOTH.replace(omega_0=25.0)
+    slipping = analytic.solution(p, Kinds.SS)
     if native.integrator == "RK4":
         yield (
             "integrator RK4 freezes the wall within a step, so that its normal lags behind the ball: use Euler or "
@@ -176,18 +153,19 @@ def advice(native: Native, creep: float, chatter: float) -> Iterator[str]:
         number = theory.hover_number(load, friction, float(speed))
         if number > 1:
             yield (
-                f"hovering at {name}: in {SLIPPING.name} the ball slips at {speed:.2f} m/s, but contact is continuous "
+                f"hovering at {name}: in SS at 25 rad/s the ball slips at {speed:.2f} m/s, but contact is continuous "
                 f"only up to {theory.fastest_slip(load, friction):.2g} m/s (hover number {number:.2g}, must be < 1; "
                 f"measured: contact lost in {chatter:.0%} of the steps). Soften the friction rows (solreffriction, "
                 f"now {theory.solreffriction:.2g} s) and lower the impedance (solimp, now {theory.solimp:.2g}): the "
                 "limit is (1 − d)/d · N/(m · friction · b_f)."
             )
-    p, theory = ROLLING.p, native.theory(native.A, ROLLING.p.g)
-    predicted = float(theory.creep_speed(float(np.hypot(*ROLLING.solution.force_A[[0, 2]])) / p.m))
+    p = SMOOTH
+    theory, rolling = native.theory(native.A, p.g), analytic.solution(p, Kinds.RR)
+    predicted = float(theory.creep_speed(float(np.hypot(*rolling.force_A[[0, 2]])) / p.m))
     if predicted > 1e-6:
         yield (
             f"creep: a contact that should roll slips at (1 − d)/d f/(m·impratio·b_f) = {predicted:.1e} m/s at A for "
-            f"{ROLLING.name} (measured, both contacts: {creep:.1e}): raise impratio (now {native.impratio:g}; up to "
+            f"RR at 12 rad/s (measured, both contacts: {creep:.1e}): raise impratio (now {native.impratio:g}; up to "
             "1e5 holds with cone elliptic), or shift the surface velocity by the last friction force, as dualball does."
         )
     depth = theory.margin(p.g)
@@ -204,7 +182,7 @@ def advice(native: Native, creep: float, chatter: float) -> Iterator[str]:
             )
     if native.noslip_iterations:
         yield "noslip_iterations cure the creep of rolling contacts, not hovering, and cost time in every step."
-    fitting = ContactSettings.for_problem(SLIPPING.p, native.timestep)
+    fitting = ContactSettings.for_problem(SMOOTH.replace(omega_0=25.0), native.timestep)
     yield (
         f'For this problem and step the theory asks for cone elliptic, solref "{fitting.solref[0]:g} '
         f'{fitting.solref[1]:g}", solreffriction "{fitting.solreffriction:.3g} 1", solimp "{fitting.solimp:.3g} '
@@ -214,50 +192,30 @@ def advice(native: Native, creep: float, chatter: float) -> Iterator[str]:
 
 def lines(columns: Sequence[Column]) -> list[Row]:
     """The card as text, without the advice."""
-
-    def line(
-        group: str,
-        name: str,
-        values: Iterable[float],
-        good: float | None = None,
-        form: str = "{:.1e}",
-        nan: str = "diverged",
-    ) -> Row:
-        """Numbers that are good up to a size, if it is given."""
-        cells: list[Cell] = []
-        for v in values:
-            fine = None if good is None else abs(v) <= good
-            cells.append((nan, False) if math.isnan(v) else (form.format(v), fine))
-        return group, name, cells
-
-    shares: list[Row] = []
-    for case in columns[0].cases:
-        held = [(column.cases[case], column.cases[case] >= AGREES) for column in columns]
-        cells = [(f"{'✓' if good else '✗'} {math.floor(100 * share)} %", good) for share, good in held]
-        shares.append(("share of time in the case", case, [*cells]))
-    of = {state.name: [column.of(state) for column in columns] for state in STATES}
-    slipping = [state.name for state in STATES if state.case is Case.SS]
-    sign, missing, off = "{:+.1e}", "missing", "relative error of ω_c"
-    return [
-        *shares,
-        *(line(off, name, [h.omega_c for h in own], GOOD, sign, missing) for name, own in of.items()),
-        *(line("error of slip (m/s)", name, [h.slip for h in own], GOOD_SPEED) for name, own in of.items()),
-        *(line("steps that lose contact", name, [100 * h.open for h in of[name]], 0, "{:.3g} %") for name in slipping),
-        line("other errors", f"creep in {ROLLING.name} (m/s)", [h.creep for h in of[ROLLING.name]], GOOD_SPEED),
-        line("other errors", "ω₀₁, end of rolling", [c.omega_01 for c in columns], GOOD, sign, missing),
-        line("other errors", f"{APPROACH.name}, rms", [c.transient for c in columns], GOOD, nan=missing),
-        line("cost", "time step (ms)", [1e3 * c.timestep for c in columns], form="{:g}"),
-        line("cost", f"a step ({OURS.name} 1)", [c.cost for c in columns], form="{:.2f}"),
-        line("cost", f"a second ({OURS.name} 1)", [c.cost_of_a_second for c in columns], form="{:.2f}"),
-    ]
+    found: list[Row] = []
+    for group in league.KINDS:
+        for k, case in enumerate(cases()):
+            if league.kind(case) == group:
+                results = [column.results[k] for column in columns]
+                cells = [(league.cell(r), None if r.skipped else r.passed) for r in results]
+                found.append((f"error, {group}", case.name, [*cells]))
+    for name, text in (("block-rests", "a block on a slope"), ("rolls-on-both", "a ball on floor and wall")):
+        speeds = [column.of(name).creep for column in columns]
+        found.append(("creep (m/s)", text, [(f"{v:.1e}", v <= GOOD_SPEED) for v in speeds]))
+    shares = [max((r.lost for r in column.results if math.isfinite(r.lost)), default=math.nan) for column in columns]
+    found.append(("contact lost", "largest share of a case's time", [(f"{v:.0%}", v == 0) for v in shares]))
+    found.append(("cost", "time step (ms)", [(f"{1e3 * column.timestep:g}", None) for column in columns]))
+    costs = [column.cost for column in columns]
+    found.append(("cost", "processor time divided by simulated time", [(f"{v:.2g}", None) for v in costs]))
+    return found
 
 
 def headline(column: Column) -> str:
     """A column in one sentence."""
-    errors = [abs(held.omega_c) for held in column.stationary]
-    worst = "a stationary state diverges" if np.isnan(errors).any() else f"ω_c is off by up to {max(errors):.1g}"
-    onset = "the loss of rolling does not show" if math.isnan(column.omega_01) else "the loss of rolling shows"
-    return f"{column.name}: {len(column.reproduced)} of {len(column.cases)} cases reproduced, {worst}, {onset}"
+    tried = [result for result in column.results if not result.skipped]
+    found = league.worst(tried)
+    said = f"; worst is {found.case}, off by {league.cell(found)} of its scale" if found else ""
+    return f"{column.name}: {len(column.passed)} of {len(tried)} exact cases passed{said}"
 
 
 def table(columns: Sequence[Column]) -> Table:
@@ -273,4 +231,6 @@ def table(columns: Sequence[Column]) -> Table:
 def html(columns: Sequence[Column], settings: str) -> str:
     """The card as one self-contained page; `settings` says in words what was graded."""
     shown = {"caption": CAPTION, "columns": columns, "lines": lines(columns), "headline": headline(columns[0])}
-    return pages.render("compare.bench", "grade.html", **shown, settings=settings, good=GOOD, good_speed=GOOD_SPEED)
+    return pages.render(
+        "compare.bench", "grade.html", **shown, settings=settings, good=TOLERANCE, good_speed=GOOD_SPEED
+    )

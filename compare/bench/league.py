@@ -34,9 +34,9 @@ KINDS = ("sticking", "rolling", "sliding", "landing")
 QUICK = (2e-3,)
 CAPTION = (
     "Errors at the shortest step in units of each case's scales; up to "
-    f"{TOLERANCE:g} an engine passes. Order: power of the step with which errors fall, the median over the cases. Cost: "
-    "processor time divided by simulated time at the shortest step, the median. A dash: the engine can't express the "
-    "case, and was not tried."
+    f"{TOLERANCE:g} an engine passes. Order: power of the step with which errors fall, the median over the cases. "
+    "Cost: processor time divided by simulated time at the shortest step, the median. A dash: the engine can't "
+    "express the case, and was not tried."
 )
 """What the numbers are."""
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from compare.bench.adapters.mujoco_free import pairs
+from compare.bench.case import Case
 from mjsim import ContactSettings, scene
 from model import InputError, Parameters, StorageError
 from model.parameters import NOT_NEGATIVE, POSITIVE, check_choice, check_number
@@ -92,19 +95,26 @@ class Native:
     def build(self, p: Parameters, loop: ContactSettings) -> tuple[Any, str]:
         """As `mjsim.scene.build`, with these settings in the place of those of the loop."""
         spec = scene.spec(p, loop)
-        option = spec.option
-        for name in _NUMBERS:
-            setattr(option, name, getattr(self, name))
-        for name, known in CHOICES.items():
-            setattr(option, name, known[getattr(self, name)])
-        for pair in spec.pairs:
-            own = self.A if pair.name == "A" else self.B
-            for field in dataclasses.fields(Pair):
-                setattr(pair, field.name, getattr(own, field.name))
+        self.set(spec, ((self.A if pair.name == "A" else self.B, pair) for pair in spec.pairs))
         try:
             return spec.compile(), str(spec.to_xml())
         except ValueError as error:
             raise InputError(f"MuJoCo refuses these settings: {' '.join(str(error).split())}") from error
+
+    def tune(self, spec: Any, case: Case, timestep: float) -> None:
+        """Set an exact case's scene: a wall as the wall, all else as the floor."""
+        own = ((self.B if name == "wall" else self.A, pair) for name, pair in pairs(spec, case))
+        dataclasses.replace(self, timestep=timestep).set(spec, own)
+
+    def set(self, spec: Any, contacts: Iterable[tuple[Pair, Any]]) -> None:
+        """Set options, and the pairs of a scene each to one of ours."""
+        for name in _NUMBERS:
+            setattr(spec.option, name, getattr(self, name))
+        for name, known in CHOICES.items():
+            setattr(spec.option, name, known[getattr(self, name)])
+        for own, pair in contacts:
+            for field in dataclasses.fields(Pair):
+                setattr(pair, field.name, getattr(own, field.name))
 
     def theory(self, pair: Pair, load: float) -> ContactSettings:
         """Settings with one impedance that a contact amounts to under the normal force m `load` (m s-2).

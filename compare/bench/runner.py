@@ -9,8 +9,8 @@ An engine is anything with three functions, a module most simply:
 
 ``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It may say of itself:
 ``NAME``, ``PRECISION`` (``f64`` or ``f32``), ``DECLARED`` (in words, all that isn't a free body in plain geometry under
-the engine's own settings), ``TIMESTEPS`` (its own instead of `STEPS`), ``KNOWN`` (package and version with which it is
-known to work, ``"mujoco 4.0.0"``).
+the engine's own settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
+`STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``).
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ from model.trajectory import version
 
 LIMIT = 120.0
 """Longest that a run at one step may take, s of real time."""
+BEGIN = 120.0
+"""Longest that an engine may take to load, s."""
 LIFTED = 1e-3
 """Gap, in units of the body's least size, from which a contact that should last counts as lost."""
 FLOORS = {"f64": 1e-11, "f32": 1e-5}
@@ -48,6 +50,8 @@ class About:
     name: str
     precision: str = "f64"
     declared: str = ""
+    note: str = ""
+    """What is worst, and why, in a sentence."""
     version: str = ""
     """Of its package, and the version with which it is known to work if that is another."""
     steps: tuple[float, ...] = STEPS
@@ -135,17 +139,17 @@ class _Server:
         self._process: Any = context.Process(target=_serve, args=(self._engine, far), daemon=True)
         self._process.start()
         far.close()
-        answer = self._answer()
+        answer = self._answer(BEGIN)
         name = self._engine if isinstance(self._engine, str) else type(self._engine).__name__
         return answer if isinstance(answer, About) else About(name, missing=f"{name} {answer}")
 
-    def _answer(self) -> Any:
+    def _answer(self, limit: float) -> Any:
         """What the process sends, or in words why it doesn't."""
         try:
-            if self._pipe.poll(self._limit):
+            if self._pipe.poll(limit):
                 return self._pipe.recv()
             self.stop()
-            return f"took longer than {self._limit:g} s"
+            return f"took longer than {limit:g} s"
         except (EOFError, OSError):
             self._process.join()
             return f"crashed (exit code {self._process.exitcode})"
@@ -165,7 +169,7 @@ class _Server:
             if not self._process.is_alive():
                 self._start()
             self._pipe.send((case, step))
-            answer = self._answer()
+            answer = self._answer(self._limit)
             if isinstance(answer, str):  # it hung or died
                 runs += [(None, math.nan, f"{answer} at a step of {1e3 * step:g} ms")] * (len(chosen) - len(runs))
                 break
@@ -213,6 +217,7 @@ def _about(engine: Any) -> About:
         name=name,
         precision=getattr(engine, "PRECISION", "f64"),
         declared=getattr(engine, "DECLARED", ""),
+        note=getattr(engine, "NOTE", ""),
         version=shown.strip(),
         steps=tuple(getattr(engine, "TIMESTEPS", STEPS)),
     )
@@ -237,18 +242,21 @@ def _attempt(engine: Any, case: Case, step: float) -> Any:
     states, spent, done = np.empty_like(case.exact), 0.0, 0
     try:
         engine.build(case, step)
-        for k, steps in enumerate(np.rint(case.times / step).astype(int).tolist()):
-            begin = time.process_time()
-            if steps > done:
-                engine.step(steps - done)
-            parts = [np.asarray(part, dtype=float) for part in engine.state()]
-            spent, done = spent + time.process_time() - begin, steps
-            shapes = [part.shape for part in parts]
-            if shapes != [(3,)] * 3:
-                return None, math.nan, f"state() must return position, velocity and spin, not shapes {shapes}"
-            states[k] = np.concatenate(parts)
-            if not (np.abs(states[k]) < 1e8).all():
-                return None, math.nan, f"diverged by t = {case.times[k]:g} s at a step of {1e3 * step:g} ms"
+        for k, t in enumerate(case.times.tolist()):
+            near = math.floor(t / step + 1e-6)
+            for at in (near, near + 1) if t / step - near > 1e-6 else (near,):  # between two steps, along a line
+                begin = time.process_time()
+                if at > done:
+                    engine.step(at - done)
+                parts = [np.array(part, dtype=float) for part in engine.state()]
+                spent, done = spent + time.process_time() - begin, at
+                shapes = [part.shape for part in parts]
+                if shapes != [(3,)] * 3:
+                    return None, math.nan, f"state() must return position, velocity and spin, not shapes {shapes}"
+                now = np.concatenate(parts)
+                if not (np.abs(now) < 1e8).all():
+                    return None, math.nan, f"diverged by t = {t:g} s at a step of {1e3 * step:g} ms"
+                states[k] = now if at == near else states[k] + (t / step - near) * (now - states[k])
     except NotImplementedError as error:
         return NotImplementedError(str(error))
     except Exception as error:  # whatever an engine throws loses the case alone

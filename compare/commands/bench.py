@@ -1,10 +1,11 @@
-"""``dualball grade``: a score card for a person's own contact settings; and ``dualball league``: all engines."""
+"""Exact cases for any engine: ``dualball cases``, ``league`` for all engines, ``grade`` for a person's own settings."""
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,18 +14,17 @@ import numpy as np
 from rich.text import Text
 
 from compare.bench import grade, league, native
-from compare.bench.league import Contestant
+from compare.bench.case import VERSION
+from compare.bench.exact import cases
 from compare.bench.native import CHOICES, Native
-from compare.bench.trials import SLIPPING
 from compare.commands import options, running
 from compare.kit import engines, pages, progress
-from compare.kit.engines import ENGINES
 from mjsim import ContactSettings
 from model import InputError
-from model.files import check_writable, write_text
+from model.files import check_writable, make_directory, write_text
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names
 
-JSON, PAGE, RUNS = "league.json", "league.html", "league"
+JSON, PAGE = "league.json", "league.html"
 _FEW = options.Number(allowed=Range(0, 1e5, whole=True))
 _NUMBERS: dict[str, tuple[options.Number, str]] = {
     "timestep": (options.seconds, "time step"),
@@ -61,14 +61,57 @@ def add(commands: options.Commands) -> None:
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write (default: none)")
     options.outputs(command)
 
-    summary = "all engines that are installed on the same tasks, against theory"
-    command = options.command(commands, "league", ranked, summary, "--quick")
-    command.add_argument("--quick", action="store_true", help="one time step and fewer tasks: within a minute")
+    summary = "the exact contact cases: a list, one in full, or the set as files for engines in any language"
+    command = options.command(commands, "cases", listed, summary, "-o cases")
+    command.add_argument("name", nargs="?", metavar="NAME", help="show this case")
     command.add_argument(
-        "--engine", action="append", metavar="NAME", help=f"only this one (repeatable): {', '.join(ENGINES)}"
+        "-o", "--output", type=Path, metavar="DIR", help="write JSON, HDF5, MJCF and the scoring rule (default: none)"
     )
+    options.outputs(command)
+
+    summary = "all engines that are installed on the exact cases, as they come and in the best settings known here"
+    command = options.command(commands, "league", ranked, summary, "--quick")
+    command.add_argument("--quick", action="store_true", help="one time step")
+    named = f"only this one (repeatable), or a module of your own: {', '.join(league.ENGINES)}"
+    command.add_argument("--engine", action="append", metavar="NAME", help=named)
     running.add_workers(command)
     options.outputs(command, "results")
+
+
+def listed(args: argparse.Namespace) -> int:
+    """List the cases, show one, or write all."""
+    own = {case.name: case for case in cases()}
+    check_names([args.name] if args.name else [], list(own), "case")
+    if args.output:
+        from compare.bench import export  # here, because only this needs it
+
+        export.write(args.output)
+    chosen = own[args.name] if args.name else None
+    data = chosen.to_mapping() if chosen else {"version": VERSION, "cases": [c.to_mapping() for c in own.values()]}
+    if chosen:
+        shown: list[Any] = [
+            pages.pairs(
+                {
+                    "case": chosen.name,
+                    "about": chosen.about,
+                    "body": str(chosen.body),
+                    "surfaces": "\n".join(map(str, chosen.surfaces)),
+                    "force": f"pull {chosen.pull} N, growth {chosen.growth} N/s, drag {chosen.drag} 1/s, "
+                    f"flow {chosen.flow} rad/s",
+                    "scales": f"{chosen.scales} of position (m), velocity (m/s), spin (rad/s)",
+                    "source": f"{chosen.source}; error below {chosen.bound:g}",
+                    "notices": "; ".join(f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()),
+                    "ends at": f"t = {chosen.times[-1]:g} s: {np.array2string(chosen.exact[-1], precision=6)}",
+                }
+            ),
+            chosen.mjcf(),
+        ]
+    else:
+        rows = [["case", "contacts", "kind", "what happens"]]
+        rows += [[c.name, str(len(c.surfaces)), league.kind(c), c.about] for c in own.values()]
+        shown = [pages.table(f"Exact contact cases, version {VERSION}", rows, justify="left")]
+    options.show(data, args.json, *shown, *([f"written to {args.output}"] if args.output else []))
+    return 0
 
 
 def graded(args: argparse.Namespace) -> int:
@@ -77,12 +120,11 @@ def graded(args: argparse.Namespace) -> int:
         check_writable(args.output)
     if args.engine is engines.MUJOCO:
         yours, described = _of_mujoco(args)
-        given: tuple[Native | None, list[Contestant]] = yours, [grade.OURS, grade.PLAIN, grade.FREE]
+        those = grade.contestants(yours)
     else:
-        others, described = _of_another(args)
-        given = None, [*others, grade.OURS]
+        yours, (those, described) = None, _of_another(args)
     with progress.shown(quiet=args.json) as show:
-        columns = grade.grade(*given, show=show)
+        columns = grade.grade(those, show, yours)
     if args.output:
         write_text(args.output, grade.html(columns, described))
     advice = (Text(f"• {item}") for item in columns[0].advice)
@@ -110,7 +152,7 @@ def _of_mujoco(args: argparse.Namespace) -> tuple[Native, str]:
     return yours, f"{described} {yours.note}".rstrip()
 
 
-def _of_another(args: argparse.Namespace) -> tuple[list[Contestant], str]:
+def _of_another(args: argparse.Namespace) -> tuple[dict[str, tuple[Any, float]], str]:
     """Another engine in its best settings and as it comes, also in words."""
     engine: engines.Engine = args.engine
     if engine.missing:
@@ -120,37 +162,39 @@ def _of_another(args: argparse.Namespace) -> tuple[list[Contestant], str]:
     if args.file or options.given(args, (*_NUMBERS, *CHOICES, *_PAIR)).keys() - {"timestep"}:
         raise InputError(f"a file and contact settings are MuJoCo's; of {engine.name} only --timestep can be given")
     step = options.given(args, ["timestep"]).get("timestep", ContactSettings.timestep)
-    those = [engines.engine(name) for name in dict.fromkeys((engine.name, engine.as_it_comes)) if name]
-    columns = [Contestant(each.name, each, step, each.configure({"timestep": step}, SLIPPING.p)) for each in those]
-    return columns, f"{engine.name} in its best known settings and as it comes, step {1e3 * step:g} ms."
+    names = [name for name in (engine.name, engine.as_it_comes, "mujoco") if name in league.ENGINES]
+    those = {name: (league.ENGINES[name], step) for name in dict.fromkeys(names)}
+    return those, f"{engine.name} in its best known settings and as it comes, step {1e3 * step:g} ms."
 
 
 def ranked(args: argparse.Namespace) -> int:
-    """Measure what isn't there yet, show the table, write JSON and page."""
+    """Measure, show the table, write JSON and page."""
     from compare.bench import figures  # here, because drawing takes a second to load
     from compare.report.pictures import address, svg
 
-    check_names(args.engine or (), list(ENGINES), "engine")
-    those = league.contestants(args.engine, league.QUICK if args.quick else league.STEPS)
-    missing = {each.name: each.engine.missing for each in those if each.engine.missing}
-    if all(each.name in missing for each in those):
-        raise InputError(f"there is nothing to compare: {'; '.join(missing.values())}")
-    with running.campaign(args, "league", RUNS) as campaign:
-        for name, why in missing.items():
-            print(f"dualball: {name} is left out: {why}", file=sys.stderr)
-        entries = league.measure(campaign, those, args.quick)
-    data = league.to_mapping(those, entries)
+    chosen = {name: league.ENGINES.get(name, name) for name in args.engine or league.ENGINES}
+    if unknown := [name for name in chosen if name not in league.ENGINES and not re.search(r"[.:]", name)]:
+        check_names(unknown, list(league.ENGINES), "engine")
+    make_directory(args.output)
+    with progress.shown(quiet=args.json or args.quiet) as show:
+        found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)
+    if all(result.skipped for results in found.values() for result in results):
+        raise InputError(f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}")
+    data = league.to_mapping(found)
     write_text(args.output / JSON, json.dumps(data, indent=1))
-    failures = [
-        (f"{entry.name}, {1e3 * (entry.step or 0):g} ms, {name}", reason)
-        for entry in entries
-        for name, reason in entry.failures.items()
-    ]
-    picture = address(svg(figures.draw_league(entries)))
-    shown = {"rows": league.rows(entries), "settings": league.settings_table(data), "caption": league.CAPTION}
-    page = pages.render("compare.report", "league.html", **shown, failures=failures, picture=picture)
-    write_text(args.output / PAGE, page)
-    options.show(data, args.json, *league.tables(entries), league.CAPTION)
+    shown = {
+        "summary": league.summary(found),
+        "rows": league.rows(found),
+        "about": league.about(found),
+        "notes": list(league.notes(found)),
+        "caption": league.CAPTION,
+        "picture": address(svg(figures.draw_league(found))),
+    }
+    write_text(args.output / PAGE, pages.render("compare.bench", "league.html", **shown))
+    for what, why in league.notes(found):
+        if what.endswith("all cases"):
+            print(f"dualball: {what.removesuffix(', all cases')} is left out: {why}", file=sys.stderr)
+    options.show(data, args.json, *league.tables(found), league.CAPTION)
     if not args.json:
         print(f"page: {args.output / PAGE}")
     return 0

@@ -26,7 +26,7 @@ GROUPS = {
         **{"attractors": "attractors", "basins": "attractors", "search": "attractors", "design": "design"},
         **{"render": "look", "view": "look"},
     },
-    "contacts and engines": {"forecast": "forecast", "grade": "bench", "league": "bench"},
+    "contacts and engines": {"forecast": "forecast", "grade": "bench", "cases": "bench", "league": "bench"},
 }
 """The commands, as help groups them, and the module of each: `predict` doesn't wait for the engines of the others."""
 

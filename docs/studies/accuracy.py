@@ -11,11 +11,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from analytic.mechanics import rolling_forces
-from compare.bench.league import Contestant, number
-from compare.bench.trials import APPROACH, AT_REST, HITTING, LANDING, SMOOTH, STATES, WINDOW, Stationary
 from compare.kit.campaign import Campaign
 from compare.kit.engines import MUJOCO
 from compare.kit.pages import Rows
+from docs.studies.states import (
+    APPROACH,
+    AT_REST,
+    HITTING,
+    LANDING,
+    SMOOTH,
+    STATES,
+    WINDOW,
+    Contestant,
+    Stationary,
+    number,
+)
 from mjsim import ContactSettings
 from model import Case, Contact, Events, State, Trajectory
 

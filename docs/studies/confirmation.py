@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compare.bench import trials
-from compare.bench.trials import EPS
+from docs.studies import states
+from docs.studies.states import EPS
 from mjsim import ContactSettings, Run, simulate
 from model import Flow, State
 from model.arrays import Array
 
-ROLLING = trials.SMOOTH.replace(omega_0=10.0)
-SLIPPING = trials.SLIPPING.p
+ROLLING = states.SMOOTH.replace(omega_0=10.0)
+SLIPPING = states.SLIPPING.p
 SLIPPING_START = State(omega_c=13.85, slip_x=-4.0, slip_z=10.0)
 """A start close enough to steady slipping to settle within a few seconds."""
 

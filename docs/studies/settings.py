@@ -1,6 +1,6 @@
 """What ways of setting MuJoCo, and other methods, reach and take: ``python -m docs.studies.settings`` draws it.
 
-Each is a contestant of a small league: the stationary states and the approach to one of `compare.bench.trials`. Runs
+Each is tried on the stationary states and the approach to one of `docs.studies.states`. Runs
 are kept in results/settings, as those of the tables of the same page (`docs.studies.tables`).
 """
 
@@ -20,12 +20,12 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from compare.bench import figures, league
-from compare.bench.league import CONTACT, ERRORS, OPEN, Contestant, Entry
 from compare.kit import drawing, progress, style
 from compare.kit.campaign import BATCH, Campaign
-from compare.kit.engines import EVENT, MOREAU, NEWCOMER, as_it_comes, newcomer
+from compare.kit.engines import ENGINES, EVENT, MOREAU, NEWCOMER, as_it_comes, newcomer
 from compare.kit.tasks import Task
+from docs.studies import states
+from docs.studies.states import CONTACT, ERRORS, OPEN, Contestant, Entry
 from mjsim import ContactSettings, Run
 from model.files import make_directory
 
@@ -80,14 +80,21 @@ def rivals(step: float) -> Ways:
 
 def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
     """Errors of ways to set MuJoCo, and how often contact is lost."""
-    return league.scored(campaign, _contestants(ways), [*ERRORS, CONTACT])
+    return states.scored(campaign, _contestants(ways), [*ERRORS, CONTACT])
 
 
 def frontier(campaign: Campaign, steps: Sequence[float]) -> list[Entry]:
     """Entries, with their cost, of MuJoCo under several settings and of theory's two simulators, at several steps."""
     ways = [each for alike in zip(*(_contestants(rivals(step)) for step in steps), strict=True) for each in alike]
-    theory = [each for name in (MOREAU.name, EVENT.name) for each in league.contestants([name], steps)]
-    return league.scored(campaign, [*ways, *theory], ERRORS, _cost)
+    theory = [each for name in (MOREAU.name, EVENT.name) for each in _theory(name, steps)]
+    return states.scored(campaign, [*ways, *theory], ERRORS, _cost)
+
+
+def _theory(name: str, steps: Sequence[float]) -> list[Contestant]:
+    """One of theory's simulators, once if it chooses its own steps."""
+    engine = ENGINES[name]
+    chosen: list[float | None] = [*steps] if "timestep" in engine.options else [None]
+    return [Contestant(name, engine, step, engine.at(step, states.SLIPPING.p)) for step in chosen]
 
 
 def _contestants(ways: Ways) -> list[Contestant]:
@@ -102,9 +109,9 @@ def _cost(task: Task) -> float:
     """
     settings = task.settings
     if not isinstance(settings, ContactSettings) or settings.coordinates != "polar":
-        return league.cost(task)
+        return states.cost(task)
     given, spent = ([task.parameters] * BATCH, [task.x0] * BATCH, task.t_end, [task.fluid] * BATCH, settings), []
-    for _ in range(league.REPEATS):
+    for _ in range(states.REPEATS):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of contacts that hover
             run = Run(*given, sample_interval=task.sample_interval)
@@ -120,7 +127,7 @@ def draw_ladder(entries: Sequence[Entry]) -> Figure:
     figure = style.figure(9, 1.1 + 0.33 * len(entries))
     axes = figure.add_subplot()
     for name, look in zip((name for name in entries[0].scores if name != OPEN), LOOKS, strict=False):
-        own = [(max(e.scores[name], figures.LEAST), k) for k, e in enumerate(entries) if math.isfinite(e.scores[name])]
+        own = [(max(e.scores[name], states.LEAST), k) for k, e in enumerate(entries) if math.isfinite(e.scores[name])]
         axes.plot([x for x, _ in own], [k for _, k in own], "-", lw=0.6, label=name, **look)
     axes.set_yticks(range(len(entries)), [entry.name for entry in entries], fontsize=8.5)
     axes.invert_yaxis()
@@ -133,7 +140,7 @@ def draw_ladder(entries: Sequence[Entry]) -> Figure:
 def draw_frontier(entries: Sequence[Entry]) -> Figure:
     """A panel for each state, a line for each method."""
     names = dict.fromkeys(entry.name for entry in entries)
-    return figures.draw_error_over_cost(entries, dict(zip(names, itertools.cycle(LOOKS), strict=False)))
+    return states.draw_error_over_cost(entries, dict(zip(names, itertools.cycle(LOOKS), strict=False)))
 
 
 if __name__ == "__main__":

@@ -7,20 +7,23 @@ directory and not computed again.
 from __future__ import annotations
 
 import argparse
+import functools
+import json
 import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from compare.bench import league
-from compare.bench.league import Entry
-from compare.kit import pages, progress
+from compare.bench.figures import draw_league
+from compare.bench.runner import Result
+from compare.kit import drawing, pages, progress
 from compare.kit.campaign import Campaign
 from compare.kit.engines import newcomer
 from compare.kit.pages import Rows
-from docs.studies import accuracy, confirmation, settings
+from docs.studies import accuracy, confirmation, settings, states
+from docs.studies.states import Entry
 from mjsim import ContactSettings
 from model import InputError
 from model.files import write_text
@@ -39,7 +42,7 @@ def write(page: Path, name: str, rows: Rows) -> None:
 
 def _of_settings(entries: Sequence[Entry]) -> Rows:
     """Entries of one time step, which isn't named."""
-    (_, _, *head), *body = league.rows(entries)
+    (_, _, *head), *body = states.rows(entries)
     return [["settings", *head], *([name, *cells] for name, _, *cells in body)]
 
 
@@ -69,22 +72,33 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
     "events": accuracy.event_times,
     "split": accuracy.force_split,
     "ablation": lambda campaign: _of_settings(settings.reached(campaign, settings.rungs(settings.STEP))),
-    "frontier": lambda campaign: league.rows(settings.frontier(campaign, settings.STEPS)),
+    "frontier": lambda campaign: states.rows(settings.frontier(campaign, settings.STEPS)),
     "variants": lambda campaign: _of_settings(settings.reached(campaign, variants(settings.STEP))),
 }
 """The tables by name."""
 
 
-def _league(campaign: Campaign) -> dict[str, Any]:
-    those = league.contestants()
-    if missing := [each.engine.missing for each in those if each.engine.missing]:
+@functools.cache
+def _league() -> dict[str, list[Result]]:
+    with progress.shown(counted=True) as show:
+        found = league.measure(league.ENGINES, None, os.cpu_count() or 1, show)
+    if missing := [results[0].skipped for results in found.values() if all(result.skipped for result in results)]:
         raise InputError(f"the page is about all engines: {missing[0]}")
-    return league.to_mapping(those, league.measure(campaign, those))
+    write_text(Path("results") / "league.json", json.dumps(league.to_mapping(found)))
+    drawing.save(draw_league(found), Path(__file__).parents[1] / "league.svg")
+    return found
+
+
+def _errors(asked: bool) -> Rows:
+    """Errors by case of the engines as they come, or of those in their best settings."""
+    return league.rows({name: own for name, own in _league().items() if name.endswith("-defaults") == asked})
 
 
 LEAGUE: dict[str, Callable[[Campaign], Rows]] = {
-    "league": lambda campaign: league.rows(league.from_mapping(_league(campaign))),
-    "league-settings": lambda campaign: league.settings_table(_league(campaign)),
+    "league": lambda campaign: league.summary(_league()),
+    "league-best": lambda campaign: _errors(False),
+    "league-defaults": lambda campaign: _errors(True),
+    "league-about": lambda campaign: league.about(_league()),
 }
 PAGES = {"mujoco-settings.md": ("settings", TABLES), "engines.md": ("league", LEAGUE)}
 """Directory of the runs, and tables of each page."""

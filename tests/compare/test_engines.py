@@ -11,9 +11,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import analytic
-from compare.bench import grade, league
-from compare.bench.league import CASES, COST, Contestant, Entry
-from compare.bench.trials import HITTING, LANDING, ROLLING, STATES
 from compare.commands import cli
 from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, NEWCOMER
@@ -22,6 +19,7 @@ from compare.kit.levels import Level
 from compare.kit.record import Records
 from compare.kit.tasks import Task, carry_out, store
 from compare.subjects.stationary import measure as settled
+from docs.studies.states import HITTING, LANDING, STATES
 from model import InputError, Parameters, State
 from model.drag import LAWS
 from model.kinematics import Motion as World
@@ -177,51 +175,6 @@ def test_settings_out_of_range_are_refused(name):
         settings(coordinates="polar")
 
 
-def test_the_league_of_theory_alone(tmp_path, capsys):
-    command = ["league", "--quick", "--engine", "event", "-o", str(tmp_path), "--workers", "0", "--quiet"]
-    assert cli.main([*command, "--json"]) == 0
-    data = json.loads(capsys.readouterr().out)
-    (entry,) = league.from_mapping(data)
-    assert entry.step is None
-    assert entry.scores[CASES] == 9
-    assert entry.scores[COST] > 0
-    assert all(error < 1e-8 for name, error in entry.scores.items() if name not in (CASES, COST))
-    assert data["contestants"][0]["versions"]["scipy"]
-    page = (tmp_path / "league.html").read_text("utf-8")
-    assert "data:image/svg+xml,<" in page
-    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "league").iterdir()}
-    assert cli.main(command) == 0  # nothing is measured twice
-    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "league").iterdir()} == before
-    assert "RR at 12" in capsys.readouterr().out
-
-
-def test_the_league_leaves_out_what_is_missing_and_says_so(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert [bool(each.engine.missing) for each in league.contestants(["event", "drake"], [1e-3])] == [False, True]
-    data = league.to_mapping(league.contestants(["drake"]), [])
-    assert data["contestants"][0]["missing"] == "drake is not installed: pip install drake"
-    assert cli.main(["league", "--engine", "drake", "-o", str(tmp_path)]) == 2
-    assert "nothing to compare: drake is not installed" in capsys.readouterr().err
-    assert cli.main(["league", "--engine", "drak", "-o", str(tmp_path)]) == 2
-    assert "did you mean 'drake'?" in capsys.readouterr().err
-
-
-def test_a_run_that_breaks_down_is_in_the_table_as_such():
-    entry = Entry("drake", 1e-3, {"RR at 12": math.nan, CASES: 3.0}, {"RR at 12": "diverged"})
-    head, row = league.rows([entry])
-    shown = {"engine": "drake", "step": "1 ms", "RR at 12": "failed", CASES: "3"}
-    assert dict(zip(head, row, strict=True)) == shown
-
-
-@engines(*BEST)
-def test_the_wall_holds_above_its_threshold_and_not_below(name):
-    """Within 3 %; the protocol itself asks for less."""
-    (discipline,) = [each for each in league.disciplines() if each.name == league.WALL]
-    (contestant,) = league.contestants([name], [2e-3])
-    tasks = [contestant.task(each) for each in discipline.runs]
-    assert discipline.score([run for task in tasks for run in carry_out([task])]) <= 0.03
-
-
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -234,16 +187,6 @@ def test_only_settings_can_be_graded(options, says, monkeypatch, capsys):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert cli.main(["grade", *options]) == 2
     assert says in capsys.readouterr().err
-
-
-@engines(*BEST)
-def test_an_engine_is_graded(name):
-    those = [Contestant(name, ENGINES[name], 4e-3, ENGINES[name].at(4e-3, ROLLING.p))]
-    (column,) = grade.grade(None, those)
-    assert column.name == name
-    assert len(column.reproduced) >= 7
-    assert all(abs(held.omega_c) < 1e-6 for held in column.stationary)
-    assert column.cost > 0
 
 
 def test_an_engine_without_defaults_of_its_own_says_so(tmp_path):

@@ -14,13 +14,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import analytic
-from compare.bench import league
-from compare.bench.league import COST, ERRORS, OPEN, Entry
-from compare.bench.trials import APPROACH, ROLLING, SLIPPING, STATES
 from compare.kit import pages
 from compare.kit.campaign import Campaign
 from compare.kit.engines import newcomer
-from docs.studies import accuracy, confirmation, settings, tables
+from docs.studies import accuracy, confirmation, settings, states, tables
+from docs.studies.states import APPROACH, COST, ERRORS, OPEN, ROLLING, SLIPPING, STATES, Entry
 from mjsim import ContactSettings
 from model import InputError
 
@@ -200,4 +198,4 @@ def test_figures_are_drawn_where_an_error_is_zero_or_missing() -> None:
 
 
 def test_numbers_of_tables() -> None:
-    assert [league.number(value) for value in (1.23e-5, 1e-16, math.nan)] == ["1.2e-05", "< 1e-14", "diverged"]
+    assert [states.number(value) for value in (1.23e-5, 1e-16, math.nan)] == ["1.2e-05", "< 1e-14", "diverged"]

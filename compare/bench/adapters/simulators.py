@@ -6,13 +6,14 @@ What runs is what `compare.kit.engines` runs: the theory's two simulators, MuJoC
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from compare.bench.adapters import mujoco_free
 from compare.bench.case import STEPS, Case
-from compare.kit.engines import ENGINES, engine
+from compare.kit.engines import ENGINES, Engine, engine
 from compare.kit.tasks import Task, carry_out
 from model import InputError
 from model.arrays import Array
@@ -36,17 +37,17 @@ class Simulated:
                 raise NotImplementedError("only for a ball in a vessel")
             self._free.build(case, timestep)
             return
-        (p, x0), chosen = case.motion, engine(self.NAME)
+        (p, x0), chosen = case.motion, self.engine(timestep)
         if chosen.missing:
             raise NotImplementedError(chosen.missing)
+        settings, t_end = chosen.at(timestep, p), timestep * math.ceil(case.times[-1] / timestep - 1e-9)
         self._task = Task(
-            engine=self.NAME,
-            parameters=p,
-            x0=x0,
-            t_end=float(case.times[-1]),
-            settings=chosen.at(timestep, p),
-            sample_interval=timestep,
+            engine=chosen.name, parameters=p, x0=x0, t_end=t_end, settings=settings, sample_interval=timestep
         )
+
+    def engine(self, timestep: float) -> Engine:
+        """What takes the ball in its vessel."""
+        return engine(self.NAME)
 
     def step(self, n: int) -> None:
         """Go on by n steps; the first time the whole motion is simulated."""
@@ -72,8 +73,10 @@ class Simulated:
 
 JOINTS = "in the vessel on joints: azimuth, radius, height, spin"
 SETTINGS = "contact settings of the study, elliptic cone"
-mujoco = Simulated("mujoco", f"{SETTINGS}; {JOINTS}, with corrections between the steps", mujoco_free.Bodies(tuned=True))
-mujoco_plain = Simulated("mujoco-plain", f"{SETTINGS}; {JOINTS}", mujoco_free.Bodies(tuned=True))
+mujoco = Simulated(
+    "mujoco", f"{SETTINGS}; {JOINTS}, with corrections between the steps", mujoco_free.Bodies(mujoco_free.studied)
+)
+mujoco_plain = Simulated("mujoco-plain", f"{SETTINGS}; {JOINTS}", mujoco_free.Bodies(mujoco_free.studied))
 event = Simulated("event", "equations of the paper, no scene; its own steps")
 time_stepping = Simulated("time-stepping", "equations of the paper, no scene")
 siconos = Simulated("siconos", "equations of motion in turning axes, no scene")

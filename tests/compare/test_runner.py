@@ -1,0 +1,148 @@
+"""Engines of three functions on exact cases: what breaks loses a case, not the run; the league; files of the set."""
+
+import json
+import os
+import time
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+from compare.bench import cases, run
+from compare.bench.case import STEPS, VERSION
+from compare.bench.runner import run_all
+from compare.commands import cli
+from model import InputError
+
+BY_NAME = {case.name: case for case in cases()}
+STOPS = BY_NAME["box-stops"]
+
+
+@dataclass
+class Exact:
+    """Knows the answer, and gives it with an error of first order; breaks in one case in some way."""
+
+    breaks: str = ""
+
+    def build(self, case, timestep):
+        self.case, self.timestep, self.done = case, timestep, 0
+        if case.name == "growing-pull":
+            raise NotImplementedError("no forces")
+
+    def step(self, n):
+        self.done += n
+        if self.case.name == "box-stops":
+            if self.breaks == "hangs":
+                time.sleep(60)
+            if self.breaks == "dies":
+                os._exit(3)
+            if self.breaks == "raises":
+                raise ValueError("singular matrix")
+
+    def state(self):
+        k = int(np.argmin(np.abs(self.case.times - self.done * self.timestep)))
+        position, velocity, spin = self.case.exact[k].reshape(3, 3)
+        if self.case.name == "box-stops" and self.breaks == "shapes":
+            return position, velocity[:2], spin
+        if self.case.name == "box-stops" and self.breaks == "nan":
+            return position, velocity * np.nan, spin
+        return position + self.timestep * self.case.times[k] * np.eye(3)[0], velocity, spin
+
+
+def test_errors_order_creep_and_cost():
+    found = run(STOPS, Exact())
+    assert found.passed
+    assert found.steps == STEPS
+    assert found.order == pytest.approx(1.0)
+    assert found.errors[-1] == pytest.approx(STEPS[-1] * STOPS.times[-1] / STOPS.scales[0])
+    assert found.creep == 0
+    assert found.lost == 0
+    assert found.cost >= 0
+    assert run(BY_NAME["growing-pull"], Exact()).skipped == "no forces"
+
+
+@pytest.mark.parametrize(
+    ("breaks", "says"),
+    [
+        ("hangs", "took longer than 3 s at a step of 4 ms"),
+        ("dies", "crashed (exit code 3) at a step of 4 ms"),
+        ("raises", "ValueError: singular matrix"),
+        ("shapes", "state() must return position, velocity and spin, not shapes [(3,), (2,), (3,)]"),
+        ("nan", "diverged by t = 0.04 s at a step of 4 ms"),
+    ],
+)
+def test_what_breaks_loses_the_case_and_not_the_run(breaks, says):
+    asked = [BY_NAME["block-slides"], STOPS, BY_NAME["turntable"]]
+    first, broken, last = run_all(asked, Exact(breaks), limit=3.0)
+    assert first.passed
+    assert last.passed
+    assert broken.failure == says
+    assert not broken.passed
+    assert np.isnan(broken.errors).all()
+
+
+@pytest.mark.parametrize(
+    ("engine", "says"),
+    [
+        ("no.such.module", "no.such.module can't be imported: No module named 'no'"),
+        ("compare.bench.runner", "compare.bench.runner has no function build nor step nor state"),
+        (SimpleNamespace(build=print, step=print), "SimpleNamespace has no function state; an engine has build, step"),
+    ],
+)
+def test_engines_that_are_none(engine, says):
+    with pytest.raises(InputError) as refused:
+        run(STOPS, engine)
+    assert says in str(refused.value)
+
+
+def test_a_version_that_broke_is_named(tmp_path, monkeypatch):
+    (tmp_path / "old.py").write_text(
+        "KNOWN = 'numpy 0.1'\ndef build(case, timestep): raise RuntimeError('gone')\nstep = state = print\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    found = run(STOPS, "old")
+    assert found.failure.startswith("RuntimeError: gone (numpy ")
+    assert found.failure.endswith("known to work: 0.1)")
+
+
+def test_steps_between_which_samples_lie():
+    assert run(BY_NAME["sphere-rolls-down"], "compare.bench.adapters.mujoco_free", [3e-3]).passed
+
+
+def test_the_league_of_theory_alone(tmp_path, capsys):
+    assert cli.main(["league", "--engine", "event", "-o", str(tmp_path), "--workers", "1", "--quiet", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    tried = [result for result in data["engines"]["event"] if not result["skipped"]]
+    assert len(tried) == sum(case.motion is not None for case in cases())
+    assert all(result["errors"][0] < 1e-8 and result["passed"] for result in tried)
+    page = (tmp_path / "league.html").read_text("utf-8")
+    assert "data:image/svg+xml,<" in page
+    assert "only for a ball in a vessel" in page
+
+
+def test_mistakes_with_the_league(tmp_path, capsys):
+    assert cli.main(["league", "--engine", "mujco", "-o", str(tmp_path)]) == 2
+    assert "did you mean 'mujoco'?" in capsys.readouterr().err
+    assert cli.main(["league", "--engine", "no.such", "-o", str(tmp_path), "--quiet"]) == 2
+    assert "nothing to compare: no.such can't be used: no.such can't be imported" in capsys.readouterr().err
+
+
+def test_the_set_as_files(tmp_path, capsys):
+    assert cli.main(["cases", "-o", str(tmp_path / "set")]) == 0
+    assert "block-rests" in capsys.readouterr().out
+    written = list((tmp_path / "set").iterdir())
+    assert sum(path.stat().st_size for path in written) < 2e6
+    assert len(written) == 2 + 2 * len(cases())
+    readme = (tmp_path / "set" / "README.md").read_text()
+    assert f"version {VERSION}" in readme
+    with h5py.File(tmp_path / "set" / "cases.h5") as file:
+        for case in cases():
+            data = json.loads((tmp_path / "set" / f"{case.name}.json").read_text())
+            assert np.array_equal(data["exact"], case.exact)
+            assert np.array_equal(file[case.name]["exact"], case.exact)
+            assert file[case.name]["contacts"].asstr()[:].tolist() == list(case.contacts)
+    assert cli.main(["cases", "lands"]) == 0
+    assert "a hollow sphere" in capsys.readouterr().out
+    assert cli.main(["cases", "land"]) == 2
