@@ -18,6 +18,7 @@ from the errors of each protocol at its quick level:
   onset; half as much as that of the period, which goes with the root of the height. A multiplier comes from the ten
   hops in which a disturbance is neither too large nor lost in errors. It rises by half of the relative change of eta:
   known to 4e-3, it gives the eta at which it is 1 to 8e-3, three times which is to be resolved;
+* motions to their ends are compared at two time steps, to a thousandth of what gravity does in the unit of time;
 * pulsations and jumps are compared at two time steps, to a thousandth. The onset of slip is bracketed to that, and slip
   begins within a time step, a few hundredths of a period, near a maximum; the mean reading and the flow by which a ramp
   passes a fold are small differences of flows;
@@ -53,6 +54,10 @@ _SPEEDS = {"v_y": "v_y", "v_h": "v_h"}
 _TURNS = {"omega_c": "ω_c", "slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
 _FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
 _FORCES |= {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}  # determined where both contacts roll
+_ENDS = (
+    *(("y", "y", "m"), ("h", "h", "m"), ("v_y", "v_y", "m s-1"), ("v_h", "v_h", "m s-1")),
+    *((name, symbol, "rad s-1") for name, symbol in _TURNS.items()),
+)
 _ALL = (
     Quantity("case", "case", "1", 0.0),
     Quantity("cases", "cases reached", "1", 0.0),
@@ -91,6 +96,7 @@ _ALL = (
     Quantity("time", "t", "s", 1e-2),
     Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
     Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
+    *(Quantity(f"end_{n}", f"{s} at the end", u, 5e-3) for n, s, u in _ENDS),
     Quantity("orbit_period", "period", "s", 1.5e-2),
     Quantity("orbit_omega_c", "mean ω_c of a period", "rad s-1", 2e-3),
     Quantity("orbit_height", "height of the hops", "m", 3e-2),

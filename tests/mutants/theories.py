@@ -10,6 +10,7 @@ import numpy as np
 
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
+from analytic.mechanics import rolling_forces
 from analytic.orbits.orbit_branch import Place
 from compare.kit.levels import Level
 from model import Case, Flow, Parameters, State
@@ -79,6 +80,17 @@ def _without(flag: Exists, there: int = 0) -> Fault:
         return np.where((plane & there) == there, plane & ~np.uint8(flag), plane)
 
     return answer(change)
+
+
+def _jams(right: Function) -> Function:
+    """Definitions 1-3 with RR stable wherever forces within both cones exist."""
+
+    def function(case: Case, p: Parameters, omega_c: float | None = None) -> Any:
+        given = right(case, p, omega_c)
+        forces = rolling_forces.margin(p.omega_0 if omega_c is None else omega_c, p) >= 0
+        return type(given).STABLE if case is Case.RR and p.mu > 1 and forces else given
+
+    return function
 
 
 def _hopping(p: Parameters) -> bool:
@@ -202,7 +214,11 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     },
     "slipping.slip_stability.lift_onset": {"lift begins 2 % late": scaled(1.02)},
     "slipping.slip_stability.neutral_flow": {"slip is neutral at 1 % more flow": scaled(1.01)},
-    "slipping.slip_stability.stability": {"Definitions 1-3 with 1 % more wall friction": given(other(eta=1.01))},
+    "slipping.slip_stability.stability": {
+        "RS in a moving fluid with 3 % more inertia": in_case(Case.RS, given(other(j=1.03))),
+        "rolling lasts while forces can jam it": _jams,
+        "Definitions 1-3 with 1 % more wall friction": given(other(eta=1.01)),
+    },
     "slipping.slip_bounds.nr_to_ns": {"(61) with 3 % more wall friction": given(other(eta=1.03))},
     "slipping.slip_bounds.rr_to_rs": {"(66) with μ, as printed": given(swapped)},
     "slipping.slip_bounds.rr_to_rs_stationary": {"(67) with 3 % more wall friction": given(other(eta=1.03))},
@@ -210,6 +226,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "slipping.slip_bounds.rr_to_sr_stationary": {"(74) with 3 % more inertia": given(other(j=1.03))},
     "slipping.slip_bounds.filippov_share": {"share of the sheets in (69) 5 % large": scaled(1.05)},
     "slipping.slip_bounds.rr_to_ss": {"(82), (83) with μ and η exchanged": given(swapped)},
+    "mechanics.drag.fall": {"flight with 2 % more drag on the fall": given(other(c=1.02))},
     # Laws of drag
     "mechanics.drag.sinking_speed": {"(10) 1 % large": scaled(1.01)},
     "mechanics.drag.of_velocity": {"the drag's slope left out of the eigenvalues": answer(np.real)},

@@ -6,8 +6,11 @@ import math
 
 import analytic
 from analytic.mechanics import drag
+from analytic.slipping import slip_stability
+from analytic.slipping.slip_stability import SlipStability
 from compare.claim import Bearing, Claim, Text, given, one
 from compare.judge import RTOL, simulated, theory
+from compare.kit.lab import state_units
 from compare.kit.record import Measurement, state
 from compare.kit.settling import forces
 from compare.subjects.motion.measure.laws import FLUIDS
@@ -15,6 +18,8 @@ from compare.subjects.motion.measure.motions import NAMES
 from model import Case
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
+
+_OWN = "The paper has no equations away from the wall: (20), with a drag on radial motion, is this project's extension."
 
 
 def _coefficient(m: Measurement) -> float:
@@ -36,6 +41,30 @@ def _end(m: Measurement) -> float:
     """A column of theory's motion where the measured one ends."""
     motion = simulated(m.parameters, state(m), float(m.conditions["time"]))
     return float(getattr(motion, m.quantity.removeprefix("after_"))[-1])
+
+
+def _end_of(name: str, *starts: str) -> Bearing:
+    """A variable at the end of motions from some starts, in units of what gravity does."""
+    return Bearing(
+        "runs",
+        f"end_{name}",
+        lambda m: float(simulated(m.parameters, state(m), float(m.conditions["time"])).x[-1, VARIABLES.index(name)]),
+        when=lambda m: m.conditions["start"] in starts,
+        size=lambda m: float(state_units(m.parameters)[VARIABLES.index(name)]),
+        by="analytic.simulate",
+    )
+
+
+def _on_smooth_wall(m: Measurement) -> float:
+    """RS while slip at the floor dies out, else SS."""
+    holds = slip_stability.stability(Case.RS, m.parameters) is SlipStability.STABLE
+    return float(Case.RS if holds else Case.SS)
+
+
+def _slip_lasts(m: Measurement) -> float:
+    """RR where slip dies out, else SS."""
+    dies_out = slip_stability.stability(Case.RR, m.parameters) is SlipStability.STABLE
+    return float(Case.RR if dies_out else Case.SS)
 
 
 def _case(m: Measurement) -> float:
@@ -94,6 +123,42 @@ LAWS = (
         (Bearing("motions", "case", _case, by="analytic.simulate"),),
     ),
     Claim(
+        "flight",
+        "extension, (9), (20)",
+        "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and keeps its spin.",
+        tuple(_end_of(name, "thrown", "thrown up") for name in VARIABLES),
+        reason=_OWN,
+    ),
+    Claim(
+        "opening",
+        "(12), section 1.1",
+        "A wall contact that carries nothing, or less than friction at the floor takes from it, opens, and the ball "
+        "leaves the wall as the equations say.",
+        tuple(_end_of(name, "pulled off, at rest", "pulled off, going round") for name in VARIABLES),
+    ),
+    Claim(
+        "smooth-wall",
+        "Prop. 2, Definitions 1-3",
+        "Along a wall without friction a ball goes round with the fluid, rolls on the floor and spins about its axis, "
+        "as long as slip at the floor dies out; faster, it slips.",
+        (
+            Bearing(
+                "runs", "case", _on_smooth_wall, when=given(start="smooth wall"), by="analytic.slip_stability.stability"
+            ),
+        ),
+    ),
+    Claim(
+        "definition-1-2",
+        "Definitions 1 and 2, (82)",
+        "On a floor so rough, μ > 1, that forces would allow a ball to jam between floor and wall and roll on beyond "
+        "ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
+        (
+            Bearing(
+                "runs", "case", _slip_lasts, when=given(start="rough floor"), by="analytic.slip_stability.stability"
+            ),
+        ),
+    ),
+    Claim(
         "impacts",
         "extension",
         "A ball that lands does not rebound, and friction takes its share of the impulse.",
@@ -114,7 +179,6 @@ _CORRECTED = {
     Case.SS: "The last row of (26) has the wrong sign before w̃_z A_z/(w̃_x jmr), and A_z and B_z of (29) are damaged.",
     Case.NS: "(28) divides by w̃_x where it should by w̃_y, and its last row has -(c v_y + g)/r for +(c v_y + g)/r.",
 }
-_OWN = "The paper has no equations away from the wall: (20), with a drag on radial motion, is this project's extension."
 _FORCES = ("Ax", "Ay", "Az", "Bx", "By", "Bz", "Ax-By", "Ay+By", "Bx+By")
 """Where both contacts roll only A_z, B_z and the sums are determined, and measured."""
 

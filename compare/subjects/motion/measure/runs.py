@@ -1,0 +1,74 @@
+"""Whole motions from given starts to their ends: flight, a contact that opens, slip on smooth walls and rough floors.
+
+Each start is carried out with two time steps; what the step changes is the uncertainty of the finer run.
+
+* *Thrown*: the ball flies past the axis of the vessel without touching anything, spinning, for as long as drag tells.
+* *Pulled off*: beside the wall, with a slip on the floor that drives it away from there; its wall contact carries
+  nothing, or as good as nothing, and opens.
+* *Smooth wall*: the ball goes round with the fluid, rolls on the floor and spins against a wall without friction, in
+  faster and faster flows. Does the floor hold it?
+* *Rough floor*, mu > 1: the ball rolls at both points but for a slight slip, in faster and faster flows. It may jam
+  between floor and wall, or the slip may last.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.kit.statistics import Measured
+from compare.kit.tasks import Task
+from model import Parameters, State
+from model.kinematics import VARIABLES
+
+STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
+    "thrown": (0.4, 3.0, (60.0, 1.0, 0.5, 0.6, -0.8, 0.4, 0.6, 0.1)),
+    "thrown up": (1.2, 2.0, (60.0, 5.0, -0.6, 0.3, 0.5, -0.9, 0.5, -0.05)),
+    "pulled off, at rest": (0.3, 0.4, (0.0, 0.0, 0.0, 0.0, 0.0, -1.5, 0.0, 0.0)),
+    "pulled off, going round": (0.3, 0.4, (0.0, 0.0, 0.15, 0.2, 0.3, -1.5, 0.0, 0.0)),
+}
+"""omega_0, how long, and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
+SMOOTH, SPUN = (0.5, 0.7, 0.9, 1.1, 1.3), 1.0
+"""Flows omega_0 sqrt(R/g) along a smooth wall, and how long, in units of sqrt(R/g)."""
+ROUGH, JAMMED, SLIGHT = 1.7, (1.5, 1.7, 1.8, 2.0, 2.2), 5e-3
+"""Friction of a rough floor, flows along it in the same units, and a slight slip divided by the ball's spin."""
+REFINED = 8, 16
+"""Time steps in a coarse one."""
+
+
+def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Where each start ends: its state, or on a smooth wall its case."""
+    runs: list[tuple[str, str, Parameters, State, float]] = []
+    for name, p in sets.items():
+        unit = time_unit(p)
+        for how, (flow, lasts, x) in STARTS.items():
+            runs.append((name, how, p.replace(omega_0=flow / unit), State(*(np.array(x) * state_units(p))), lasts))
+        for flow in SMOOTH:
+            going = State(omega_c=flow / unit, slip_y=math.sqrt(p.g * p.R) / p.r)
+            runs.append((name, "smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, SPUN))
+        for flow in JAMMED:
+            spin = flow / unit * p.R / p.r
+            slight = State(omega_c=flow / unit, slip_x=-SLIGHT / 10 * spin, slip_z=SLIGHT * spin)
+            runs.append((name, "rough floor", p.replace(omega_0=flow / unit, mu=ROUGH), slight, SPUN))
+    pairs: list[list[Task]] = []
+    for _, _, p, x, lasts in runs:
+        step = coarse_step(p)
+        count = round(lasts * time_unit(p) / step)
+        pairs.append([lab.task(p, x, count * step, step / times, samples=count) for times in REFINED])
+    for (name, how, p, x, _), tasks, (coarse, fine) in zip(runs, pairs, lab.groups(pairs), strict=True):
+        at: dict[str, Condition] = {"start": how, "time": float(fine.time[-1]), **state_of(x.stacked())}
+        if coarse.case[-1] != fine.case[-1]:
+            yield Missing("runs", name, f"{how}: with half the time step the ball ends in another case")
+        elif how in ("smooth wall", "rough floor"):
+            yield measurement(lab, "runs", name, p, "case", float(fine.case[-1]), tasks, **at)
+        else:
+            # The change of one variable may vanish by chance: the largest, in natural units, stands for all.
+            units, ends = state_units(p), (coarse.x[-1], fine.x[-1])
+            change = float(np.abs((ends[1] - ends[0]) / units).max())
+            for variable, value, size in zip(VARIABLES, ends[1].tolist(), units.tolist(), strict=True):
+                sure = Measured(value, change * size)
+                yield measurement(lab, "runs", name, p, f"end_{variable}", sure, tasks, **at)
