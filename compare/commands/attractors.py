@@ -41,30 +41,28 @@ def add(commands: options.Commands) -> None:
     command.set_defaults(engine=EVENT)
     running.add_start(command)
     command.add_argument(
-        "--starts", type=options.count, default=20, metavar="N", help="random starts, unless one is given by --start"
+        "--starts", type=options.count, default=20, help="random starts, unless one is given by --start"
     )
-    command.add_argument("--seed", type=options.count_or_none, default=0, metavar="N", help="of the random starts")
+    command.add_argument("--seed", type=options.seed, default=0, help="of the random starts")
     command.add_argument(
-        "--time", type=options.seconds, metavar="s", help=f"how long to follow a run at most (default {LASTING:g}/c)"
+        "--time", type=options.seconds, help=f"how long to follow a run at most (default {LASTING:g}/c)"
     )
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several: grid")
     follow = "follow each periodic motion in a parameter, to where it is born and ends"
     options.add_axes(command, "--follow", follow, "NAME=FROM:TO")
-    command.add_argument("--page", type=Path, metavar="FILE", help="write the tables as Markdown, too (default: don't)")
+    command.add_argument("--page", type=Path, help="write the tables as Markdown, too (default: don't)")
     options.outputs(command, shown="print as JSON")
 
     summary = "where in parameter space the ball hops for ever, resumable"
     command = options.command(commands, "search", searched, summary, "--sets 200 --range mu=0.5:1")
-    command.add_argument("--sets", type=options.count, default=500, metavar="N", help="parameter sets")
-    command.add_argument("--starts", type=options.count, default=5, metavar="N", help="random starts of each")
-    command.add_argument(
-        "--seed", type=options.count_or_none, default=0, metavar="N", help="of the random sets and starts"
-    )
+    command.add_argument("--sets", type=options.count, default=500, help="parameter sets")
+    command.add_argument("--starts", type=options.count, default=5, help="random starts of each")
+    command.add_argument("--seed", type=options.seed, default=0, help="of the random sets and starts")
     options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
     running.add_workers(command)
-    command.add_argument("--kept", type=Path, nargs="+", metavar="FILE", help="show what --save wrote instead")
-    command.add_argument("--save", type=Path, metavar="FILE", help="write the sets with hopping as JSON")
-    command.add_argument("--page", type=Path, metavar="FILE", help="write the table as Markdown")
+    command.add_argument("--kept", type=Path, nargs="+", help="show what --save wrote instead")
+    command.add_argument("--save", type=Path, help="write the sets with hopping as JSON")
+    command.add_argument("--page", type=Path, help="write the table as Markdown")
     options.outputs(command, "search", "print the sets with hopping as JSON")
 
     summary = "what becomes of the ball from each start of a plane of states, resumable"
@@ -76,10 +74,10 @@ def add(commands: options.Commands) -> None:
         text = f"a state variable {name} the plane, and its range"
         command.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=text)
     points = "MuJoCo, too, on every N-th point both ways; 0: not at all"
-    command.add_argument("--mujoco", type=options.count_or_none, default=0, metavar="N", help=points)
-    command.add_argument("--timestep", type=options.seconds, default=2.5e-4, metavar="s", help="that of MuJoCo")
+    command.add_argument("--mujoco", type=options.count_or_none, default=0, help=points)
+    command.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="that of MuJoCo")
     running.add_workers(command)
-    command.add_argument("--save", type=Path, metavar="FILE", help="write the map as JSON")
+    command.add_argument("--save", type=Path, help="write the map as JSON")
     options.outputs(command, "basins", "print the shares as JSON")
 
 

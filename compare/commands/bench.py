@@ -58,7 +58,7 @@ def add(commands: options.Commands) -> None:
     for name, (count, metavar, meaning) in _PAIR.items():
         group.add_argument(f"--{name}", type=options.number, nargs=count, metavar=metavar, help=meaning)
     running.add_engine_name(command)
-    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write (default: none)")
+    command.add_argument("-o", "--output", type=Path, help="HTML page to write (default: none)")
     options.outputs(command)
 
     summary = "the exact contact cases: a list, one in full, or the set as files for engines in any language"

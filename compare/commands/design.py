@@ -30,10 +30,8 @@ def add(commands: options.Commands) -> None:
     what = "the best meter for a fluid and a range of flows, within bounds"
     command = options.command(commands, "design", run, what, "meter.toml -o meter.html")
     command.add_argument("file", type=Path, metavar="FILE.toml", help="fluid, flow, bounds, materials, tolerances")
-    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write (default: none)")
-    command.add_argument(
-        "--seed", type=options.count_or_none, default=0, metavar="N", help="of the random numbers of the search"
-    )
+    command.add_argument("-o", "--output", type=Path, help="HTML page to write (default: none)")
+    command.add_argument("--seed", type=options.seed, default=0, help="of the random numbers of the search")
     options.outputs(command, shown="print JSON instead of tables")
 
 

@@ -32,7 +32,7 @@ def add(commands: options.Commands) -> None:
     text = "exit with 1 if a pair sinks in deeper, measured"
     command.add_argument("--max-depth", type=options.number, metavar="m", help=text)
     command.add_argument("--try", dest="tries", action="store_true", help="make the advised change and measure again")
-    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="HTML page to write")
+    command.add_argument("-o", "--output", type=Path, help="HTML page to write")
     options.outputs(command)
 
 

@@ -24,15 +24,13 @@ def add(commands: options.Commands) -> None:
 
     summary = "draw the paper's figures, with measured points where there are results"
     command = options.command(commands, "figures", figures, summary, "--format pdf")
-    command.add_argument(
-        "-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help="where to write them"
-    )
+    command.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help="to fill")
     command.add_argument("--results", type=Path, metavar="DIR", help=f"{stored} (default results, if it is there)")
     command.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
 
     command = options.command(commands, "inspect", inspect, "what a trajectory file holds", "run.h5 --plot run.png")
-    command.add_argument("file", type=Path, metavar="FILE", help="a run, or a collection of 'dualball collect'")
-    command.add_argument("--plot", type=Path, metavar="FILE", help="draw the run: png, svg or pdf (default: don't)")
+    command.add_argument("file", type=Path, help="a run, or a collection of 'dualball collect'")
+    command.add_argument("--plot", type=Path, help="draw the run: png, svg or pdf (default: don't)")
     options.outputs(command)
 
     summary = "two motions side by side: differences, cases, parameters"
@@ -40,57 +38,34 @@ def add(commands: options.Commands) -> None:
     what = "a run, or time and some of its quantities from CSV or any HDF5 file"
     for name in ("a", "b"):
         command.add_argument(name, metavar="FILE", help=what)
-    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="draw both (png, svg or pdf)")
+    command.add_argument("-o", "--output", type=Path, help="draw both (png, svg or pdf)")
     options.outputs(command)
 
     summary = "a picture or film of a run: the scene, contact forces, slip, case"
     command = options.command(commands, "render", render, summary, "run.h5 -o film.gif --from 1 --seconds 10")
-    command.add_argument("file", type=Path, metavar="FILE", help="a run")
-    command.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="picture.png or film.gif")
-    command.add_argument(
-        "--width",
-        type=options.Number("1", Range(16, 8192, whole=True)),
-        metavar="PIXELS",
-        help="width (default 960 for a picture, 640 for a film)",
-    )
-    command.add_argument("--at", type=options.moment, metavar="s", help="time of a picture (default: the end)")
-    for option, name, usual, allowed, unit, meaning in (
-        ("from", "start", 0.0, NOT_NEGATIVE, "s", "start of a film, in the time of the run"),
-        ("seconds", "seconds", 6.0, POSITIVE, "s", "length of a film; shorter if the run ends before"),
-        ("speed", "speed", 0.25, POSITIVE, "NUMBER", "speed of a film; 1 is real time"),
-        (
-            "force-arrow",
-            "force_arrow",
-            3.0,
-            NOT_NEGATIVE,
-            "RADII",
-            "length of the arrow of a force m g, radii of the ball",
-        ),
-        (
-            "slip-arrow",
-            "slip_arrow",
-            3.0,
-            NOT_NEGATIVE,
-            "RADII",
-            "length of the arrow of the fastest slip, radii of the ball",
-        ),
+    command.add_argument("file", type=Path, help="a run")
+    command.add_argument("-o", "--output", type=Path, required=True, help="picture.png or film.gif")
+    second, radii = options.Number("s", POSITIVE), options.Number("radii", NOT_NEGATIVE)
+    for option, kind, usual, meaning in (
+        ("width", options.Number(allowed=Range(16, 8192, whole=True)), None, "pixels (default: 960, of a film 640)"),
+        ("at", options.moment, None, "time of a picture (default: the end)"),
+        ("from", options.moment, 0.0, "start of a film, in the time of the run"),
+        ("seconds", second, 6.0, "length of a film; shorter if the run ends before"),
+        ("speed", options.Number(allowed=Range(1e-3, 1e3)), 0.25, "speed of a film; 1 is real time"),
+        ("force-arrow", radii, 3.0, "length of the arrow of a force m g"),
+        ("slip-arrow", radii, 3.0, "length of the arrow of the fastest slip"),
+        ("rate", options.Number(allowed=Range(1, 1000, whole=True)), 20, "frames a second"),
     ):
-        command.add_argument(
-            f"--{option}", dest=name, type=options.Number("1", allowed), default=usual, metavar=unit, help=meaning
-        )
-    command.add_argument(
-        "--rate", type=options.Number("1", Range(1, 1000, whole=True)), default=20, metavar="N", help="frames a second"
-    )
+        dest = "start" if option == "from" else option.replace("-", "_")
+        command.add_argument(f"--{option}", dest=dest, type=kind, default=usual, help=meaning)
 
     summary = "the ball in MuJoCo's viewer, driven by the study's own loop"
     command = options.command(commands, "view", view, summary, "--omega-0 25 --speed 0.5")
     options.add_parameters(command)
     running.add_flow(command)
     running.add_start(command)
-    command.add_argument("--timestep", type=options.seconds, metavar="s", help="time step (default: that of the study)")
-    command.add_argument(
-        "--speed", type=options.Number("1", POSITIVE), default=1.0, metavar="NUMBER", help="1 is real time"
-    )
+    command.add_argument("--timestep", type=options.seconds, help="time step (default: that of the study)")
+    command.add_argument("--speed", type=options.Number(allowed=Range(1e-3, 1e3)), default=1.0, help="1 is real time")
 
 
 def report(args: argparse.Namespace) -> int:

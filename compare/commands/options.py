@@ -48,12 +48,18 @@ class Number:
             raise argparse.ArgumentTypeError(f"{said} is out of range: it must be {limits}")
         return int(number) if self.allowed.whole else number
 
+    @property
+    def metavar(self) -> str:
+        """What stands for it in help: its unit, or that it is a number."""
+        return "N" if self.allowed.whole else readable(self.unit) or "NUMBER"
+
 
 _LARGE = 2.0
 """Lengths of a meter, m, beyond which it is asked whether they are in millimetres."""
 number = Number()
 count = Number(allowed=Range(1, 1e6, whole=True))
 count_or_none = Number(allowed=Range(0, 1e6, whole=True))
+seed = Number(allowed=Range(0, 2**32, whole=True))
 seconds = Number("s", Range(1e-9, 1e9))
 """A duration, or a time step."""
 moment = Number("s", NOT_NEGATIVE)
@@ -67,7 +73,14 @@ def hdf5(text: str) -> Path:
 
 
 class _Help(argparse.HelpFormatter):
-    """Help that says the default of each option that has one."""
+    """Help that says what kind of thing an option takes, and its default if it has one."""
+
+    def _get_default_metavar_for_optional(self, action: argparse.Action) -> str:
+        if isinstance(action.type, Number):
+            return action.type.metavar
+        return "FILE" if action.type in (Path, hdf5) else super()._get_default_metavar_for_optional(action)
+
+    _get_default_metavar_for_positional = _get_default_metavar_for_optional
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         default, text = action.default, action.help or ""
@@ -118,10 +131,9 @@ def add_parameters(parser: argparse.ArgumentParser) -> None:
     source.add_argument("--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table")
     for field in Parameters.quantities():
         meta, option = field.metadata, f"--{field.name.replace('_', '-')}"
-        unit, allowed = readable(meta["unit"]) or "NUMBER", f", {meta['allowed']}".replace(", any", "")
+        text = meta["meaning"] + f", {meta['allowed']}".replace(", any", "")
         parse = Number(meta["unit"], meta["allowed"])
-        text = meta["meaning"] + allowed
-        group.add_argument(option, dest=f"parameter_{field.name}", metavar=unit, type=parse, help=text)
+        group.add_argument(option, dest=f"parameter_{field.name}", type=parse, help=text)
     group.add_argument("--drag", dest="parameter_drag", metavar="LAW", help=f"law of drag: {', '.join(drag.LAWS)}")
 
 

@@ -32,9 +32,9 @@ def add_flow(parser: argparse.ArgumentParser) -> None:
     )
     wave = "a mean with waves on it, frequencies in Hz"
     choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
-    choice.add_argument("--flow", type=Path, metavar="FILE", help="measured, as CSV: time, omega_0 on each line")
+    choice.add_argument("--flow", type=Path, help="measured, as CSV: time, omega_0 on each line")
     longest = "longest time between lines of --flow (default: ten times the usual one)"
-    group.add_argument("--longest-interval", type=seconds, metavar="s", help=longest)
+    group.add_argument("--longest-interval", type=seconds, help=longest)
 
 
 def flow(args: argparse.Namespace) -> Flow | None:
@@ -62,12 +62,10 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     """Options that choose an engine and its accuracy."""
     group = parser.add_argument_group("engine")
     add_engine_name(group)
-    group.add_argument(
-        "--timestep", type=seconds, metavar="s", help="time step (default: the engine's; event has none)"
-    )
-    group.add_argument("--rtol", type=number, metavar="NUMBER", help="relative tolerance of event (default 1e-9)")
+    group.add_argument("--timestep", type=seconds, help="time step (default: the engine's; event has none)")
+    group.add_argument("--rtol", type=number, help="relative tolerance of event (default 1e-9)")
     restitution = "coefficient of restitution of event and time-stepping (default 0)"
-    group.add_argument("--restitution", type=number, metavar="NUMBER", help=restitution)
+    group.add_argument("--restitution", type=number, help=restitution)
 
 
 def add_engine_name(parser: argparse._ActionsContainer) -> None:
@@ -104,13 +102,13 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
     add_processes(choice)
     choice.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://host:8786")
     longest = "longest real time a run may take (default: no limit)"
-    group.add_argument("--limit", type=seconds, default=math.inf, metavar="s", help=longest)
+    group.add_argument("--limit", type=seconds, default=math.inf, help=longest)
 
 
 def add_processes(options: Any) -> None:
     """The option that says how many processes of this machine take part, for a parser or a group of one."""
     here, all_of_them = "processes of this machine; 0: this one", os.cpu_count() or 1
-    options.add_argument("--workers", type=count_or_none, default=all_of_them, metavar="N", help=here)
+    options.add_argument("--workers", type=count_or_none, default=all_of_them, help=here)
 
 
 def workers(args: argparse.Namespace) -> Workers:

@@ -28,14 +28,11 @@ def add(commands: options.Commands) -> None:
     options.add_parameters(command)
     running.add_flow(command)
     running.add_start(command)
-    command.add_argument("--time", type=options.seconds, default=10.0, metavar="s", help="duration")
+    command.add_argument("--time", type=options.seconds, default=10.0, help="duration")
     command.add_argument(
-        "--sample-interval",
-        type=options.seconds,
-        metavar="s",
-        help="time between samples (default: a thousandth of the duration)",
+        "--sample-interval", type=options.seconds, help="time between samples (default: duration/1000)"
     )
-    command.add_argument("-o", "--output", type=options.hdf5, metavar="FILE", help="HDF5 file to write (default: none)")
+    command.add_argument("-o", "--output", type=options.hdf5, help="HDF5 file to write (default: none)")
     options.outputs(command, shown="print the description as JSON")
 
     command = options.command(
@@ -44,34 +41,26 @@ def add(commands: options.Commands) -> None:
     options.add_parameters(command)
     running.add_start(command)
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
-    command.add_argument(
-        "--random", type=options.count, metavar="N", help="N points that fill the ranges NAME=FROM:TO instead"
-    )
-    command.add_argument("--seed", type=options.count_or_none, default=0, metavar="N", help="of the points of --random")
+    command.add_argument("--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead")
+    command.add_argument("--seed", type=options.seed, default=0, help="of the points of --random")
     command.add_argument(
         "--direction",
         choices=("held", "up", "down", "both"),
         default="held",
-        help="held: a run for each point; up, down, both: omega_0 in steps within one run (shows hysteresis)",
+        help="held: a run a point; else omega_0 in steps within one run",
     )
-    command.add_argument("--hold", type=options.seconds, default=20.0, metavar="s", help="time at each step")
+    command.add_argument("--hold", type=options.seconds, default=20.0, help="time at each step")
     running.add_engine(command)
-    command.add_argument(
-        "--time", type=options.seconds, default=30.0, metavar="s", help="duration of a run that is held"
-    )
+    command.add_argument("--time", type=options.seconds, default=30.0, help="duration of a run that is held")
     running.add_workers(command)
-    command.add_argument(
-        "--batch", type=options.count, default=campaign.BATCH, metavar="N", help="runs in one MuJoCo batch"
-    )
+    command.add_argument("--batch", type=options.count, default=campaign.BATCH, help="runs in one MuJoCo batch")
     options.outputs(command, "sweep", "print a summary as JSON")
 
     command = options.command(
         commands, "collect", collect, "gather the runs of a directory into one file for xarray", "sweep -o sweep.h5"
     )
     command.add_argument("directory", type=Path, metavar="DIR", help="what sweep has filled")
-    command.add_argument(
-        "-o", "--output", type=options.hdf5, default=Path("sweep.h5"), metavar="FILE", help="HDF5 file to write"
-    )
+    command.add_argument("-o", "--output", type=options.hdf5, default=Path("sweep.h5"), help="HDF5 file to write")
 
 
 def run(args: argparse.Namespace) -> int:

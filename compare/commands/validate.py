@@ -32,15 +32,11 @@ def add(commands: options.Commands) -> None:
         "--quick", dest="level", action="store_const", const=Level.QUICK, default=Level.DEFAULT, help="a minute or two"
     )
     level.add_argument(
-        "--full",
-        dest="level",
-        action="store_const",
-        const=Level.FULL,
-        help="everything, in an hour or more (default: in between)",
+        "--full", dest="level", action="store_const", const=Level.FULL, help="an hour or more (default: in between)"
     )
     own = command.add_mutually_exclusive_group()
     own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
-    own.add_argument("--parameters", type=Path, metavar="FILE", help="your own set, a TOML file, instead of many")
+    own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
     running.add_engine_name(command)
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     running.add_workers(command)
