@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.stats import qmc
 
 from compare.kit.levels import Level
+from compare.kit.sweep import sobol
 from model import Parameters
 from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 
@@ -46,7 +46,7 @@ def sets(level: Level) -> dict[str, Parameters]:
 def _design(count: int) -> dict[str, Parameters]:
     """Sets that fill the box of `LOW` and `HIGH` evenly (scrambled Sobol sequence)."""
     low, high = np.array(list(LOW.values())), np.array(list(HIGH.values()))
-    unit = qmc.Sobol(len(LOW), rng=np.random.default_rng(SEED)).random(2 ** math.ceil(math.log2(count)))[:count]
+    unit = sobol(len(LOW), count, SEED)
     designed = {}
     for k, row in enumerate((low + unit * (high - low)).tolist(), start=1):
         values = dict(zip(LOW, row, strict=True))

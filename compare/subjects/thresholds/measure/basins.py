@@ -18,7 +18,6 @@ from itertools import islice, zip_longest
 
 import numpy as np
 from scipy.spatial import Delaunay
-from scipy.stats import qmc
 
 from compare.kit.brackets import Bracket, Care, Search, narrow
 from compare.kit.fits import vanishing
@@ -84,6 +83,8 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
 
 def spread(count: int, seed: int) -> list[Array]:
     """Points (2,) of the unit square, evenly spread."""
+    from scipy.stats import qmc  # slow to import
+
     return list(qmc.Halton(2, seed=seed).random(count))
 
 
