@@ -38,6 +38,15 @@ def _of(case: Case | None, change: Change) -> Fault:
     return answer(of_case(case, change))
 
 
+def _everywhere(solutions: list[Any]) -> list[Any]:
+    return [replace(s, exists=True) for s in solutions]
+
+
+def _rolls_up_to(p: Parameters) -> float:
+    t = bifurcation.thresholds(p)
+    return t.omega_01 if p.eta < p.j else t.omega_03
+
+
 def _gone(solution: Any) -> None:
     return None
 
@@ -168,7 +177,22 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     },
     "stationary.slipping_branch.eigenvalues_at": {"eigenvalues of SS 3 % large": scaled(1.03)},
     "mechanics.dynamics.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
-    "stationary.solutions.leaning_modes": {"leaning rate of SR 5 % large": scaled(1.05, 0)},
+    "stationary.solutions.leaning_modes": {
+        "leaning rate of SR 5 % large": scaled(1.05, 0),
+        "leaning and the orbit exchange their rates": answer(lambda modes: (modes[0][::-1], modes[1])),
+        "leaning and the orbit exchange their directions": answer(lambda modes: (modes[0], modes[1][::-1])),
+        "leaning modes in the other order": answer(lambda modes: (modes[0][::-1], modes[1][::-1])),
+        "leaning mirrored": answer(lambda modes: (modes[0], modes[1] * [1, -1])),
+    },
+    "mechanics.dynamics.jacobian": {"Jacobians transposed": answer(lambda matrix: np.swapaxes(matrix, -1, -2))},
+    "stationary.solutions._rr": {"RR exists at any flow": answer(_everywhere)},
+    "stationary.solutions._rs": {
+        "RS in a fluid that moves": lambda right: lambda p: right(p.replace(omega_0=0.0)),
+    },
+    "stationary.solutions._nr": {"NR at any flow": answer(_everywhere)},
+    "stationary.slipping_branch.points_at": {"SS beyond the fold for that before it": answer(lambda s: s[::-1])},
+    "stationary.slipping_branch.fold": {"the fold a little further along the branch": answer(lambda s: s + 0.5)},
+    "stationary.slipping_branch.light_drag": {"a slight lag's drag 3 % large": scaled(1.03)},
     # Bifurcations, (84)-(90)
     "bifurcation.diagram.threshold_curves": {
         "ω₀₁ with 1 + μ for 1 + η": _mu_for_eta,
@@ -196,8 +220,15 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     },
     "stationary.slipping_branch.eta_critical": {"η_cr 4 % high": scaled(1.04)},
     "bifurcation.diagram.critical_drag": {"drag at which a fold is born 3 % high": scaled(1.03)},
+    "bifurcation.diagram.wall_spin": {
+        "spin on the wall about the ball's own radius": lambda right: lambda x, p: right(x, p) - x.omega_c,
+    },
+    "bifurcation.diagram.curves_without_drag": {
+        "ω₀₃ without the inertia's root": answer(entries(omega_03=lambda w: w * w))
+    },
     "bifurcation.diagram.number_of_folds": {
-        "a fold where there is none, none where there is one": answer(lambda n: 1 - n)
+        "two folds": answer(lambda n: 2 * n),
+        "a fold where there is none, none where there is one": answer(lambda n: 1 - n),
     },
     # Stability with respect to slipping, (53)-(83)
     "slipping.slip_stability.gamma": {"γ 3 % large": scaled(1.03)},
@@ -219,6 +250,8 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "rolling lasts while forces can jam it": _jams,
         "Definitions 1-3 with 1 % more wall friction": given(other(eta=1.01)),
     },
+    "slipping.slip_stability._sign": {"what is driven is held": lambda right: lambda drive, hold: right(hold, drive)},
+    "slipping.slip_bounds._nr_terms": {"(56)-(59) with 2 % more inertia": given(other(j=1.02))},
     "slipping.slip_bounds.nr_to_ns": {"(61) with 3 % more wall friction": given(other(eta=1.03))},
     "slipping.slip_bounds.rr_to_rs": {"(66) with μ, as printed": given(swapped)},
     "slipping.slip_bounds.rr_to_rs_stationary": {"(67) with 3 % more wall friction": given(other(eta=1.03))},
@@ -233,7 +266,17 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "mechanics.drag.law": {
         "Schiller and Naumann's wake 5 % strong": answer(fields(wake=times(1.05))),
         "quadratic drag 5 % strong": answer(fields(blunt=times(1.05))),
+        "Schiller and Naumann's drag at any Reynolds number": answer(
+            lambda law: law._replace(blunt=0.0) if law.wake else law
+        ),
+        "C_D = 0.47 beyond Schiller and Naumann": answer(
+            lambda law: law._replace(blunt=law.blunt * 0.47 / 0.44) if law.wake else law
+        ),
     },
+    "mechanics.drag.slope": {"a little more lag brings 3 % more drag": scaled(1.03)},
+    "mechanics.drag.speed_of": {"the lag that a force needs 1 % large": scaled(1.01)},
+    "mechanics.drag.fall_speed": {"falls with 5 % more drag": given(other(c=1.05))},
+    "mechanics.drag.ramp_lag": {"a fall begins 2 % fast": scaled(1.02)},
     # The flowmeter, section 5.3
     "flowmeter.characteristic.operating_range": {
         "operating range up to ω₀₂": lambda right: lambda p: bifurcation.thresholds(p).omega_02,
@@ -266,7 +309,39 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     },
     "flowmeter.design.response_time": {"a design's response as in RS": lambda right: lambda p: (1 + p.j) / p.c},
     "stationary.solutions.slowest_time_constant": {"the slowest time constant 3 % long": scaled(1.03)},
+    "flowmeter.characteristic.mean_slope": {"the mean slope 3 % large": scaled(1.03)},
+    "flowmeter.characteristic.reading_range": {"the reading range ends with rolling": lambda right: _rolls_up_to},
+    "flowmeter.response.peak": {
+        "the peak after a jump 3 % late": scaled(1.03, 0),
+        "the peak 3 % high": scaled(1.03, 1),
+    },
+    "flowmeter.response.ramp_coefficient": {"a ramp overshoots by 15 % more": scaled(1.15)},
+    "flowmeter.pulsation.first_harmonic": {"rolling is ahead of a pulsation": answer(np.conj)},
     # Motions
+    "simulation.transitions.collide": {
+        "landings rebound by a tenth": lambda right: lambda at, p, w, e, *rest: right(at, p, w, 0.1, *rest),
+        "landings with 5 % more floor friction": given(other(mu=1.05)),
+    },
+    "simulation.transitions.choose": {"after an event μ and η are exchanged": given(swapped)},
+    "simulation.transitions.leave": {"rolling is left with μ and η exchanged": given(swapped)},
+    "simulation.charts._rates": {"motions with one slip have 2 % more inertia": given(other(j=1.02))},
+    "simulation.charts._one_slip": {"one contact slips with 3 % more floor friction": given(other(mu=1.03))},
+    "simulation.charts._ss": {"both contacts slip with 3 % more wall friction": given(other(eta=1.03))},
+    "simulation.charts._off_floor": {"off the floor there is 3 % more drag": given(other(c=1.03))},
+    "simulation.charts._rn": {"rolling off the wall with 5 % more drag": given(other(c=1.05))},
+    "simulation.charts._sn": {"slipping off the wall with 3 % more friction": given(other(mu=1.03))},
+    "simulation.charts._nn": {
+        "flight with 5 % more drag": given(other(c=1.05)),
+        "flight with 1 % less weight": given(other(g=0.99)),
+    },
+    "simulation.two_point_rolling.omega_c": {"two-point rolling with 5 % more drag": given(other(c=1.05))},
+    "simulation.two_point_rolling.end": {"two-point rolling ends with 5 % more floor friction": given(other(mu=1.05))},
+    "mechanics.rolling_forces.margin": {"forces admit rolling with 5 % more wall friction": given(other(eta=1.05))},
+    "mechanics.rolling_forces.slip_margin": {"slip begins with 3 % more floor friction": given(other(mu=1.03))},
+    "mechanics.rolling_forces.least_utilisation": {
+        "rolling is feasible with 5 % more floor friction": given(other(mu=1.05))
+    },
+    "mechanics.rigid_body.slip_at_B": {"slip at the wall 1 % large": answer(lambda slip: (1.01 * slip[0], slip[1]))},
     "simulation.simulator.simulate": {
         "motions of a ball with 2 % more inertia": given(other(j=1.02)),
         "motions with 2 % more wall friction": given(other(eta=1.02)),
