@@ -27,6 +27,8 @@ def case(m: Measurement) -> float:
     sinks where not.
     """
     allowed = cases(m.parameters)
+    if m.conditions["start"] == "on the wall" and detected(m) is Case.NS and _exists(Case.NR, m):
+        raise LookupError("NR exists, and yet the ball sinks")
     if m.conditions["start"] == "on the wall":
         allowed &= {Case.NR} if Case.NR in allowed else {Case.NS}
     else:
@@ -44,9 +46,13 @@ def rolling(m: Measurement) -> float:
     limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
     if m.parameters.omega_0 < limit:
         return float(Case.RR)
-    if detected(m) is Case.RR:
+    if detected(m) is Case.RR or (_exists(Case.RR, m) and m.parameters.mu < 1):  # beyond, forces may hold it
         raise LookupError("RR has ended")
     return case(m)
+
+
+def _exists(case: Case, m: Measurement) -> bool:
+    return any(s.exists and s.case is case for s in theory(analytic.stationary_solutions, m.parameters))
 
 
 def bearings(quantities: Iterable[str], when: When, by: str, of: Case | None = None) -> tuple[Bearing, ...]:
