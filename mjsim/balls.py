@@ -20,7 +20,7 @@ from model.arrays import Array
 
 GAPS = slice(2, 0, -1)
 """Where the joints hold the gaps (y, h) and what goes with them."""
-NORMALS = slice(1, None, 14)
+NORMALS = slice(1, 28, 14)
 """Where the sensors hold the normal forces."""
 TICKS = 128
 """Finest steps in one of the settings."""

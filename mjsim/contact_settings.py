@@ -83,7 +83,7 @@ class ContactSettings:
     """Whether the friction force of the last step shifts the surface velocity, so that rolling doesn't creep."""
     servo: float = 0.01
     """Time constant, s, in which the margins remove the penetration; 0 leaves it."""
-    hover: float = 0.05
+    hover: float = 0.2
     """Largest hover number of a contact under its load: where slip is faster, friction is damped less. 0: as fast as
     it is. It needs memory or order 2."""
     order: int = 2

@@ -24,9 +24,6 @@ _SLIDES = 9.0
 """A contact slides if its speed squared exceeds this times that of its change in a step; ending slip changes faster."""
 NO_LIMIT = 1e30
 """Stands for infinity where that would make infinity times zero."""
-_WALL = 5.0
-"""How many times the hover number of the floor, under the weight, that of the wall may be, under the centrifugal force:
-unlike the floor's load, which falls to nothing as the ball lifts off, that is all it carries."""
 _NEAR = 32.0
 """Steps to the axis from which on they are shorter: the azimuth turns by up to 1/32 in one."""
 _FEW = 16.0
@@ -161,15 +158,16 @@ def corrections(
     # difference; only where a contact clearly slides, since a slip that ends must be able to.
     v_Ax, v_Az, v_By, v_Bz = slip(v, rho, ball.r)
     A_x, A_z, B_y, B_z = slip(change, rho, ball.r)
-    lag_A = ball.lag_A * (_SLIDES * (A_x * A_x + A_z * A_z) < v_Ax * v_Ax + v_Az * v_Az)
-    lag_B = ball.lag_B * (_SLIDES * (B_y * B_y + B_z * B_z) < v_By * v_By + v_Bz * v_Bz)
+    v2_A, v2_B = v_Ax * v_Ax + v_Az * v_Az, v_By * v_By + v_Bz * v_Bz
+    lag_A = ball.lag_A * (_SLIDES * (A_x * A_x + A_z * A_z) < v2_A)
+    lag_B = ball.lag_B * (_SLIDES * (B_y * B_y + B_z * B_z) < v2_B)
 
     # Continuous sliding. A contact that slides fast would hover: its surface moves along with the excess, which leaves
-    # the direction of friction as it is, and delays it by as much more as there is less damping.
-    weight, thrown = ball.weight, _WALL * rho * v.omega_c * v.omega_c
-    hover_A, hover_B = hovering(v, rho, ball)
-    less_A = unbearable(hover_A, ball.hover * weight)
-    less_B = unbearable(hover_B, ball.hover * (weight - (weight - thrown) * (thrown < weight)))
+    # the direction of friction as it is, and delays it by as much more as there is less damping. The floor bears the
+    # weight, the wall the centrifugal force, counted up to the weight.
+    weight, thrown = ball.weight, rho * v.omega_c * v.omega_c
+    less_A = unbearable(ball.hover_A * v2_A**0.5, ball.hover * weight)
+    less_B = unbearable(ball.hover_B * v2_B**0.5, ball.hover * (weight - (weight - thrown) * (thrown < weight)))
     lag_A, lag_B = lag_A + (lag_A > 0) * less_A / 2, lag_B + (lag_B > 0) * less_B / 2
 
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at

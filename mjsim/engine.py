@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -26,6 +27,8 @@ BLOCK = 256
 """Most samples a run keeps before it hands them out."""
 BLOCK_STEPS = 20_000
 """Most steps it takes before that, if one sample doesn't need more."""
+NOTED = 4096
+"""Steps of all runs of which the cases are told at once."""
 _HUGE = 1e10
 """Beyond this MuJoCo takes a coordinate for divergence (mjMAXVAL)."""
 
@@ -100,13 +103,17 @@ class Run:
         lengths = [(p.R, p.r) for p in parameters]
         self._alike = [[i for i, own in enumerate(lengths) if own == each] for each in dict.fromkeys(lengths)]
         """Runs of the same geometry, whose samples are worked out together."""
-        self._classifiers = [Classifier(p, settings) for p in parameters]
-        """They hold the changes of case so far, as `events`."""
+        self._classifier = Classifier(parameters, settings)
+        self._noted = np.empty((max(64, NOTED // len(parameters)), len(parameters), recorder.NSENSOR))
+        self._waiting = [np.empty(0, SAMPLE)] * len(parameters)
+        """Samples of each run whose case is not yet decided."""
+        self._ends = [math.inf] * len(parameters)
+        """When each run broke down, s."""
 
     @property
     def events(self) -> list[Events]:
         """Changes of case of each run so far."""
-        return [classifier.events for classifier in self._classifiers]
+        return [self._classifier.events(i, end) for i, end in enumerate(self._ends)]
 
     @property
     def margins(self) -> Array:
@@ -118,6 +125,7 @@ class Run:
         blocks, state = self._journal.recall() if self._journal else (iter(()), {})
         if state:
             self._stepper.restore(state)
+            self._classifier.restore(state)
         for raw in blocks:
             yield self._finish(done, raw)
             done += len(raw)
@@ -126,10 +134,19 @@ class Run:
         omega_0 = self._omega_0(done * self._interval, (self._count - 1) * self._interval + 1)
         while done < self._count and not all(header.failure for header in self.headers):
             raw = np.empty((min(size, self._count - done), len(self.headers), recorder.COLUMNS))
-            for row in raw:
-                self._stepper.advance(itertools.islice(omega_0, self._interval), row)
+            filled, room, last = 0, len(self._noted), done + len(raw) == self._count
+            for k, row in enumerate(raw):
+                left, first = 1 if last and k + 1 == len(raw) else self._interval, row
+                while left:
+                    count = min(left, room - filled)
+                    self._stepper.advance(itertools.islice(omega_0, count), self._noted[filled:], first)
+                    filled, left, first = filled + count, left - count, None
+                    if filled == room:
+                        self._classifier.add(recorder.contacts(self._noted))
+                        filled = 0
+            self._classifier.add(recorder.contacts(self._noted[:filled]), last)
             if self._journal:
-                self._journal.note(raw, self._stepper.state())
+                self._journal.note(raw, self._stepper.state() | self._classifier.state())
             yield self._finish(done, raw)
             done += len(raw)
 
@@ -156,7 +173,13 @@ class Run:
                 if not self.headers[i].failure and len(part) < len(time):
                     failure = self._reason(i, float(time[len(part)]), part)
                     self.headers[i] = dataclasses.replace(self.headers[i], failure=failure)
-                blocks[i] = self._classifiers[i].add(part, last == self._count or bool(self.headers[i].failure))
+                    self._ends[i] = float(time[len(part)])
+                part = np.concatenate([self._waiting[i], part])
+                steps = np.rint(part["time"] / self._settings.timestep).astype(int)
+                over = last == self._count or self.headers[i].failure
+                ready = len(part) if over else int(np.searchsorted(steps, self._classifier.decided))
+                part["case"] = self._classifier.cases(i, steps)
+                blocks[i], self._waiting[i] = part[:ready], part[ready:]
         if self._progress:
             self._progress(last / self._count)
         return blocks

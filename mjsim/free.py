@@ -41,16 +41,18 @@ class Free(Stepper):
         self._balls = [_Ball(*each, settings, theta_0) for each in zip(models, parameters, x0s, strict=True)]
         self.margins, self.given_up = np.zeros((2, len(models))), np.full(len(models), np.inf)
 
-    def advance(self, omega_0: Iterable[Array], row: Array | None = None) -> None:
-        for fluid in omega_0:
+    def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
+        if row is not None:
+            for k, ball in enumerate(self._balls):
+                row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = ball.joint_coordinates()
+        for number, fluid in enumerate(omega_0):
             for k, (ball, omega) in enumerate(zip(self._balls, fluid.tolist(), strict=True)):
-                if row is not None:
-                    row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = ball.joint_coordinates()
-                ball.step(omega)
-                if row is not None:
-                    row[k, recorder.SENSORS :] = *ball.data.sensordata, 0.0
+                gaps = ball.step(omega)
+                if sensors is not None:
+                    sensors[number, k] = *ball.data.sensordata, *gaps
                 self.margins[:, k] = ball.model.pair_margin[:2]
-            row = None
+        if row is not None and sensors is not None:
+            row[:, recorder.SENSORS : -1], row[:, -1] = sensors[0], 0.0
 
     def state(self) -> dict[str, Array]:
         return {
@@ -78,22 +80,23 @@ class _Ball:
         self._turns = settings.wall == "tangent"
         self._reach = settings.touching(p.g)
 
-    def step(self, omega_0: float) -> None:
-        """Take a step."""
+    def step(self, omega_0: float) -> tuple[float, float]:
+        """Take a step; return the gaps of A and B before it, m."""
         data, p, gain = self.data, self._p, self._settings.servo_gain
         x, y, z, *_ = data.qpos.tolist()
         v_x, v_y, v_z, *_ = data.qvel.tolist()
-        w_x, w_y = v_x + omega_0 * y, v_y - omega_0 * x
+        w_x, w_y, gaps = v_x + omega_0 * y, v_y - omega_0 * x, (z - p.r, p.R - math.hypot(x, y))
         mc = resistance(w_x, w_y, v_z, self._ball)
         data.qfrc_applied[:3] = -mc * w_x, -mc * w_y, -mc * v_z  # (9)
         self._unwrap(math.atan2(y, x))
         if self._turns:
             data.mocap_quat[0] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
         if gain:
-            for contact, gap in enumerate((z - p.r, p.R - math.hypot(x, y))):
+            for contact, gap in enumerate(gaps):
                 if gap < self._reach:
                     self.model.pair_margin[contact] = followed(self.model.pair_margin[contact], gap, gain)
         mujoco.mj_step(self.model, data)
+        return gaps
 
     def joint_coordinates(self) -> tuple[Array, Array]:
         """The state as coordinates of the joint chain, with the orientation upright."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from mjsim.classify import Contacts
 from model import Parameters, State, trajectory
 from model.arrays import Array
 from model.kinematics import frame, rotated
 
-NQ, NV, NSENSOR = 7, 6, 28
-"""Sizes of the scene: (azimuth, inward, upward, quaternion), their velocities, two contact sensors."""
+NQ, NV, NSENSOR = 7, 6, 30
+"""Sizes of the scene: (azimuth, inward, upward, quaternion), their velocities, two contact sensors and the two gaps."""
 SENSORS = NQ + NV
 """Where the sensors begin in a raw sample, which ends with the time by which all but velocities are ahead of them."""
 COLUMNS = SENSORS + NSENSOR + 1
@@ -40,13 +41,21 @@ def state(qpos: Array, qvel: Array, p: Parameters) -> State:
     return State(y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h)
 
 
+def contacts(sensors: Array) -> Contacts:
+    """What the contacts do in successive steps, of sensors (steps, runs, `NSENSOR`)."""
+    each, gaps = sensors[..., :-2].reshape(*sensors.shape[:2], 2, NSENSOR // 2 - 1), sensors[..., -2:]
+    normal, first, second = np.moveaxis(each[..., _FORCE], -1, 0)
+    slips = np.moveaxis(each[..., _SLIP], -1, 0)
+    return Contacts(normal, np.sqrt(first**2 + second**2), np.sqrt(slips[0] ** 2 + slips[1] ** 2), gaps)
+
+
 def samples(time: Array, raw: Array, p: Parameters) -> npt.NDArray[np.void]:
     """Samples of dtype `SAMPLE`, shape (n,), all but the case; time (n,), raw (n, `COLUMNS`)."""
     qpos, qvel, sensors, lead = np.split(raw, [NQ, SENSORS, COLUMNS - 1], axis=1)
     axes = frame(qpos[:, 0])
     qpos = np.concatenate([qpos[:, :3] - lead * qvel[:, :3], qpos[:, 3:]], axis=1)
     block = trajectory.samples(time, qpos[:, 0], state(qpos, qvel, p), p)
-    for contact, sensor in zip("AB", np.split(sensors, 2, axis=1), strict=True):
+    for contact, sensor in zip("AB", np.split(sensors[:, :-2], 2, axis=1), strict=True):
         gap, speed, touches = block[f"gap_{contact}"], block[f"slip_speed_{contact}"], sensor[:, _COUNT] > 0
         force, normal, tangent = sensor[:, _FORCE, None], sensor[:, _NORMAL], sensor[:, _TANGENT]
         in_world = force[:, 0] * normal + force[:, 1] * tangent + force[:, 2] * np.cross(normal, tangent)

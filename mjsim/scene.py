@@ -36,6 +36,8 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     for name, friction in (("A", p.mu), ("B", p.eta)):
         _set_pair(named["pair"][name], friction, settings)
     if settings.coordinates == "free":
+        for name in ("gap A", "gap B"):
+            spec.delete(spec.sensor(name))
         for joint in named["joint"].values():
             spec.delete(joint)
         named["body"]["ball"].add_freejoint(name="free")

@@ -49,8 +49,11 @@ class Stepper(Protocol):
     given_up: Array
     """When each run was given up, as its steps were divided again and again, s; inf for those that go on."""
 
-    def advance(self, omega_0: Iterable[Array], row: Array | None = None) -> None:
-        """Take a step for each omega_0 (runs,); write (qpos, qvel, sensors) of the first to row (runs, `COLUMNS`)."""
+    def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
+        """Take a step for each omega_0 (runs,), and note its sensors, (steps, runs, `NSENSOR`).
+
+        A row (runs, `COLUMNS`) gets (qpos, qvel, sensors) of the first step and the time by which positions are ahead.
+        """
 
     def state(self) -> dict[str, Array]:
         """Copies of all that is carried from one step to the next."""
@@ -78,6 +81,7 @@ class Polar(Stepper):
         self._balls = balls = Balls(models, parameters, settings, batched)
         self.model, self.data = models[0], balls.engine.data
         self.margins = balls.margins
+        self._sensors = balls.sensors.T
         self._parameters = parameters
         self._R, self._r = (np.array([getattr(p, name) for p in parameters]) for name in "Rr")
         self.given_up, self._steps = np.full(len(models), np.inf), 0
@@ -91,23 +95,26 @@ class Polar(Stepper):
         """Whether all runs take whole steps."""
         landing.begin(balls, omega_0)
 
-    def advance(self, omega_0: Iterable[Array], row: Array | None = None) -> None:
+    def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
         balls = self._balls
-        for fluid in omega_0:
-            if row is not None:
-                row[:, : recorder.NQ], row[:, recorder.NQ : recorder.SENSORS] = balls.qpos.T, balls.qvel.T
-                row[:, -1] = balls.leads
+        if row is not None:
+            row[:, : recorder.NQ], row[:, recorder.NQ : recorder.SENSORS] = balls.qpos.T, balls.qvel.T
+            row[:, -1] = balls.leads
+        for k, fluid in enumerate(omega_0):
             if self._whole and balls.drive_all(fluid):
                 balls.engine.step_all()  # mj_step
-                if row is not None:
-                    row[:, recorder.SENSORS : -1] = balls.sensors.T
+                if sensors is not None:
+                    sensors[k] = self._sensors
             else:
-                self._divided(fluid, row)
-            self._steps, row = self._steps + 1, None
+                self._divided(fluid, None if sensors is None else sensors[k])
+            self._steps += 1
+        if row is not None and sensors is not None:
+            row[:, recorder.SENSORS : -1] = sensors[0]
 
-    def _divided(self, fluid: Array, row: Array | None) -> None:
+    def _divided(self, fluid: Array, sensors: Array | None) -> None:
         """Take a step in which some ball lands or comes near the axis; the others take it in one."""
         balls = self._balls
+        gaps = (balls.gaps + balls.speeds * (balls.settings.timestep * balls.settings.midpoint - balls.leads)).T
         left, taken = np.full(len(balls.ticks), TICKS), np.zeros(len(balls.ticks), dtype=int)
         before = self._rates(slice(None))
         self._more = np.maximum(self._more - _SHARE * (self._steps - self._counted), 0.0)
@@ -121,9 +128,10 @@ class Polar(Stepper):
                 axis.advance(balls, k, self._parameters[k], self._passing[:, k])
             if not passes.all():
                 balls.step(runs[~passes])
-            if row is not None:
+            if sensors is not None:
                 first = runs[left[runs] == TICKS]
-                row[first, recorder.SENSORS : -1] = balls.sensors.T[first]
+                sensors[first] = self._sensors[first]
+                sensors[first, -2:] = gaps[first]
             left[runs] -= balls.ticks[runs]
             taken[runs] += 1
             self._more[runs] += 1

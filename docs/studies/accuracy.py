@@ -27,7 +27,7 @@ from docs.studies.states import (
     number,
 )
 from mjsim import ContactSettings
-from model import Case, Contact, Events, State, Trajectory
+from model import Case, Contact, Events, State
 
 STEPS = (4e-3, 1e-3)
 """Time steps of stationary states, s."""
@@ -95,12 +95,12 @@ def event_times(campaign: Campaign, steps: Sequence[float] = (1e-3, 5e-4, 2.5e-4
     rows = [["motion", "h", *(name for kind in KINDS for name in (f"contacts {kind}", "order"))]]
     for motion in (LANDING, HITTING):
         exact, before = _moments(motion.exact.events), dict.fromkeys(KINDS, (math.nan, math.nan))
-        runs = campaign.run([_at(step).task((motion.p, motion.x0, motion.lasts, step)) for step in steps])
+        runs = campaign.run([_at(step).task((motion.p, motion.x0, motion.lasts, motion.lasts)) for step in steps])
         for step, run in zip(steps, runs, strict=True):
             cells, seen = [], _moments(run.events)
             for kind in KINDS:
                 these = [(at, time) for at, time in exact.items() if at[1] == kind]
-                error = max(abs(_located(run, *at, seen[at]) - time) if at in seen else math.inf for at, time in these)
+                error = max(abs(seen[at] - time) if at in seen else math.inf for at, time in these)
                 order = math.log(before[kind][1] / error) / math.log(before[kind][0] / step)
                 cells += [f"{1e6 * error:.2g} µs", "" if math.isnan(order) else f"{order:.1f}"]
                 before[kind] = step, error
@@ -119,21 +119,6 @@ def _moments(events: Events) -> dict[tuple[str, str], float]:
             elif before is Contact.S and after is Contact.R:
                 moments[contact, STICK] = time
     return moments
-
-
-def _located(run: Trajectory, contact: str, kind: str, time: float) -> float:
-    """When gap or slip speed vanishes, by the parabola through the three last samples before; a sample is a step.
-
-    The last steps of a sliding contact are left out in which the engine has it stick: those in which it is slower than
-    three times its change in a step.
-    """
-    gaps = {"A": run.y, "B": run.h}
-    values = gaps[contact] if kind == CLOSE else getattr(run, f"slip_speed_{contact}")
-    k = int(np.searchsorted(run.time, time)) - 1
-    while kind == STICK and values[k] < 3 * (values[k - 1] - values[k]):
-        k -= 1
-    parabola = np.polynomial.Polynomial.fit(run.time[k - 2 : k + 1], values[k - 2 : k + 1], 2)
-    return float(min(parabola.roots().real, key=lambda root: abs(root - time)))
 
 
 def force_split(campaign: Campaign, omegas: Sequence[float] = (6.0, 10.0, 13.0)) -> Rows:

@@ -64,6 +64,8 @@ class Settings:
 
     memory: ClassVar[bool] = False
     """Nothing corrects for friction that is regularised."""
+    midpoint: ClassVar[float] = 0.0
+    """Forces are those at the beginning of a step."""
 
     def __post_init__(self) -> None:
         for each in fields(self):

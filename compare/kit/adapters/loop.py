@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from compare.kit.adapters.adapter import BreakdownError, Floats, Library, Scene, Settings
 from mjsim import limits, recorder
-from mjsim.classify import Classifier
+from mjsim.classify import Classifier, Contacts
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
 from model import Flow, Header, Parameters, State, Trajectory
@@ -35,6 +35,8 @@ from model.trajectory import current_versions, samples
 
 _HUGE = 1e8
 """A coordinate, velocity or force beyond this, in SI units, has diverged."""
+NOTED = 1024
+"""Steps of which the cases are told at once."""
 _WIDTH = 1 + 3 + 6 + 2 * 5
 """A row: azimuth, place, velocity, and for each contact whether it touches, force (3,), gap."""
 _SPIN = np.eye(6)
@@ -70,7 +72,22 @@ def simulate(
     x, joints = State.one(x0), settings.coordinates == "joints"
     limits.check_place(x, p, p.r / 10)
     ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
-    rows, done, failure = np.empty((count, _WIDTH)), 0, ""
+    total, done, told, failure, theta = (
+        (count - 1) * every + 1,
+        0,
+        0,
+        "",
+        0.0,
+    )  # of the last sample only forces are needed
+    rows, kept, classifier = np.empty((NOTED, _WIDTH)), list[npt.NDArray[np.void]](), Classifier([p], settings)
+
+    def keep(first: int, last: bool) -> None:
+        """Tell the cases of the steps in `rows`, and keep the samples among them."""
+        steps = np.arange(first, done)
+        block = _samples(np.asarray(steps * settings.timestep, dtype=float), rows[: len(steps)], joints, p)
+        classifier.add(_contacts(block), last)
+        kept.append(block[steps % every == 0])
+
     with closing(build(library.load(), p, settings)) as scene:
         place: Floats
         velocity: Floats
@@ -81,36 +98,50 @@ def simulate(
             motion = to_world(x, 0.0, p)
             place, velocity = motion.position.tolist(), [*motion.velocity.tolist(), *motion.spin.tolist()]
         scene.start(place, velocity)
-        theta = 0.0
         try:
-            while done < count:
-                row, steps = rows[done], every if done + 1 < count else 1  # of the last sample only forces are needed
+            while done < total:
+                number = done % NOTED
+                if number == 0:
+                    fluid = flow((done + np.arange(NOTED) + 0.5) * settings.timestep).tolist()
+                row = rows[number]
                 row[:10], row[10:] = [theta, *place, *velocity], 0.0
-                times = (done * every + np.arange(steps) + 0.5) * settings.timestep
-                for number, omega_0 in enumerate(flow(times).tolist()):
-                    place, velocity = scene.advance(_drag(place, velocity, omega_0, ball, joints))
-                    if joints and place[1] >= p.R:
-                        raise BreakdownError("reached the vessel's axis, where polar coordinates end,")
-                    azimuth = math.remainder(math.atan2(place[1], place[0]) - theta, math.tau)
-                    theta += place[0] if joints else azimuth
-                    if number == 0:
-                        for contact, force, gap in scene.touches():
-                            of = row[10 + 5 * contact :][:5]
-                            of[4] = min(gap, of[4]) if of[0] else gap
-                            of[0], of[1:4] = 1.0, of[1:4] + force
-                if not (np.abs(row) < _HUGE).all():
+                place, velocity = scene.advance(_drag(place, velocity, fluid[number], ball, joints))
+                if joints and place[1] >= p.R:
+                    raise BreakdownError("reached the vessel's axis, where polar coordinates end,")
+                azimuth = math.remainder(math.atan2(place[1], place[0]) - theta, math.tau)
+                theta += place[0] if joints else azimuth
+                for contact, force, gap in scene.touches():
+                    of = row[10 + 5 * contact :][:5]
+                    of[4] = min(gap, of[4]) if of[0] else gap
+                    of[0], of[1:4] = 1.0, of[1:4] + force
+                if not np.abs(row).max() < _HUGE:
                     raise BreakdownError("diverged")
                 done += 1
-                progress(done / count)
+                if done % NOTED == 0 and done < total:
+                    keep(done - NOTED, last=False)
+                    told = done
+                    progress(done / total)
         except BreakdownError as error:
-            failure = f"{error} by t = {done * every * settings.timestep:g} s"
-    time = np.arange(done, dtype=float) * (every * settings.timestep)
+            failure = f"{error} by t = {done * settings.timestep:g} s"
+    keep(told, last=True)
     given = {"t_end": float(t_end), "sample_interval": every * settings.timestep, "x0": list(x), "theta_0": 0.0}
     versions = {**current_versions(), library.name: library.version}
     header = Header(engine, p, flow, asdict(settings) | given, failure=failure, versions=versions)
-    classifier = Classifier(p, settings)
-    block = classifier.add(_samples(time, rows[:done], joints, p), last=True)
-    return Trajectory.from_blocks(header, [block], classifier.events)
+    block = np.concatenate(kept)
+    block["case"] = classifier.cases(0, np.arange(len(block)) * every)
+    return Trajectory.from_blocks(header, [block], classifier.events(0))
+
+
+def _contacts(block: npt.NDArray[np.void]) -> Contacts:
+    """What the contacts do in successive steps, of samples (n,)."""
+    A, B = block["force_A"], block["force_B"]
+    each = (
+        (A[:, 1], B[:, 0]),
+        (np.hypot(A[:, 0], A[:, 2]), np.hypot(B[:, 1], B[:, 2])),
+        (block["slip_speed_A"], block["slip_speed_B"]),
+        (block["gap_A"], block["gap_B"]),
+    )
+    return Contacts(*(np.stack(pair, axis=-1)[:, None] for pair in each))
 
 
 def _drag(place: Floats, velocity: Floats, omega_0: float, ball: Ball, joints: bool) -> Floats:
