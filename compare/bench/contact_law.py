@@ -163,7 +163,7 @@ class Contacts:
         sideways = np.where(frictional & ~slides[:, None], sideways, 0)
         return Law(
             depth=depth - self.margin,
-            creep=np.where(slides, np.nan, np.hypot(creep[:, 0], creep[:, 1])),
+            creep=np.where(slides | (self.dim == 1), np.nan, np.hypot(creep[:, 0], creep[:, 1])),
             turning=np.where(slides, np.nan, np.hypot.reduce(creep[:, 2:], 1)),
             hover=np.where(self.dim > 1, hover, np.inf),
             slides=slides,
@@ -232,7 +232,7 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Law:
-    """What n contacts do under their loads, nan where a contact slides; and what makes up their small motions."""
+    """What n contacts do under their loads, nan where one slides or lacks friction; and their small motions."""
 
     depth: Array
     creep: Array

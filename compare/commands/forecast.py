@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import mujoco
 from rich.text import Text
 
 from compare.bench import forecast
@@ -47,6 +48,10 @@ def foretold(args: argparse.Namespace) -> int:
     if args.output:
         check_writable(args.output)
     good = {"creep": args.max_creep or forecast.CREEP, "depth": args.max_depth}
+    heard = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(
+        lambda _: None
+    )  # or it writes a log where the user is; what it warns of is in the table
     try:
         model, data = forecast.load(args.file, args.keyframe)
         found = forecast.forecast(model, data, forecast.settle(model, data, args.settle), **good)
@@ -56,6 +61,8 @@ def foretold(args: argparse.Namespace) -> int:
     except forecast.UnsettledError as error:
         print(f"dualball: {args.file}: {error}", file=sys.stderr)
         return 1
+    finally:
+        mujoco.set_mju_user_warning(heard)
     if args.output:
         write_text(args.output, forecast.html(found, after, str(args.file)))
     shown: list[Any] = [pages.table(forecast.title(found), forecast.rows(found), **LOOK)]

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import math
+import re
+from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 import pytest
 
 from compare.bench import forecast
 from compare.bench.forecast import Forecast
+from compare.commands import cli
 
 FLOOR = '<geom name="floor" type="plane" size="20 20 .1" {}/>'
 SLOPE = FLOOR.format('euler="0 15 0"')
@@ -92,3 +98,176 @@ def test_depth_and_creep_are_as_predicted(scene: str) -> None:
         # Round-off of a place, over the window.
         assert pair.creep == pytest.approx(pair.creep_measured, rel=1e-2, abs=1e-11)
         assert pair.turning == pytest.approx(pair.turning_measured, rel=1e-2, abs=forecast.STILL)
+
+
+# A body that a moving floor drags under a guide; how far its place is from where it was put, and its pair.
+GUIDED = '<body pos="0 0 .0495"><joint type="slide" axis="0 0 1"/><geom name="box" {} mass="1"/></body>'
+SPHERE, BLOCK = 'type="sphere" size=".05"', 'type="box" size=".05 .05 .05"'
+SLIDING = {
+    "elliptic": ('cone="elliptic"', 'friction=".6"', SPHERE),
+    "elliptic, impratio 10, condim 6": ('cone="elliptic" impratio="10"', 'friction=".6" condim="6"', SPHERE),
+    "springs": ('cone="elliptic"', 'friction=".3" solref="-3000 -80"', SPHERE),
+    "wide impedance": ('cone="elliptic"', 'friction=".6" solimp=".3 .9 .002"', BLOCK),
+    "discrete": ('cone="elliptic" integrator="discrete"', 'friction=".6"', SPHERE),
+    "pyramidal": ("", 'friction=".6"', SPHERE),
+    "pyramidal, impratio 5": ('impratio="5"', 'friction=".6" solimp=".5 .5 .001"', BLOCK),
+    "pyramidal, discrete": ('integrator="discrete"', 'friction=".4"', SPHERE),
+    "solreffriction": ('cone="elliptic"', "", SPHERE),
+}
+
+
+@pytest.mark.parametrize("name", SLIDING)
+def test_contact_is_lost_from_the_predicted_speed_on(name: str) -> None:
+    option, geom, shape = SLIDING[name]
+    rest = PAIR.format(".2 1") if name == "solreffriction" else ""
+    floor = FLOOR.format('surfacevel="1e-12 0 0"')  # what doesn't move at the beginning never does
+    model, data, found = settled(mjcf(floor + GUIDED.format(shape), option, geom, rest))
+    predicted = found.pairs[0].hover
+    first, second = data.contact.frame[0].reshape(3, 3)[1:]
+    direction = (first + second) / math.sqrt(2) if model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL else first
+    for share, lost in ((0.95, False), (1.05, True)):
+        for speed in np.linspace(0.1, share, 20) * predicted:
+            model.geom_surfacevel[0, :3] = speed * direction
+            carried = []
+            for _ in range(100):
+                mujoco.mj_step(model, data)
+                carried.append(data.nefc > 0 and data.efc_force.max() > 0)
+        assert (not all(carried)) == lost
+
+
+LEVEL = FLOOR.format("") + box(place="0 0 .0499", angle="0 0 0")
+ROUND = '<body name="ball" pos="0 0 .0499"><freejoint/><geom name="ball" type="sphere" size=".05" mass="1"/></body>'
+PILE = FLOOR.format("") + "".join(box(f"0 0 {0.0499 + k * 0.0998}", "0 0 0", f"box{k}") for k in range(3))
+UNSAFE = '<flag refsafe="disable"/>'
+STEPS = {
+    "springs": mjcf(LEVEL, 'cone="elliptic"', 'solref="-5000 -100"'),
+    "springs, pyramidal": mjcf(LEVEL, geom='solref="-5000 -100"'),
+    "springs, ball": mjcf(FLOOR.format("") + ROUND, 'cone="elliptic"', 'solref="-5000 -100"'),
+    "springs, little damping": mjcf(LEVEL, 'cone="elliptic"', 'solref="-5000 -10"'),
+    "springs, implicitfast": mjcf(LEVEL, 'cone="elliptic" integrator="implicitfast"', 'solref="-9000 -90"'),
+    "springs, RK4": mjcf(LEVEL, 'cone="elliptic" integrator="RK4"', 'solref="-5000 -100"'),
+    "springs, pile": mjcf(PILE, 'cone="elliptic"', 'solref="-5000 -100"'),
+    "springs, gripper": mjcf(GRIPPER, 'cone="elliptic" impratio="10"', 'friction=".6" solref="-20000 -200"', SQUEEZE),
+    "friction": mjcf(LEVEL, 'cone="elliptic"', rest=PAIR.format("-1 -90")),
+    "refsafe off": mjcf(LEVEL, 'cone="elliptic"', 'solref=".004 1"', flag=UNSAFE),
+    "refsafe off, slope": mjcf(ON_SLOPE, 'cone="elliptic"', 'friction=".6" solref=".01 1"', flag=UNSAFE),
+    "low impedance": mjcf(LEVEL, 'cone="elliptic"', 'solimp=".1 .1 .001"'),
+    "low impedance, pile": mjcf(PILE, 'cone="elliptic"', 'solimp=".2 .2 .001"'),
+}
+
+
+@pytest.mark.parametrize("scene", STEPS)
+def test_small_motions_grow_from_the_predicted_step_on(scene: str) -> None:
+    model, data, found = settled(STEPS[scene])
+    left = []
+    for share in (1 / 1.1, 1.3):
+        model.opt.timestep = share * found.largest_step
+        trial = mujoco.MjData(model)
+        trial.qpos[:], trial.ctrl[:] = data.qpos, data.ctrl
+        mujoco.mj_step(model, trial, 300)  # depth depends on the step
+        creeping = trial.qvel.copy()
+        trial.qvel[:] += 1e-6 * np.cos(np.arange(model.nv))
+        mujoco.mj_step(model, trial, 300)
+        left.append(np.abs(trial.qvel - creeping).max())
+    assert left[0] < 3e-5  # a ball goes on rolling
+    assert left[1] > 1e-4
+
+
+DEEP = {
+    "deep": mjcf(LEVEL, 'cone="elliptic"', 'solref=".1 1"'),
+    "deep, pyramidal": mjcf(LEVEL, geom='solref=".2 1"'),
+    "deep, springs": mjcf(LEVEL, 'cone="elliptic"', 'solref="-100 -10"'),
+}
+
+
+QUICK = ("slope", "gripper", "ball held by rolling friction", "deep", "slope, pyramidal, springs")
+ADVISED = [name for name in SCENES | DEEP if name != "slope, noslip"]
+
+
+@pytest.mark.parametrize("scene", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in ADVISED])
+def test_advice_does_what_it_says(scene: str) -> None:
+    model, data, found = settled((SCENES | DEEP)[scene])
+    found, after = forecast.tried(model, data, found, 10.0)
+    change = found.change
+    assert change
+    assert change.found == pytest.approx(change.after, rel=0.2)
+    assert change.found < change.before / 1.4
+    assert found.memory == (max(pair.creep for pair in after.pairs) > forecast.CREEP)
+
+
+def test_a_disturbance_dies_out_at_the_predicted_rate() -> None:
+    model, data, found = settled(mjcf(LEVEL, 'cone="elliptic"', 'solref="-2000 -40"'))
+    data.qvel[2] += 1e-5
+    speeds = []
+    for _ in range(60):
+        mujoco.mj_step(model, data)
+        speeds.append(abs(data.qvel[2]))
+    # An oscillation that dies out: the largest speeds of two halves, at a whole number of half periods.
+    slow = found.pairs[0].decay
+    assert -math.log(max(speeds[40:]) / max(speeds[:20])) / (40 * model.opt.timestep) == pytest.approx(slow, rel=0.3)
+
+
+CLOTH = (
+    '<flexcomp name="c" type="grid" count="4 4 1" spacing=".05 .05 .05" pos="1 1 .1" radius=".01" mass=".1" dim="2">'
+)
+CLOTH += '<edge equality="true"/></flexcomp>'
+FALLING = '<body name="stone"><freejoint/><geom size=".1"/></body>'
+REFUSED = {
+    "<mujoco><worldbody><geom type='brick'/></worldbody></mujoco>": (2, "MuJoCo refuses it"),
+    mjcf(""): (2, "nothing touches"),
+    mjcf(FALLING): (2, "nothing touches.*body 'stone' at .* m/s"),
+    mjcf(FALLING, rest='<equality><weld body1="stone"/></equality>'): (2, "nothing touches"),
+    mjcf(FLOOR.format("") + CLOTH): (2, "nothing touches.*16 contacts of flexible bodies are left out"),
+    mjcf(LEVEL, geom='solref="-5000 0"'): (
+        1,
+        "still moves: body 'box' at .*disturbances of its contacts die out at 0 1/s only",
+    ),
+    mjcf(SLOPE + ROUND): (1, "still moves: body 'ball' at"),
+    mjcf(LEVEL.replace('"/></body>', '" /><joint/></body>')): (2, "MuJoCo refuses it"),
+}
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_has_no_forecast_gets_one_line(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.xml").write_text(text)
+    code, said = REFUSED[text]
+    assert cli.main(["forecast", "scene.xml", "--settle", "2"]) == code
+    error = capsys.readouterr().err
+    assert re.search(said, error)
+    assert error.count("\n") == 1
+    assert [each.name for each in tmp_path.iterdir()] == ["scene.xml"]
+
+
+def test_a_keyframe_that_does_not_exist_and_one_that_does(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text(SCENES["gripper"])
+    assert cli.main(["forecast", str(path), "--keyframe", "dropped"]) == 2
+    assert "no keyframe 'dropped', but held" in capsys.readouterr().err
+    assert cli.main(["forecast", str(path), "--keyframe", "held", "--max-creep", "1e-6"]) == 1
+    assert re.search(r"rod / left: creep 0.000\d+ m/s, more than 1e-06", capsys.readouterr().err)
+    assert cli.main(["forecast", str(path), "--keyframe", "0", "--max-creep", "1e-3", "--max-depth", "1e-3"]) == 0
+
+
+def test_the_page_the_json_and_what_the_engine_replaces(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, page = tmp_path / "scene.xml", tmp_path / "page.html"
+    path.write_text(SCENES["hidden mix"].replace("<option ", '<option timestep=".008" '))
+    assert cli.main(["forecast", str(path), "--try", "--json", "-o", str(page)]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    (pair,) = shown["before"]["pairs"]
+    assert shown["after"]["pairs"][0]["creep_measured"] == pytest.approx(shown["before"]["change"]["after"], rel=0.2)
+    assert [line.partition(" ")[0] for line in pair["replaced"]] == ["solref", "solref", "friction"]
+    assert "0.012 s is too short for the time step: 0.016 s is taken" in pair["replaced"][0]
+    assert "After the change" in page.read_text("utf-8")
+
+
+def test_two_hundred_contacts_stay_readable() -> None:
+    _, _, found = settled(
+        mjcf(FLOOR.format("") + "".join(box(f"{k / 5} 0 .0499", "0 0 0", f"box{k}") for k in range(50)))
+    )
+    assert len(found.pairs) == 50
+    assert sum(len(pair.members) for pair in found.pairs) == 200
+    assert len(forecast.rows(found)) == forecast.SHOWN + 1
+    assert list(forecast.sentences(found)) == ["Nothing needs to change."]
