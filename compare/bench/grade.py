@@ -29,7 +29,7 @@ from compare.bench.runner import Result, run_all
 from compare.bench.two_contacts import SMOOTH
 from compare.kit import pages
 from compare.kit.engines import ENGINES, NEWCOMER, Engine
-from compare.kit.progress import Show
+from compare.kit.progress import Show, nowhere
 from compare.kit.statistics import plain
 from mjsim import ContactSettings
 from model import Case as Kinds
@@ -51,7 +51,7 @@ class Graded(Simulated):
     """MuJoCo with settings of its own: the ball in the vessel on the study's joints, other bodies free."""
 
     def __init__(self, native: Native) -> None:
-        super().__init__(NEWCOMER.name, free=mujoco_free.Bodies(native.tune))
+        super().__init__(NEWCOMER.name, mujoco_free.Bodies(native.tune))
         self._native = native
 
     def engine(self, timestep: float) -> Engine:
@@ -95,23 +95,25 @@ class Column:
         return dict(plain(dataclasses.asdict(self) | {"passed": self.passed, "cost": self.cost}))
 
 
-def contestants(yours: Native | None) -> dict[str, tuple[Any, float]]:
-    """The columns of a card of MuJoCo's settings, and their time steps."""
-    own = {"yours": (Graded(yours), yours.timestep)} if yours else {}
-    return own | {
-        "dualball": (simulators.mujoco, ContactSettings.timestep),
-        "MuJoCo": (Graded(Native()), Native.timestep),
-        "newcomer": (mujoco_free, Native.timestep),
-    }
+OTHERS: dict[str, tuple[Any, float]] = {
+    "dualball": (simulators.mujoco, ContactSettings.timestep),
+    "MuJoCo": (Graded(Native()), Native.timestep),
+    "newcomer": (mujoco_free, Native.timestep),
+}
+"""Engines beside a person's settings, each with its time step."""
 
 
-def grade(those: Mapping[str, tuple[Any, float]], show: Show, yours: Native | None = None) -> list[Column]:
-    """Columns of the score card, with advice for `yours` in the first.
+def grade(
+    yours: Native | None, others: Mapping[str, tuple[Any, float]] = OTHERS, show: Show = nowhere
+) -> list[Column]:
+    """Columns of the score card: the given settings first, with advice, then others, engines with a time step each.
 
     Raises `InputError` if MuJoCo refuses the settings.
     """
+    those = dict(others)
     if yours:
         yours.build(SMOOTH, yours.loop())
+        those = {"yours": (Graded(yours), yours.timestep)} | those
     columns: list[Column] = []
     for name, (engine, step) in those.items():
         found = []

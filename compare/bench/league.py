@@ -28,6 +28,11 @@ ENGINES: dict[str, str] = {
     "mujoco-defaults": f"{_OWN}.mujoco_free",
     "siconos": f"{_OWN}.simulators:siconos",
     "siconos-defaults": f"{_OWN}.simulators:siconos_defaults",
+    **{
+        f"{name}{suffix}": f"{_OWN}.{name}:{which}"
+        for name in ("pybullet", "drake", "dart", "rapier", "sapien")
+        for suffix, which in (("", "best"), ("-defaults", "defaults"))
+    },
 }
 """Where each engine is; NAME is in its best known settings, NAME-defaults as it comes."""
 KINDS = ("sticking", "rolling", "sliding", "landing")

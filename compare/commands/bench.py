@@ -120,11 +120,11 @@ def graded(args: argparse.Namespace) -> int:
         check_writable(args.output)
     if args.engine is engines.MUJOCO:
         yours, described = _of_mujoco(args)
-        those = grade.contestants(yours)
+        others = grade.OTHERS
     else:
-        yours, (those, described) = None, _of_another(args)
+        yours, (others, described) = None, _of_another(args)
     with progress.shown(quiet=args.json) as show:
-        columns = grade.grade(those, show, yours)
+        columns = grade.grade(yours, others, show)
     if args.output:
         write_text(args.output, grade.html(columns, described))
     advice = (Text(f"• {item}") for item in columns[0].advice)

@@ -17,7 +17,6 @@ from compare.bench.grade import Column
 from compare.bench.native import Native, Pair
 from compare.bench.two_contacts import SMOOTH
 from compare.commands import cli
-from compare.kit.progress import nowhere
 from mjsim import ContactSettings, scene
 from mjsim.scene import SCENE
 from model import Case, InputError, Parameters
@@ -45,8 +44,7 @@ def read(tmp_path: Path) -> Callable[[str], Native]:
 
 @pytest.fixture(scope="module")
 def columns() -> list[Column]:
-    those = grade.contestants(ELLIPTIC)
-    return grade.grade({name: those[name] for name in ("yours", "dualball")}, nowhere, ELLIPTIC)
+    return grade.grade(ELLIPTIC, {"dualball": grade.OTHERS["dualball"]})
 
 
 def test_creep_and_hovering_are_as_predicted(columns: list[Column]) -> None:
@@ -80,7 +78,7 @@ def test_card_as_table_and_page(columns: list[Column]) -> None:
 def test_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, columns, capsys) -> None:
     asked = []
 
-    def measured(those: object, show: object, yours: Native) -> list[Column]:
+    def measured(yours: Native, others: object, show: object) -> list[Column]:
         asked.append(yours)
         return columns
 

@@ -11,6 +11,7 @@ import numpy as np
 import pydrake.all as engine
 
 from compare.bench.adapters.free import CHORD, Free, State
+from compare.bench.adapters.simulators import Simulated
 from compare.bench.case import Vector
 from model.arrays import Array
 
@@ -116,3 +117,4 @@ class Drake(Free):
 
 defaults = Drake("drake-defaults")
 free = Drake("drake", "TAMSI, 1e10 N/m, stiction tolerance 1e-8 m/s; a box touches by its corners")
+best = Simulated("drake", free)

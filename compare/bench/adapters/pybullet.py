@@ -10,6 +10,7 @@ from typing import Any
 import pybullet as engine
 
 from compare.bench.adapters.free import CHORD, Free, State, upright
+from compare.bench.adapters.simulators import Simulated
 from compare.bench.case import Vector
 from model.arrays import Array
 
@@ -87,3 +88,4 @@ class PyBullet(Free):
 
 defaults = PyBullet("pybullet-defaults")
 free = PyBullet("pybullet", "lengths in dm, 200 iterations to round-off, Coulomb's cone")
+best = Simulated("pybullet", free)

@@ -19,12 +19,17 @@ from model import InputError
 from model.arrays import Array
 from model.kinematics import to_world
 
+JOINTS = "the ball in the vessel on joints: azimuth, radius, height, spin"
+
 
 class Simulated:
     """An engine of the study by name, and what takes the cases without a vessel."""
 
-    def __init__(self, name: str, declared: str = "", free: Any = None) -> None:
-        self.NAME, self.DECLARED, self._free = name, declared, free
+    def __init__(self, name: str, free: Any = None, declared: str = "", note: str = "") -> None:
+        self.NAME, self._free = name, free
+        own = getattr(free, "DECLARED", "")
+        self.DECLARED = "; ".join(filter(None, (JOINTS if free else "", declared or own)))
+        self.NOTE, self.KNOWN = note or getattr(free, "NOTE", ""), getattr(free, "KNOWN", "")
         if "timestep" not in ENGINES[name].options:
             self.TIMESTEPS = STEPS[-1:]
         self._states: Array | None = None
@@ -71,13 +76,11 @@ class Simulated:
         return tuple(self._states[self._at])
 
 
-JOINTS = "in the vessel on joints: azimuth, radius, height, spin"
-SETTINGS = "contact settings of the study, elliptic cone"
-mujoco = Simulated(
-    "mujoco", f"{SETTINGS}; {JOINTS}, with corrections between the steps", mujoco_free.Bodies(mujoco_free.studied)
-)
-mujoco_plain = Simulated("mujoco-plain", f"{SETTINGS}; {JOINTS}", mujoco_free.Bodies(mujoco_free.studied))
-event = Simulated("event", "equations of the paper, no scene; its own steps")
-time_stepping = Simulated("time-stepping", "equations of the paper, no scene")
-siconos = Simulated("siconos", "equations of motion in turning axes, no scene")
-siconos_defaults = Simulated("siconos-defaults", "equations of motion, no scene")
+_BODIES = mujoco_free.Bodies(mujoco_free.studied)
+_STUDY = "elliptic cone, contact settings of the study"
+mujoco = Simulated("mujoco", _BODIES, f"{_STUDY}, corrections between the steps")
+mujoco_plain = Simulated("mujoco-plain", _BODIES, _STUDY)
+event = Simulated("event", declared="the equations of the paper, no scene; its own steps")
+time_stepping = Simulated("time-stepping", declared="the equations of the paper, no scene")
+siconos = Simulated("siconos", declared="equations of motion in turning axes, no scene")
+siconos_defaults = Simulated("siconos-defaults", declared="equations of motion, no scene")
