@@ -103,9 +103,7 @@ OTHERS: dict[str, tuple[Any, float]] = {
 """Engines beside a person's settings, each with its time step."""
 
 
-def grade(
-    yours: Native | None, others: Mapping[str, tuple[Any, float]] = OTHERS, show: Show = nowhere
-) -> list[Column]:
+def grade(yours: Native | None, others: Mapping[str, tuple[Any, float]] = OTHERS, show: Show = nowhere) -> list[Column]:
     """Columns of the score card: the given settings first, with advice, then others, engines with a time step each.
 
     Raises `InputError` if MuJoCo refuses the settings.

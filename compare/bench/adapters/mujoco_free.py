@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import mujoco
 
+import mjsim
 from compare.bench.case import FACETS, Case
 from model.arrays import Array
 
@@ -16,10 +18,13 @@ DECLARED = f"{FACETS} planes for a cylinder; a table that turns hangs on a hinge
 
 
 class Bodies:
-    """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a time step."""
+    """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a time step.
 
-    def __init__(self, tune: Callable[[Any, Case, float], None] | None = None) -> None:
-        self._tune = tune
+    With `memory` its contacts remember their friction (`mjsim.FrictionMemory`).
+    """
+
+    def __init__(self, tune: Callable[[Any, Case, float], None] | None = None, memory: bool = False) -> None:
+        self._tune, self._memory = tune, memory
 
     def build(self, case: Case, timestep: float) -> None:
         """The scene at its start."""
@@ -29,17 +34,19 @@ class Bodies:
         self._case, self._model = case, spec.compile()
         self._data = mujoco.MjData(self._model)
         mujoco.mj_resetDataKeyframe(self._model, self._data, 0)
+        plain = functools.partial(mujoco.mj_step, self._model)
+        self._advance = mjsim.FrictionMemory(self._model).step if self._memory else plain
 
     def step(self, n: int) -> None:
         """Take n steps."""
         case, data = self._case, self._data
         if not case.forced:
-            mujoco.mj_step(self._model, data, n)
+            self._advance(data, n)
             return
         force = data.body("body").xfrc_applied[:3]
         for _ in range(n):
             force[:] = case.force(data.time, data.qpos[-7:-4], data.qvel[-6:-3])
-            mujoco.mj_step(self._model, data)
+            self._advance(data)
 
     def state(self) -> tuple[Array, Array, Array]:
         """Position, velocity and spin; MuJoCo counts the spin in the body's axes."""

@@ -76,10 +76,11 @@ class Simulated:
         return tuple(self._states[self._at])
 
 
-_BODIES = mujoco_free.Bodies(mujoco_free.studied)
 _STUDY = "elliptic cone, contact settings of the study"
-mujoco = Simulated("mujoco", _BODIES, f"{_STUDY}, corrections between the steps")
-mujoco_plain = Simulated("mujoco-plain", _BODIES, _STUDY)
+mujoco = Simulated(
+    "mujoco", mujoco_free.Bodies(mujoco_free.studied, memory=True), f"{_STUDY}, corrections between the steps"
+)
+mujoco_plain = Simulated("mujoco-plain", mujoco_free.Bodies(mujoco_free.studied), _STUDY)
 event = Simulated("event", declared="the equations of the paper, no scene; its own steps")
 time_stepping = Simulated("time-stepping", declared="the equations of the paper, no scene")
 siconos = Simulated("siconos", declared="equations of motion in turning axes, no scene")
