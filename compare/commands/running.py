@@ -18,7 +18,7 @@ from compare.kit.tasks import Task
 from compare.kit.workers import Workers, dask, processes
 from model import Flow, InputError, Parameters, State
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import POSITIVE, check_names, check_number, parse_number
+from model.parameters import Range, check_names, check_number, parse_number
 
 
 def add_flow(parser: argparse.ArgumentParser) -> None:
@@ -89,9 +89,10 @@ def settings(args: argparse.Namespace, p: Parameters) -> Settings:
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
     """The run of a ball that the options of `add_engine`, `add_start` and ``--time`` describe."""
-    if args.time is not None:
-        check_number("time", args.time, "s", POSITIVE)
-    given = {"x0": start(args), "t_end": args.time, "settings": settings(args, p)} | more
+    chosen = settings(args, p)
+    if step := getattr(chosen, "timestep", None):
+        check_number("time", args.time or step, "s", Range(step), "to hold a time step it")
+    given = {"x0": start(args), "t_end": args.time, "settings": chosen} | more
     return Task(engine=args.engine.name, parameters=p, **given)
 
 

@@ -15,7 +15,7 @@ from compare.kit.tasks import failed_path, journal_path, store
 from compare.kit.workers import interrupts
 from compare.view import inspection
 from model import Flow, InputError, Parameters
-from model.files import check_writable, make_directory, reading_json, write_text
+from model.files import check_writable, reading_json, write_text
 from model.parameters import Range, check_number
 
 
@@ -101,8 +101,8 @@ def grid(args: argparse.Namespace) -> int:
     else:
         sets = sweep.grid(p, axes) if args.random is None else sweep.random(p, axes, args.random, args.seed)
         tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
-    _keep_apart(args, p)
     with running.campaign(args, "sweep", batch=args.batch) as work:
+        _keep_apart(args, p)
         failures = work.complete(tasks)
     whole = len(tasks) - len(failures)
     if args.json:
@@ -120,7 +120,6 @@ def _keep_apart(args: argparse.Namespace, p: Parameters) -> None:
     """Raise `InputError` if the directory holds another sweep, with which `collect` would mix this one."""
     names = ("vary", "random", "seed", "direction", "hold", "start", "time", "timestep", "rtol", "restitution")
     asked = {name: getattr(args, name) for name in names} | {"engine": args.engine.name} | dataclasses.asdict(p)
-    make_directory(args.output)
     if (path := args.output / "sweep.json").exists():
         with reading_json(path, "sweep") as held:
             differ = [f"{name} = {held[name]}, not {value}" for name, value in asked.items() if held[name] != value]

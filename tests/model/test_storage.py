@@ -186,6 +186,14 @@ def replace(file: h5py.File, name: str, value: object) -> None:
     file[name] = value
 
 
+def test_a_file_from_before_the_flow_was_a_column_is_read(path: Path) -> None:
+    def age(file: h5py.File) -> None:
+        del file["omega_0"], file.attrs["Conventions"], file.attrs["title"], file.attrs["mu"]
+
+    edit(path, age)
+    assert_same(storage.load(path), make())
+
+
 def test_a_file_that_was_changed_is_refused(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["y"][0] = 1.0
