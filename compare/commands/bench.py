@@ -74,7 +74,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--quick", action="store_true", help="one time step")
     named = f"only this one (repeatable), or a module of your own: {', '.join(league.ENGINES)}"
     command.add_argument("--engine", action="append", metavar="NAME", help=named)
-    running.add_workers(command)
+    running.add_processes(command)
     options.outputs(command, "results")
 
 
