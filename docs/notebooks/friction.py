@@ -1,0 +1,152 @@
+# %% [markdown]
+# # Does it slip?
+#
+# A box on a slope and a rod in a gripper, both well inside their friction cones, both
+# with MuJoCo's own contact parameters. Both creep. How fast can be computed before the
+# simulation runs; one option makes it slower, and a memory for friction ends it.
+
+# %%
+# %config InlineBackend.figure_formats = ["svg"]
+import functools
+
+import matplotlib.pyplot as plt
+import mujoco
+import numpy as np
+
+from compare.bench import forecast
+from mjsim import FrictionMemory
+
+plt.rcParams |= {
+    "figure.figsize": (7, 3.2),
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+}
+SLOPE = """
+<mujoco>
+  <option cone="elliptic"/>
+  <default><geom friction="0.6"/></default>
+  <worldbody>
+    <geom name="slope" type="plane" size="2 2 0.1" euler="0 15 0"/>
+    <body pos="0.013 0 0.0485" euler="0 15 0">
+      <freejoint/>
+      <geom name="box" type="box" size="0.05 0.05 0.05" mass="1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+GRIPPER = """
+<mujoco>
+  <option cone="elliptic" impratio="10"/>
+  <worldbody>
+    <body pos="-0.03 0 0.5" gravcomp="1">
+      <joint name="left" type="slide" axis="1 0 0" damping="20"/>
+      <geom name="left" type="box" size="0.01 0.03 0.03" mass="0.2"/>
+    </body>
+    <body pos="0.03 0 0.5" gravcomp="1">
+      <joint name="right" type="slide" axis="-1 0 0" damping="20"/>
+      <geom name="right" type="box" size="0.01 0.03 0.03" mass="0.2"/>
+    </body>
+    <body pos="0 0 0.5">
+      <freejoint/>
+      <geom name="rod" type="capsule" size="0.02 0.03" mass="0.1"/>
+    </body>
+  </worldbody>
+  <actuator><motor joint="left"/><motor joint="right"/></actuator>
+  <keyframe><key name="held" ctrl="5 5"/></keyframe>
+</mujoco>
+"""
+
+# %% [markdown]
+# ## The forecast
+#
+# `dualball forecast scene.xml` does this on the command line. The engine settles the
+# model and says what each contact carries. The creep follows from the softness $R_t$ of
+# the friction rows and their damping $b_f$: a contact that bears the friction $f_t$
+# slips at $R_t f_t / b_f$.
+
+
+# %%
+def settled(text):
+    """A model at rest, its state, and the forecast."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    moving = forecast.settle(model, data, limit=10.0)
+    return model, data, forecast.forecast(model, data, moving)
+
+
+for text in (SLOPE, GRIPPER):
+    _, _, found = settled(text)
+    for pair in found.pairs:
+        print(
+            f"{pair.name:>12}: {pair.cone:.0%} of the cone in use, "
+            f"creep {1e6 * pair.creep:.4g} µm/s predicted, "
+            f"{1e6 * pair.creep_measured:.4g} µm/s measured"
+        )
+    for line in forecast.sentences(found):
+        print("   ", line)
+
+# %% [markdown]
+# ## What each option does
+#
+# The creep of the box for every `impratio`, computed once and measured each time. It
+# falls in proportion, and never to zero.
+
+# %%
+ratios = np.geomspace(1, 1e4, 5)
+predicted, measured = [], []
+for ratio in ratios:
+    _, _, found = settled(SLOPE.replace("elliptic", f'elliptic" impratio="{ratio:g}'))
+    predicted.append(found.pairs[0].creep)
+    measured.append(found.pairs[0].creep_measured)
+figure, axes = plt.subplots()
+axes.loglog(ratios, predicted, color="black", lw=1, label="predicted")
+axes.loglog(ratios, measured, "o", color="#D55E00", mfc="white", label="measured")
+axes.set(xlabel="impratio", ylabel="creep (m/s)")
+axes.legend()
+figure.tight_layout()
+plt.show()
+
+# %% [markdown]
+# ## A memory
+#
+# `mjsim.FrictionMemory(model).step(data)` takes the place of `mj_step`. Each contact
+# remembers the friction force it had in the last step, so that none of it is left to
+# creep. How far the box and the rod come in five seconds:
+
+
+# %%
+def way(model, data, step, seconds=5.0):
+    """Distance of the last body from where it was, in µm, and the time, sampled."""
+    begin, moved = data.xpos[-1].copy(), []
+    for _ in range(100):
+        step(data, int(seconds / 100 / model.opt.timestep))
+        mujoco.mj_kinematics(model, data)
+        moved.append(1e6 * np.linalg.norm(data.xpos[-1] - begin))
+    return np.arange(1, 101) * seconds / 100, moved
+
+
+figure, panels = plt.subplots(1, 2)
+for axes, (name, text) in zip(
+    panels, {"box on a slope": SLOPE, "rod in a gripper": GRIPPER}.items(), strict=True
+):
+    model, data, _ = settled(text)
+    remembering = mujoco.MjData(model)
+    mujoco.mj_copyData(remembering, model, data)
+    memory = FrictionMemory(model)
+    memory.step(remembering, 500)  # it takes a moment to know the forces
+    plainly = functools.partial(mujoco.mj_step, model)
+    axes.plot(*way(model, data, plainly), color="#D55E00", label="plain")
+    with_memory = way(model, remembering, memory.step)
+    axes.plot(*with_memory, color="#0072B2", label="with memory")
+    axes.set(title=name, xlabel="time (s)", ylabel="way (µm)")
+    print(f"{name}: {with_memory[1][-1]:.1e} µm in 5 s with memory")
+panels[0].legend()
+figure.tight_layout()
+plt.show()
+
+# %% [markdown]
+# [Friction that holds](../friction.md) derives the formulas, and says where the memory
+# ends: it changes nothing about what slides.
