@@ -19,10 +19,13 @@ import importlib
 import math
 import multiprocessing
 import os
+import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +35,7 @@ from model import InputError
 from model.arrays import Array
 from model.trajectory import version
 
-LIMIT = 120.0
+LIMIT = 300.0
 """Longest that a run at one step may take, s of real time."""
 BEGIN = 120.0
 """Longest that an engine may take to load, s."""
@@ -134,11 +137,16 @@ class _Server:
         self.about = self._start()
 
     def _start(self) -> About:
-        context = multiprocessing.get_context("spawn")
-        self._pipe, far = context.Pipe()
-        self._process: Any = context.Process(target=_serve, args=(self._engine, far), daemon=True)
-        self._process.start()
+        # Not by `multiprocessing`, which runs a person's script a second time unless that is guarded.
+        self._pipe, far = multiprocessing.Pipe()
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", f"from {__name__} import serve; serve({far.fileno()})"],
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)},
+            pass_fds=[far.fileno()],
+            stdout=subprocess.DEVNULL,  # engines are talkative
+        )
         far.close()
+        self._pipe.send(self._engine)
         answer = self._answer(BEGIN)
         name = self._engine if isinstance(self._engine, str) else type(self._engine).__name__
         return answer if isinstance(answer, About) else About(name, missing=f"{name} {answer}")
@@ -151,12 +159,12 @@ class _Server:
             self.stop()
             return f"took longer than {limit:g} s"
         except (EOFError, OSError):
-            self._process.join()
-            return f"crashed (exit code {self._process.exitcode})"
+            return f"crashed (exit code {self._process.wait()})"
 
     def stop(self) -> None:
         self._process.kill()
-        self._process.join()
+        self._process.wait()
+        self._pipe.close()
 
     def result(self, case: Case, steps: Sequence[float] | None) -> Result:
         """Of all steps; later ones are not tried where one hangs."""
@@ -166,7 +174,7 @@ class _Server:
         runs: list[tuple[Array | None, float, str]] = []
         chosen = tuple(sorted(steps or about.steps, reverse=True))
         for step in chosen:
-            if not self._process.is_alive():
+            if self._process.poll() is not None:
                 self._start()
             self._pipe.send((case, step))
             answer = self._answer(self._limit)
@@ -223,17 +231,20 @@ def _about(engine: Any) -> About:
     )
 
 
-def _serve(engine: Any, pipe: Any) -> None:
-    """The process: cases come in, what the engine makes of them goes out."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)  # engines are talkative
+def serve(handle: int) -> None:
+    """The process: an engine and then cases come in, what the engine makes of them goes out."""
+    pipe = Connection(handle)
     try:
-        adapter = load(engine)
+        adapter = load(pipe.recv())
         pipe.send(_about(adapter))
     except InputError as error:
         pipe.send(f"can't be used: {error}")
         return
     while True:
-        case, step = pipe.recv()
+        try:
+            case, step = pipe.recv()
+        except EOFError:  # there are no more
+            return
         pipe.send(_attempt(adapter, case, step))
 
 
