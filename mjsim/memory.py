@@ -8,11 +8,12 @@ friction f therefore creeps at v = R f/b for ever. With the force f_last of the 
 the steady state has v = 0: a round of an augmented Lagrangian in each step. In mechanical terms a spring of stiffness
 b/(R h) with a damper 1/(R h) stands at the contact, and a slider at the edge of the cone. MuJoCo's solver projects each
 new f on the cone, so what is remembered never exceeds Coulomb's limit. What a contact that slides remembers would only
-press on its normal row, so memory fades out between two and three times the cone (`_KEPT`).
+press on its normal row, so memory fades out where ten to twenty times the cone would be needed to hold it (`KEPT`).
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -25,13 +26,18 @@ from scipy.spatial.distance import cdist
 from model import InputError
 from model.arrays import Array
 
-_KEPT = 3.0
-"""A contact that only more than this many times Coulomb's limit would hold keeps nothing; with one less, all."""
+KEPT = 10.0
+"""Times Coulomb's limit that may be needed to hold a contact which keeps all; with twice as much it keeps nothing."""
 _ROWS = np.arange(5)
 _COLUMNS = np.array([2, 4, 1, 3, 5])
 """Where forces along the tangents, and moments about normal and tangents, stand in rows (axis; force, moment)."""
-_APART = 1e6
-"""Distance between contacts of different pairs of geoms, m, so that none is the nearest of another pair's."""
+_APART = np.array([1e6, 1e6, 1, 1, 1, 1, 1, 1])
+"""Keeps contacts of different geoms apart, m."""
+_ELLIPTIC = mujoco.mjtCone.mjCONE_ELLIPTIC
+_STATE = "place", "force", "load", "joints", "time"
+Kept = tuple[Array, Array, Array]
+"""Of each contact the geoms and its place on both in their axes, (n, 8), friction force and moment on both in their
+axes, (n, 2, 3, 2), and the normal force, (n,); m, N, N m."""
 _SPLIT = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_IMPLICIT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
 
@@ -43,7 +49,8 @@ class FrictionMemory:
     model : any `mujoco.MjModel` with integrator Euler, implicit or implicitfast
 
     The memory belongs to one simulation: make one for each `MjData`. It takes part in the state of that, so save and
-    restore both. Contacts of flexes, without friction (condim 1) or without damping of friction are left as they are.
+    restore both. Joints and tendons with `frictionloss` hold as well. Contacts of flexes, and those without friction
+    (condim 1) or without damping of friction, are left as they are.
 
     Raises
     ------
@@ -60,26 +67,24 @@ class FrictionMemory:
             }.get(integrator, "computes the reference accelerations anew after the place where memory enters")
             name = integrator.name.removeprefix("mjINT_")
             raise InputError(f"integrator = {name} {why}; a friction memory needs Euler, implicit or implicitfast")
+        self._recall, self._retain = _kernels()
         self.reset()
 
     def reset(self) -> None:
         """Forget all, as after `mj_resetData`."""
-        self._place, self._force, self._load = np.empty((0, 7)), np.empty((0, 2, 3, 2)), np.empty(0)
+        self._kept: Kept = np.empty((0, 8)), np.empty((0, 2, 3, 2)), np.empty(0)
+        self._joints = np.empty(0)
         self._time = math.nan
 
     def state(self) -> dict[str, Array]:
-        """A copy of what is remembered: place and force of each contact on both of its geoms, and its normal force."""
-        return {
-            "place": self._place.copy(),
-            "force": self._force.copy(),
-            "load": self._load.copy(),
-            "time": np.array(self._time),
-        }
+        """A copy of what is remembered: `Kept`, friction of joints and tendons (n,), and the time of it, s."""
+        values = (*self._kept, self._joints, np.array(self._time))
+        return {name: value.copy() for name, value in zip(_STATE, values, strict=True)}
 
     def restore(self, state: Mapping[str, npt.ArrayLike]) -> None:
         """Go on from a `state`."""
-        self._place, self._force, self._load = (np.array(state[name], float) for name in ("place", "force", "load"))
-        self._time = float(np.asarray(state["time"]))
+        place, force, load, self._joints, time = (np.array(state[name], dtype=float) for name in _STATE)
+        self._kept, self._time = (place, force, load), float(time)
 
     def step(self, data: Any, nstep: int = 1) -> None:
         """Advance by `nstep` steps.
@@ -96,67 +101,102 @@ class FrictionMemory:
             self.reset()
         for _ in range(nstep):
             mujoco.mj_step1(model, data)
-            if data.ncon == 0:
+            if data.nefc:
+                self._step2(data)
+            else:
                 mujoco.mj_step2(model, data)
                 self.reset()
-            else:
-                self._step_in_contact(data)
         self._time = data.time
 
-    def _step_in_contact(self, data: Any) -> None:
+    def _step2(self, data: Any) -> None:
         model, contact = self.model, data.contact
-        address, dim, geom = contact.efc_address, contact.dim, contact.geom
-        used = (address >= 0) & (dim > 1) & (geom[:, 0] >= 0) & (geom[:, 1] >= 0)
-        used[used] = data.efc_KBIP[address[used] + 1, 1] > 0
-        address, dim, geom = address[used], dim[used], geom[used]
-        frame, friction = contact.frame[used].reshape(-1, 3, 3), contact.friction[used]
-        axes = data.geom_xmat[geom].reshape(-1, 2, 3, 3)
-
-        # Where contacts are on both geoms, and what they remember, as of the mean of both.
-        arm = contact.pos[used][:, None] - data.geom_xpos[geom]
-        place = np.empty((len(geom), 7))
-        place[:, 0] = _APART * (geom[:, 0] * model.ngeom + geom[:, 1])
-        place[:, 1:] = (arm[:, :, None] @ axes).reshape(-1, 6)
-        remembered, load = np.zeros((len(geom), 3, 2)), np.zeros(len(geom))
-        if len(self._place) and len(place):
-            nearest = cdist(self._place, place, "sqeuclidean").argmin(axis=1)
-            kept = self._place[:, 0] == place[nearest, 0]
-            nearest = nearest[kept]
-            np.add.at(remembered, nearest, (axes[nearest] @ self._force[kept]).sum(axis=1) / 2)
-            np.add.at(load, nearest, self._load[kept])
-        force = (frame @ remembered).reshape(-1, 6)[:, _COLUMNS]
-
-        own = dim[:, None] - 1 > _ROWS
-        softness, reference = data.efc_R, data.efc_aref
-        if model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC:
-            rows = (address[:, None] + 1 + _ROWS)[own]
-            reference[rows] += softness[rows] * force[own]
-        else:
-            rows = (address[:, None] + 2 * _ROWS)[own]
-            for side, shares in zip((0, 1), edges(force, load, friction, own), strict=True):
-                reference[rows + side] += softness[rows + side] * shares[own]
-
+        geom, frame, dim = contact.geom, contact.frame, contact.dim
+        address, friction, axes = contact.efc_address, contact.friction, data.geom_xmat
+        softness, reference, elliptic = data.efc_R, data.efc_aref, model.opt.cone == _ELLIPTIC
+        used, place = self._recall(
+            self._kept, geom, contact.pos, frame, dim, address, friction, data.geom_xpos, axes, data.efc_KBIP,
+            softness, reference, elliptic,
+        )  # fmt: skip
+        joints = slice(data.ne, data.ne + data.nf)
+        if len(self._joints) == data.nf:
+            reference[joints] += softness[joints] * self._joints
         mujoco.mj_step2(model, data)
         acceleration = np.empty(data.nefc)
         mujoco.mj_mulJacVec(model, data, acceleration, data.qacc)
-        holding = (reference - acceleration) / softness
-        forces, asked = data.efc_force, np.zeros(force.shape)
-        force = np.zeros(force.shape)
-        if model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC:
-            force[own], asked[own] = forces[rows], holding[rows]
-            load = forces[address]
-            share = np.sqrt(((asked / friction) ** 2).sum(axis=1))
-        else:
-            force[own], asked[own] = forces[rows] - forces[rows + 1], np.abs(holding[rows] - holding[rows + 1])
-            force *= friction
-            share = asked.sum(axis=1)
-            asked[own] = forces[rows] + forces[rows + 1]
-            load = asked.sum(axis=1)
-        force *= np.clip(_KEPT - share / np.maximum(load, 1e-300), 0, 1)[:, None]
-        along = np.zeros((len(geom), 6))
-        along[:, _COLUMNS] = force
-        world = frame.transpose(0, 2, 1) @ along.reshape(-1, 3, 2)
-        self._place, self._force, self._load = place, axes.transpose(0, 1, 3, 2) @ world[:, None], load
+        if data.nf:
+            share = np.abs(reference - acceleration)[joints] / (softness * data.efc_frictionloss)[joints]
+            self._joints = data.efc_force[joints] * np.clip(2 - share / KEPT, 0, 1) * (data.efc_KBIP[joints, 1] > 0)
+        force, load = self._retain(
+            used, geom, frame, dim, address, friction, axes, softness, reference, acceleration, data.efc_force, elliptic
+        )
+        self._kept = place, force, load
+
+
+def recall(
+    kept: Kept, geom: Array, pos: Array, frame: Array, dim: Array, address: Array, friction: Array,
+    xpos: Array, xmat: Array, damping: Array, softness: Array, reference: Array, elliptic: bool,
+) -> tuple[npt.NDArray[np.intp], Array]:  # fmt: skip
+    """Add to the reference accelerations what contacts remember; return which have a memory, and their places.
+
+    Parameters
+    ----------
+    kept : what is remembered of the last step
+    geom, pos, frame, dim, address, friction : contacts, as `MjData.contact` has them
+    xpos, xmat, damping, softness, reference : `geom_xpos`, `geom_xmat`, `efc_KBIP`, `efc_R`, `efc_aref`
+    elliptic : whether cones are elliptic
+    """
+    used = np.flatnonzero((address >= 0) & (dim > 1) & (geom >= 0).all(axis=1))
+    used = used[damping[address[used] + 1, 1] > 0]
+    geom, frame, friction, address = geom[used], frame[used].reshape(-1, 3, 3), friction[used], address[used]
+    axes = xmat[geom].reshape(-1, 2, 3, 3)
+    arm = pos[used][:, None] - xpos[geom]
+    place = np.concatenate([geom, (arm[:, :, None] @ axes).reshape(-1, 6)], axis=1)
+    world, load = np.zeros((len(used), 3, 2)), np.zeros(len(used))
+    before, forces, loads = kept
+    if len(before) and len(used):
+        nearest = cdist(before * _APART, place * _APART, "sqeuclidean").argmin(axis=1)
+        same = (before[:, :2] == place[nearest, :2]).all(axis=1)
+        nearest = nearest[same]
+        np.add.at(world, nearest, (axes[nearest] @ forces[same]).sum(axis=1) / 2)
+        np.add.at(load, nearest, loads[same])
+    force = (frame @ world).reshape(-1, 6)[:, _COLUMNS]
+    own = dim[used][:, None] - 1 > _ROWS
+    if elliptic:
+        rows = (address[:, None] + 1 + _ROWS)[own]
+        reference[rows] += softness[rows] * force[own]
+    else:
+        rows = (address[:, None] + 2 * _ROWS)[own]
+        for side, share in enumerate(edges(force, load, friction, own)):
+            reference[rows + side] += softness[rows + side] * share[own]
+    return used, place
+
+
+def retain(
+    used: npt.NDArray[np.intp], geom: Array, frame: Array, dim: Array, address: Array, friction: Array, xmat: Array,
+    softness: Array, reference: Array, acceleration: Array, forces: Array, elliptic: bool,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Friction of contacts on both geoms in their axes, (n, 2, 3, 2), and normal forces, (n,), to remember.
+
+    Parameters as for `recall`, and the accelerations ``J qacc`` and `efc_force` that the step came to.
+    """
+    address, own = address[used], dim[used][:, None] - 1 > _ROWS
+    holding = (reference - acceleration) / softness
+    force, asked = np.zeros(own.shape), np.zeros(own.shape)
+    if elliptic:
+        rows = (address[:, None] + 1 + _ROWS)[own]
+        force[own], asked[own], load = forces[rows], holding[rows], forces[address]
+        share = np.sqrt(((asked / friction[used]) ** 2).sum(axis=1))
+    else:
+        rows = (address[:, None] + 2 * _ROWS)[own]
+        asked[own] = np.abs(holding[rows] - holding[rows + 1])
+        share = asked.sum(axis=1)
+        asked[own], force[own] = forces[rows] + forces[rows + 1], forces[rows] - forces[rows + 1]
+        load = asked.sum(axis=1)
+        force *= friction[used]
+    along = np.zeros((len(used), 6))
+    along[:, _COLUMNS] = force * np.clip(2 - share / np.maximum(KEPT * load, 1e-300), 0, 1)[:, None]
+    world = frame[used].reshape(-1, 3, 3).transpose(0, 2, 1) @ along.reshape(-1, 3, 2)
+    return xmat[geom[used]].reshape(-1, 2, 3, 3).transpose(0, 1, 3, 2) @ world[:, None], load
 
 
 def edges(force: Array, load: Array, friction: Array, own: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -179,3 +219,13 @@ def edges(force: Array, load: Array, friction: Array, own: npt.NDArray[np.bool_]
     level = np.where(own, rest, np.inf).min(axis=1)[:, None]
     pair, mean = np.maximum(needed, level) / 2, load[:, None] / (2 * count)
     return pair + lean / 2 - mean, pair - lean / 2 - mean
+
+
+@functools.cache
+def _kernels() -> tuple[Any, Any]:
+    """`recall` and `retain`, compiled if numba is installed."""
+    try:
+        from mjsim import compiled_memory
+    except ImportError:
+        return recall, retain
+    return compiled_memory.recall, compiled_memory.retain

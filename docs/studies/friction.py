@@ -1,0 +1,273 @@
+"""Write the tables on friction that holds: ``python -m docs.studies.friction docs/friction.md``.
+
+Creep, breakaway, sliding and cost take a minute or two; the piles, ``--only piles``, half an hour.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+from unittest import mock
+
+import mujoco
+import numpy as np
+
+from compare.kit.pages import Rows
+from docs.studies.tables import write
+from mjsim import FrictionMemory, memory
+
+G = 9.81
+SCENES = {
+    "box": "box on a slope of 15°",
+    "stack": "four slabs on it",
+    "fingers": "capsule between two fingers",
+    "grasp": "cylinder between three fingertips",
+    "ball": "ball held by rolling friction",
+    "cart": "cart with its wheels braked",
+}
+WAYS: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "impratio 10": {"impratio": 10},
+    "impratio 100": {"impratio": 100},
+    "noslip": {"noslip_iterations": 10},
+    "memory": {"memory": True},
+    "memory, pyramidal": {"memory": True, "cone": mujoco.mjtCone.mjCONE_PYRAMIDAL},
+}
+"""Options, and whether there is a memory."""
+PILES, BODIES, SETTLING, LAST = 100, 18, 5.0, 1.0
+STILL, RISE = 1e-9, 1e-9
+"""Most that a body at rest moves in the last second, m; least rise of energy that counts, J."""
+
+
+class Stepper(Protocol):
+    def step(self, data: Any, nstep: int = 1) -> None: ...
+
+
+class Plain:
+    """`mj_step` with the methods of a memory."""
+
+    def __init__(self, model: Any) -> None:
+        self.model = model
+
+    def step(self, data: Any, nstep: int = 1) -> None:
+        mujoco.mj_step(self.model, data, nstep)
+
+
+def start(model: Any, memory: bool = False, **options: Any) -> tuple[Any, Stepper]:
+    """Data of a model with other options, and what steps them."""
+    for name, value in options.items():
+        setattr(model.opt, name, value)
+    return mujoco.MjData(model), FrictionMemory(model) if memory else Plain(model)
+
+
+def one(geom: str, mu: float = 0.6, slope: float = 0.0) -> Any:
+    """A body on a plane; gravity is tilted instead of the plane, degrees."""
+    a = math.radians(slope)
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option cone="elliptic" tolerance="1e-12" gravity="{G * math.sin(a)} 0 {-G * math.cos(a)}"/>'
+        f'<default><geom friction="{mu}"/></default><worldbody><geom type="plane" size="9 9 1"/>'
+        f'<body pos="0 0 .05"><freejoint/>{geom}</body></worldbody></mujoco>'
+    )
+
+
+BOX, BALL = '<geom type="box" size=".05 .05 .05" mass="1"/>', '<geom type="sphere" size=".05" mass="1"/>'
+
+
+def creep(scene: str, way: dict[str, Any]) -> float:
+    """How far a body of a scene goes in a second once it has settled, m s-1."""
+    data, stepper = start(mujoco.MjModel.from_xml_path(f"docs/friction/{scene}.xml"), **way)
+    stepper.step(data, 2500)
+    place = data.xpos.copy()
+    stepper.step(data, 500)
+    return float(np.abs(data.xpos - place).max())
+
+
+def breakaway(way: dict[str, Any]) -> float:
+    """Force that starts to move a box, faster than 1e-5 m/s, in units of mu N; it grows for 11 s."""
+    data, stepper = start(one(BOX), **way)
+    stepper.step(data, 500)
+    shares = np.linspace(0, 1.1, 5500)
+    for share in shares:
+        data.qfrc_applied[0] = share * 0.6 * G
+        stepper.step(data)
+        if data.qvel[0] > 1e-5:
+            return float(share)
+    return math.inf
+
+
+def shaken(way: dict[str, Any]) -> float:
+    """How far a box on a slope of 10° goes in 8 s, shaken along it by 2 N at 40 rad/s, m."""
+    data, stepper = start(one(BOX, slope=10), **way)
+    stepper.step(data, 500)
+    place = data.qpos[0]
+    for _ in range(4000):
+        data.qfrc_applied[0] = 2 * math.sin(40 * data.time)
+        stepper.step(data)
+    return float(abs(data.qpos[0] - place))
+
+
+def wall() -> Any:
+    """A wall of boxes in three courses with some fifty contacts, leaning on friction."""
+    boxes = "".join(
+        f'<body pos="{0.22 * i + 0.11 * (row % 2)} 0 {0.05 + 0.1 * row}"><freejoint/>'
+        '<geom type="box" size=".1 .05 .05" mass="1"/></body>'
+        for row in range(3)
+        for i in range(3 - row % 2)
+    )
+    return mujoco.MjModel.from_xml_string(
+        '<mujoco><option cone="elliptic" gravity="1 0 -9.6"/><worldbody><geom type="plane" size="9 9 1"/>'
+        f"{boxes}</worldbody></mujoco>"
+    )
+
+
+def costs(ways: Sequence[dict[str, Any]], rounds: int = 9) -> tuple[list[float], int]:
+    """Processor time of a step at `wall`, in units of plain MuJoCo's: medians of runs in turn; number of contacts."""
+    runs = [start(wall(), **way) for way in ways]
+    for data, stepper in runs:
+        stepper.step(data, 500)
+    times = np.empty((rounds, len(runs)))
+    for row in times:
+        for k, (data, stepper) in enumerate(runs):
+            begin = time.process_time()
+            stepper.step(data, 300)
+            row[k] = time.process_time() - begin
+    return list(np.median(times / times[:, :1], axis=0)), runs[0][0].ncon
+
+
+def uncompiled(way: dict[str, Any]) -> float:
+    """Cost of a memory without numba."""
+    with mock.patch.object(memory, "_kernels", return_value=(memory.recall, memory.retain)):
+        return costs([{}, way])[0][1]
+
+
+def holding() -> Rows:
+    """Creep in the scenes, breakaway, drift of a shaken box, and cost, one row each, for each way."""
+    spent, count = costs(list(WAYS.values()))
+    remembering = [way for way in WAYS.values() if "memory" in way]
+    without = ["–"] * (len(WAYS) - len(remembering)) + [f"{uncompiled(way):.1f}" for way in remembering]
+    return [
+        ["", *WAYS],
+        *(
+            [f"{name} (`{scene}.xml`): creep, m/s", *(f"{creep(scene, way):.0e}" for way in WAYS.values())]
+            for scene, name in SCENES.items()
+        ),
+        ["box that is pulled: breaks away at, μN", *(f"{breakaway(way):.4f}" for way in WAYS.values())],
+        ["box shaken on a slope of 10°: drift in 8 s, m", *(f"{shaken(way):.0e}" for way in WAYS.values())],
+        [f"wall of boxes with {count} contacts: cost of a step", *(f"{cost:.2f}" for cost in spent)],
+        ["the same without numba", *without],
+    ]
+
+
+def sliding() -> Rows:
+    """Motions that slide, relative to their closed forms, with and without memory."""
+
+    def acceleration(way: dict[str, Any]) -> float:
+        data, stepper = start(one(BOX, 0.3, 20), **way)
+        data.qvel[0] = speed = 1.0
+        stepper.step(data, 500)
+        exact = G * (math.sin(math.radians(20)) - 0.3 * math.cos(math.radians(20)))
+        return float((data.qvel[0] - speed) / exact - 1)  # in a second
+
+    def stopping(way: dict[str, Any]) -> float:
+        data, stepper = start(one(BOX, 0.3), **way)
+        stepper.step(data, 500)
+        data.qvel[0], place = 1.0, data.qpos[0]
+        stepper.step(data, 500)
+        return float((data.qpos[0] - place) * 2 * 0.3 * G - 1)
+
+    def rolling(way: dict[str, Any]) -> float:
+        data, stepper = start(one(BALL, 0.3), **way)
+        stepper.step(data, 500)
+        data.qvel[0] = 1.0
+        stepper.step(data, 500)
+        return float(data.qvel[0] * 7 / 5 - 1)
+
+    ways = {name: WAYS[name] for name in ("plain", "memory", "memory, pyramidal")}
+    ways["plain, pyramidal"] = {"cone": mujoco.mjtCone.mjCONE_PYRAMIDAL}
+    return [
+        ["motion, error relative to its closed form", *ways],
+        *(
+            [name, *(f"{measure(way):+.2e}" for way in ways.values())]
+            for name, measure in (
+                ("box that slides down 20° from 1 m/s: g (sin − μ cos)", acceleration),
+                ("box that slides to a stop: v²/(2 μ g)", stopping),
+                ("ball that slides, then rolls: 5/7 v", rolling),
+            )
+        ),
+    ]
+
+
+def pile(seed: int, mixed: bool) -> Any:
+    """Random bodies that fall on a floor one after the other: boxes, or five kinds."""
+    rng, bodies = np.random.default_rng(seed), ""
+    for k in range(BODIES):
+        size, turn = rng.uniform(0.03, 0.06, 3), rng.normal(size=4)
+        x, y = rng.uniform(-0.1, 0.1, 2)
+        kind = rng.choice(["box", "capsule", "ellipsoid", "cylinder", "sphere"]) if mixed else "box"
+        q, s = (" ".join(map(str, values)) for values in (turn / np.linalg.norm(turn), size))
+        bodies += f'<body pos="{x} {y} {0.1 + 0.12 * k}" quat="{q}"><freejoint/><geom type="{kind}" size="{s}"/></body>'
+    return mujoco.MjModel.from_xml_string(
+        '<mujoco><option cone="elliptic"/><default><geom friction=".6"/></default><worldbody>'
+        f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
+    )
+
+
+def settle(model: Any, stepper: Stepper) -> tuple[float, float]:
+    """How far bodies go in the last second, m, and the most that energy rises above what it was since the fall, J."""
+    data, lowest, rise = mujoco.MjData(model), math.inf, 0.0
+    for k in range(round((SETTLING + LAST) / 0.01)):
+        if k == round(SETTLING / 0.01):
+            place = data.xpos.copy()
+        stepper.step(data, 5)
+        if data.time > SETTLING / 2:
+            mujoco.mj_energyVel(model, data)
+            energy = data.energy[1] + G * float(model.body_mass @ data.xipos[:, 2])
+            lowest = min(lowest, energy)
+            rise = max(rise, energy - lowest)
+    return float(np.abs(data.xpos - place).max()), rise
+
+
+def piles() -> Rows:
+    """How many piles come to rest, and how energy rises."""
+    rows = [
+        [
+            "piles",
+            "way",
+            "at rest to 1e-9 m",
+            "largest drift in a second: median, m",
+            "energy rises in",
+            "by at most, J",
+        ]
+    ]
+    for mixed in (False, True):
+        for name, make in (("plain", Plain), ("memory", FrictionMemory)):
+            done = np.array([settle(model := pile(seed, mixed), make(model)) for seed in range(PILES)])
+            drift, rise = done.T
+            kind = f"{PILES} of {BODIES} {'mixed bodies' if mixed else 'boxes'}"
+            rose = rise > RISE
+            cells = [f"{(drift < STILL).sum()}", f"{np.median(drift):.0e}", f"{rose.sum()}", f"{rise.max():.0e}"]
+            rows.append([kind, name, *cells])
+    return rows
+
+
+TABLES: dict[str, Callable[[], Rows]] = {"holding": holding, "sliding": sliding, "piles": piles}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure and write all tables, or those named."""
+    parser = argparse.ArgumentParser(description="Write the tables on the memory for friction.")
+    parser.add_argument("page", type=Path, metavar="FILE", help="docs/friction.md")
+    parser.add_argument("--only", action="append", choices=list(TABLES), metavar="NAME", help="only this table")
+    args = parser.parse_args(argv)
+    for name in args.only or TABLES:
+        write(args.page, name, TABLES[name]())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
