@@ -24,8 +24,9 @@ NORMALS = slice(1, 28, 14)
 """Where the sensors hold the normal forces."""
 TICKS = 128
 """Finest steps in one of the settings."""
-_DRAG, _GAIN, _FALL, _MEMORY, _LAG, _HOVER, _WEIGHT, _LIMIT = (
-    Ball._fields.index(name) for name in ("drag", "gain", "fall", "memory_A", "lag_A", "hover_A", "weight", "hover")
+_DRAG, _TORQUE, _GAIN, _FALL, _MEMORY, _LAG, _HOVER, _WEIGHT, _LIMIT = (
+    Ball._fields.index(name)
+    for name in ("drag", "torque", "gain", "fall", "memory_A", "lag_A", "hover_A", "weight", "hover")
 )
 """Rows of `Balls.table`."""
 
@@ -223,7 +224,8 @@ class Balls:
         self.resize(runs, np.full(len(runs), TICKS))
         self.qpos[1:3, runs], self.qvel[:, runs], self.last[:, runs] = 0.0, 0.0, 0.0
         for table in (self.table, self._normal):
-            table[_DRAG, runs], table[_FALL, runs] = 0.0, np.inf
+            table[_DRAG, runs] = table[_TORQUE, runs] = 0.0
+            table[_FALL, runs] = np.inf
         self._ball = Ball(*self._quantities(self.table))
 
     def damp(self, runs: Runs, load: Array | None = None) -> None:

@@ -48,6 +48,8 @@ class Ball(NamedTuple):
     mass: Quantity
     inertia: Quantity
     """j m r^2, kg m2."""
+    torque: Quantity
+    """Of the fluid, j m r^2 times its rate, kg m2 s-1; 0 where it is left out."""
     ahead: Quantity
     """Where in a step forces are taken, in steps after its beginning: 1/2, or 0 where the engine's order is kept."""
     gain: Quantity
@@ -79,10 +81,11 @@ class Ball(NamedTuple):
             SCHILLER_NAUMANN: (Re, 1.0, 0.15, 0.44 / 24),
             QUADRATIC: (Re, 0.0, 0.0, p.C_D / 24),
         }
+        inertia = p.j * p.m * p.r**2
         memory, lag, hover = settings.memory_gain(p.m), settings.friction_lag, settings.b_f / settings.softness
         return cls(
-            p.R, p.r, p.m * p.c, *laws[p.drag], p.m, p.j * p.m * p.r**2, settings.midpoint, settings.servo_gain,
-            settings.slowest_fall(p.g), settings.timestep, memory, memory, lag, lag,
+            p.R, p.r, p.m * p.c, *laws[p.drag], p.m, inertia, inertia * p.fluid_torque, settings.midpoint,
+            settings.servo_gain, settings.slowest_fall(p.g), settings.timestep, memory, memory, lag, lag,
             p.mu * hover, p.eta * hover, p.g or NO_LIMIT,
             (settings.shifts_surfaces and settings.hover) or NO_LIMIT,
         )  # fmt: skip
@@ -153,6 +156,10 @@ def corrections(
     moment_x = -ball.inertia * (omega_c * o_z - v.omega_c * v.o_z)
     moment_z = ball.inertia * (omega_c * o_x - v.omega_c * v.o_x)
 
+    # The fluid's torque at mid step, against the spin relative to the fluid; that about y turns the joints' axis, too.
+    torque_x, torque_z = -ball.torque * o_x, -ball.torque * o_z
+    torque_y = -ball.torque * (v.o_y + ahead * change.o_y + omega_c - omega_0)
+
     # Direction of sliding friction at mid step. The engine opposes friction to the slip that there would be 1/b_f after
     # the beginning of the step. A surface velocity equal to the change of slip between the middle and then removes the
     # difference; only where a contact clearly slides, since a slip that ends must be able to.
@@ -179,7 +186,10 @@ def corrections(
     wall_y = lag_B * B_y + less_B * v_By + ball.memory_B * (upward - A_normal)
     wall_z = lag_B * B_z + less_B * v_Bz + ball.memory_B / ball.r * about_y
 
-    forces = rho * (drag_z + inertial_z), drag_h + inertial_h, drag_y, moment_x, 0.0, moment_z
+    forces = (
+        rho * (drag_z + inertial_z) + torque_y, drag_h + inertial_h, drag_y,
+        moment_x + torque_x, torque_y, moment_z + torque_z,
+    )  # fmt: skip
     return forces, (floor_z, floor_x, wall_y, wall_z)
 
 

@@ -88,6 +88,9 @@ class _Ball:
         w_x, w_y, gaps = v_x + omega_0 * y, v_y - omega_0 * x, (z - p.r, p.R - math.hypot(x, y))
         mc = resistance(w_x, w_y, v_z, self._ball)
         data.qfrc_applied[:3] = -mc * w_x, -mc * w_y, -mc * v_z  # (9)
+        if self._ball.torque:  # the spin is along the ball's own axes, that of the fluid along the vessel's
+            fluid = rotated(data.qpos[3:7] * [1, -1, -1, -1], np.array([0.0, 0.0, omega_0]))
+            data.qfrc_applied[3:] = -self._ball.torque * (data.qvel[3:] - fluid)
         self._unwrap(math.atan2(y, x))
         if self._turns:
             data.mocap_quat[0] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))

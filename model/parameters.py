@@ -133,6 +133,14 @@ class Parameters:
         Range(0.0, 1.0, below=True),
         default=0.0,
     )
+    fluid_torque: float = _quantity(
+        "k",
+        "s-1",
+        "rate at which the fluid's torque alone would stop the spin (0: left out, as in the paper)",
+        NOT_NEGATIVE,
+        default=0.0,
+    )
+    """Time stepping and MuJoCo take it; closed forms and the event-driven simulation leave it out, and say so."""
     drag: str = laws.STOKES
     """The law of drag, one of `model.drag.LAWS`."""
 

@@ -29,6 +29,7 @@ def shortest_time(p: Parameters, flow: Flow, t_end: float, c: Callable[[float], 
     rates = {
         "sqrt(R/g)": math.sqrt(p.g / p.R),
         "1/omega_0": fastest,
+        "1/fluid_torque": p.fluid_torque,
         "1/(2 pi f)": 2 * math.pi * float(flow.waves[:, 1].max(initial=0.0)),
     }
     rates |= {"1/c": p.c} if p.drag == STOKES else {"1/(2 c(R omega_0))": 2 * c(p.R * fastest)}

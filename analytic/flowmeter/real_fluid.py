@@ -47,7 +47,12 @@ class Rolling:
 
 
 def torque_rate(spin: Real, p: Parameters, layer: bool = True) -> Real:
-    """k in s-1 for a ball that turns at `spin` rad s-1 relative to the fluid; by Stokes unless `layer`."""
+    """k in s-1 for a ball that turns at `spin` rad s-1 relative to the fluid; by Stokes unless `layer`.
+
+    p.fluid_torque takes the place of both if it is given.
+    """
+    if p.fluid_torque:
+        return p.fluid_torque + 0.0 * spin
     stokes, Re = 4 * p.c / (3 * p.j), spin * p.r**2 / p.nu_f if p.nu_f else 0.0 * spin
     # The two torques are equal at Re = 8, to 0.2 %.
     return stokes * np.maximum(1.0, layer * (6.45 * np.sqrt(Re) + 32.1) / (16 * math.pi))
@@ -88,7 +93,7 @@ def model_error(p: Parameters) -> float:
 
     The larger of what Stokes and the boundary layer say, or the largest shift by the fluid's inertia if that is more.
     """
-    if not p.nu_f:
+    if not (p.nu_f or p.fluid_torque):
         return 0.0
     shifts = [rolling(p, layer).shift for layer in (False, True)]
     return float(np.nanmax(np.abs([*shifts, *bifurcation.inertia_shifts(p).values(), 0.0])))

@@ -111,6 +111,11 @@ def simulate(
         from analytic.simulation.hybrid import run  # here, because the integrators of scipy take half a second to load
     else:
         from analytic.simulation.time_stepping import run
+    if settings.method == "event" and p.fluid_torque:
+        raise InputError(
+            f"fluid_torque = {p.fluid_torque:g} s-1: the event-driven simulation leaves the torque out; "
+            "method = 'time-stepping' takes it"
+        )
     flow = Flow.steady(p.omega_0) if flow is None else flow
     x = start_state(x0, p, settings)
     times = sample_times(t_end, sample_interval)

@@ -50,6 +50,8 @@ class Constants(NamedTuple):
     g: float
     e: float
     """Coefficient of restitution."""
+    k: float
+    """Rate of the fluid's torque."""
 
 
 class FlowArrays(NamedTuple):
@@ -140,10 +142,11 @@ def solve(
             f_h = v_h - dt * (spin * u.v_k + c * w_h)
             f_y = v_y - dt * (p.g + c * u.v_y)
             f_k = v_k + dt * (spin * u.v_h - c * w_k)
-            f_x = o_x - dt * spin * u.o_z  # f_z takes the new o_x, which saves two iterations of seven
-            f_z = o_z + dt * spin * (o_x + f_x - A.t / (j * r)) / 2
+            f_x = o_x - dt * (spin * u.o_z + p.k * u.o_x)  # f_z takes the new o_x, which saves two iterations of seven
+            turn_y = o_y - dt * p.k * (u.o_y - omega_0)
+            f_z = o_z + dt * (spin * (o_x + f_x - A.t / (j * r)) / 2 - p.k * u.o_z)
             a = Impulse(to_A - f_y, -rest * (f_h + r * f_z + slip_A[0]), -rest * (f_k - r * f_x + slip_A[1]))
-            b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * o_y + slip_B[1]))
+            b = Impulse(to_B - f_h, -rest * (f_y - r * f_z + slip_B[0]), -rest * (f_k + r * turn_y + slip_B[1]))
             residual, aim = 0.0, max(enough, ROUGH * change)
             if in_A and in_B:
                 A, B, residual = both(a, b, B, on_A, on_B, j, aim)
@@ -152,7 +155,7 @@ def solve(
             elif in_B:
                 B = project(b, on_B)
             n_h, n_y, n_k = f_h + A.s + B.n, f_y + A.n + B.s, f_k + A.t + B.t
-            after = Velocities(n_h, n_y, n_k, f_x - A.t / (j * r), o_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r))
+            after = Velocities(n_h, n_y, n_k, f_x - A.t / (j * r), turn_y + B.t / (j * r), f_z + (A.s - B.s) / (j * r))
             change = abs(n_h - new.v_h) + abs(n_y - new.v_y) + abs(n_k - new.v_k)  # a sum, since max overlooks nan
             change += r * (abs(after.o_x - new.o_x) + abs(after.o_y - new.o_y) + abs(after.o_z - new.o_z))
             new = after
@@ -168,7 +171,8 @@ def solve(
     power = u.v_h * (u.v_h - omega_0 * x_k) + u.v_y * u.v_y + u.v_k * (u.v_k + omega_0 * x_i)
     at_A = A.s * (u.v_h + r * u.o_z) + A.n * u.v_y + A.t * (u.v_k - r * u.o_x)
     at_B = B.n * u.v_h + B.s * (u.v_y - r * u.o_z) + B.t * (u.v_k + r * u.o_y)
-    work = m * (at_A + at_B - dt * c * power)
+    turned = j * r * r * p.k * (u.o_x * u.o_x + u.o_y * (u.o_y - omega_0) + u.o_z * u.o_z)
+    work = m * (at_A + at_B - dt * (c * power + turned))
     # A loaded contact has met its target, and round-off must not open it again.
     new = Velocities(to_B if B.n > 0 else new.v_h, to_A if A.n > 0 else new.v_y, new.v_k, new.o_x, new.o_y, new.o_z)
     P = Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)

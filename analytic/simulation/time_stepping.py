@@ -103,7 +103,7 @@ def prepared(
     timestep = settings.timestep or fitting_step(500, p, flow, t_end)
     time_scales.check_timestep(timestep, p, flow, t_end, partial(drag.coefficient, p=p))
     at = stepping.At(theta, x.y, x.h, rigid_body.velocities(x, p))
-    given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution
+    given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution, p.fluid_torque
     return (
         stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),
         Stretches.of(times, flow, timestep),

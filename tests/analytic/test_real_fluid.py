@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from analytic import simulate
 from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
-from model import Parameters
+from model import Case, InputError, Parameters, State
 
 
 @pytest.mark.parametrize("name", ["steel-in-water", "plastic-in-oil", "air", "reference"])
@@ -41,6 +42,20 @@ def test_the_torque_is_of_the_order_of_the_drag_for_every_ball() -> None:
     rates = [real_fluid.torque_rate(Re * p.nu_f / p.r**2, p) / stokes for Re in (7.9, 8.0, 8.1, 2000.0)]
     assert rates[:3] == pytest.approx([1.0] * 3, abs=5e-3)
     assert rates[3] == pytest.approx(2000 / (16 * np.pi) * (6.45 / np.sqrt(2000) + 32.1 / 2000))
+
+
+def test_time_stepping_takes_the_torque_and_the_event_driven_simulation_refuses_it() -> None:
+    """Where friction suffices the ball stays in the stationary motion; the work of the torque is in the balance."""
+    p = Parameters.named("reference").replace(mu=1.0, eta=1.0, fluid_torque=10 / 3)
+    start = State(omega_c=real_fluid.rolling(p).omega_c)
+    run = simulate(p, start, 2.0, method="time-stepping", timestep=2e-3)
+    assert np.abs(run.omega_c - start.omega_c).max() <= 1e-12
+    assert run.cases[-1] is Case.RR
+    thrown = simulate(p, State(y=9.0, h=0.02, slip_x=30.0, slip_y=-40.0), 0.2, method="time-stepping", timestep=1e-3)
+    balance = thrown.header.settings
+    assert abs(balance["energy_residual"]) < 1e-9 * balance["energy_scale"]
+    with pytest.raises(InputError, match=r"fluid_torque = 3\.33333 s-1: the event-driven simulation leaves"):
+        simulate(p, start, 1.0)
 
 
 def test_the_mirror_image_and_where_nothing_moves() -> None:

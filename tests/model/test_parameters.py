@@ -34,6 +34,7 @@ valid = st.builds(
     nu_f=st.floats(1e-9, 1e3),
     C_D=st.floats(1e-3, 1e3),
     density_ratio=zero_or(0.999),
+    fluid_torque=zero_or(1e3),
     drag=st.sampled_from(LAWS),
 )
 
@@ -114,6 +115,7 @@ BAD = {
     "nu_f": [-1e-6],
     "C_D": [0.0, -0.44],
     "density_ratio": [-0.1, 1.0],
+    "fluid_torque": [-1.0],
 }
 
 

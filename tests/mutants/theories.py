@@ -259,6 +259,7 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "slipping.slip_bounds.rr_to_sr_stationary": {"(74) with 3 % more inertia": given(other(j=1.03))},
     "slipping.slip_bounds.filippov_share": {"share of the sheets in (69) 5 % large": scaled(1.05)},
     "slipping.slip_bounds.rr_to_ss": {"(82), (83) with μ and η exchanged": given(swapped)},
+    "flowmeter.real_fluid.torque_rate": {"the fluid's torque 2 % strong": scaled(1.02)},
     "mechanics.drag.fall": {"flight with 2 % more drag on the fall": given(other(c=1.02))},
     # Laws of drag
     "mechanics.drag.sinking_speed": {"(10) 1 % large": scaled(1.01)},

@@ -28,7 +28,7 @@ from mjsim import limits, recorder
 from mjsim.classify import Classifier, Contacts
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
-from model import Flow, Header, Parameters, State, Trajectory
+from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import Motion, frame, from_world, to_world
 from model.trajectory import current_versions, samples
@@ -69,6 +69,8 @@ def simulate(
     """
     every, count = limits.sampling(t_end, settings.timestep, sample_interval)
     limits.check_timestep(settings.timestep, p, flow, t_end)
+    if p.fluid_torque:
+        raise InputError(f"fluid_torque = {p.fluid_torque:g} s-1: {engine} doesn't take it; mujoco, time-stepping do")
     x, joints = State.one(x0), settings.coordinates == "joints"
     limits.check_place(x, p, p.r / 10)
     ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings

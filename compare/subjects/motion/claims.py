@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import analytic
+from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
@@ -59,6 +60,13 @@ def _on_smooth_wall(m: Measurement) -> float:
     """RS while slip at the floor dies out, else SS."""
     holds = slip_stability.stability(Case.RS, m.parameters) is SlipStability.STABLE
     return float(Case.RS if holds else Case.SS)
+
+
+def _braked_rolls(m: Measurement) -> float:
+    """RR, if friction suffices for it; LookupError else."""
+    if not real_fluid.rolling(m.parameters).friction < 1:
+        raise LookupError("friction doesn't balance the fluid's torque")
+    return float(Case.RR)
 
 
 def _slip_lasts(m: Measurement) -> float:
@@ -157,6 +165,23 @@ LAWS = (
                 "runs", "case", _slip_lasts, when=given(start="rough floor"), by="analytic.slip_stability.stability"
             ),
         ),
+    ),
+    Claim(
+        "fluid-torque",
+        "extension",
+        "A fluid that brakes the spin of a ball makes it roll slower than the fluid goes round, at first order in the "
+        "torque.",
+        (
+            Bearing("torque", "case", _braked_rolls, by="analytic.flowmeter.real_fluid.rolling"),
+            Bearing(
+                "torque",
+                "omega_c",
+                lambda m: real_fluid.rolling(m.parameters).omega_c,
+                size=lambda m: m.parameters.omega_0,
+                by="analytic.flowmeter.real_fluid.rolling",
+            ),
+        ),
+        reason="The paper leaves the torque out; so does all else here, unless parameters give it.",
     ),
     Claim(
         "impacts",

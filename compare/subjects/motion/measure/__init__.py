@@ -10,5 +10,6 @@ PROTOCOLS = (
     Protocol("field", motions.field, waits=False),
     Protocol("motions", motions.motions, quick=ONE, waits=False),
     Protocol("runs", runs.measure, quick=LAWS, waits=False),
+    Protocol("torque", runs.torque, quick=ONE),
     Protocol("impacts", motions.impacts, quick=TWO, waits=False),
 )

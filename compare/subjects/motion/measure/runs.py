@@ -9,6 +9,8 @@ Each start is carried out with two time steps; what the step changes is the unce
   faster and faster flows. Does the floor hold it?
 * *Rough floor*, mu > 1: the ball rolls at both points but for a slight slip, in faster and faster flows. It may jam
   between floor and wall, or the slip may last.
+
+`torque` is apart: a ball whose spin a real fluid brakes settles.
 """
 
 from __future__ import annotations
@@ -20,8 +22,10 @@ import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.kit.settling import settle
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
+from compare.kit.trials import Start
 from model import Parameters, State
 from model.kinematics import VARIABLES
 
@@ -36,8 +40,24 @@ SMOOTH, SPUN = (0.5, 0.7, 0.9, 1.1, 1.3), 1.0
 """Flows omega_0 sqrt(R/g) along a smooth wall, and how long, in units of sqrt(R/g)."""
 ROUGH, JAMMED, SLIGHT = 1.7, (1.5, 1.7, 1.8, 2.0, 2.2), 5e-3
 """Friction of a rough floor, flows along it in the same units, and a slight slip divided by the ball's spin."""
+BRAKED, SLOW = 0.5, 0.6
+"""Rate of the fluid's torque divided by c, and the flow omega_0 sqrt(R/g), on contacts with a friction of 1."""
 REFINED = 8, 16
 """Time steps in a coarse one."""
+
+
+def torque(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
+    """Case and omega_c to which a ball settles from rest whose spin the fluid brakes, as `Parameters.fluid_torque`."""
+    starts = []
+    for name, p in sets.items():
+        q = p.replace(mu=1.0, eta=1.0, fluid_torque=BRAKED * p.c, omega_0=SLOW / time_unit(p))
+        starts.append(Start(name, q, "rest", np.zeros(8)))
+    for start, settled in zip(starts, settle(lab, starts), strict=True):
+        if settled.failure:
+            yield Missing("torque", start.set, settled.failure)
+            continue
+        for quantity, value in (("case", settled.case), ("omega_c", settled.values["omega_c"])):
+            yield measurement(lab, "torque", start.set, start.p, quantity, value, [settled.task])
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
