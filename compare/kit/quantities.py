@@ -86,7 +86,6 @@ _ALL = (
     *(Quantity(f"omega_0{k}", f"ω₀{'₁₂₃₄'[k - 1]}", "rad s-1", 1e-3 if k == 4 else 1e-4) for k in range(1, 5)),
     *(Quantity(f"edge_{n}", f"{s} on the edge", "rad s-1", 1e-3) for n, s in (_TURNS | {"wall_spin": "ω_x⁰"}).items()),
     Quantity("lifts", "leaves the floor", "1", 0.0),
-    Quantity("slip_onset", "ω_c at which the floor slips", "rad s-1", 2e-2),
     Quantity("lift_onset", "ω_c at A_y = 0", "rad s-1", 2e-2),
     Quantity("critical_drag", "c at η = η_cr", "s-1", 4e-3),
     Quantity("folds", "number of folds", "1", 0.0),

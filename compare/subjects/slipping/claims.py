@@ -246,16 +246,9 @@ CLAIMS = (
         "definition-3",
         "Definitions 1-3, (67)",
         "Rolling is stable with respect to slipping up to a flow at which it is neutral, and unstable beyond (on the "
-        "wall alone the other way round); at rest slip at the wall neither grows nor dies out. Beside a smooth wall a "
-        "ball that spins slips on the floor once turning its axis takes more friction than there is.",
+        "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
         (
             _growth(_gamma, _along(_RR_RS, "rest")),
-            Bearing(
-                "lift",
-                "slip_onset",
-                lambda m: slip_stability.neutral_flow(Case.RS, m.parameters),
-                by="slip_stability.neutral_flow",
-            ),
             _neutral("omega_01", Case.RR, "onset of slip"),
             _neutral("omega_02", Case.NR, "onset of sliding on the wall"),
             _neutral("omega_03", Case.RR, "loss of the floor"),

@@ -12,7 +12,7 @@ where it stops pressing; at slower ones its force is measured and extrapolated t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from compare.subjects.slipping.measure.growth import SMOOTH, Push, without_size
-from model import Case, Contact, Parameters, State, Trajectory
+from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
@@ -44,7 +44,6 @@ ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
     (Case.RS, Case.NS): (0.0, 0.8, 0.0),
     (Case.SR, Case.NR): (-0.6, 0.0, 0.0),
     (Case.SS, Case.NS): (0.3, 0.1, 0.8),
-    (Case.RS, Case.SS): (0.0, 0.8, 0.0),
 }
 """Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r omega_c."""
 ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
@@ -220,7 +219,7 @@ class Arrow:
 
 def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the fastest orbit."""
-    arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS if arrow[1].A is Contact.N]
+    arrows = [Arrow(lab, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
     first = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
     seen: list[list[Trajectory]] = []
     near: list[list[Task]] = []
@@ -244,61 +243,30 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
             yield arrow.row("lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
         elif (to := Case(int(lifted.case[-1]))) is not arrow.outer:
             yield Missing("lift", arrow.set, f"out of {arrow.inner.name} the ball leaves the floor for {to.name}")
-        elif (value := _onset(runs, _force)) is None:
+        elif (value := _onset(runs)) is None:
             why = f"where the ball leaves {arrow.inner.name} the floor's contact comes and goes"
             yield Missing("lift", arrow.set, why)
         else:
             yield arrow.row("lift_onset", 1 / time_unit(arrow.p), value, tasks)
-    yield from _held(lab, sets)
-
-
-def _held(lab: Lab, sets: Mapping[str, Parameters]) -> Iterator[Measurement | Missing]:
-    """omega_c at which a ball begins to slip on the floor that spins beside a smooth wall, and goes with the fluid.
-
-    A slow orbit shows about where friction comes to its limit, slower ones than that where it does.
-    """
-    arrows = [Arrow(lab, name, p.replace(eta=0.0), Case.RS, Case.SS) for name, p in sets.items() if p.mu]
-    near: list[list[Task]] = []
-    for arrow, (run,) in zip(
-        arrows, lab.groups([[arrow.task(0.2 / time_unit(arrow.p))] for arrow in arrows]), strict=True
-    ):
-        left = _spare(run)
-        used = (arrow.p.mu - left.value) / arrow.p.mu if left else 0.0
-        where = float(run.omega_c[0]) / math.sqrt(used) if used > 0 else 0.0
-        near.append([arrow.task(where * (1 - part), times) for part in NEAR for times in (1, 2) if where])
-    for arrow, tasks, runs in zip(arrows, near, lab.groups(near), strict=True):
-        if value := _onset(runs, _spare):
-            yield arrow.row("slip_onset", 1 / time_unit(arrow.p), value, tasks)
-        else:
-            yield Missing("lift", arrow.set, "a ball that spins beside a smooth wall does not come to slip smoothly")
-
-
-def _spare(run: Trajectory) -> Measured | None:
-    """mu less friction over normal force at the floor, at the beginning; None if the ball slips there."""
-    if np.any(run.case[SKIPPED:] != Case.RS):
-        return None
-    A_x, A_y, A_z = run.force_A[SKIPPED:].T
-    return _at_start(run.time[SKIPPED:], run.header.parameters.mu - np.hypot(A_x, A_z) / A_y)
 
 
 def _force(run: Trajectory) -> Measured | None:
     """Force of the floor at the beginning divided by the weight; None where it doesn't press for long enough."""
     p, force = run.header.parameters, run.force_A[SKIPPED:, 1]
     pressed = int(np.argmax(np.append(force <= 0, True)))
-    return _at_start(run.time[SKIPPED:][:pressed], force[:pressed] / (p.m * p.g)) if pressed >= FEWEST else None
-
-
-def _at_start(time: Array, values: Array) -> Measured:
-    """What forces (n,) point to at time 0; that of a sample acts from then on for a step: it belongs to its middle."""
+    if pressed < FEWEST:
+        return None
+    time = run.time[SKIPPED:][:pressed]
+    # The force of a sample acts from then on for a step: it belongs to the middle of it.
     begin = -(time[1] - time[0]) / 2
-    value, lower = polynomials(time, values, DEGREES, begin)[0].tolist()
+    value, lower = (polynomials(time, force[:pressed], DEGREES, begin)[0] / (p.m * p.g)).tolist()
     return Measured(value, abs(value - lower))
 
 
-def _onset(runs: Sequence[Trajectory], of: Callable[[Trajectory], Measured | None]) -> Measured | None:
-    """omega_c where a force vanishes, from runs with both steps at each orbit; None if it does not so smoothly."""
+def _onset(runs: Sequence[Trajectory]) -> Measured | None:
+    """omega_c where the force vanishes, from runs with both steps at each orbit; None if it does not so smoothly."""
     squares, forces = np.array([run.omega_c[0] ** 2 for run in runs[::2]]), []
-    for coarse, fine in zip(map(of, runs[::2]), map(of, runs[1::2]), strict=True):
+    for coarse, fine in zip(map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
         if coarse is None or fine is None:
             return None
         change = fine.value - coarse.value
