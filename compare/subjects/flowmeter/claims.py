@@ -50,13 +50,12 @@ def _only_rolling(m: Measurement) -> float:
 
 
 def _reads_flow(m: Measurement) -> float:
-    """omega_0 within the reading range; beyond it, that of slipping on the floor, which is less."""
+    """omega_0 within the reading range; beyond it, that of slipping on the floor, which is less: never for eta > j."""
     p = m.parameters
-    if p.omega_0 < analytic.reading_range(p) or detected(m) is Case.NR:
-        return p.omega_0
-    if (reads := float(reached(m).state.omega_c)) >= p.omega_0:
+    within, reads = p.omega_0 < analytic.reading_range(p), float(reached(m).state.omega_c)
+    if not within and (lifts_first(m) or (detected(m) is not Case.NR and reads >= p.omega_0)):
         raise LookupError("beyond the range a ball on the floor lags")
-    return reads
+    return p.omega_0 if within else reads
 
 
 def _unloads(m: Measurement) -> float:
