@@ -122,14 +122,6 @@ def _on_the_wall(m: Measurement) -> float:
     return float(Case.NR if stable else Case.NS)
 
 
-def _lifts(m: Measurement) -> float:
-    return float(slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0)
-
-
-def _lift_onset(m: Measurement) -> float:
-    return slip_stability.lift_onset(*_arrow(m), _x(m), m.parameters)
-
-
 CLAIMS = (
     *(
         # Slips at random or dragged; not in the direction that bears on the extrema alone.
@@ -279,10 +271,10 @@ CLAIMS = (
             else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in {outer.name}, would drive "
             "it up.",
             tuple(
-                Bearing("lift", quantity, predict, when=given(inner=inner.name), by=f"slip_stability.{by}")
-                for quantity, predict, by in (
-                    ("lifts", _lifts, "lift_acceleration"),
-                    ("lift_onset", _lift_onset, "lift_onset"),
+                Bearing("lift", quantity, predict, when=given(inner=inner.name), by="slip_stability: lift")
+                for quantity, predict in (
+                    ("lifts", lambda m: slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0),
+                    ("lift_onset", lambda m: slip_stability.lift_onset(*_arrow(m), _x(m), m.parameters)),
                 )
             ),
         )

@@ -104,10 +104,10 @@ class Pushed:
                     tasks.append(lab.task(p, x, lasts * step, step / refined, samples=samples))
         return tasks
 
-    def missing(self, why: str, rows: int) -> Missing:
-        """That its rates, decay and frequency of each, were not measured."""
+    def missing(self, why: str, modes: int = 0) -> Missing:
+        """That rates, decay and frequency of each, were not measured: of some modes, or of all of them."""
         at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
-        return Missing(PROTOCOL, self.start.set, f"{at}: {why}", rows)
+        return Missing(PROTOCOL, self.start.set, f"{at}: {why}", 2 * (modes or len(self.active)))
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -120,12 +120,12 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for state, own in zip(states, tasks, strict=True):
         runs, step = lab.attempt(own), coarse_step(state.start.p) / lab.effort("rates.refined")[1]
         if isinstance(runs, str):
-            yield state.missing(f"a run {runs}", 2 * len(state.active))
+            yield state.missing(f"a run {runs}")
             continue
         count = 2 * len(state.active)
         answers = [answer(state, size, runs[k * count : (k + 1) * count]) for k, size in enumerate(state.sizes)]
         if min(map(len, answers)) < LEAST.get(state.case, 8):
-            yield state.missing("pushed, the ball doesn't stay in this case", 2 * len(state.active))
+            yield state.missing("pushed, the ball doesn't stay in this case")
         else:
             values, sure = spectrum(state, answers, step)
             yield from _rows(lab, state, values, sure, step, own[-count:])
@@ -251,7 +251,7 @@ def _rows(
     order = np.lexsort((-exponents.real, exponents.imag))
     for mode, k in enumerate((k for k in order if exponents[k].imag >= 0), start=1):
         if abs(exponents[k]) * step > RESOLVED:
-            yield state.missing(f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step", 2)
+            yield state.missing(f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time step", 1)
             continue
         rate, frequency = -float(exponents[k].real), float(exponents[k].imag)
         for name, value, other in (("decay_rate", rate, frequency), ("frequency", frequency, rate)):

@@ -58,13 +58,6 @@ def _edge(name: str) -> Bearing:
     )
 
 
-def _folds(m: Measurement) -> float:
-    """1 where theory has a fold in reach, by (87); LookupError where it has no branch of slipping."""
-    if not m.parameters.eta < m.parameters.j:
-        raise LookupError("no branch of slipping at both points for eta > j")
-    return float(m.parameters.eta > _known(m).eta_cr)
-
-
 CLAIMS = (
     Claim(
         "table-5-P3",
@@ -121,7 +114,9 @@ CLAIMS = (
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
         "the wall at ω₀₂, without a jump.",
         (
-            Bearing("thresholds", "folds", _folds, by="analytic.thresholds: eta_cr"),
+            Bearing(
+                "thresholds", "folds", lambda m: m.parameters.eta > _known(m).eta_cr, by="analytic.thresholds: eta_cr"
+            ),
             Bearing(
                 "birth",
                 "critical_drag",
