@@ -108,7 +108,7 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
         file.attrs["versions"] = json.dumps(dict(current_versions()))
         scales["run"] = file.create_dataset("run", data=list(runs), dtype=_TEXT)
         scales["run"].make_scale("run")
-        headers = [json.dumps(run.header.texts() | {"mjcf": run.header.mjcf}) for run in runs.values()]
+        headers = [json.dumps(run.header.attributes() | {"mjcf": run.header.mjcf}) for run in runs.values()]
         file.create_dataset("header", data=headers, dtype=_TEXT).dims[0].attach_scale(scales["run"])
         for dimension, of in (("sample", Trajectory), ("event", Events)):
             tables: list[Any] = [run.events if of is Events else run for run in runs.values()]

@@ -98,19 +98,14 @@ class Header:
     """UTC time."""
 
     def attributes(self) -> dict[str, Any]:
-        """What a file says of itself: the conventions it follows, each parameter, and all but the MJCF as text."""
-        about = {
-            "Conventions": CONVENTIONS,
-            "title": f"Motion of a dual-point contact ball, simulated by {self.engine}",
-        }
-        return about | dataclasses.asdict(self.parameters) | self.texts()
-
-    def texts(self) -> dict[str, str]:
-        """All but the MJCF as text, mappings as JSON."""
+        """What a file says of itself: its conventions, each parameter, and all but the MJCF as text or JSON."""
         texts = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "mjcf"}
-        mappings = {name: dict(texts[name]) for name in ("settings", "versions")}
-        mappings |= {"parameters": dataclasses.asdict(self.parameters), "flow": self.flow.to_mapping()}
-        return texts | {name: json.dumps(mapping) for name, mapping in mappings.items()}
+        parameters = dataclasses.asdict(self.parameters)
+        mappings = {"parameters": parameters, "flow": self.flow.to_mapping()}
+        mappings |= {name: dict(texts[name]) for name in ("settings", "versions")}
+        title = f"Motion of a dual-point contact ball, simulated by {self.engine}"
+        about = {"Conventions": CONVENTIONS, "title": title} | parameters
+        return about | texts | {name: json.dumps(mapping) for name, mapping in mappings.items()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -181,7 +181,10 @@ def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path: Path, design: l
     assert len({tuple(header.settings["solref"]) for header in headers}) == 2
 
 
-def test_a_run_that_diverges_is_kept_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_that_diverges_is_kept_and_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)  # where MuJoCo would leave its MUJOCO_LOG.TXT
     run = tmp_path / "run.h5"
     assert cli.main(["simulate", "--start", "omega_c=1e9", "--time", "0.1", "-o", str(run)]) == 1
     err = capsys.readouterr().err
