@@ -177,10 +177,13 @@ class Polar(Stepper):
         return near
 
     def _rates(self, runs: Runs | slice) -> Array:
-        """Accelerations in the last step, (6, k), m s-2."""
-        balls = self._balls
+        """What forces and moments accelerated in the last step, (6, k), m s-2: not what the axes do as they turn."""
+        balls, (omega_c, v_h, _, o_x, _, o_z) = self._balls, self._balls.qvel[:, runs]
         rates: Array = (balls.qvel[:, runs] - balls.last[:, runs]) / balls.steps[runs]
-        rates[0] *= self._R[runs]
+        rho = self._R[runs] - balls.qpos[1, runs]
+        rates[0] = rho * rates[0] - 2 * omega_c * v_h
+        rates[1] += rho * omega_c**2
+        rates[3:] += omega_c * np.stack([o_z, 0 * o_z, -o_x])
         rates[3:] *= self._r[runs]
         return rates
 
