@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from compare.bench.trials import HITTING, LANDING
 
 import mjsim
+from docs.studies.states import HITTING, LANDING
 from mjsim import ContactSettings
 from mjsim.classify import PERSISTENCE, Classifier, Contacts
 from model import Case, Parameters
