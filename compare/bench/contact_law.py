@@ -95,18 +95,14 @@ class Contacts:
         stiffness = np.where(positive, 1 / (high * time * ratio) ** 2, -time / high**2)
         return stiffness, np.where(positive, 2 / (high * time), -ratio / high)
 
+    @np.errstate(all="ignore")  # a contact without stiffness or friction divides by zero
     def law(self) -> Law:
         """What the contacts do under their loads."""
-        with np.errstate(all="ignore"):  # a contact without stiffness or friction divides by zero
-            return self._law()
-
-    def _law(self) -> Law:
-        h, load = self.timestep, np.maximum(self.force[:, 0], 0)
+        h, load = self.timestep, self.force[:, 0]
         spring, b = self.reference(self.solref)
         own = self.solreffriction.any(1) & (not self.pyramidal)
         b_f = np.where(own, self.reference(self.solreffriction)[1], b)
         mu, frictional = self.friction, self._frictional
-        edges = np.maximum(self.dim - 1, 1)
         estimate = self.inverse_mass
         if self.pyramidal:  # an edge is the normal and mu times a direction of friction
             estimate = estimate * np.where(self.dim > 1, 2 * mu[:, 0] ** 2 * (1 + mu[:, 0] ** 2) / self.impratio, 1)
@@ -146,13 +142,12 @@ class Contacts:
             x = (k * depth / softness)[:, None]
             creep = softness[:, None] * np.where(wanted <= 2 * x, wanted / 2, wanted - x) / (mu * damping[:, None])
             hover = first * load / (first_damping * np.hypot(mu[:, 0], mu[:, 1]))
-            inertia = np.where(self.dim > 1, 2 * edges, 1) / softness
+            inertia = np.where(self.dim > 1, 2 * self.dim - 2, 1) / softness
             sideways = 2 * mu**2 / softness[:, None]
         else:
             soft = softness[:, None] / self.impratio * (mu[:, :1] / mu) ** 2
             creep = soft * np.abs(self.force[:, 1:]) / damping[:, None]
-            largest = mu[:, :2].max(1)
-            hover = (1 + mu[:, 0] ** 2 / self.impratio) * first * load / (largest * first_damping)
+            hover = (1 + mu[:, 0] ** 2 / self.impratio) * first * load / (mu[:, :2].max(1) * first_damping)
             inertia, sideways = 1 / softness, 1 / soft
         if self.noslip:  # it corrects friction alone, after normal forces were found beside friction at no creep
             creep, sticks = np.zeros_like(creep), frictional & ~slides[:, None]
@@ -188,23 +183,19 @@ class Contacts:
         law, flat = self.law(), self.rows.reshape(-1, self.rows.shape[2])
         weight = law.weight * (np.arange(6) < self.dim[:, None])
 
-        def within(values: Array) -> Array:
-            product: Array = (flat.T * np.nan_to_num(values).ravel()) @ flat
-            return product
-
-        stiffness = np.zeros_like(weight)
-        stiffness[:, 0] = weight[:, 0] * law.stiffness
-        return np.eye(flat.shape[1]) + within(weight), within(weight * law.damping), within(stiffness)
+        values = weight, weight * law.damping, weight * law.stiffness[:, None] * (np.arange(6) == 0)
+        mass, damping, stiffness = ((flat.T * np.nan_to_num(each).ravel()) @ flat for each in values)
+        return np.eye(len(mass)) + mass, damping, stiffness
 
     def stable(self, timestep: float) -> bool:
         """Whether small motions die out at a time step: the first that doesn't changes sign in every step."""
         if self.discrete:
             return True
         mass, damping, stiffness = dataclasses.replace(self, timestep=timestep).matrices()
-        forms = [4 * mass - 2 * timestep * damping - timestep**2 * stiffness]
+        damping, stiffness = timestep * damping, timestep**2 * stiffness
+        forms = [4 * mass - 2 * damping - stiffness]
         if self.integrator == mujoco.mjtIntegrator.mjINT_RK4:  # its region ends at -2.785 and 2.83 i
-            forms = [7.757 * mass - 2.785 * timestep * damping + timestep**2 * stiffness]
-            forms += [8 * mass - timestep**2 * stiffness]
+            forms = [2.785**2 * mass - 2.785 * damping + stiffness, 8 * mass - stiffness]
         return all(np.linalg.eigvalsh(form)[0] > 0 for form in forms)
 
     def largest_step(self, below: float = LARGEST) -> float:

@@ -30,7 +30,7 @@ RESTLESS, JOLT, TURNING = 0.3, 1e-3, 0.05
 """A body moves on if its speed changes by this share, or this (m/s), between windows, or if it turns by this, rad."""
 WINDOW, WINDOW_STEPS = 0.1, 50
 """A window is so long, s, and of so many steps."""
-BAD = ("QPOS", "QVEL", "QACC")
+BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
 """What the engine warns of when a model diverges."""
 CHECKED, CHECKS = 3.0, 3
 """A changed model must settle within so many s to be advised; so many are tried, after which there is no advice."""
@@ -39,9 +39,7 @@ SHOWN = 12
 QUANTITIES = {
     "creep": ("creep", 1e6, "µm/s"),
     "depth": ("depth", 1e6, "µm"),
-    "hover": ("speed from which it hovers", 1e3, "mm/s"),
-    "decay": ("rate at which a disturbance dies out", 1.0, "1/s"),
-    "largest_step": ("largest stable step", 1e3, "ms"),
+    "largest_step": ("largest step", 1e3, "ms"),
 }
 """What may be wrong with a pair, in words, its unit and how many of it are one of SI."""
 
@@ -188,7 +186,7 @@ def forecast(
     for k, (first, second) in enumerate(geoms):
         part = belongs.ravel() == k
         own = those.only(part)
-        rate, step = own.decay(), own.largest_step()
+        step = own.largest_step()
         pairs.append(
             Pair(
                 name=f"{names[first]} / {names[second]}",
@@ -197,11 +195,11 @@ def forecast(
                 cone=float(own.cone.max()),
                 slides=bool(law.slides[part].any()),
                 hover=float(law.hover[part].min()),
-                decay=rate,
+                decay=own.decay(),
                 largest_step=step,
                 replaced=tuple(_replaced(model, own, names)),
                 harm={name: float(values[part].max()) for name, values in harm.items()}
-                | {"decay": 1 / rate if rate else math.inf, "largest_step": those.timestep / step},
+                | {"largest_step": those.timestep / step},
                 **{name: float(getattr(law, name)[part].max()) for name in ("depth", "creep", "turning")},
                 **{name: float(values[part].max()) for name, values in found.items()},
             )
@@ -233,14 +231,8 @@ def _harm(c: Contacts, radius: Array, good: Array, creep: float) -> dict[str, Ar
     """By what may be wrong with each contact: how many times what passes for good."""
     law = c.law()
     speed = np.nan_to_num(np.fmax(law.creep, law.turning * np.where(c.dim > 3, radius, 0)))
-    rate = c.impedance(law.depth + c.margin) * law.damping[:, 0] / 2
-    return {
-        "creep": speed / creep,
-        "depth": law.depth / good,
-        "hover": np.where(law.slides, np.hypot(*c.slip[:, :2].T) / law.hover, 0),
-        "decay": np.divide(1, rate, out=np.full(len(rate), math.inf), where=rate > 0),
-        "largest_step": np.full(len(rate), 0.0 if c.stable(c.timestep) else 2.0),
-    }
+    step = np.full(len(speed), 0.0 if c.stable(c.timestep) else 2.0)
+    return {"creep": speed / creep, "depth": law.depth / good, "largest_step": step}
 
 
 def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -257,8 +249,6 @@ def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:
             yield "solref", (_rounded(share * time), ratio)
         elif time < 0:
             yield "solref", (_rounded(time / share**2), _rounded(ratio / share))
-    if time < 0:
-        yield "solref", (time, _rounded(-2 * math.sqrt(-time)))  # damped critically
     for impedance in (0.95, 0.98, 0.99, 0.995, 0.998, 0.999):
         if c.solimp[0, 0] < impedance:
             yield "solimp", (impedance, max(impedance, c.solimp[0, 1]))
@@ -274,13 +264,11 @@ def apply(model: Any, option: str, value: Sequence[float]) -> None:
     """Change one option of a model; those of contacts for all geoms and pairs that are softer."""
     if option in ("impratio", "cone", "timestep"):
         setattr(model.opt, option, value[0])
-    for kind in ("geom", "pair"):
-        if option == "solref":
-            own = model.geom_solref if kind == "geom" else model.pair_solref
-            own[own[:, 0] > value[0] if value[0] > 0 else own[:, 0] < 0] = value
-        elif option == "solimp":
-            own = model.geom_solimp if kind == "geom" else model.pair_solimp
+    for own in (getattr(model, f"{kind}_{option}") for kind in ("geom", "pair") if option in ("solref", "solimp")):
+        if option == "solimp":
             own[:, :2] = np.maximum(own[:, :2], value)
+        else:
+            own[own[:, 0] > value[0] if value[0] > 0 else own[:, 0] < 0] = value
 
 
 def _change(
@@ -324,11 +312,8 @@ def _restless(model: Any, data: Any) -> float:
 
 
 def _of(c: Contacts, part: Array, quantity: str) -> float:
-    """Creep, depth, or another of `QUANTITIES`, at the worst of some contacts."""
-    if quantity in ("decay", "largest_step"):
-        return float(getattr(c.only(part), quantity)())
-    values = getattr(c.law(), quantity)[part]
-    return float(values.min() if quantity == "hover" else values.max())
+    """Creep, depth, or largest step of some contacts."""
+    return c.only(part).largest_step() if quantity == "largest_step" else float(getattr(c.law(), quantity)[part].max())
 
 
 def _replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[str]:
@@ -338,14 +323,16 @@ def _replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[str]:
         yield f"solref {asked[0]:g} {asked[1]:g} is of neither format: {SOLREF[0]:g} {SOLREF[1]:g} is taken"
     for name in ("solref", "solreffriction"):
         ref = getattr(c, name)
-        if (ref[0] > 0).all() and (taken := 2 / (c.reference(ref)[1][0] * np.clip(imp[1], *limits))) > 1.000001 * ref[
-            0, 0
-        ]:
-            yield f"{name} {ref[0, 0]:g} s is too short for the time step: {taken:.3g} s is taken (refsafe)"
+        if (ref[0] > 0).all():
+            taken = 2 / (c.reference(ref)[1][0] * np.clip(imp[1], *limits))
+            if taken > 1.000001 * ref[0, 0]:
+                yield f"{name} {ref[0, 0]:g} s is too short for the time step: {taken:.3g} s is taken (refsafe)"
     if c.solreffriction.any() and c.pyramidal:
         yield "solreffriction is ignored by the pyramidal cone"
     if (clipped := np.clip(imp[:2], *limits) != imp[:2]).any():
         yield f"impedance {imp[:2][clipped][0]:g} is outside {limits[0]:g} … {limits[1]:g}: the limit is taken"
+    if (np.sort(c.geoms[0]) == np.sort(np.column_stack([model.pair_geom1, model.pair_geom2]))).all(1).any():
+        return  # parameters of the geoms count for nothing
     for name, mixed in (("solref", asked), ("solimp", imp), ("friction", c.friction[0, [0, 2, 3]])):
         own = getattr(model, f"geom_{name}")[c.geoms[0]]
         if not np.allclose(own[0], own[1]):
@@ -362,8 +349,7 @@ def _advance(model: Any, data: Any) -> Array:
     place, axes, begin = data.xipos.copy(), data.xmat.reshape(-1, 3, 3).copy(), data.time
     steps = max(WINDOW_STEPS, math.ceil(WINDOW / model.opt.timestep))
     mujoco.mj_step(model, data, steps)
-    bad = [w for name in BAD if (w := data.warning[getattr(mujoco.mjtWarning, f"mjWARN_BAD{name}")]).number]
-    if bad:
+    if bad := [each for each in (data.warning[kind] for kind in BAD) if each.number]:
         body = _body(model, model.dof_bodyid[min(bad[0].lastinfo, model.nv - 1)])
         raise UnsettledError(f"the model diverges before {begin + steps * model.opt.timestep:.3g} s, {body} first")
     mujoco.mj_forward(model, data)
@@ -407,11 +393,13 @@ def sentences(f: Forecast) -> Iterator[str]:
         yield f"Set {f.change.written}: the {name} of {f.change.pair} goes from {before} to {after} {unit}.{done}"
     if f.memory:
         yield (
-            "No single option cures the creep. Step the model with mjsim.FrictionMemory(model).step(data): what holds "
-            "then stays where it is, and slips at the same force as before."
+            "No single option cures the creep. Step the model with mjsim.FrictionMemory (integrator Euler, implicit or "
+            "implicitfast): what friction can hold then stays where it is."
         )
     if sliding:
-        yield f"Friction is used up, so these slide: {_few(sliding)}. Only more friction or less load would hold them."
+        yield f"Friction is used up, so these slide: {_few(sliding)}. No setting but more friction holds them."
+    if lost := [pair.name for pair in f.pairs if pair.slides and pair.creep_measured > pair.hover]:
+        yield f"These slide so fast that contact is lost again and again: {_few(lost)}."
     if f.moving:
         yield f"Not settled, and left out: {_few(f.moving)}."
     if not (f.change or f.memory or sliding):
@@ -441,8 +429,8 @@ def _few(names: Sequence[str]) -> str:
 
 def rows(f: Forecast) -> list[list[str]]:
     """The pairs as a table, its head first, the worst next; what was measured is called found."""
-    head = ["pair", "load N", "depth µm", "found", "creep µm/s", "found", "mm/ min", "cone %", "hover mm/s"]
-    table = [[*head, "dies out 1/s", "step ms"]]
+    head = ["pair", "load\nN", "depth\nµm", "found\nµm", "creep\nµm/s", "found\nµm/s", "mm/\nmin", "cone\n%"]
+    table = [[*head, "hover\nmm/s", "decay\n1/s", "step\nms"]]
     for p in f.pairs[:SHOWN]:
         micro = [_number(v, 1e6) for v in (p.depth, p.depth_measured, p.creep, p.creep_measured)]
         rest = _number(p.creep_measured, 6e4), _number(p.cone, 100), _number(p.hover, 1e3), _number(p.decay)
