@@ -159,6 +159,15 @@ def test_protocol_on_a_set_without_fold(lab, flows):
     assert verdicts["table-5-NF2"].outcome is Outcome.NOT_RUN
 
 
+def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monkeypatch):
+    p = sets(Level.QUICK)["thick-fluid"]
+    known = Records(tuple(_settled("thick-fluid", p, (0.6, 1.4, 2.5))))
+    monkeypatch.setattr(thresholds, "extrapolated", lambda *what: None)
+    records = Records.of(thresholds.measure(lab, {"thick-fluid": p}, known))
+    assert any("points to no flow at which it ends" in each.reason for each in records.missing)
+    assert [m.value for m in records.select("thresholds", "folds")] == [1.0]  # an end is seen, and no smooth one
+
+
 def test_protocol_without_settled_states(lab):
     rows = list(thresholds.measure(lab, {"reference": REFERENCE}, Records()))
     assert all(isinstance(row, Missing) for row in rows)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from compare.kit.levels import EFFORT, Level
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
+from compare.kit.trials import Start
 from compare.subjects.flowmeter import measure as characteristic
 from compare.subjects.stationary import measure as settled
 from compare.subjects.thresholds.measure import basins
@@ -81,6 +84,19 @@ class TestSettled:
         assert sum(each.rows for each in starts) == 4
         assert len(states) == 3  # from rest and with the fluid the ball ends in the same
         assert all(each.rows > 10 for each in states)
+
+    def test_a_state_that_depends_on_the_step_is_missing(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+        right = settling.settle
+
+        def other_case(lab: Lab, starts: list[Start], **how: float) -> list[settling.Settled]:
+            states = right(lab, starts, **how)
+            return [replace(each, case=Case.SN) for each in states] if how.get("refine") == 2 else states
+
+        monkeypatch.setattr(settled, "settle", other_case)
+        measured = _measured(lab, monkeypatch, THICK, 0.6)
+        assert {m.quantity for m in measured.measurements} == {"case"}
+        assert len(measured.missing) == 3
+        assert all("is SN with half the time step" in each.reason and each.rows > 10 for each in measured.missing)
 
     def test_what_quadratic_drag_does_not_settle_has_no_values(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
         """A ball that goes round with the fluid keeps a slight lag; one that slips or sinks settles."""
