@@ -34,8 +34,7 @@ from model.parameters import POSITIVE
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    summary = "what balls come to from many starts: stationary, periodic, chaotic motions"
-    command = options.command(commands, "attractors", run, summary, "--set hopping --starts 10")
+    command = options.command(commands, "attractors", run, "--set hopping --starts 10")
     options.add_parameters(command)
     running.add_engine(command)
     command.set_defaults(engine=EVENT)
@@ -53,8 +52,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--page", type=Path, help="write the tables as Markdown, too (default: don't)")
     options.outputs(command, shown="print as JSON")
 
-    summary = "where in parameter space the ball hops for ever, resumable"
-    command = options.command(commands, "search", searched, summary, "--sets 200 --range mu=0.5:1")
+    command = options.command(commands, "search", searched, "--sets 200 --range mu=0.5:1")
     command.add_argument("--sets", type=options.count, default=500, help="parameter sets")
     command.add_argument("--starts", type=options.count, default=5, help="random starts of each")
     command.add_argument("--seed", type=options.seed, default=0, help="of the random sets and starts")
@@ -65,9 +63,8 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--page", type=Path, help="write the table as Markdown")
     options.outputs(command, "search", "print the sets with hopping as JSON")
 
-    summary = "what becomes of the ball from each start of a plane of states, resumable"
     example = "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21"
-    command = options.command(commands, "basins", plane, summary, example)
+    command = options.command(commands, "basins", plane, example)
     options.add_parameters(command)
     running.add_start(command)
     for name in ("across", "up"):

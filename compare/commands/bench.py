@@ -44,8 +44,7 @@ _PAIR: dict[str, tuple[Any, Any, str]] = {
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    summary = "a score card for MuJoCo contact settings: yours, dualball's, MuJoCo's own; or for another engine"
-    command = options.command(commands, "grade", graded, summary, "mine.xml -o card.html")
+    command = options.command(commands, "grade", graded, "mine.xml -o card.html")
     command.add_argument(
         "file", type=Path, nargs="?", metavar="FILE.xml", help="MJCF file with a ball and its contacts"
     )
@@ -61,16 +60,14 @@ def add(commands: options.Commands) -> None:
     command.add_argument("-o", "--output", type=Path, help="HTML page to write (default: none)")
     options.outputs(command)
 
-    summary = "the exact contact cases: a list, one in full, or the set as files for engines in any language"
-    command = options.command(commands, "cases", listed, summary, "-o cases")
+    command = options.command(commands, "cases", listed, "-o cases")
     command.add_argument("name", nargs="?", metavar="NAME", help="show this case")
     command.add_argument(
         "-o", "--output", type=Path, metavar="DIR", help="write JSON, HDF5, MJCF and the scoring rule (default: none)"
     )
     options.outputs(command)
 
-    summary = "all engines that are installed on the exact cases, as they come and in the best settings known here"
-    command = options.command(commands, "league", ranked, summary, "--quick")
+    command = options.command(commands, "league", ranked, "--quick")
     command.add_argument("--quick", action="store_true", help="one time step")
     named = f"only this one (repeatable), or a module of your own: {', '.join(league.ENGINES)}"
     command.add_argument("--engine", action="append", metavar="NAME", help=named)

@@ -18,17 +18,35 @@ from compare.commands import options
 from model import InputError, SimulationError
 from model.trajectory import current_versions
 
-GROUPS = {
-    "study": {"validate": "validate", "judge": "validate", "report": "look", "figures": "look"},
-    "the ball": {
-        **{"predict": "predict", "simulate": "simulate", "inspect": "look", "compare": "look"},
-        **{"sweep": "simulate", "collect": "simulate"},
-        **{"attractors": "attractors", "basins": "attractors", "search": "attractors", "design": "design"},
-        **{"render": "look", "view": "look"},
+GROUPS: dict[str, dict[str, tuple[str, str]]] = {
+    "study": {
+        "validate": ("validate", "hold simulation against theory, claim by claim; the main job"),
+        "judge": ("validate", "judge the stored measurements of a validation again"),
+        "report": ("look", "judge stored measurements again and write report.html anew"),
+        "figures": ("look", "draw the paper's figures, with measured points where there are results"),
     },
-    "contacts and engines": {"forecast": "forecast", "grade": "bench", "cases": "bench", "league": "bench"},
+    "the ball": {
+        "predict": ("predict", "stationary solutions, thresholds and operating range, from theory"),
+        "simulate": ("simulate", "one run with any engine, into an HDF5 file"),
+        "inspect": ("look", "what a trajectory file holds"),
+        "compare": ("look", "two motions side by side: differences, cases, parameters"),
+        "sweep": ("simulate", "many runs over ranges of parameters, resumable"),
+        "collect": ("simulate", "gather the runs of a directory into one file for xarray"),
+        "attractors": ("attractors", "what balls come to from many starts: stationary, periodic, chaotic motions"),
+        "basins": ("attractors", "what becomes of the ball from each start of a plane of states, resumable"),
+        "search": ("attractors", "where in parameter space the ball hops for ever, resumable"),
+        "design": ("design", "the best meter for a fluid and a range of flows, within bounds"),
+        "render": ("look", "a picture or film of a run: the scene, contact forces, slip, case"),
+        "view": ("look", "the ball in MuJoCo's viewer, driven by the study's own loop"),
+    },
+    "contacts and engines": {
+        "forecast": ("forecast", "what the contacts of a MuJoCo model will do: depth, creep, hovering, largest step"),
+        "grade": ("bench", "a score card for contact settings: yours, dualball's, MuJoCo's own; or another engine"),
+        "cases": ("bench", "the exact contact cases: listed, shown, or as files for engines in any language"),
+        "league": ("bench", "all installed engines on the exact cases, as they come and in the best settings known"),
+    },
 }
-"""The commands, as help groups them, and the module of each: `predict` doesn't wait for the engines of the others."""
+"""The commands, as help groups them: the module of each, loaded for nothing else, and what it is for."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -54,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser(words: Sequence[str]) -> options.Parser:
-    """The parser of the command that was asked for, or of all of them."""
+    """The parser of the command that was asked for, or of their names."""
     parser = options.Parser(
         prog="dualball",
         usage="dualball [-h] [--version] COMMAND ...",
@@ -63,18 +81,19 @@ def _parser(words: Sequence[str]) -> options.Parser:
     )
     parser.add_argument("--version", action="version", version=f"dualball {current_versions()['dualball']}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True, prog="dualball", help=argparse.SUPPRESS)
-    known = {name: module for group in GROUPS.values() for name, module in group.items()}
-    asked = known.get(words[0]) if words else None
-    for module in [asked] if asked else dict.fromkeys(known.values()):
+    known = {name: about for group in GROUPS.values() for name, about in group.items()}
+    if words and words[0] in known:
+        module, what = known[words[0]]
         importlib.import_module(f"compare.commands.{module}").add(commands)
-    if not asked:
-        listed = []
-        for title, group in GROUPS.items():
-            listed.append(f"\n{title.capitalize()}:")
-            for name in group:
-                what, indent = commands.choices[name].description or "", " " * 14
-                listed.append(textwrap.fill(what, 100, initial_indent=f"  {name:<12}", subsequent_indent=indent))
-        parser.epilog = "\n".join([*listed, "\n'dualball COMMAND --help' says more."]).lstrip("\n")
+        commands.choices[words[0]].description = what
+        return parser
+    listed = []
+    for title, group in GROUPS.items():
+        listed.append(f"\n{title.capitalize()}:")
+        for name, (_, what) in group.items():
+            commands.add_parser(name)
+            listed.append(textwrap.fill(what, 100, initial_indent=f"  {name:<12}", subsequent_indent=" " * 14))
+    parser.epilog = "\n".join([*listed, "\n'dualball COMMAND --help' says more."]).lstrip("\n")
     return parser
 
 

@@ -27,8 +27,7 @@ _USUAL = {"gravity": 9.81, "j": (0.4, 0.4)}
 
 def add(commands: options.Commands) -> None:
     """Declare the command."""
-    what = "the best meter for a fluid and a range of flows, within bounds"
-    command = options.command(commands, "design", run, what, "meter.toml -o meter.html")
+    command = options.command(commands, "design", run, "meter.toml -o meter.html")
     command.add_argument("file", type=Path, metavar="FILE.toml", help="fluid, flow, bounds, materials, tolerances")
     command.add_argument("-o", "--output", type=Path, help="HTML page to write (default: none)")
     command.add_argument("--seed", type=options.seed, default=0, help="of the random numbers of the search")

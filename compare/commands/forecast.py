@@ -22,8 +22,7 @@ LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
 
 def add(commands: options.Commands) -> None:
     """Declare the command."""
-    summary = "what the contacts of any MuJoCo model will do: depth, creep, hovering, largest step; and what to change"
-    command = options.command(commands, "forecast", foretold, summary, "scene.xml --try")
+    command = options.command(commands, "forecast", foretold, "scene.xml --try")
     command.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
     command.add_argument("--keyframe", metavar="NAME", help="begin with this keyframe, by name or number")
     text = "longest time to wait until the model has settled; 0 takes the state as it stands"

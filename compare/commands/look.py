@@ -17,32 +17,28 @@ from model.parameters import NOT_NEGATIVE, POSITIVE, Range
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    summary = "judge stored measurements again and write report.html anew"
-    command = options.command(commands, "report", report, summary, "results")
+    command = options.command(commands, "report", report, "results")
     stored = "directory of a validation"
     command.add_argument("directory", type=Path, nargs="?", default=Path("results"), metavar="DIR", help=stored)
 
-    summary = "draw the paper's figures, with measured points where there are results"
-    command = options.command(commands, "figures", figures, summary, "--format pdf")
+    command = options.command(commands, "figures", figures, "--format pdf")
     command.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help="to fill")
     command.add_argument("--results", type=Path, metavar="DIR", help=f"{stored} (default results, if it is there)")
     command.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
 
-    command = options.command(commands, "inspect", inspect, "what a trajectory file holds", "run.h5 --plot run.png")
+    command = options.command(commands, "inspect", inspect, "run.h5 --plot run.png")
     command.add_argument("file", type=Path, help="a run, or a collection of 'dualball collect'")
     command.add_argument("--plot", type=Path, help="draw the run: png, svg or pdf (default: don't)")
     options.outputs(command)
 
-    summary = "two motions side by side: differences, cases, parameters"
-    command = options.command(commands, "compare", compare, summary, "mine.csv theory.h5 -o difference.png")
+    command = options.command(commands, "compare", compare, "mine.csv theory.h5 -o difference.png")
     what = "a run, or time and some of its quantities from CSV or any HDF5 file"
     for name in ("a", "b"):
         command.add_argument(name, metavar="FILE", help=what)
     command.add_argument("-o", "--output", type=Path, help="draw both (png, svg or pdf)")
     options.outputs(command)
 
-    summary = "a picture or film of a run: the scene, contact forces, slip, case"
-    command = options.command(commands, "render", render, summary, "run.h5 -o film.gif --from 1 --seconds 10")
+    command = options.command(commands, "render", render, "run.h5 -o film.gif --from 1 --seconds 10")
     command.add_argument("file", type=Path, help="a run")
     command.add_argument("-o", "--output", type=Path, required=True, help="picture.png or film.gif")
     second, radii = options.Number("s", POSITIVE), options.Number("radii", NOT_NEGATIVE)
@@ -59,8 +55,7 @@ def add(commands: options.Commands) -> None:
         dest = "start" if option == "from" else option.replace("-", "_")
         command.add_argument(f"--{option}", dest=dest, type=kind, default=usual, help=meaning)
 
-    summary = "the ball in MuJoCo's viewer, driven by the study's own loop"
-    command = options.command(commands, "view", view, summary, "--omega-0 25 --speed 0.5")
+    command = options.command(commands, "view", view, "--omega-0 25 --speed 0.5")
     options.add_parameters(command)
     running.add_flow(command)
     running.add_start(command)

@@ -91,12 +91,9 @@ class _Help(argparse.HelpFormatter):
         return f"{text} (default {default})"
 
 
-def command(
-    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str, example: str = ""
-) -> Parser:
+def command(commands: Commands, name: str, run: Callable[[argparse.Namespace], int], example: str) -> Parser:
     """Declare a command; the example is what follows its name."""
-    epilog = f"Example: dualball {name} {example}" if example else None
-    declared: Parser = commands.add_parser(name, description=summary, epilog=epilog, formatter_class=_Help)
+    declared: Parser = commands.add_parser(name, epilog=f"Example: dualball {name} {example}", formatter_class=_Help)
     declared.set_defaults(run=run)
     return declared
 

@@ -27,8 +27,7 @@ from model.kinematics import UNITS, VARIABLES
 
 def add(commands: options.Commands) -> None:
     """Declare the command."""
-    what = "stationary solutions, thresholds and operating range, from theory"
-    command = options.command(commands, "predict", run, what, "--set steel-in-water --omega-0 20")
+    command = options.command(commands, "predict", run, "--set steel-in-water --omega-0 20")
     options.add_parameters(command)
     options.outputs(command, shown="print JSON instead of tables")
 

@@ -21,9 +21,7 @@ from model.parameters import Range, check_number
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    command = options.command(
-        commands, "simulate", run, "one run with any engine, into an HDF5 file", "--omega-0 25 -o run.h5"
-    )
+    command = options.command(commands, "simulate", run, "--omega-0 25 -o run.h5")
     running.add_engine(command)
     options.add_parameters(command)
     running.add_flow(command)
@@ -35,9 +33,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("-o", "--output", type=options.hdf5, help="HDF5 file to write (default: none)")
     options.outputs(command, shown="print the description as JSON")
 
-    command = options.command(
-        commands, "sweep", grid, "many runs over ranges of parameters, resumable", "--vary omega_0=10:30:21"
-    )
+    command = options.command(commands, "sweep", grid, "--vary omega_0=10:30:21")
     options.add_parameters(command)
     running.add_start(command)
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
@@ -56,9 +52,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--batch", type=options.count, default=campaign.BATCH, help="runs in one MuJoCo batch")
     options.outputs(command, "sweep", "print a summary as JSON")
 
-    command = options.command(
-        commands, "collect", collect, "gather the runs of a directory into one file for xarray", "sweep -o sweep.h5"
-    )
+    command = options.command(commands, "collect", collect, "sweep -o sweep.h5")
     command.add_argument("directory", type=Path, metavar="DIR", help="what sweep has filled")
     command.add_argument("-o", "--output", type=options.hdf5, default=Path("sweep.h5"), help="HDF5 file to write")
 

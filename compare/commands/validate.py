@@ -24,9 +24,7 @@ _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
-    command = options.command(
-        commands, "validate", run, "hold simulation against theory, claim by claim; the main job", "--quick"
-    )
+    command = options.command(commands, "validate", run, "--quick")
     level = command.add_mutually_exclusive_group()
     level.add_argument(
         "--quick", dest="level", action="store_const", const=Level.QUICK, default=Level.DEFAULT, help="a minute or two"
@@ -41,9 +39,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     running.add_workers(command)
 
-    again = options.command(
-        commands, "judge", judge, "judge the stored measurements of a validation again", "results --claim prop-1"
-    )
+    again = options.command(commands, "judge", judge, "results --claim prop-1")
     again.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="of a validation")
     running.add_processes(again)
 
