@@ -81,18 +81,18 @@ def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
     kinds = {case.name: kind(case) for case in cases()}
     table = [["engine", "precision", "passed", *KINDS, "order", "cost"]]
     for name, results in league.items():
-        tried = [result for result in results if not result.skipped]
-        if not tried:
+        own = [result for result in results if not result.skipped]
+        if not own:
             continue
-        medians = [_median(r.error if math.isfinite(r.error) else math.inf for r in tried if kinds[r.case] == each)
+        medians = [_median(r.error if math.isfinite(r.error) else math.inf for r in own if kinds[r.case] == each)
                    for each in KINDS]  # fmt: skip
         order, cost = (_median(v for v in values if math.isfinite(v)) for values in
-                       ([r.order for r in tried], [r.cost for r in tried]))  # fmt: skip
-        floor = FLOORS[tried[0].engine.precision]
+                       ([r.order for r in own], [r.cost for r in own]))  # fmt: skip
+        floor = FLOORS[own[0].engine.precision]
         table.append([
             name,
-            tried[0].engine.precision,
-            f"{sum(r.passed for r in tried)} of {len(tried)}",
+            own[0].engine.precision,
+            f"{sum(r.passed for r in own)} of {len(own)}",
             *(number(value, floor) for value in medians),
             "" if math.isnan(order) else f"{order:.1f}",
             "" if math.isnan(cost) else f"{cost:.2g}",
@@ -102,11 +102,22 @@ def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
 
 def rows(league: Mapping[str, Sequence[Result]]) -> Rows:
     """A row for each case, a column for each engine that was tried: errors at the shortest step."""
-    tried = {name: results for name, results in league.items() if not all(result.skipped for result in results)}
-    table = [["case", *tried]]
+    those = tried(league)
+    table = [["case", *those]]
     for k, case in enumerate(cases()):
-        table.append([case.name, *(cell(results[k]) for results in tried.values())])
+        table.append([case.name, *(cell(results[k]) for results in those.values())])
     return table
+
+
+def failed(league: Mapping[str, Sequence[Result]]) -> set[tuple[str, int]]:
+    """Case and column of the cells of `rows` that are not passed."""
+    columns = enumerate(tried(league).values(), 1)
+    return {(r.case, k) for k, results in columns for r in results if not (r.skipped or r.passed)}
+
+
+def tried(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
+    """Engines that were tried in some case."""
+    return {name: results for name, results in league.items() if not all(result.skipped for result in results)}
 
 
 def cell(result: Result) -> str:

@@ -182,6 +182,7 @@ def ranked(args: argparse.Namespace) -> int:
     shown = {
         "summary": league.summary(found),
         "rows": league.rows(found),
+        "failed": league.failed(found),
         "about": league.about(found),
         "notes": list(league.notes(found)),
         "caption": league.CAPTION,

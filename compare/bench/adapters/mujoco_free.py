@@ -14,6 +14,7 @@ from model.arrays import Array
 
 NAME = "mujoco-defaults"
 KNOWN = "mujoco 4.0.0"
+NOTE = "every corner of the facets takes away some of the speed, until the wall no longer carries the ball"
 DECLARED = f"{FACETS} planes for a cylinder; a table that turns hangs on a hinge"
 
 

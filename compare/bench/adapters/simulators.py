@@ -78,10 +78,35 @@ class Simulated:
 
 _STUDY = "elliptic cone, contact settings of the study"
 mujoco = Simulated(
-    "mujoco", mujoco_free.Bodies(mujoco_free.studied, memory=True), f"{_STUDY}, corrections between the steps"
+    "mujoco",
+    mujoco_free.Bodies(mujoco_free.studied, memory=True),
+    f"{_STUDY}, corrections between the steps",
+    "friction rows that are slow enough not to hover follow, ten steps late, a friction that turns or sets in",
 )
-mujoco_plain = Simulated("mujoco-plain", mujoco_free.Bodies(mujoco_free.studied), _STUDY)
-event = Simulated("event", declared="the equations of the paper, no scene; its own steps")
-time_stepping = Simulated("time-stepping", declared="the equations of the paper, no scene")
-siconos = Simulated("siconos", declared="equations of motion in turning axes, no scene")
-siconos_defaults = Simulated("siconos-defaults", declared="equations of motion, no scene")
+mujoco_plain = Simulated(
+    "mujoco-plain",
+    mujoco_free.Bodies(mujoco_free.studied),
+    _STUDY,
+    "contacts soft enough for sliding let a ball that lands sink in and throw it back",
+)
+event = Simulated(
+    "event",
+    declared="the equations of the paper, no scene; its own steps",
+    note="what is left is its relative tolerance, 1e-9, and an impact passes it on",
+)
+time_stepping = Simulated(
+    "time-stepping",
+    declared="the equations of the paper, no scene",
+    note="a contact closes at the end of a step: after a landing it is of first order, elsewhere of second",
+)
+siconos = Simulated(
+    "siconos",
+    declared="equations of motion in turning axes, no scene",
+    note="a contact closes up to half a step early or late",
+)
+siconos_defaults = Simulated(
+    "siconos-defaults",
+    declared="equations of motion, no scene",
+    note="each step ends along a chord of the cylinder, and the wall takes away what then points into it: a ball that "
+    "it should carry loses its speed and falls",
+)
