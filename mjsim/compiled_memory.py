@@ -59,8 +59,9 @@ def recall(
         if nearest < 0:
             continue
         i = used[nearest]
+        kinds = 1 if dim[i] == 3 else 2
         for j in range(3):
-            for kind in range(2):
+            for kind in range(kinds):
                 world[j, kind] = 0.0
                 for side in range(2):
                     for axis in range(3):
@@ -68,7 +69,7 @@ def recall(
         for j in range(3):
             force[nearest, 0] += frame[i, 3 + j] * world[j, 0]
             force[nearest, 1] += frame[i, 6 + j] * world[j, 0]
-            for row in range(3):
+            for row in range(3 * kinds - 3):
                 force[nearest, 2 + row] += frame[i, 3 * row + j] * world[j, 1]
         load[nearest] += loads[m]
 
@@ -105,7 +106,7 @@ def retain(
     softness: Array, reference: Array, acceleration: Array, forces: Array, elliptic: bool,
 ) -> tuple[Array, Array]:  # fmt: skip
     """As `mjsim.memory.retain`."""
-    result, load, force, world = np.empty((len(used), 2, 3, 2)), np.zeros(len(used)), np.empty(5), np.empty((3, 2))
+    result, load, force, world = np.zeros((len(used), 2, 3, 2)), np.zeros(len(used)), np.empty(5), np.empty((3, 2))
     for k in range(len(used)):
         i = used[k]
         a, mu, asked = address[i], friction[i], 0.0
@@ -125,13 +126,14 @@ def retain(
                 )
         if elliptic:
             load[k], asked = forces[a], math.sqrt(asked)
+        kinds = 1 if dim[i] == 3 else 2
         share = min(max(2 - asked / max(_KEPT * load[k], 1e-300), 0.0), 1.0)
         for j in range(3):
             world[j, 0] = share * (frame[i, 3 + j] * force[0] + frame[i, 6 + j] * force[1])
             world[j, 1] = share * (frame[i, j] * force[2] + frame[i, 3 + j] * force[3] + frame[i, 6 + j] * force[4])
         for side in range(2):
             for axis in range(3):
-                for kind in range(2):
+                for kind in range(kinds):
                     total = 0.0
                     for j in range(3):
                         total += xmat[geom[i, side], 3 * j + axis] * world[j, kind]

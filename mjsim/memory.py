@@ -25,6 +25,7 @@ from scipy.spatial.distance import cdist
 
 from model import InputError
 from model.arrays import Array
+from model.parameters import Range, check_number
 
 KEPT = 10.0
 """Times Coulomb's limit that may be needed to hold a contact which keeps all; with twice as much it keeps nothing."""
@@ -33,8 +34,10 @@ _COLUMNS = np.array([2, 4, 1, 3, 5])
 """Where forces along the tangents, and moments about normal and tangents, stand in rows (axis; force, moment)."""
 _APART = np.array([1e6, 1e6, 1, 1, 1, 1, 1, 1])
 """Keeps contacts of different geoms apart, m."""
+_OPEN = 1e9
+"""Approach that a contact allows which is open, m s-2."""
 _ELLIPTIC = mujoco.mjtCone.mjCONE_ELLIPTIC
-_STATE = "place", "force", "load", "joints", "time"
+_STATE = "place", "force", "load", "joints", "lift", "time"
 Kept = tuple[Array, Array, Array]
 """Of each contact the geoms and its place on both in their axes, (n, 8), friction force and moment on both in their
 axes, (n, 2, 3, 2), and the normal force, (n,); m, N, N m."""
@@ -47,6 +50,9 @@ class FrictionMemory:
     Parameters
     ----------
     model : any `mujoco.MjModel` with integrator Euler, implicit or implicitfast
+    servo : time in which contacts with friction lose their depth, s; None: they sink in as MuJoCo has them. It needs
+        geoms with a `margin`, more than bodies sink in, of which an open contact then takes no notice; and it must be
+        slower than the contact, best five times the time constant of `solref`.
 
     The memory belongs to one simulation: make one for each `MjData`. It takes part in the state of that, so save and
     restore both. Joints and tendons with `frictionloss` hold as well. Contacts of flexes, and those without friction
@@ -55,11 +61,16 @@ class FrictionMemory:
     Raises
     ------
     InputError
-        If the integrator gives no access between a step's reference accelerations and its forces.
+        If the integrator gives no access between a step's reference accelerations and its forces, or the servo is
+        faster than a step.
     """
 
-    def __init__(self, model: Any) -> None:
-        self.model = model
+    def __init__(self, model: Any, servo: float | None = None) -> None:
+        self.model, self._servo = model, servo
+        if servo is not None:
+            check_number(
+                "servo", servo, "s", Range(float(model.opt.timestep), math.inf), "to be no faster than a step it"
+            )
         integrator = mujoco.mjtIntegrator(model.opt.integrator)
         if integrator not in _SPLIT:
             why = {
@@ -73,17 +84,17 @@ class FrictionMemory:
     def reset(self) -> None:
         """Forget all, as after `mj_resetData`."""
         self._kept: Kept = np.empty((0, 8)), np.empty((0, 2, 3, 2)), np.empty(0)
-        self._joints = np.empty(0)
+        self._joints, self._lift = np.empty(0), np.empty(0)
         self._time = math.nan
 
     def state(self) -> dict[str, Array]:
-        """A copy of what is remembered: `Kept`, friction of joints and tendons (n,), and the time of it, s."""
-        values = (*self._kept, self._joints, np.array(self._time))
+        """A copy of what is remembered: `Kept`, friction of joints, distances held by the servo, m, and the time, s."""
+        values = (*self._kept, self._joints, self._lift, np.array(self._time))
         return {name: value.copy() for name, value in zip(_STATE, values, strict=True)}
 
     def restore(self, state: Mapping[str, npt.ArrayLike]) -> None:
         """Go on from a `state`."""
-        place, force, load, self._joints, time = (np.array(state[name], dtype=float) for name in _STATE)
+        place, force, load, self._joints, self._lift, time = (np.array(state[name], dtype=float) for name in _STATE)
         self._kept, self._time = (place, force, load), float(time)
 
     def step(self, data: Any, nstep: int = 1) -> None:
@@ -117,6 +128,8 @@ class FrictionMemory:
             self._kept, geom, contact.pos, frame, dim, address, friction, data.geom_xpos, axes, data.efc_KBIP,
             softness, reference, elliptic,
         )  # fmt: skip
+        if self._servo:
+            self._lift = self._lifted(data, used, place)
         joints = slice(data.ne, data.ne + data.nf)
         if len(self._joints) == data.nf:
             reference[joints] += softness[joints] * self._joints
@@ -130,6 +143,22 @@ class FrictionMemory:
             used, geom, frame, dim, address, friction, axes, softness, reference, acceleration, data.efc_force, elliptic
         )
         self._kept = place, force, load
+
+    def _lifted(self, data: Any, used: npt.NDArray[np.intp], place: Array) -> Array:
+        """Servo: move the distances that contacts hold, so that loaded ones come to have no depth; return them, m."""
+        before, contact = self._kept[0], data.contact
+        lift: Array = np.zeros(len(place))
+        if len(before) and len(place):
+            nearest = cdist(place * _APART, before * _APART, "sqeuclidean").argmin(axis=1)
+            lift = self._lift[nearest] * (before[nearest, :2] == place[:, :2]).all(axis=1)
+        gap, margin, rows = contact.dist[used], contact.includemargin[used], contact.efc_address[used]
+        lift = np.clip(lift - self.model.opt.timestep / self._servo * gap, 0, margin)
+        spring = data.efc_KBIP[rows, 0] * data.efc_KBIP[rows, 2] * (margin - lift)
+        spring[(lift == 0) & (gap > 0)] = _OPEN
+        shared = 1 if self.model.opt.cone == _ELLIPTIC else 2 * (contact.dim[used] - 1)
+        of = np.repeat(np.arange(len(used)), shared)
+        data.efc_aref[rows[of] + np.arange(len(of)) - np.searchsorted(of, of)] -= spring[of]
+        return lift
 
 
 def recall(

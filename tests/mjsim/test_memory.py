@@ -80,6 +80,28 @@ def test_fast_sliding_is_the_engines_own(cone):
     assert data.qpos == pytest.approx(plain.qpos, rel=1e-12)
 
 
+@CONES
+def test_servo_takes_the_depth_away(cone):
+    """A ball that rolls down has the lever r, so that it gains 5/7 g sin(slope): 1 % less without servo."""
+    slope, ball = np.radians(5), '<geom size=".05" mass=".03" margin="2e-3"/>'
+    model, data = scene(slope, cone=cone, geom=ball, option='tolerance="1e-12"')
+    stepper = FrictionMemory(model, servo=0.1)
+    stepper.step(data, 500)
+    speed = data.qvel[0]
+    stepper.step(data, 500)
+    assert abs(data.contact.dist[0]) < 1e-9
+    assert data.qvel[0] - speed == pytest.approx(5 / 7 * G * np.sin(slope), rel=1e-4)
+    model, data = scene(geom=BOX.replace("mass", 'euler="10 20 0" margin="2e-3" mass'), cone=cone)
+    data.qpos[2], free = 0.2, np.sqrt(2 * (0.2 - 0.075) / G)
+    stepper = FrictionMemory(model, servo=0.1)
+    stepper.step(data, int(free / model.opt.timestep) - 12)
+    assert data.qvel[2] == pytest.approx(-G * data.time, rel=1e-9)  # the margin bears nothing
+    stepper.step(data, 2000)
+    assert np.abs(data.contact.dist).max() < 1e-9
+    with pytest.raises(InputError, match="servo"):
+        FrictionMemory(model, servo=1e-3)
+
+
 def test_states_threads_and_neighbours():
     """Memories are independent, and one that is restored goes on to the bit."""
     model, data = scene(np.radians(15), boxes=2)
