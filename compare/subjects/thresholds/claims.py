@@ -11,9 +11,11 @@ from itertools import product
 
 import numpy as np
 from scipy.optimize import brentq
+from scipy.special import ai_zeros
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
+from analytic.flowmeter import design, response
 from analytic.mechanics import dynamics
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary import slipping_branch
@@ -250,6 +252,54 @@ def _with_inertia() -> Iterator[Check]:
         yield _check("omega_02", "weight on the wall", hangs, expected["omega_02"])
 
 
+def _past_the_fold() -> Iterator[Check]:
+    """The delay of a slow ramp by the normal form at the fold itself, q' = a (omega_0 - omega_04) + b q^2.
+
+    From the null vectors of the Jacobian there and two derivatives of the vector field, instead of the branch.
+    """
+    for eta, mu, c in (0.2, 0.2, 1.0), (0.15, 0.45, 2.0), (0.3, 0.2, 0.5):
+        p = FORMAL.replace(eta=eta, mu=mu, c=c)
+        x, flow = slipping_branch.states(slipping_branch.fold(p), p)
+        q = p.replace(omega_0=float(flow))
+        J = dynamics.jacobian(Case.SS, x, q)
+        along, across = np.zeros(8), np.zeros(8)
+        for vector, matrix in (along, J), (across, J.T):
+            values, vectors = np.linalg.eig(matrix)
+            vector[TURNING] = np.real(vectors[:, np.argmin(np.abs(values))])
+        across /= across @ along
+        size = 1e-4 * float(np.abs(x).max())
+        # The rate along the null vector, at the fold, on either side of it, and in a flow that is faster by 1 rad/s.
+        here, ahead, behind, faster = (
+            across @ np.array(dynamics.rates(Case.SS, State(*(x + shift * along).tolist()), q, q.omega_0 + more))
+            for shift, more in ((0.0, 0.0), (size, 0.0), (-size, 0.0), (0.0, 1.0))
+        )
+        a, b = float(faster - here), float(ahead + behind - 2 * here) / (2 * size**2)
+        delay = -float(ai_zeros(1)[0][0]) * (a * b) ** (-1 / 3)
+        coefficient = response.ramp_coefficient(p)
+        yield _check("ramp_end", "K of K ρ^(2/3), by the normal form", delay, coefficient, 1e-4 * delay)
+
+
+def _slopes() -> Iterator[Check]:
+    """Logarithmic derivatives of the thresholds by hand (docs/design.md), and as a design gives them."""
+    p = FORMAL.replace(eta=0.25)
+    mu, eta, j = p.mu, p.eta, p.j
+    D = mu * eta * (1 + j) + j - eta
+    exact = {
+        ("omega_01", "mu"): (j - eta) / (2 * D),
+        ("omega_01", "eta"): eta * (1 + j) * (1 - mu) / (2 * (1 + eta) * D),
+        ("omega_01", "j"): -j * (1 + mu * eta) / (2 * D),
+        ("omega_01", "R"): -0.5,
+        ("omega_02", "eta"): -0.5,
+        ("omega_02", "mu"): 0.0,
+        ("omega_03", "j"): -0.5,
+        ("omega_03", "g"): 0.5,
+    }
+    given = design.sensitivities(p.replace, {name: getattr(p, name) for name in ("mu", "eta", "j", "R", "g")})
+    for (threshold, name), slope in exact.items():
+        of = given[threshold][name]
+        yield _check("law", f"d ln {threshold}/d ln {name}, off by", of.value - slope, 0.0, max(of.error, 1e-9))
+
+
 def _check(quantity: str, what: str, value: float, predicted: float, uncertainty: float = 0.0) -> Check:
     own = max(uncertainty, ROUND_OFF * (abs(predicted) or 1.0))
     algebra = Measurement(
@@ -298,6 +348,22 @@ FORMAL_CLAIMS = (
         algebra=_sliding,
         text=Text.FORMAL,
         reason="Where it does not, no ball rolls at both points: δ is measured in between, by eq-69.",
+    ),
+    Claim(
+        "design-sensitivities",
+        "(84)-(86)",
+        "By how many per cent a threshold changes if friction, inertia, the vessel or gravity does by one.",
+        algebra=_slopes,
+        text=Text.FORMAL,
+        reason="Derivatives of the closed forms, which thresholds themselves are measured against.",
+    ),
+    Claim(
+        "ramp-law",
+        "(88), docs/theory.md, 11",
+        "A flow that rises slowly at a rate ρ passes the fold by K ρ^(2/3) before the ball lifts off.",
+        algebra=_past_the_fold,
+        text=Text.FORMAL,
+        reason="A limit: at rates that an engine can be asked for, terms ρ ln ρ and ρ are 1 to 30 % of it (ramp-fold).",
     ),
     Claim(
         "fluid-inertia",
