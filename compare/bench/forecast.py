@@ -213,13 +213,14 @@ def forecast(
 
 
 def _measured(model: Any, data: Any, c: Contacts, number: Array, bodies: Array) -> dict[str, Array]:
-    """How deep each contact is, and how fast its two material points and its two bodies part within a window."""
-    found, axes, begin = data.contact, data.xmat.reshape(-1, 3, 3), data.time
+    """How deep each contact is, and how fast its two bodies slip past each other and turn, in the mean of a window."""
+    found = data.contact
     depth, drift, frames = -found.dist[number], found.surfacevel[number, :2], found.frame[number].reshape(-1, 3, 3)
-    local = np.einsum("nbji,nbj->nbi", axes[bodies], found.pos[number][:, None] - data.xpos[bodies])
-    turning = np.diff(_advance(model, data)[bodies, 3:], axis=1)[:, 0]
-    place = data.xpos[bodies] + np.einsum("nbij,nbj->nbi", axes[bodies], local)
-    slip = np.einsum("nij,nj->ni", frames[:, 1:], place[:, 1] - place[:, 0]) / (data.time - begin) + drift
+    lever = found.pos[number][:, None] - data.xipos[bodies]
+    velocity = _advance(model, data)[bodies]
+    (first, second), turning = np.moveaxis(velocity, 1, 0)[..., :3], np.diff(velocity[..., 3:], axis=1)[:, 0]
+    arms = np.cross(velocity[..., 3:], lever)
+    slip = np.einsum("nij,nj->ni", frames[:, 1:], second + arms[:, 1] - first - arms[:, 0]) + drift
     return {
         "depth_measured": depth,
         "creep_measured": np.where(c.dim > 1, np.hypot(*slip.T), np.nan),
@@ -354,8 +355,9 @@ def _advance(model: Any, data: Any) -> Array:
         raise UnsettledError(f"the model diverges before {begin + steps * model.opt.timestep:.3g} s, {body} first")
     mujoco.mj_forward(model, data)
     turn = data.xmat.reshape(-1, 3, 3) @ axes.transpose(0, 2, 1)
-    turned = np.column_stack([turn[:, i, j] - turn[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))]) / 2
-    mean: Array = np.hstack([data.xipos - place, turned]) / (steps * model.opt.timestep)
+    axis = np.column_stack([turn[:, i, j] - turn[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))]) / 2
+    sine = np.hypot.reduce(axis, 1, keepdims=True).clip(1e-30, 1)
+    mean: Array = np.hstack([data.xipos - place, axis * np.arcsin(sine) / sine]) / (steps * model.opt.timestep)
     return mean
 
 

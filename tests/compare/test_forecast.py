@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import re
@@ -47,6 +48,14 @@ BALL = SLOPE + (
 PAIR = (
     '<contact><pair geom1="floor" geom2="box" friction=".7 .5 .01 .001 .001" solreffriction="{}" condim="4"/></contact>'
 )
+WHEEL = (
+    '<body pos="{0} {1} 0"><joint axis="0 1 0" frictionloss="1"/>'
+    '<geom name="wheel{2}" type="cylinder" size=".05 .02" euler="90 0 0" mass=".3"/></body>'
+)
+WHEELS = "".join(WHEEL.format(x, y, k) for k, (x, y) in enumerate(itertools.product((-0.1, 0.1), (-0.11, 0.11))))
+CART = (
+    f'<body pos=".013 0 .0515" euler="0 15 0"><freejoint/><geom type="box" size=".15 .08 .02" mass="2"/>{WHEELS}</body>'
+)
 SCENES = {
     "slope": mjcf(ON_SLOPE, 'cone="elliptic"'),
     "slope, impratio 10": mjcf(ON_SLOPE, 'cone="elliptic" impratio="10"'),
@@ -73,6 +82,7 @@ SCENES = {
     "gripper, pyramidal": mjcf(GRIPPER, rest=SQUEEZE),
     "ball held by rolling friction": mjcf(BALL, 'cone="elliptic" impratio="3"'),
     "ball held by rolling friction, pyramidal": mjcf(BALL),
+    "wheels held by dry friction": mjcf(SLOPE + CART, 'cone="elliptic" impratio="100"'),
     "hidden mix": mjcf(
         FLOOR.format('solref=".004 1" friction=".3" euler="0 12 0"') + box(".01 0 .0525", angle="0 12 0")
     ),
