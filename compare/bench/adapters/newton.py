@@ -1,78 +1,96 @@
-"""Newton: several solvers on one scene."""
+"""Newton, four of its solvers, on a processor in single precision.
+
+Traps: quaternions end with the scalar; shapes have torsional and rolling friction unless that is set to zero; friction is
+the mean of both coefficients, in VBD the root of their product. The solver MuJoCo wants a MuJoCo older than 4: it is in
+`compare.bench.adapters.mujoco_warp` by itself. Kernels are compiled when they are first needed, which takes minutes.
+"""
 
 from __future__ import annotations
 
+import logging
 from typing import Any
 
 import newton as engine
 import numpy as np
 import warp
 
-from compare.bench.adapters.free import Free, State, upright
+from compare.bench.adapters.free import CHORD, Free, State, upright
 from compare.bench.case import Vector
 from model.arrays import Array
 
 warp.config.quiet = True
-engine_solvers = engine.solvers
+logging.getLogger("newton").setLevel(logging.ERROR)
 
 
 class Newton(Free):
-    KNOWN = "newton 1.8.0"
-    PRECISION = "f32"
+    """As in `Free`, with one of the solvers and its options."""
 
-    def __init__(self, solver: str, combine: str, best: str = "", options: Any = None) -> None:
-        super().__init__(f"newton-{solver.lower()}" + ("" if best else "-defaults"), best)
-        self.solver_name, self.combine, self.options = f"Solver{solver}", combine, options or {}
+    PRECISION = "f32"
+    KNOWN = "newton 1.8.0"
+
+    def __init__(self, solver: str, note: str, best: str = "", **options: Any) -> None:
+        super().__init__(f"newton-{solver.lower()}{'' if best else '-defaults'}", best)
+        self.solver, self.options, self.NOTE = getattr(engine.solvers, f"Solver{solver}"), options, note
 
     def make(self) -> None:
-        case, body = self.case, self.case.body
-        builder = engine.ModelBuilder(gravity=(0.0, 0.0, -case.g))
-        if hasattr(getattr(engine.solvers, self.solver_name), "register_custom_attributes"):
-            getattr(engine.solvers, self.solver_name).register_custom_attributes(builder)
-        def material(friction: float) -> Any:
-            return engine.ModelBuilder.ShapeConfig(density=0.0, mu=friction, mu_torsional=0.0, mu_rolling=0.0, **self.material)
-        own, of = {"mean": (0.0, lambda f: 2 * f), "max": (0.0, lambda f: f), "root": (1.0, lambda f: f * f)}[self.combine]
+        """As in `Free`."""
+        case, body, builder = self.case, self.case.body, engine.ModelBuilder(gravity=(0.0, 0.0, -self.case.g))
+        rooted = self.solver is engine.solvers.SolverVBD
+
+        def rough(mu: float) -> Any:
+            return builder.ShapeConfig(density=0.0, mu=mu, mu_torsional=0.0, mu_rolling=0.0)
+
+        if hasattr(self.solver, "register_custom_attributes"):
+            self.solver.register_custom_attributes(builder)
         for surface, point, normal in self.planes():
             if surface.turning:
                 raise NotImplementedError("its planes don't turn")
-            w, x, y, z = upright(normal)
-            self.wall = builder.add_shape_plane(None, xform=warp.transform(point, (x, y, z, w)), width=0.0, length=0.0, cfg=material(of(surface.friction)))
-        w, x, y, z = body.orientation
-        self.body = builder.add_body(xform=warp.transform(body.position, (x, y, z, w)), mass=body.mass, inertia=np.diag(body.inertia), lock_inertia=True)
+            material = rough(surface.friction**2 if rooted else 2 * surface.friction)
+            self.wall = builder.add_shape_plane(None, xform=pose(point, normal), width=0.0, length=0.0, cfg=material)
+        w, *axis = body.orientation
+        start = warp.transform(body.position, (*axis, w))
+        number = builder.add_body(xform=start, mass=body.mass, inertia=np.diag(body.inertia), lock_inertia=True)
         if body.shape == "sphere":
-            builder.add_shape_sphere(self.body, radius=body.size[0], cfg=material(own))
+            builder.add_shape_sphere(number, radius=body.size[0], cfg=rough(float(rooted)))
         else:
-            builder.add_shape_box(self.body, **dict(zip(("hx", "hy", "hz"), body.size)), cfg=material(own))
-        builder.joint_qd[-6:] = builder.body_qd[-1] = [*body.velocity, *body.spin]
-        if self.solver_name == "SolverVBD": builder.color()
+            builder.add_shape_box(number, hx=body.size[0], hy=body.size[1], hz=body.size[2], cfg=rough(float(rooted)))
+        builder.joint_qd[:6] = builder.body_qd[0] = [*body.velocity, *body.spin]
+        if rooted:
+            builder.color()
         self.model = builder.finalize(device="cpu")
-        self.solver = getattr(engine.solvers, self.solver_name)(self.model, **(self.options() if callable(self.options) else self.options))
-        self.now_, self.next_, self.control = self.model.state(), self.model.state(), self.model.control()
-        self.now_.body_qd.assign(np.array([[*body.velocity, *body.spin]], np.float32))
-        self.contacts = self.model.contacts()
-    material: dict = {}
+        self.contacts, self.solves = self.model.contacts(), self.solver(self.model, **self.options)
+        self.old, self.new = self.model.state(), self.model.state()
 
     def advance(self) -> None:
-        self.model.collide(self.now_, self.contacts)
-        self.solver.step(self.now_, self.next_, self.control, self.contacts, self.timestep)
-        self.now_, self.next_ = self.next_, self.now_
-        self.now_.clear_forces()
+        """As in `Free`."""
+        self.model.collide(self.old, self.contacts)
+        self.solves.step(self.old, self.new, None, self.contacts, self.timestep)
+        self.old, self.new = self.new, self.old
+        self.old.clear_forces()
 
     def state(self) -> State:
-        at, rate = self.now_.body_q.numpy()[0], self.now_.body_qd.numpy()[0]
-        return at[:3].astype(float), rate[:3].astype(float), rate[3:].astype(float)
+        """As in `Free`."""
+        place, rate = self.old.body_q.numpy()[0].astype(float), self.old.body_qd.numpy()[0].astype(float)
+        return place[:3], rate[:3], rate[3:]
 
     def push(self, force: Vector) -> None:
-        self.now_.body_f.numpy()[0, :3] = force
+        """As in `Free`."""
+        self.old.body_f.numpy()[0, :3] = force  # on a processor this is the engine's own memory
 
     def turn(self, point: Array, normal: Array) -> None:
-        w, x, y, z = upright(normal)
-        self.model.shape_transform.numpy()[self.wall] = [*point, x, y, z, w]
+        """As in `Free`."""
+        self.model.shape_transform.numpy()[self.wall] = pose(point, normal)
 
 
-xpbd = Newton("XPBD", "mean")
-semi = Newton("SemiImplicit", "mean")
-feather = Newton("Featherstone", "mean")
-mujoco = Newton("MuJoCo", "max")
-kamino = Newton("Kamino", "mean")
-vbd = Newton("VBD", "root")
+def pose(point: Array, normal: Array) -> Any:
+    """Of a plane."""
+    w, x, y, z = upright(normal)
+    return warp.transform(point, (x, y, z, w))
+
+
+_CREEPS = (
+    "worst with what must not move: friction corrects positions by a share of the slip in each of a few iterations, so that "
+    "bodies creep at a rate that more iterations lessen"
+)
+xpbd_defaults = Newton("XPBD", _CREEPS)
+xpbd = Newton("XPBD", f"{_CREEPS}; then round the cylinder: {CHORD}", "10 iterations", iterations=10)
