@@ -33,6 +33,12 @@ ENGINES: dict[str, str] = {
         for name in ("pybullet", "drake", "dart", "rapier", "sapien")
         for suffix, which in (("", "best"), ("-defaults", "defaults"))
     },
+    "mujoco-warp": f"{_OWN}.mujoco_warp:best",
+    "mujoco-warp-defaults": f"{_OWN}.mujoco_warp:defaults",
+    "newton-xpbd": f"{_OWN}.newton:xpbd",
+    "newton-xpbd-defaults": f"{_OWN}.newton:xpbd_defaults",
+    "newton-semiimplicit-defaults": f"{_OWN}.newton:semi_implicit_defaults",
+    "newton-vbd-defaults": f"{_OWN}.newton:vbd_defaults",
 }
 """Where each engine is; NAME is in its best known settings, NAME-defaults as it comes."""
 KINDS = ("sticking", "rolling", "sliding", "landing")

@@ -31,6 +31,13 @@ def test_an_engine_reaches_its_order(name: str) -> None:
     assert run(CASES["lands"], f"{OWN}.{name}:defaults", steps=(2e-3,)).error < 2
 
 
+@pytest.mark.slow  # they compile for minutes where they haven't run before
+@pytest.mark.parametrize("engine", ["newton:xpbd", "mujoco_warp:best"])
+def test_engines_on_warp(engine: str) -> None:
+    pytest.importorskip("warp")
+    assert run(CASES["sphere-slips-down"], f"{OWN}.{engine}", steps=(2e-3,), limit=600).passed
+
+
 def test_engines_that_are_not_installed() -> None:
     with pytest.raises(InputError, match="No module named 'nosuchengine'"):
         run(CASES["block-rests"], "nosuchengine")

@@ -1,8 +1,8 @@
 """Newton, four of its solvers, on a processor in single precision.
 
-Traps: quaternions end with the scalar; shapes have torsional and rolling friction unless that is set to zero; friction is
-the mean of both coefficients, in VBD the root of their product. The solver MuJoCo wants a MuJoCo older than 4: it is in
-`compare.bench.adapters.mujoco_warp` by itself. Kernels are compiled when they are first needed, which takes minutes.
+Traps: quaternions end with the scalar; shapes have torsional and rolling friction unless that is set to zero; friction
+is the mean of both coefficients, in VBD the root of their product. The solver MuJoCo wants a MuJoCo older than 4: it is
+in `compare.bench.adapters.mujoco_warp` by itself. Kernels are compiled when they are first needed, which takes minutes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import warp
 
 from compare.bench.adapters.free import CHORD, Free, State, upright
-from compare.bench.case import Vector
+from compare.bench.case import STEPS, Vector
 from model.arrays import Array
 
 warp.config.quiet = True
@@ -31,10 +31,11 @@ class Newton(Free):
     def __init__(self, solver: str, note: str, best: str = "", **options: Any) -> None:
         super().__init__(f"newton-{solver.lower()}{'' if best else '-defaults'}", best)
         self.solver, self.options, self.NOTE = getattr(engine.solvers, f"Solver{solver}"), options, note
+        self.TIMESTEPS: tuple[float, ...] = STEPS
 
     def make(self) -> None:
         """As in `Free`."""
-        case, body, builder = self.case, self.case.body, engine.ModelBuilder(gravity=(0.0, 0.0, -self.case.g))
+        body, builder = self.case.body, engine.ModelBuilder(gravity=(0.0, 0.0, -self.case.g))
         rooted = self.solver is engine.solvers.SolverVBD
 
         def rough(mu: float) -> Any:
@@ -89,8 +90,24 @@ def pose(point: Array, normal: Array) -> Any:
 
 
 _CREEPS = (
-    "worst with what must not move: friction corrects positions by a share of the slip in each of a few iterations, so that "
+    "worst with what must not move: it takes a share of the slip out of positions in each of a few iterations, so that "
     "bodies creep at a rate that more iterations lessen"
 )
 xpbd_defaults = Newton("XPBD", _CREEPS)
 xpbd = Newton("XPBD", f"{_CREEPS}; then round the cylinder: {CHORD}", "10 iterations", iterations=10)
+semi_implicit_defaults = Newton(
+    "SemiImplicit",
+    "worst at long steps and with light bodies: its springs and friction of 1000 N s/m are explicit, and explode at 4 ms, "
+    "or with the ball in the vessel",
+)
+vbd_defaults = Newton(
+    "VBD",
+    "worst with what must not move: below 1 cm/s its friction is smoothed, and neither step nor iterations lessen that",
+    rigid_body_contact_buffer_size=128,
+)
+kamino_defaults = Newton(
+    "Kamino",
+    "resting, sliding and rolling are right to first order, as of a solver with Coulomb's cone; but its 200 iterations "
+    "of ADMM take 50 ms a step on a processor, so that it has one step here, and isn't in the league's table",
+)
+vbd_defaults.TIMESTEPS, kamino_defaults.TIMESTEPS = (4e-3, 2e-3), (4e-3,)
