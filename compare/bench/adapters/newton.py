@@ -97,8 +97,8 @@ xpbd_defaults = Newton("XPBD", _CREEPS)
 xpbd = Newton("XPBD", f"{_CREEPS}; then round the cylinder: {CHORD}", "10 iterations", iterations=10)
 semi_implicit_defaults = Newton(
     "SemiImplicit",
-    "worst at long steps and with light bodies: its springs and friction of 1000 N s/m are explicit, and explode at 4 ms, "
-    "or with the ball in the vessel",
+    "worst at long steps and with light bodies: its springs and friction of 1000 N s/m are explicit, and explode at "
+    "4 ms, or with the ball in the vessel",
 )
 vbd_defaults = Newton(
     "VBD",
