@@ -50,8 +50,9 @@ _CHOICES = {
     "coordinates": ("polar", "free"),
     "wall": ("tangent", "prism"),
 }
-_LEFT, _STURDY = 0.95, (3.0, 0.75)
-"""Largest `contact_decay` allowed; and `solref` with its time in steps, the fastest that is stable for mu, eta <= 1."""
+_LEFT, _STURDY = 0.95, ((3.0, 0.75), (4.0, 1.0), (8.0, 1.0), (12.0, 1.5))
+"""`contact_decay` beyond which contacts are made slower; and `solref` with its time in steps, the fastest first: stable
+up to mu eta = 1.03, 2.1, 5 and 9."""
 _FALL = 0.01
 """Distance fallen in a step from which a contact is an impact, in units of the gap that counts as touching."""
 
@@ -276,8 +277,8 @@ class ContactSettings:
         """With slower contacts if the friction of a ball would make these chatter, else as they are."""
         if self.contact_decay(p.mu, p.eta) <= _LEFT:
             return self
-        steps, ratio = _STURDY
-        return dataclasses.replace(self, solref=(steps * self.timestep, ratio))
+        slower = [dataclasses.replace(self, solref=(steps * self.timestep, ratio)) for steps, ratio in _STURDY]
+        return next((each for each in slower if each.contact_decay(p.mu, p.eta) <= 1), slower[-1])
 
     @classmethod
     def for_problem(
