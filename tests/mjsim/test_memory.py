@@ -194,3 +194,50 @@ def test_edges_bear_what_they_should():
     assert min(plus.min(), minus.min()) > -1e-12
     assert (plus + minus).sum(axis=1) == pytest.approx(load)
     assert friction * (plus - minus) == pytest.approx(force)
+
+
+def rise(model, stepper, seconds, velocity=()):
+    """Most that the energy of free bodies, kinetic and potential, rises above the least it has been so far, J."""
+    data, least, most = mujoco.MjData(model), np.inf, 0.0
+    data.qvel[: len(velocity)] = velocity
+    for _ in range(round(seconds / model.opt.timestep)):
+        stepper(data)
+        mujoco.mj_energyVel(model, data)
+        energy = data.energy[1] - model.body_mass @ (data.xipos @ model.opt.gravity)
+        least = min(least, energy)
+        most = max(most, energy - least)
+    return most
+
+
+@pytest.mark.parametrize(
+    ("geom", "velocity"),
+    [
+        (BOX, (1, 0.3, 0)),  # slides to a stop
+        (BOX, (0, 0, 0.5, 3, 5, 1)),  # is thrown
+        (BALL, (1, 0, 0)),  # slides, then rolls
+        (BALL, (1, 0, 0, 0, 20, 0)),  # rolls
+        (BALL, (0, 0, 0, 0, 0, 30)),  # spins
+    ],
+)
+def test_never_more_energy(geom, velocity):
+    """Energy rises no further than in plain MuJoCo, whose bodies hop; five starts of each, as the hops are random."""
+    model, _ = scene(geom=geom, condim=4)
+    starts = [factor * np.array(velocity) for factor in (0.8, 0.9, 1.0, 1.1, 1.2)]
+    plain = [rise(model, lambda data: mujoco.mj_step(model, data), 0.8, start) for start in starts]
+    ours = [rise(model, FrictionMemory(model).step, 0.8, start) for start in starts]
+    assert np.mean(ours) <= np.mean(plain) + np.std(plain) + 1e-6
+
+
+@pytest.mark.slow
+def test_piles_come_to_rest():
+    from docs.studies import friction
+
+    still, rises = [], []
+    for seed in range(20):
+        model = friction.pile(seed, mixed=False)
+        plain = friction.settle(model, friction.Plain(model))[1]
+        drift, most = friction.settle(model, FrictionMemory(model))
+        still.append(drift < friction.STILL)
+        rises.append((most, plain))
+    assert sum(still) >= 16  # some rock where the collider's points come and go
+    assert np.max(rises, axis=0)[0] <= np.max(rises, axis=0)[1]
