@@ -178,7 +178,8 @@ def corrections(
     lag_A, lag_B = lag_A + (lag_A > 0) * less_A / 2, lag_B + (lag_B > 0) * less_B / 2
 
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
-    # that speed for the last step's friction f leaves only the change of f to creep. The friction forces follow from
+    # that speed for the last step's friction f leaves only the change of f to creep. That is the law of `mjsim.memory`;
+    # surface velocities carry it into a batch, whose steps have no halves. The friction forces follow from
     # contact = (., A_x + B_x, A_y + B_y, -r A_z, r B_z, .).
     (_, inward, upward, about_x, about_y, _), (A_normal, B_normal) = contact, normals
     floor_z = lag_A * A_z + less_A * v_Az - ball.memory_A / ball.r * about_x
