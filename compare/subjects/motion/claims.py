@@ -16,6 +16,7 @@ from compare.kit.record import Measurement, state
 from compare.kit.settling import forces
 from compare.subjects.motion.measure.laws import FLUIDS
 from compare.subjects.motion.measure.motions import NAMES
+from compare.subjects.motion.measure.runs import STARTS
 from model import Case
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -143,6 +144,14 @@ LAWS = (
         "A wall contact that carries nothing, or less than friction at the floor takes from it, opens, and the ball "
         "leaves the wall as the equations say.",
         tuple(_end_of(name, "pulled off, at rest", "pulled off, going round") for name in VARIABLES),
+    ),
+    Claim(
+        "sliding",
+        "(20), (23)-(29)",
+        "A ball that slips or rolls at one contact or both moves on from case to case as the equations say.",
+        tuple(
+            _end_of(name, *(how for how in STARTS if how.startswith(("slips", "rolls", "sinks")))) for name in VARIABLES
+        ),
     ),
     Claim(
         "smooth-wall",

@@ -5,6 +5,7 @@ Each start is carried out with two time steps; what the step changes is the unce
 * *Thrown*: the ball flies past the axis of the vessel without touching anything, spinning, for as long as drag tells.
 * *Pulled off*: beside the wall, with a slip on the floor that drives it away from there; its wall contact carries
   nothing, or as good as nothing, and opens.
+* *Slips*, *rolls*, *sinks*: at one contact, at both, or off the wall, for a while, through whatever cases follow.
 * *Smooth wall*: the ball goes round with the fluid, rolls on the floor and spins against a wall without friction, in
   faster and faster flows. Does the floor hold it?
 * *Rough floor*, mu > 1: the ball rolls at both points but for a slight slip, in faster and faster flows. It may jam
@@ -22,7 +23,7 @@ import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
-from compare.kit.settling import settle
+from compare.kit.settling import PRESSES, settle
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
@@ -34,6 +35,12 @@ STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
     "thrown up": (1.2, 2.0, (60.0, 5.0, -0.6, 0.3, 0.5, -0.9, 0.5, -0.05)),
     "pulled off, at rest": (0.3, 0.4, (0.0, 0.0, 0.0, 0.0, 0.0, -1.5, 0.0, 0.0)),
     "pulled off, going round": (0.3, 0.4, (0.0, 0.0, 0.15, 0.2, 0.3, -1.5, 0.0, 0.0)),
+    "slips at the floor": (1.2, 0.5, (0.0, 0.0, 1.3, -0.9, 0.0, 0.0, 0.0, 0.0)),
+    "slips at the wall": (0.6, 0.5, (0.0, 0.0, 0.4, 0.0, 1.5, 0.0, 0.0, 0.0)),
+    "slips at both": (1.5, 0.5, (0.0, 0.0, 1.2, 0.8, 0.6, 1.0, 0.0, 0.0)),
+    "slips off the wall": (0.8, 0.5, (0.0, 0.0, 0.4, 1.2, 0.3, 0.7, 0.5, -0.1)),
+    "rolls off the wall": (1.5, 1.0, (0.0, 0.0, 0.3, 0.0, 0.2, 0.2, 0.5, -0.2)),
+    "sinks along the wall": (1.0, 1.0, (5.0, -0.3, 0.7, 0.5, 0.6, 0.8, 0.0, 0.0)),
 }
 """omega_0, how long, and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
 SMOOTH, SPUN = (0.5, 0.7, 0.9, 1.1, 1.3), 1.0
@@ -83,6 +90,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         at: dict[str, Condition] = {"start": how, "time": float(fine.time[-1]), **state_of(x.stacked())}
         if coarse.case[-1] != fine.case[-1]:
             yield Missing("runs", name, f"{how}: with half the time step the ball ends in another case")
+        elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
+            yield Missing("runs", name, f"{how}: it hardly presses, and may hover")
         elif how in ("smooth wall", "rough floor"):
             yield measurement(lab, "runs", name, p, "case", float(fine.case[-1]), tasks, **at)
         else:
