@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -286,3 +287,27 @@ def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
         "refsafe": not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE,
         **{name: getattr(data.contact, name)[number] for name in ("solref", "solreffriction", "solimp", "friction")},
     }
+
+
+def replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[str]:
+    """What the engine takes in the place of what the model says, for the contacts of one pair."""
+    asked, imp, limits = c.solref[0], c.solimp[0], (mujoco.mjMINIMP, mujoco.mjMAXIMP)
+    if (asked > 0).sum() == 1:
+        yield f"solref {asked[0]:g} {asked[1]:g} is of neither format: {SOLREF[0]:g} {SOLREF[1]:g} is taken"
+    for name in ("solref", "solreffriction"):
+        ref = getattr(c, name)
+        if (ref[0] > 0).all():
+            taken = 2 / (c.reference(ref)[1][0] * np.clip(imp[1], *limits))
+            if taken > 1.000001 * ref[0, 0]:
+                yield f"{name} {ref[0, 0]:g} s is too short for the time step: {taken:.3g} s is taken (refsafe)"
+    if c.solreffriction.any() and c.pyramidal:
+        yield "solreffriction is ignored by the pyramidal cone"
+    if (clipped := np.clip(imp[:2], *limits) != imp[:2]).any():
+        yield f"impedance {imp[:2][clipped][0]:g} is outside {limits[0]:g} … {limits[1]:g}: the limit is taken"
+    if (np.sort(c.geoms[0]) == np.sort(np.column_stack([model.pair_geom1, model.pair_geom2]))).all(1).any():
+        return  # parameters of the geoms count for nothing
+    for name, mixed in (("solref", asked), ("solimp", imp), ("friction", c.friction[0, [0, 2, 3]])):
+        own = getattr(model, f"geom_{name}")[c.geoms[0]]
+        if not np.allclose(own[0], own[1]):
+            first, second, taken = (" ".join(f"{v:g}" for v in each) for each in (*own, mixed))
+            yield f"{name} {first} ({names[c.geoms[0, 0]]}) and {second} ({names[c.geoms[0, 1]]}): {taken} is taken"

@@ -18,7 +18,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench.contact_law import LARGEST, SOLREF, Array, Contacts, contacts, parameters
+from compare.bench.contact_law import LARGEST, Array, Contacts, contacts, parameters, replaced
 from compare.kit import pages
 from model import InputError, StorageError
 
@@ -32,6 +32,8 @@ WINDOW, WINDOW_STEPS = 0.1, 50
 """A window is so long, s, and of so many steps."""
 BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
 """What the engine warns of when a model diverges."""
+OFF = 0.05
+"""Share of the predicted creep by which the measured one may differ without a word."""
 CHECKED, CHECKS = 3.0, 3
 """A changed model must settle within so many s to be advised; so many are tried, after which there is no advice."""
 SHOWN = 12
@@ -110,7 +112,8 @@ class Forecast:
     """Of all contacts together, s."""
     moving: tuple[str, ...]
     """Bodies that have not settled, in words; their pairs are left out."""
-    notes: tuple[str, ...]
+    flexible: int
+    """Contacts of flexible bodies, which are left out, too."""
     change: Change | None
     memory: bool
     """Whether creep is harmful, and stays so with any single option."""
@@ -165,11 +168,11 @@ def forecast(
     """
     those, number = contacts(model, data)
     bodies = model.geom_bodyid[those.geoms]
-    soft = int((data.contact.geom < 0).any(1).sum())
-    notes = (f"{soft} contacts of flexible bodies are left out",) if soft else ()
+    flexible = int((data.contact.geom < 0).any(1).sum())
     if not len(number):
-        also = [*notes, *(f"{each} after {data.time:.3g} s" for each in list(moving.values())[:1])]
-        raise InputError("; ".join(["nothing touches: the model has no contact under load", *also]))
+        also = f"; {flexible} contacts of flexible bodies are left out" if flexible else ""
+        also += f"; after {data.time:.3g} s {_few([*moving.values()])}" if moving else ""
+        raise InputError(f"nothing touches: the model has no contact under load{also}")
     kept = np.array([moving.keys().isdisjoint(both) for both in bodies.tolist()], bool)
     if not kept.any():
         rate = those.decay()
@@ -197,7 +200,7 @@ def forecast(
                 hover=float(law.hover[part].min()),
                 decay=own.decay(),
                 largest_step=step,
-                replaced=tuple(_replaced(model, own, names)),
+                replaced=tuple(replaced(model, own, names)),
                 harm={name: float(values[part].max()) for name, values in harm.items()}
                 | {"largest_step": those.timestep / step},
                 **{name: float(getattr(law, name)[part].max()) for name in ("depth", "creep", "turning")},
@@ -209,7 +212,7 @@ def forecast(
     step = min(alone, those.largest_step(min(alone, LARGEST)))
     best, left = _change(model, start, those, number, lambda c: _harm(c, radius, good, creep), pairs[0], len(moving))
     memory = max(pair.harm["creep"] for pair in pairs) > 1 and bool(left["creep"].max() > 1)
-    return Forecast(tuple(pairs), model.opt.timestep, step, tuple(moving.values()), notes, best, memory)
+    return Forecast(tuple(pairs), model.opt.timestep, step, tuple(moving.values()), flexible, best, memory)
 
 
 def _measured(model: Any, data: Any, c: Contacts, number: Array, bodies: Array) -> dict[str, Array]:
@@ -317,30 +320,6 @@ def _of(c: Contacts, part: Array, quantity: str) -> float:
     return c.only(part).largest_step() if quantity == "largest_step" else float(getattr(c.law(), quantity)[part].max())
 
 
-def _replaced(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[str]:
-    """What the engine takes in the place of what the model says, for the contacts of one pair."""
-    asked, imp, limits = c.solref[0], c.solimp[0], (mujoco.mjMINIMP, mujoco.mjMAXIMP)
-    if (asked > 0).sum() == 1:
-        yield f"solref {asked[0]:g} {asked[1]:g} is of neither format: {SOLREF[0]:g} {SOLREF[1]:g} is taken"
-    for name in ("solref", "solreffriction"):
-        ref = getattr(c, name)
-        if (ref[0] > 0).all():
-            taken = 2 / (c.reference(ref)[1][0] * np.clip(imp[1], *limits))
-            if taken > 1.000001 * ref[0, 0]:
-                yield f"{name} {ref[0, 0]:g} s is too short for the time step: {taken:.3g} s is taken (refsafe)"
-    if c.solreffriction.any() and c.pyramidal:
-        yield "solreffriction is ignored by the pyramidal cone"
-    if (clipped := np.clip(imp[:2], *limits) != imp[:2]).any():
-        yield f"impedance {imp[:2][clipped][0]:g} is outside {limits[0]:g} … {limits[1]:g}: the limit is taken"
-    if (np.sort(c.geoms[0]) == np.sort(np.column_stack([model.pair_geom1, model.pair_geom2]))).all(1).any():
-        return  # parameters of the geoms count for nothing
-    for name, mixed in (("solref", asked), ("solimp", imp), ("friction", c.friction[0, [0, 2, 3]])):
-        own = getattr(model, f"geom_{name}")[c.geoms[0]]
-        if not np.allclose(own[0], own[1]):
-            first, second, taken = (" ".join(f"{v:g}" for v in each) for each in (*own, mixed))
-            yield f"{name} {first} ({names[c.geoms[0, 0]]}) and {second} ({names[c.geoms[0, 1]]}): {taken} is taken"
-
-
 def _advance(model: Any, data: Any) -> Array:
     """Mean velocities of the bodies in a window, shape (nbody, 6): of the centre of mass, m/s, and turning, rad/s.
 
@@ -387,7 +366,7 @@ def tried(model: Any, data: Any, before: Forecast, limit: float, **good: Any) ->
 
 def sentences(f: Forecast) -> Iterator[str]:
     """What to do, what was found when it was tried, and what else should be known, in words."""
-    sliding = [pair.name for pair in f.pairs if pair.slides]
+    sliding = [p.name for p in f.pairs if p.slides]
     if f.change:
         name, factor, unit = QUANTITIES[f.change.quantity]
         before, after, found = (_number(v, factor) for v in (f.change.before, f.change.after, f.change.found))
@@ -400,21 +379,20 @@ def sentences(f: Forecast) -> Iterator[str]:
         )
     if sliding:
         yield f"Friction is used up, so these slide: {_few(sliding)}. No setting but more friction holds them."
-    if lost := [pair.name for pair in f.pairs if pair.slides and pair.creep_measured > pair.hover]:
+    if lost := [p.name for p in f.pairs if p.slides and p.creep_measured > p.hover]:
         yield f"These slide so fast that contact is lost again and again: {_few(lost)}."
+    if off := [p.name for p in f.pairs if abs(p.creep_measured - p.creep) > OFF * p.creep + 1e2 * STILL]:
+        yield f"Creep is not what was predicted at {_few(off)}: not settled yet, or the solver stops early (tolerance)."
     if f.moving:
         yield f"Not settled, and left out: {_few(f.moving)}."
     if not (f.change or f.memory or sliding):
         yield "Nothing needs to change."
-    replaced: dict[str, list[str]] = {}
-    for pair in f.pairs:
-        for line in pair.replaced:
-            replaced.setdefault(line, []).append(pair.name)
-    for line, names in replaced.items():
-        yield f"MuJoCo replaces something at {_few(names)}: {line}."
+    for line in dict.fromkeys(line for p in f.pairs for line in p.replaced):
+        yield f"MuJoCo replaces something at {_few([p.name for p in f.pairs if line in p.replaced])}: {line}."
     if math.isfinite(f.largest_step):
         yield f"The contacts are stable up to a step of {1e3 * f.largest_step:.3g} ms (now {1e3 * f.timestep:g} ms)."
-    yield from (f"{note}." for note in f.notes)
+    if f.flexible:
+        yield f"{f.flexible} contacts of flexible bodies are left out."
 
 
 def _number(value: float, factor: float = 1) -> str:
