@@ -117,4 +117,9 @@ class Drake(Free):
 
 defaults = Drake("drake-defaults")
 free = Drake("drake", "TAMSI, 1e10 N/m, stiction tolerance 1e-8 m/s; a box touches by its corners")
-best = Simulated("drake", free, note="a ball that lands overlaps by up to a step's way, and comes out slowly")
+best = Simulated(
+    "drake",
+    free,
+    "TAMSI, 1e10 N/m, stiction tolerance 1e-8 m/s; a box touches by its corners",
+    "a ball that lands overlaps by up to a step's way, and comes out slowly",
+)

@@ -88,4 +88,9 @@ class PyBullet(Free):
 
 defaults = PyBullet("pybullet-defaults")
 free = PyBullet("pybullet", "lengths in dm, 200 iterations to round-off, Coulomb's cone")
-best = Simulated("pybullet", free, note="a landing is late by up to a step, and forces are those at a step's beginning")
+best = Simulated(
+    "pybullet",
+    free,
+    "lengths in cm there and dm elsewhere, 200 iterations to round-off, Coulomb's cone",
+    "a landing is late by up to a step, and forces are those at a step's beginning",
+)
