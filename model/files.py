@@ -244,5 +244,10 @@ def remove_leftovers(directory: Path) -> None:
 
 
 def _temporary(path: Path) -> Path:
-    """A name beside a file's, with the machine and process that write it."""
+    """A name beside a file's, with the machine and process that write it; `StorageError` for what is no file.
+
+    The new file takes the place of the old one: as the superuser that would replace /dev/null.
+    """
+    if path.exists() and not path.is_file():
+        raise StorageError(f"cannot write {path}: it is not a file")
     return path.with_name(f".{path.name}.{_HOST}.{os.getpid()}{_SUFFIX}")
