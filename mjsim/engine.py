@@ -27,6 +27,8 @@ BLOCK = 256
 """Most samples a run keeps before it hands them out."""
 BLOCK_STEPS = 20_000
 """Most steps it takes before that, if one sample doesn't need more."""
+EVENT_TIMES = "located between the time steps; what jumps only to the step"
+"""How exact events are, as files say."""
 NOTED = 4096
 """Steps of all runs of which the cases are told at once."""
 _HUGE = 1e10
@@ -94,7 +96,7 @@ class Run:
         models = [built[p][0] for p in scenes]
         self._stepper = start(models, parameters, settings, states, theta_0, next(self._omega_0(0, 1)), batched)
         shown = settings.to_mapping() | {"t_end": float(t_end), "sample_interval": self._interval * settings.timestep}
-        shown |= {"x0": None, "theta_0": theta_0}
+        shown |= {"x0": None, "theta_0": theta_0, "event_times": EVENT_TIMES}
         self.headers = [
             Header("mujoco", p, flow, shown | {"x0": list(x)}, built[still][1])
             for p, flow, x, still in zip(parameters, flows, states, scenes, strict=True)

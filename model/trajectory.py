@@ -208,7 +208,7 @@ def _event_column(units: str, long_name: str, shape: tuple[int, ...] = (), dtype
 class Events:
     """Changes of case and impacts, arrays of shape (k,) or (k, axis)."""
 
-    time: Array = _event_column("s", "time of the event")
+    time: Array = _event_column("s", "time of the event, located between time steps")
     from_case: npt.NDArray[np.int8] = _event_column("1", "case before the event", dtype=np.int8)
     to_case: npt.NDArray[np.int8] = _event_column("1", "case after the event", dtype=np.int8)
     impulse_A: Array = _event_column("N s", "impulse of the floor on the ball, zero without impact", (3,))

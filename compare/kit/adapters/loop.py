@@ -28,6 +28,7 @@ from mjsim import limits, recorder
 from mjsim.classify import Classifier, Contacts
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, resistance
+from mjsim.engine import EVENT_TIMES
 from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import Motion, frame, from_world, to_world
@@ -127,6 +128,7 @@ def simulate(
             failure = f"{error} by t = {done * settings.timestep:g} s"
     keep(told, last=True)
     given = {"t_end": float(t_end), "sample_interval": every * settings.timestep, "x0": list(x), "theta_0": 0.0}
+    given |= {"event_times": EVENT_TIMES}
     versions = {**current_versions(), library.name: library.version}
     header = Header(engine, p, flow, asdict(settings) | given, failure=failure, versions=versions)
     block = np.concatenate(kept)
