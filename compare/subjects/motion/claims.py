@@ -71,9 +71,10 @@ def _braked_rolls(m: Measurement) -> float:
 
 
 def _slip_lasts(m: Measurement) -> float:
-    """RR where slip dies out, else SS."""
-    dies_out = slip_stability.stability(Case.RR, m.parameters) is SlipStability.STABLE
-    return float(Case.RR if dies_out else Case.SS)
+    """RR where slip dies out, else the case in which theory's motion ends: it slips at both points, or is lifted."""
+    if slip_stability.stability(Case.RR, m.parameters) is SlipStability.STABLE:
+        return float(Case.RR)
+    return float(theory(analytic.simulate, m.parameters, state(m), float(m.conditions["time"]), rtol=RTOL).case[-1])
 
 
 def _case(m: Measurement) -> float:
