@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from model.arrays import Array
 from model.errors import InputError, StorageError
-from model.parameters import NOT_NEGATIVE, POSITIVE, check_number, parse_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, REACH, Range, check_number, parse_number
 
 GAP = 10.0
 """An interval this many times the usual one (the median) is a gap in a measured flow: it wasn't measured there. A few
@@ -101,8 +101,8 @@ class Flow:
         flow = cls._pieces("sines", [0.0], [mean], [0.0])
         rows = [
             (
-                check_number(f"amplitude of wave {k}", amplitude, "rad s-1"),
-                check_number(f"frequency of wave {k}", frequency, "Hz", POSITIVE),
+                check_number(f"amplitude of wave {k}", amplitude, "rad s-1", REACH),
+                check_number(f"frequency of wave {k}", frequency, "Hz", Range(0.0, REACH.high, open=True)),
                 check_number(f"phase of wave {k}", phase, "rad"),
             )
             for k, (amplitude, frequency, phase) in enumerate(waves)
@@ -155,8 +155,8 @@ class Flow:
 
     @staticmethod
     def _check(times: Iterable[float], values: Iterable[float]) -> None:
-        t = [check_number(f"time of flow sample {k}", time, "s") for k, time in enumerate(times)]
-        v = [check_number(f"omega_0 of flow sample {k}", value, "rad s-1") for k, value in enumerate(values)]
+        t = [check_number(f"time of flow sample {k}", time, "s", REACH) for k, time in enumerate(times)]
+        v = [check_number(f"omega_0 of flow sample {k}", value, "rad s-1", REACH) for k, value in enumerate(values)]
         if not v:
             raise InputError("a flow needs at least one value of omega_0")
         if np.any(np.diff(t) <= 0):

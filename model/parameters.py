@@ -47,6 +47,8 @@ POSITIVE = Range(0.0, open=True)
 NOT_NEGATIVE = Range(0.0)
 SIZES = Range(1e-20, 1e20)
 """Of parameters that aren't 0: what is computed from them stays finite."""
+REACH = Range(-1e12, 1e12)
+"""Of flows and states, for the same reason."""
 
 
 def check_number(name: str, value: Any, unit: str, allowed: Range = ANY, meaning: str = "") -> float:
@@ -188,11 +190,11 @@ class Parameters:
         gravity : gravitational acceleration in vacuum, m s-2
         r, j, rest : R, mu, eta and omega_0 (0 if not given), drag and C_D, as in `Parameters`
         """
-        check_number("nu_f", nu_f, "m2 s-1", POSITIVE)
-        check_number("rho_f", rho_f, "kg m-3", POSITIVE)
+        given = {"nu_f": (nu_f, "m2 s-1"), "rho_f": (rho_f, "kg m-3"), "r": (r, "m"), "gravity": (gravity, "m s-2")}
+        for name, (value, unit) in given.items():
+            check_number(name, value, unit, POSITIVE)
+            check_number(name, value, unit, SIZES)
         check_number("rho_b", rho_b, "kg m-3", Range(rho_f, open=True), "a ball not denser than the fluid floats; it")
-        check_number("r", r, "m", POSITIVE)
-        check_number("gravity", gravity, "m s-2", POSITIVE)
         m, c = 4 / 3 * math.pi * r**3 * rho_b, 9 * nu_f / (2 * r**2) * rho_f / rho_b
         fluid = {"nu_f": nu_f, "density_ratio": rho_f / rho_b}
         return cls(m=m, r=r, j=j, g=gravity * (1 - rho_f / rho_b), c=c, **{"omega_0": 0.0} | rest | fluid)

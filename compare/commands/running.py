@@ -18,7 +18,7 @@ from compare.kit.tasks import Task
 from compare.kit.workers import Workers, dask, processes
 from model import Flow, InputError, Parameters, State
 from model.kinematics import UNITS, VARIABLES
-from model.parameters import Range, check_names, check_number, parse_number
+from model.parameters import REACH, Range, check_names, check_number, parse_number
 
 
 def add_flow(parser: argparse.ArgumentParser) -> None:
@@ -140,5 +140,5 @@ def start(args: argparse.Namespace) -> State:
     for item in args.start:
         name, _, value = item.partition("=")
         check_names([name], VARIABLES, "state variable")
-        values[name] = parse_number(name, value, units[name])
+        values[name] = parse_number(name, value, units[name], REACH)
     return State(**values)
