@@ -44,13 +44,17 @@ def torque(p: Parameters) -> str:
         f"the friction it takes {law.friction:.2g} of what there is"
         for law in laws
     )
-    said = f"At ω₀ = {p.omega_0:g} rad/s the fluid's torque, which is left out, brakes the spin by Stokes at the rate "
-    said += f"8πρ_fνr/(jm) = {stokes_told}"
-    if layer.Re > 8:
+    how = "at the given rate fluid_torque" if p.fluid_torque else "by Stokes at the rate 8πρ_fνr/(jm)"
+    said = f"At ω₀ = {p.omega_0:g} rad/s the fluid's torque, which is left out, brakes the spin {how} = {stokes_told}"
+    if layer.Re > 8 and not p.fluid_torque:
         said += f"; with a boundary layer, as for the spin's Re = {layer.Re:.2g}, at {layer_told}"
     if max(stokes.friction, layer.friction) > 1:
         said += ". More than 1 means that the ball can't roll at both points"
-    return said + "." + (" (If a fluid made c by Stokes' drag: which fluid isn't known.)" if not p.nu_f else "")
+    return (
+        said
+        + "."
+        + (" (If a fluid made c by Stokes' drag: which fluid isn't known.)" if not (p.nu_f or p.fluid_torque) else "")
+    )
 
 
 AT_WALLS = (

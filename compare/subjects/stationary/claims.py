@@ -101,9 +101,9 @@ def _in_region(m: Measurement) -> float:
 
 
 def _dividing(m: Measurement) -> float:
-    """omega_c of SS beyond the fold; LookupError where the region has none."""
-    if Exists.SS_BEYOND_FOLD not in _region(m):
-        raise LookupError("the region has no SS beyond the fold")
+    """omega_c of SS beyond the fold; LookupError where the region lacks it, or an attractor that it divides."""
+    if Exists.SS | Exists.SS_BEYOND_FOLD | Exists.NR not in _region(m):
+        raise LookupError("the region lacks SS, SS beyond the fold, or NR")
     return float(theory(analytic.solution, m.parameters, Case.SS, stable=False).state.omega_c)
 
 
