@@ -3,11 +3,6 @@
 import importlib
 from typing import TYPE_CHECKING, Any
 
-import model
-
-if not hasattr(model, "Parameters"):
-    raise ImportError(f"{model.__file__} hides the package model of dualball: rename that, or work in another folder")
-
 if TYPE_CHECKING:
     from compare.claim import Claim, Outcome, Verdict
     from compare.kit.check import Check

@@ -79,7 +79,7 @@ def test_the_first_lines_of_the_readme_print_what_it_says(capsys: pytest.Capture
     assert capsys.readouterr().out == printed
 
 
-@pytest.mark.parametrize("package", ["analytic", "mjsim", "compare"])
+@pytest.mark.parametrize("package", ["analytic", "mjsim", "compare.testing"])
 def test_a_foreign_model_is_named(tmp_path: Path, package: str) -> None:
     (tmp_path / "model.py").touch()
     where = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
