@@ -41,7 +41,6 @@ _STATE = "place", "force", "load", "joints", "lift", "time"
 Kept = tuple[Array, Array, Array]
 """Of each contact the geoms and its place on both in their axes, (n, 8), friction force and moment on both in their
 axes, (n, 2, 3, 2), and the normal force, (n,); m, N, N m."""
-_SPLIT = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_IMPLICIT, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
 
 class FrictionMemory:
@@ -68,18 +67,17 @@ class FrictionMemory:
     def __init__(self, model: Any, servo: float | None = None) -> None:
         self.model, self._servo = model, servo
         if servo is not None:
-            check_number(
-                "servo", servo, "s", Range(float(model.opt.timestep), math.inf), "to be no faster than a step it"
-            )
-        integrator = mujoco.mjtIntegrator(model.opt.integrator)
-        if integrator not in _SPLIT:
-            why = {
-                mujoco.mjtIntegrator.mjINT_RK4: "solves for contact forces four times a step",
-            }.get(integrator, "computes the reference accelerations anew after the place where memory enters")
-            name = integrator.name.removeprefix("mjINT_")
-            raise InputError(f"integrator = {name} {why}; a friction memory needs Euler, implicit or implicitfast")
+            check_number("servo", servo, "s", Range(float(model.opt.timestep)), "to be no faster than a step it")
+        self._check_integrator()
         self._recall, self._retain = _kernels()
         self.reset()
+
+    def _check_integrator(self) -> None:
+        name = mujoco.mjtIntegrator(self.model.opt.integrator).name.removeprefix("mjINT_")
+        if name not in ("EULER", "IMPLICIT", "IMPLICITFAST"):
+            anew = "computes the reference accelerations anew after the place where memory enters"
+            why = "solves for contact forces four times a step" if name == "RK4" else anew
+            raise InputError(f"integrator = {name} {why}; a friction memory needs Euler, implicit or implicitfast")
 
     def reset(self) -> None:
         """Forget all, as after `mj_resetData`."""
@@ -103,21 +101,22 @@ class FrictionMemory:
         Raises
         ------
         InputError
-            If the data belong to another model.
+            If the data belong to another model, or its integrator was changed to one that is refused.
         """
         model = self.model
         if data.model is not model:
             raise InputError("data belong to another MjModel than this friction memory")
-        if data.time != self._time:
-            self.reset()
+        self._check_integrator()
         for _ in range(nstep):
             mujoco.mj_step1(model, data)
+            if data.time != self._time:  # another state, or one that MuJoCo has reset as it diverged
+                self.reset()
             if data.nefc:
                 self._step2(data)
             else:
                 mujoco.mj_step2(model, data)
                 self.reset()
-        self._time = data.time
+            self._time = data.time
 
     def _step2(self, data: Any) -> None:
         model, contact = self.model, data.contact
@@ -133,7 +132,11 @@ class FrictionMemory:
         joints = slice(data.ne, data.ne + data.nf)
         if len(self._joints) == data.nf:
             reference[joints] += softness[joints] * self._joints
+        begin = data.time
         mujoco.mj_step2(model, data)
+        if data.time <= begin or (data.ncon, data.nefc) != (len(dim), len(reference)):  # reset as it diverged
+            self.reset()
+            return
         acceleration = np.empty(data.nefc)
         mujoco.mj_mulJacVec(model, data, acceleration, data.qacc)
         if data.nf:
@@ -146,11 +149,11 @@ class FrictionMemory:
 
     def _lifted(self, data: Any, used: npt.NDArray[np.intp], place: Array) -> Array:
         """Servo: move the distances that contacts hold, so that loaded ones come to have no depth; return them, m."""
-        before, contact = self._kept[0], data.contact
+        contact = data.contact
         lift: Array = np.zeros(len(place))
-        if len(before) and len(place):
-            nearest = cdist(place * _APART, before * _APART, "sqeuclidean").argmin(axis=1)
-            lift = self._lift[nearest] * (before[nearest, :2] == place[:, :2]).all(axis=1)
+        if len(self._lift) and len(place):
+            nearest, same = _nearest(place, self._kept[0])
+            lift[same] = self._lift[nearest[same]]
         gap, margin, rows = contact.dist[used], contact.includemargin[used], contact.efc_address[used]
         lift = np.clip(lift - self.model.opt.timestep / self._servo * gap, 0, margin)
         spring = data.efc_KBIP[rows, 0] * data.efc_KBIP[rows, 2] * (margin - lift)
@@ -183,8 +186,7 @@ def recall(
     world, load = np.zeros((len(used), 3, 2)), np.zeros(len(used))
     before, forces, loads = kept
     if len(before) and len(used):
-        nearest = cdist(before * _APART, place * _APART, "sqeuclidean").argmin(axis=1)
-        same = (before[:, :2] == place[nearest, :2]).all(axis=1)
+        nearest, same = _nearest(before, place)
         nearest = nearest[same]
         np.add.at(world, nearest, (axes[nearest] @ forces[same]).sum(axis=1) / 2)
         np.add.at(load, nearest, loads[same])
@@ -226,6 +228,12 @@ def retain(
     along[:, _COLUMNS] = force * np.clip(2 - share / np.maximum(KEPT * load, 1e-300), 0, 1)[:, None]
     world = frame[used].reshape(-1, 3, 3).transpose(0, 2, 1) @ along.reshape(-1, 3, 2)
     return xmat[geom[used]].reshape(-1, 2, 3, 3).transpose(0, 1, 3, 2) @ world[:, None], load
+
+
+def _nearest(place: Array, others: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    """Which of the others is nearest to each place, and whether it is of the same geoms."""
+    nearest = cdist(place * _APART, others * _APART, "sqeuclidean").argmin(axis=1)
+    return nearest, (place[:, :2] == others[nearest, :2]).all(axis=1)
 
 
 def edges(force: Array, load: Array, friction: Array, own: npt.NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -130,6 +130,18 @@ def test_what_is_refused():
             FrictionMemory(scene(option=f'integrator="{integrator}"')[0])
 
 
+@pytest.mark.parametrize(("array", "value"), [("qvel", np.nan), ("qfrc_applied", 1e300)])
+def test_a_state_that_mujoco_resets_is_forgotten(array, value, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo logs that it does
+    model, data = scene(np.radians(15))
+    stepper, fresh = FrictionMemory(model), mujoco.MjData(model)
+    stepper.step(data, 50)
+    getattr(data, array)[0] = value
+    stepper.step(data, 50)
+    FrictionMemory(model).step(fresh, 50)
+    assert (data.qpos == fresh.qpos).all()
+
+
 @CONES
 @pytest.mark.parametrize(("condim", "solref"), [(1, (0.02, 1)), (3, (-1000, 0))])
 def test_contacts_without_friction_or_damping_are_left_alone(cone, condim, solref):
