@@ -1,5 +1,6 @@
 import dataclasses
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ import xarray
 
 import model.trajectory
 from model import Case, Events, Flow, Header, InputError, Parameters, StorageError, Trajectory, storage
-from model.files import reading, seal
+from model.files import reading, seal, write_text
 from model.trajectory import SAMPLE, columns
 
 
@@ -307,3 +308,12 @@ def test_a_foreign_or_damaged_batch_is_refused(tmp_path: Path, change, says: str
         storage.load(path / "a")
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_what_is_no_file_is_not_replaced(tmp_path: Path) -> None:
+    """As the superuser, renaming a whole file to /dev/null would take it from everyone."""
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(StorageError, match="pipe: it is not a file"):
+        write_text(tmp_path / "pipe", "")
+    with pytest.raises(StorageError, match="pipe: it is not a file"):
+        storage.save(make(), tmp_path / "pipe")
