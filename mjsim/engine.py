@@ -189,11 +189,12 @@ class Run:
     def _reason(self, i: int, time: float, block: npt.NDArray[np.void]) -> str:
         """Why run i has no sample at a time, after those of a block."""
         given_up = self._stepper.given_up[i]
+        why = f"diverged by t = {time:g} s"
         if given_up <= time:
-            return f"was given up at t = {given_up:g} s, as a contact opened and closed all the time"
+            why = f"was given up at t = {given_up:g} s, since its steps were divided again and again"
         names = zip(VARIABLES, UNITS, strict=True)
         last = [f"{name} = {block[name][-1]:.6g} {unit}" for name, unit in names] if len(block) else []
-        return f"diverged by t = {time:g} s{' after ' * bool(last)}{', '.join(last)}"
+        return f"{why}{', after ' * bool(last)}{', '.join(last)}"
 
 
 def start(
