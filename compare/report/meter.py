@@ -96,12 +96,12 @@ def sentences(made: Design) -> list[str]:
             "The inertia of the fluid, which the model leaves out, would make the limit at worst about "
             f"{_number(made.with_inertia, off)} rad/s."
         )
-    said += [torque(chosen.p.replace(omega_0=request.fastest)), AT_WALLS]
     if math.isfinite(chosen.response):
         said.append(f"It follows small changes of the flow with a time constant of {_number(chosen.response, off)} s.")
     if request.slowest > 0:
         turn, ratio = 2 * math.pi / request.slowest, request.fastest / request.slowest
         said.append(f"At the slowest flow, 1/{_number(ratio)} of the fastest, a turn takes {_number(turn)} s.")
+    said += [torque(chosen.p.replace(omega_0=request.fastest)), AT_WALLS]
     p = chosen.p
     Re = float(np.max(drag.reynolds(p.R * (curve.omega_0 - curve.band[0]), p)))
     if not drag.covers(Re, p.drag):
