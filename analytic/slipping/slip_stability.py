@@ -88,7 +88,7 @@ def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters)
 
 
 def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
-    """omega_c in rad s-1 at which the ball begins to lift, at states else like x that go round with the fluid.
+    """omega_c in rad s-1 at which the ball begins to lift, at states else like x in a flow as much faster than it.
 
     Out of SR slip_x is in proportion to omega_c. Looked for between a tenth and ten times omega_c of x; nan where it
     lifts at both or at none.
@@ -98,7 +98,7 @@ def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> flo
     def rise(omega_c: float) -> float:
         slip_x = state.slip_x * omega_c / state.omega_c if inner is Case.SR else state.slip_x
         there = state._replace(omega_c=omega_c, slip_x=slip_x)
-        return lift_acceleration(inner, outer, there, p.replace(omega_0=omega_c))
+        return lift_acceleration(inner, outer, there, p.replace(omega_0=p.omega_0 * omega_c / state.omega_c))
 
     low, high = 0.1 * float(state.omega_c), 10 * float(state.omega_c)
     if rise(low) * rise(high) > 0:

@@ -243,7 +243,14 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "lift out of RR, SR and SS with 2 % more inertia": given(other(j=1.02)),
         "lift with 2 % more wall friction": given(other(eta=1.02)),
     },
-    "slipping.slip_stability.lift_onset": {"lift begins 2 % late": scaled(1.02)},
+    "slipping.slip_stability.lift_onset": {
+        "a fluid that leads makes it lift 2 % early": lambda right: (
+            lambda inner, outer, x, p: (
+                right(inner, outer, x, p) * (0.98 if p.omega_0 > 1.01 * State.of(x).omega_c else 1.0)
+            )
+        ),
+        "lift begins 2 % late": scaled(1.02),
+    },
     "slipping.slip_stability.neutral_flow": {"slip is neutral at 1 % more flow": scaled(1.01)},
     "slipping.slip_stability.stability": {
         "RS in a moving fluid with 3 % more inertia": in_case(Case.RS, given(other(j=1.03))),

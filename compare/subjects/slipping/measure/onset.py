@@ -46,6 +46,8 @@ ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
     (Case.SS, Case.NS): (0.3, 0.1, 0.8),
 }
 """Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r omega_c."""
+LEADS = 1.5
+"""How much faster than the ball the fluid goes round where a contact slips."""
 ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 """The first orbits, omega_c sqrt(R/g)."""
 NEAR = (0.05, 0.08, 0.12, 0.17)
@@ -200,10 +202,11 @@ class Arrow:
     outer: Case
 
     def start(self, omega_c: float) -> tuple[Parameters, Array]:
-        """The state at an orbit, with the fluid going round like the ball."""
+        """The state at an orbit, and the flow."""
         unit = self.p.R / self.p.r * omega_c if self.inner is Case.SR else state_units(self.p)[3]
         slips = np.array(ARROWS[self.inner, self.outer]) * unit
-        return self.p.replace(omega_0=omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
+        leads = 1.0 if self.inner is Case.RR else LEADS  # what rolls at both points may lag by next to nothing
+        return self.p.replace(omega_0=leads * omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
 
     def task(self, omega_c: float, times: int = 1) -> Task:
         """The run from there, with steps half as long as those of `short`, divided by `times`."""
