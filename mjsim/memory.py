@@ -36,7 +36,7 @@ _APART = np.array([1e6, 1e6, 1, 1, 1, 1, 1, 1])
 """Keeps contacts of different geoms apart, m."""
 _OPEN = 1e9
 """Approach that a contact allows which is open, m s-2."""
-_ELLIPTIC = mujoco.mjtCone.mjCONE_ELLIPTIC
+_ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 _STATE = "place", "force", "load", "joints", "lift", "time"
 Kept = tuple[Array, Array, Array]
 """Of each contact the geoms and its place on both in their axes, (n, 8), friction force and moment on both in their
@@ -130,7 +130,7 @@ class FrictionMemory:
         if self._servo:
             self._lift = self._lifted(data, used, place)
         joints = slice(data.ne, data.ne + data.nf)
-        if len(self._joints) == data.nf:
+        if 0 < len(self._joints) == data.nf:
             reference[joints] += softness[joints] * self._joints
         begin = data.time
         mujoco.mj_step2(model, data)
