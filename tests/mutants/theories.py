@@ -337,7 +337,6 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "landings with 5 % more floor friction": given(other(mu=1.05)),
     },
     "simulation.transitions.choose": {"after an event μ and η are exchanged": given(swapped)},
-    "simulation.transitions.leave": {"rolling is left with μ and η exchanged": given(swapped)},
     "simulation.charts._rates": {"motions with one slip have 2 % more inertia": given(other(j=1.02))},
     "simulation.charts._one_slip": {"one contact slips with 3 % more floor friction": given(other(mu=1.03))},
     "simulation.charts._ss": {"both contacts slip with 3 % more wall friction": given(other(eta=1.03))},
@@ -355,7 +354,6 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "mechanics.rolling_forces.least_utilisation": {
         "rolling is feasible with 5 % more floor friction": given(other(mu=1.05))
     },
-    "mechanics.rigid_body.slip_at_B": {"slip at the wall 1 % large": answer(lambda slip: (1.01 * slip[0], slip[1]))},
     "simulation.simulator.simulate": {
         "motions of a ball with 2 % more inertia": given(other(j=1.02)),
         "motions with 2 % more wall friction": given(other(eta=1.02)),

@@ -6,7 +6,7 @@ Fig. 12, and (83) for eta > 1, no ball shows, since a contact would have to pull
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import product
 
 import numpy as np
@@ -16,7 +16,7 @@ from scipy.special import ai_zeros
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import design, response
-from analytic.mechanics import dynamics
+from analytic.mechanics import dynamics, rolling_forces
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary import slipping_branch
 from compare.claim import Bearing, Claim, Text, When, given
@@ -60,12 +60,36 @@ def _edge(name: str) -> Bearing:
     )
 
 
+_HOLDS: dict[str, Callable[[float, Parameters], float]] = {
+    "margin": lambda omega, p: float(rolling_forces.margin(omega, p, omega)),
+    "slip_margin": lambda omega, p: float(rolling_forces.slip_margin(omega, p, omega)),
+    "least_utilisation": lambda omega, p: 1 - float(rolling_forces.least_utilisation(omega, p, omega).utilisation),
+}
+"""What changes sign where the contacts can't hold a ball any more that rolls with the fluid."""
+
+
+def _holds(name: str, quantity: str) -> Bearing:
+    """The flow up to which forces admit rolling: for mu < 1 that up to which it goes on."""
+
+    def end(m: Measurement) -> float:
+        p, unit = m.parameters.replace(omega_0=1.0), math.sqrt(m.parameters.g / m.parameters.R)
+        return float(brentq(_HOLDS[name], 0.01 * unit, 100 * unit, args=(p,), rtol=1e-12))
+
+    return Bearing("thresholds", quantity, end, when=lambda m: m.parameters.mu < 1, by=f"rolling_forces.{name}")
+
+
 CLAIMS = (
     Claim(
         "table-5-P3",
         "Table 5, P3",
         "At ω₀₁ two-point rolling gives way to slipping at both points, whose slip begins at zero.",
         (_at("omega_01"),),
+    ),
+    Claim(
+        "rolling-holds",
+        "(12), (13), (22)",
+        "Rolling at both points goes on just as long as forces within both friction cones admit it, for μ < 1.",
+        tuple(_holds(name, quantity) for name in _HOLDS for quantity in ("omega_01", "omega_03")),
     ),
     Claim(
         "table-5-P2",
