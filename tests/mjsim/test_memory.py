@@ -194,6 +194,26 @@ def test_scenes_of_the_page_hold(name):
     assert np.abs(data.xpos - place).max() < 1e-12
 
 
+def test_forces_turn_with_a_hand():
+    fingers = "".join(
+        f'<body pos="{side * 0.03} 0 0"><joint type="slide" axis="{-side} 0 0" stiffness="500" damping="20" '
+        'springref=".02"/><geom type="box" size=".01 .03 .03" mass=".2"/></body>'
+        for side in (-1, 1)
+    )
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option cone="elliptic" tolerance="1e-12"/><default><geom friction="1"/></default><worldbody><body>'
+        f'<joint axis="0 0 1" armature="1000"/><geom size=".005" contype="0" conaffinity="0"/>{fingers}</body>'
+        '<body><freejoint/><geom type="capsule" size=".02 .03" mass=".1"/></body></worldbody></mujoco>'
+    )
+    data, stepper = mujoco.MjData(model), FrictionMemory(model)
+    data.qvel[0] = 2
+    stepper.step(data, 2000)
+    height, turned = data.qpos[5], data.qpos[0]
+    stepper.step(data, 500)
+    assert data.qpos[5] == pytest.approx(height, abs=1e-12)
+    assert data.qpos[0] - turned > 1
+
+
 def test_edges_bear_what_they_should():
     """They are never negative, add up to the normal force, and give the row forces, as far as the cone goes."""
     rng = np.random.default_rng(1)
