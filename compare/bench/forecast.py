@@ -116,7 +116,7 @@ class Forecast:
     """Contacts of flexible bodies, which are left out, too."""
     change: Change | None
     memory: bool
-    """Whether creep is harmful, and stays so with any single option."""
+    """Whether creep stays harmful with the change, or without one if none helps."""
 
 
 def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
@@ -276,13 +276,7 @@ def apply(model: Any, option: str, value: Sequence[float]) -> None:
 
 
 def _change(
-    model: Any,
-    data: Any,
-    c: Contacts,
-    number: Array,
-    harm: Callable[[Contacts], dict[str, Array]],
-    pair: Pair,
-    restless: int,
+    model: Any, data: Any, c: Contacts, number: Array, harm: Callable[[Contacts], Any], pair: Pair, restless: int
 ) -> tuple[Change | None, dict[str, Array]]:
     """The first option, in its mildest value, that makes all contacts good, or else the one that helps most.
 
@@ -295,12 +289,12 @@ def _change(
         apply(other, option, value)
         mujoco.mj_fwdPosition(other, state)
         changed = dataclasses.replace(c, **parameters(other, state, number))
-        harms = harm(changed)
+        harms, effect = harm(changed), [_of(each, part, what) for each in (c, changed)]
         left = max(float(each.max()) for each in harms.values())
-        effect = [_of(each, part, what) for each in (c, changed)]
         tried.append((left, harms, Change(option, value, pair.name, what, *effect), other))
     cures = [each for each in tried if each[0] <= 1]
-    helps = sorted((each for each in tried if 1 < each[0] < pair.harm[what] / 1.4), key=lambda each: each[0])
+    helps = [each for each in tried if 1 < each[0] < pair.harm[what] / 1.4]
+    helps.sort(key=lambda each: (each[0], max(1, float(each[1][what].max()))))
     for _, harms, best, other in [*cures, *helps][:CHECKS]:
         if _restless(other, data) <= restless:
             return best, harms
@@ -374,8 +368,8 @@ def sentences(f: Forecast) -> Iterator[str]:
         yield f"Set {f.change.written}: the {name} of {f.change.pair} goes from {before} to {after} {unit}.{done}"
     if f.memory:
         yield (
-            "No single option cures the creep. Step the model with mjsim.FrictionMemory (integrator Euler, implicit or "
-            "implicitfast): what friction can hold then stays where it is."
+            f"{'That alone does not cure' if f.change else 'No single option cures'} the creep. Step the model with "
+            "mjsim.FrictionMemory (integrator Euler, implicit or implicitfast): what friction can hold then stays."
         )
     if sliding:
         yield f"Friction is used up, so these slide: {_few(sliding)}. No setting but more friction holds them."
@@ -420,8 +414,7 @@ def rows(f: Forecast) -> list[list[str]]:
 
 def title(f: Forecast) -> str:
     """What the table holds."""
-    rest = f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else ""
-    return f"{len(f.pairs)} pair{'s' * (len(f.pairs) > 1)} in contact{rest}"
+    return f"Pairs in contact: {len(f.pairs)}" + (f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else "")
 
 
 def html(f: Forecast, after: Forecast | None, file: str) -> str:
