@@ -32,12 +32,10 @@ WINDOW, WINDOW_STEPS = 0.1, 50
 """A window is so long, s, and of so many steps."""
 BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
 """What the engine warns of when a model diverges."""
-OFF = 0.05
-"""Share of the predicted creep by which the measured one may differ without a word."""
 CHECKED, CHECKS = 3.0, 3
 """A changed model must settle within so many s to be advised; so many are tried, after which there is no advice."""
-SHOWN = 12
-"""Pairs in a table; the rest are counted."""
+SHOWN, OFF = 12, 0.05
+"""Pairs in a table; and share of the predicted creep by which the measured one may differ without a word."""
 QUANTITIES = {
     "creep": ("creep", 1e6, "µm/s"),
     "depth": ("depth", 1e6, "µm"),
@@ -122,8 +120,7 @@ class Forecast:
 def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     """A model and its state, at a keyframe by name or number.
 
-    Raises `StorageError` for a file that isn't there, `InputError` for one that MuJoCo refuses and for a keyframe that
-    doesn't exist.
+    Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it or it has no such keyframe.
     """
     if not path.is_file():
         raise StorageError(f"cannot read {path}: there is no such file")
