@@ -207,9 +207,9 @@ def eventful(
 
 
 def near_axis(rho: Quantity, v: Velocity, ball: Ball) -> Quantity:
-    """Whether a ball at the distance rho from the axis is less than `_NEAR` steps away from it."""
+    """Whether a ball at the distance rho from the axis, less than R/4, is less than `_NEAR` steps away from it."""
     along = rho * v.omega_c
-    return rho * rho <= (_NEAR * ball.step) ** 2 * (v.v_h * v.v_h + along * along)
+    return (rho < ball.R / 4) & (rho * rho <= (_NEAR * ball.step) ** 2 * (v.v_h * v.v_h + along * along))
 
 
 def hovering(v: Velocity, rho: Quantity, ball: Ball) -> tuple[Quantity, Quantity]:
