@@ -39,8 +39,9 @@ class Drake(Free):
             plant.set_discrete_contact_approximation(engine.DiscreteContactApproximation.kTamsi)
         plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -case.g])
         plant.SetUseSampledOutputPorts(False)
-        moments, most = np.array(body.inertia) / body.mass, max(surface.friction for surface in case.surfaces)
-        ball = plant.AddRigidBody("body", engine.SpatialInertia(body.mass, np.zeros(3), engine.UnitInertia(*moments)))
+        most = max(surface.friction for surface in case.surfaces)
+        moments = engine.UnitInertia(*(np.array(body.inertia) / body.mass))
+        ball = plant.AddRigidBody("body", engine.SpatialInertia(body.mass, np.zeros(3), moments))
         for k, (place, shape) in enumerate(self.shapes()):
             self.add(plant, ball, place, shape, f"body{k}", most)
         self.wall, hinges = None, []
@@ -52,8 +53,8 @@ class Drake(Free):
                 turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
                 pose, shape = engine.RigidTransform(turn, point - size / 2 * normal), engine.Box(size, size, size)
             elif surface.radius or surface.turning:
-                inertia = engine.SpatialInertia(body.mass, np.zeros(3), engine.UnitInertia(HEAVY, HEAVY, HEAVY))
-                of = plant.AddRigidBody(surface.name, inertia)
+                heavy = engine.UnitInertia(HEAVY, HEAVY, HEAVY)
+                of = plant.AddRigidBody(surface.name, engine.SpatialInertia(body.mass, np.zeros(3), heavy))
                 frames = plant.world_body().body_frame(), of.body_frame()
                 hinges.append((surface, plant.AddJoint(engine.RevoluteJoint(surface.name, *frames, [0.0, 0.0, 1.0]))))
             own = most * surface.friction / (2 * most - surface.friction)  # their harmonic mean is the pair's
@@ -71,27 +72,25 @@ class Drake(Free):
         self.x[self.q : self.q + 7] = [*body.orientation, *body.position]
         self.x[self.v : self.v + 6] = [*body.spin, *body.velocity]
         for surface, joint in hinges:
-            if surface.turning:
-                self.x[plant.num_positions() + joint.velocity_start()] = surface.turning
-            else:
+            self.x[plant.num_positions() + joint.velocity_start()] = surface.turning
+            if surface.radius:
                 joint.Lock(self.context)
                 self.wall = joint.position_start()
 
     def shapes(self) -> list[tuple[Any, Any]]:
         """The shape of the body; a box in the best settings is its corners."""
         body = self.case.body
-        if body.shape == "sphere":
-            return [(engine.RigidTransform(), engine.Sphere(*body.size))]
-        if not self.best:
-            return [(engine.RigidTransform(), engine.Box(*(2 * np.array(body.size))))]
+        if body.shape == "sphere" or not self.best:
+            whole = engine.Sphere(*body.size) if body.shape == "sphere" else engine.Box(*(2 * np.array(body.size)))
+            return [(engine.RigidTransform(), whole)]
         corners = itertools.product(*((-half, half) for half in body.size))
         return [(engine.RigidTransform(np.array(corner)), engine.Sphere(1e-9)) for corner in corners]
 
-    def add(self, plant: Any, of: Any, place: Any, shape: Any, name: str, friction: float) -> None:
+    def add(self, plant: Any, of: Any, place: Any, shape: Any, name: str, mu: float) -> None:
         """A shape that touches others."""
         springs = {"dissipation": 100.0, "point_stiffness": 1e10} if self.best else {}
-        material, coefficient = engine.ProximityProperties(), engine.CoulombFriction(friction, friction)
-        engine.AddContactMaterial(**springs, friction=coefficient, properties=material)
+        material = engine.ProximityProperties()
+        engine.AddContactMaterial(**springs, friction=engine.CoulombFriction(mu, mu), properties=material)
         plant.RegisterCollisionGeometry(of, place, shape, name, material)
 
     def advance(self) -> None:
@@ -101,13 +100,11 @@ class Drake(Free):
 
     def state(self) -> State:
         """As in `Free`."""
-        spin, velocity = self.x[self.v : self.v + 3], self.x[self.v + 3 : self.v + 6]
-        return self.x[self.q + 4 : self.q + 7], velocity, spin
+        return self.x[self.q + 4 :][:3], self.x[self.v + 3 :][:3], self.x[self.v :][:3]
 
     def push(self, force: Vector) -> None:
         """As in `Free`."""
-        start = self.v - self.plant.num_positions() + 3
-        self.force[start : start + 3] = force
+        self.force[self.v - self.plant.num_positions() + 3 :][:3] = force
         self.input.FixValue(self.context, self.force)
 
     def turn(self, point: Array, normal: Array) -> None:
