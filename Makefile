@@ -6,7 +6,7 @@
 # make wheel      build sdist and wheel, and try the wheel in an empty environment
 # make check      what CI runs: lint, types, import contracts, a quick validation judged by wrong theories, a small league,
 #                 tests, docs, wheel
-# make league     physics engines on the same tasks, PyBullet and Drake where they have a wheel, Siconos where it is
+# make league     physics engines on exact contact cases: those that have a wheel, Siconos where the system has it
 # make help       this list
 # make lock       resolve the dependencies anew (needs uv)
 
