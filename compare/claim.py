@@ -33,6 +33,8 @@ class Outcome(StrEnum):
     NOT_RUN = "not run"
     ERROR = "error"
     """The prediction broke down."""
+    NOT_ASKED = "not asked"
+    """Of another engine than the one on trial."""
 
 
 class Text(StrEnum):
@@ -112,6 +114,27 @@ class Claim:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Witness:
+    """What one engine says of a claim."""
+
+    engine: str
+    outcome: Outcome
+    reason: str = ""
+    """Why it was not asked, or could not be judged."""
+    checks: tuple[Check, ...] = ()
+    """In the limit of no time step, where the engine is judged so."""
+    order: float = math.nan
+    """Median of the orders in the time step with which the numbers converge; nan where the step shows nothing."""
+    typical: float = math.nan
+    """Median of the deviations divided by their scales at MuJoCo's own step of 2 ms, or of an engine that is judged at
+    one step at that; nan where none was measured so."""
+    worst: float = math.nan
+    """The largest of these."""
+    left_out: int = 0
+    """Measurements that its protocols left out, or that it has not with every time step."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Verdict:
     """What the numbers say of a claim."""
 
@@ -122,6 +145,8 @@ class Verdict:
     """Why it could not be judged."""
     missing: tuple[Missing, ...] = ()
     """What its protocols left out, and why."""
+    witnesses: tuple[Witness, ...] = ()
+    """What every engine says, the one on trial first."""
 
     @property
     def passed(self) -> bool:

@@ -71,28 +71,32 @@ def verdict(claim: Claim, records: Records) -> Verdict:
             left_out[replace(each, rows=0)] += each.rows
     missing = tuple(replace(each, rows=rows) for each, rows in left_out.items())
     try:
-        checks = (
-            tuple(claim.algebra())
-            if claim.algebra
-            else tuple(
-                check(bearing, m)
-                for bearing in claim.bearings
-                for m in records.select(bearing.protocol, bearing.quantity, bearing.when)
-            )
-        )
+        checks = tuple(claim.algebra()) if claim.algebra else tuple(check for _, check in checks_of(claim, records))
     except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other
         reason = f"{type(error).__name__}: {error}"
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
+    return Verdict(claim=claim, outcome=outcome(checks), checks=checks, missing=missing)
+
+
+def outcome(checks: Sequence[Check]) -> Outcome:
+    """What checks come to, see `verdict`; nothing is run where there are none."""
     told = Counter(check.measurement.quantity for check in checks if check.conclusive)
     if not checks:
-        outcome = Outcome.NOT_RUN
-    elif not all(check.agrees for check in checks):
-        outcome = Outcome.REFUTED
-    elif any(2 * told[name] < count for name, count in Counter(c.measurement.quantity for c in checks).items()):
-        outcome = Outcome.INCONCLUSIVE
-    else:
-        outcome = Outcome.CONFIRMED
-    return Verdict(claim=claim, outcome=outcome, checks=checks, missing=missing)
+        return Outcome.NOT_RUN
+    if not all(check.agrees for check in checks):
+        return Outcome.REFUTED
+    if any(2 * told[name] < count for name, count in Counter(c.measurement.quantity for c in checks).items()):
+        return Outcome.INCONCLUSIVE
+    return Outcome.CONFIRMED
+
+
+def checks_of(claim: Claim, records: Records) -> list[tuple[int, Check]]:
+    """Every measurement that bears on a claim beside its prediction, with the number of its bearing."""
+    return [
+        (n, check(bearing, m))
+        for n, bearing in enumerate(claim.bearings)
+        for m in records.select(bearing.protocol, bearing.quantity, bearing.when)
+    ]
 
 
 def check(bearing: Bearing, m: Measurement) -> Check:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
@@ -13,18 +14,20 @@ from typing import Any
 
 from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Claim, Outcome, Verdict
-from compare.judge import forget, judge, select, verdict
-from compare.kit import programme, record
+from compare.judge import forget, select
+from compare.kit import programme
 from compare.kit.campaign import Campaign
 from compare.kit.drawing import Material
 from compare.kit.engines import MUJOCO, Engine
+from compare.kit.engines import engine as engine_of
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.progress import Show, Whole, nowhere
-from compare.kit.record import Records
+from compare.kit.record import Missing, Records, Testimony
 from compare.kit.workers import Spread, Workers, spread
 from compare.report import results
 from compare.report.results import Summary
+from compare.witnesses import hear
 from model import Parameters
 
 Announce = Callable[[Verdict], None]
@@ -64,36 +67,55 @@ def validate(
     results.open_directory(output)
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
     todo = [protocol for protocol in programme.needed(PROTOCOLS, names) if protocol.level <= level]
-    waiting, records, broken = {protocol.name for protocol in todo}, Records(), dict[str, str]()
-    judged: dict[str, Future[Verdict]] = {}
-    whole = Whole(progress, {protocol.name: protocol.cost for protocol in todo}, len(chosen))
+    engines = [engine, *map(engine_of, engine.beside)]
+    testimony = {each.name: dict.fromkeys(each.refine, Records()) for each in engines}
+    broken, judged = dict[str, str](), dict[str, Future[Verdict]]()
 
     def judge_what_is_there() -> None:
+        waiting = Counter(protocol.name for protocol, _ in jobs)
         for claim in chosen:
-            if claim.id not in judged and not waiting & claim.protocols:
-                judged[claim.id] = bench.submit(_announced, claim, records, dict(broken), announce)
+            if claim.id not in judged and not waiting.keys() & claim.protocols:
+                heard = {name: dict(steps) for name, steps in testimony.items()}
+                judged[claim.id] = bench.submit(_announced, claim, heard, dict(broken), announce)
                 judged[claim.id].add_done_callback(lambda _: whole.judged())
 
+    whole = Whole(progress, {}, len(chosen))
     with (
         ThreadPoolExecutor(1) as bench,  # judges while the next protocols' runs are on their way
         Campaign(output / results.RUNS, workers, limit=limit, report=whole.measuring) as campaign,
     ):
+        labs = [Lab(campaign, each, level, refine) for each in engines for refine in each.refine]
+        jobs = [(protocol, lab) for lab in labs for protocol in todo if protocol.measures(lab)]
+        whole.costs = {programme.called(protocol.name, lab): programme.cost((protocol, lab)) for protocol, lab in jobs}
         judge_what_is_there()
-        for protocol, found in programme.run(todo, Lab(campaign, engine, level), sets, output):
-            waiting.remove(protocol.name)
-            whole.measured(protocol.name)
+        for job, found in programme.run(tuple(jobs), sets, output):
+            protocol, lab = job
+            jobs.remove(job)
+            name = programme.called(protocol.name, lab)
+            whole.measured(name)
             if isinstance(found, Records):
-                records += found
-            else:  # a protocol that breaks down takes its own claims with it, and no others
+                testimony[lab.engine.name][lab.refine] += found
+            elif lab.engine is engine:  # a protocol that breaks down takes its own claims with it, and no others
                 broken[protocol.name] = f"{protocol.name}: {type(found).__name__}: {found}"
+            else:
+                why = Missing(protocol.name, "all", f"{name}: {type(found).__name__}: {found}")
+                testimony[lab.engine.name][lab.refine] += Records(missing=(why,))
             judge_what_is_there()
     verdicts = {name: future.result() for name, future in judged.items()}
-    files = [path for each in PROTOCOLS if (path := programme.file(each, output, engine, level, sets)).exists()]
+    files = {
+        each.name: {refine: _files(output, Lab(campaign, each, level, refine), sets) for refine in each.refine}
+        for each in engines
+    }
     count = workers if isinstance(workers, int) else workers.count
     with spread(min(count, os.cpu_count() or 1)) as over:
         draw = whole.drawing(over) if report else None
-        _write(output, level, files, sum(map(record.load, files), Records()), verdicts, draw)
+        _write(output, level, files, results.testimony(files), verdicts, draw)
     return [verdicts[claim.id] for claim in chosen]
+
+
+def _files(output: Path, lab: Lab, sets: Mapping[str, Parameters] | None) -> list[Path]:
+    asked = [protocol for protocol in PROTOCOLS if protocol.measures(lab)]
+    return [path for each in asked if (path := programme.file(each, output, lab, sets)).exists()]
 
 
 def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, workers: int = 0) -> list[Verdict]:
@@ -107,45 +129,47 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
     summary = results.load(directory)
     stored.cache_clear()
     forget()
-    records = stored(directory)  # what can't be read is said before anything is judged
-    files = [directory / name for name in summary.measurements]
+    testimony = stored(directory)  # what can't be read is said before anything is judged
+    files = summary.files(directory)
     with spread(workers) as over:  # the last claims first: they take longest
         found = over(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
         verdicts = {claim.id: Verdict(claim=claim, **each) for claim, each in zip(CLAIMS[::-1], found, strict=True)}
-        written = _write(directory, Level[summary.level], files, records, verdicts, over)
+        written = _write(directory, Level[summary.level], files, testimony, verdicts, over)
     return [v for v in written if v.claim.id in chosen]
 
 
 def _judged(directory: Path, number: int) -> dict[str, Any]:
     """What there is to say of a claim; claims themselves don't go from process to process."""
-    judged = verdict(CLAIMS[number], stored(directory))
+    judged = hear(CLAIMS[number], stored(directory))
     return {name: value for name, value in vars(judged).items() if name != "claim"}
 
 
 @cache
-def stored(directory: Path) -> Records:
+def stored(directory: Path) -> Testimony:
     """The measurements of the last validation in a directory, read once in a process."""
-    return results.load(directory).records(directory)
+    return results.testimony(results.load(directory).files(directory))
 
 
-def material(directory: Path, verdicts: Sequence[Verdict], records: Records) -> Material:
-    """What figures of a results directory are made of."""
-    return Material({v.claim.id: v.checks for v in verdicts}, records, directory)
+def material(directory: Path, verdicts: Sequence[Verdict], testimony: Testimony) -> Material:
+    """What figures of a results directory are made of: of engines beside the one on trial at half the usual step."""
+    checks = {v.claim.id: (*v.checks, *(c for w in v.witnesses[1:] for c in w.checks)) for v in verdicts}
+    first, *others = [steps.get(2, steps[min(steps)]) for steps in testimony.values()] or [Records()]
+    return Material(checks, first, directory, sum(others, Records()))
 
 
 def stored_material(directory: Path) -> Material:
     """The same from what is stored, judged again; of theory alone if nothing is."""
     if not (directory / results.SUMMARY).exists():
         return Material()
-    records = results.load(directory).records(directory)
-    return material(directory, judge(CLAIMS, records), records)
+    testimony = stored(directory)
+    return material(directory, [hear(claim, testimony) for claim in CLAIMS], testimony)
 
 
 def _write(
     directory: Path,
     level: Level,
-    files: Sequence[Path],
-    records: Records,
+    files: results.Files,
+    testimony: Testimony,
     known: Mapping[str, Verdict],
     over: Spread | None,
 ) -> list[Verdict]:
@@ -153,21 +177,21 @@ def _write(
 
     Return the verdicts on all claims.
     """
-    others = {v.claim.id: v for v in judge([claim for claim in CLAIMS if claim.id not in known], records)}
-    verdicts = [known.get(claim.id) or others[claim.id] for claim in CLAIMS]
+    verdicts = [known.get(claim.id) or hear(claim, testimony) for claim in CLAIMS]
     summary = Summary.of(directory, verdicts, level, files)
     if over:
         from compare.report import report as page  # here, because drawing takes a second to load
 
-        page.write(material(directory, verdicts, records), verdicts, summary, over)
+        page.write(material(directory, verdicts, testimony), verdicts, summary, over)
     else:
         results.save(summary, directory)
     return verdicts
 
 
-def _announced(claim: Claim, records: Records, broken: Mapping[str, str], announce: Announce) -> Verdict:
+def _announced(claim: Claim, testimony: Testimony, broken: Mapping[str, str], announce: Announce) -> Verdict:
     """The verdict, or that one of the protocols of its claim broke down."""
-    (judged,) = judge([claim], records)
+    forget()
+    judged = hear(claim, testimony)
     if errors := [why for name, why in broken.items() if name in claim.protocols]:
         judged = replace(judged, outcome=Outcome.ERROR, error="; ".join(errors))
     announce(judged)

@@ -47,8 +47,8 @@ class Regularised(Protocol):
         """s"""
 
     @property
-    def memory(self) -> bool:
-        """Whether friction that the engine regularises is corrected for."""
+    def rolls(self) -> float:
+        """Share of `regularisation_speed` below which a contact rolls; from three times that on it slips."""
 
     @property
     def midpoint(self) -> float:
@@ -125,7 +125,7 @@ class Classifier:
         # A friction force of which one step can build up only a part leaves, while it changes slowly, a creep far
         # below the speed that belongs to all of it.
         load = self._coefficients * np.maximum(normal / self._m, self._g)
-        band = settings.regularisation_speed(load) * (1e-3 if settings.memory else 3.0)
+        band = settings.regularisation_speed(load) * settings.rolls
         saturated = friction >= (1 - _SATURATED) * limit
         # A rotation that slips at both contacts alike while one of them holds is creep, too: the load moves from one
         # to the other, as it may where both roll, and slip would be stopped by the one that holds.

@@ -197,6 +197,11 @@ class ContactSettings:
         """Slip speed (m s-1) below which one step can't build up the friction force m `load`: R_t f_t / b_f."""
         return np.asarray(self.softness / self.impratio * np.asarray(load, dtype=float) / self.b_f)
 
+    @property
+    def rolls(self) -> float:
+        """Share of `regularisation_speed` below which a contact rolls: without memory one that does creeps so fast."""
+        return 1e-3 if self.memory else 0.4
+
     def creep_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) of a contact that rolls steadily under the friction force m `load`; 0 with memory."""
         return self.regularisation_speed(load) * (0.0 if self.memory else 1.0)

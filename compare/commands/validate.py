@@ -105,6 +105,9 @@ def line(verdict: Verdict) -> Text:
         found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
         count = len(verdict.checks)
         shown.append("; ".join([f"{count:>5} number{'s' if count > 1 else ''}", *found]))
+    for each in verdict.witnesses[1:]:
+        kind, mark = wording.MARKS[each.outcome]
+        shown.append(f"; {each.engine} ").append(f"{mark} {each.outcome}", _STYLES[kind])
     if verdict.error:
         shown.append(f"  {verdict.error}", "red")
     if verdict.outcome is Outcome.NOT_RUN and verdict.missing:
@@ -116,7 +119,14 @@ def summary(verdicts: Sequence[Verdict]) -> Text:
     """How many claims and numbers came out how."""
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     said = "; ".join([wording.headline(ran), *map(" ".join, wording.totals(ran))])
-    return Text(f"{said}. {wording.missing(ran)}".strip(), "bold")
+    shown = Text(f"{said}. {wording.missing(ran)}".strip(), "bold")
+    for each in wording.witnesses(ran):
+        shown.append(
+            f"\n{each['engine']}: {each['confirmed']} of {each['asked']} claims confirmed, {each['refuted']} refuted; "
+            f"typical deviation {each['typical']}, worst {each['worst']} ({each['about']})",
+            "not bold",
+        )
+    return shown
 
 
 def checks(verdict: Verdict) -> Table:

@@ -29,6 +29,8 @@ class Check:
     """Largest deviation that still agrees."""
     scale: float
     relation: Relation = Relation.EQUAL
+    ceiling: float | None = None
+    """What it may overlook, where that isn't what its quantity says."""
 
     @property
     def deviation(self) -> float:
@@ -59,4 +61,5 @@ class Check:
     @property
     def conclusive(self) -> bool:
         """Whether the check resolves as much as its quantity asks for."""
-        return self.resolves <= quantity(self.measurement.quantity).resolves
+        ceiling = quantity(self.measurement.quantity).resolves if self.ceiling is None else self.ceiling
+        return self.resolves <= ceiling

@@ -35,6 +35,8 @@ class Material:
     records: Records = Records()
     directory: Path = Path()
     """The results directory, where names of run files begin."""
+    beside: Records = Records()
+    """What other engines measured at steps that users take."""
 
     def select(self, quantity: str, *conditions: str) -> Iterator[Measurement]:
         """Measurements of a quantity that have conditions of these names."""

@@ -28,11 +28,16 @@ class Lab:
     engine: Engine
     level: Level
     refine: int = 1
-    """Time steps in one that a protocol asks for: the engine's limit of no step is found with several."""
+    """Time steps in one that a protocol asks for, see `Engine.refine`."""
 
     def effort(self, name: str) -> Any:
         """How much of something is measured at this level, see `compare.kit.levels`."""
-        return levels.effort(name, self.level)
+        return levels.effort(name, self.level, beside=self.beside)
+
+    @property
+    def beside(self) -> bool:
+        """Whether the engine is heard beside the one on trial, or in its place, with time steps of its own."""
+        return self.engine.refine != (1,)
 
     def task(
         self,
@@ -44,11 +49,16 @@ class Lab:
         flow: Flow | None = None,
         samples: int = 100,
     ) -> Task:
-        """A run of the engine on trial with a time step in s, in the studies' settings."""
+        """A run of the engine on trial with a time step in s, in the studies' settings.
+
+        One that goes on from another begins on floor and wall, into which contacts may have let it sink.
+        """
+        x = np.array(x0, float)
+        x[[0, 6][: len(x) // 4]] = np.maximum(x[[0, 6][: len(x) // 4]], 0.0)  # y, and h where it is given
         return Task(
             engine=self.engine.name,
             parameters=p,
-            x0=x0,
+            x0=x,
             t_end=t_end,
             flow=flow,
             settings=self.engine.at(step / self.refine, p),

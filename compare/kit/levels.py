@@ -20,6 +20,9 @@ _FLOWS = (
 )
 EFFORT: dict[str, tuple[Any, Any, Any]] = {
     # quick, default, full
+    # settling: lengths of successive rounds, in units of `settling.SPAN`. The later ones are longer, because a ball on
+    # the wall that goes on from its mean swings again, if less, and that has to die out, too.
+    "settling.rounds": ((1.0, 2.0, 2.0), (1.0, 2.0, 2.0), (1.0, 2.0, 2.0)),
     # settled: flows omega_0 sqrt(R/g), and the share of the drift limit down to which a state goes on. The five flows
     # of quick were chosen with results in sight, so that on the sets of quick they bracket every threshold.
     "settled.flows": ((0.62, 1.4, 1.7, 2.5, 4.2), _FLOWS, _FLOWS),
@@ -68,6 +71,14 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
 }
 
 
-def effort(name: str, level: Level) -> Any:
-    """The entry of `EFFORT` for a level."""
-    return EFFORT[name][level]
+BESIDE: dict[str, Any] = {
+    # engines beside the one on trial measure as much as the quick level at every level, but for this
+    "settled.flows": (0.62, 1.7, 4.2),
+    "settling.rounds": (0.5,),
+    "thresholds.width": 5e-4,
+}
+
+
+def effort(name: str, level: Level, beside: bool = False) -> Any:
+    """The entry of `EFFORT` for a level, or of an engine beside the one on trial."""
+    return BESIDE[name] if beside and name in BESIDE else EFFORT[name][Level.QUICK if beside else level]

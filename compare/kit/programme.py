@@ -16,7 +16,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 from compare.kit import record
-from compare.kit.engines import Engine
+from compare.kit.engines import NEWCOMER, PLAIN, Engine
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records
@@ -31,6 +31,8 @@ MOST = 3e4
 """Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or more at a time; and
 contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c is three times that: as much as
 `omega_c` may be off in a state that counts as settled."""
+TWELVE = 12
+"""Sets, at most, that engines beside the one on trial measure at the default and the full level."""
 Measure = Callable[[Lab, Mapping[str, Parameters], Records], Iterable[Measurement | Missing]]
 ONE = ("reference",)
 """For what one ball shows as well as seven, or the paper draws for one."""
@@ -38,6 +40,8 @@ TWO = ("reference", "high-wall-friction")
 """One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
 LAWS = ("reference", "wake", "blunt")
 """One for each law of drag."""
+FOUR = (*TWO, "rough-floor", "wake")
+"""These two, a floor rough enough for balls that slip and balls that ride the wall at one flow, a law of drag."""
 SEVEN = (*TWO, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
 """Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride the wall at one flow;
 drag so strong that nothing folds; two other laws of drag; friction of the wall above that of the floor and the inertia.
@@ -67,22 +71,38 @@ class Protocol:
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
     engine: Engine | None = None
     """Who measures, where it isn't the engine on trial."""
+    plain: tuple[str, ...] = ()
+    """The sets that plain MuJoCo measures at the quick level, in the limit of no time step. At the others it measures
+    twelve of these protocols, and `reference` of the rest."""
+    follows: bool = False
+    """Whether an engine beside the one on trial looks where that one found something."""
+    defaults: tuple[str, ...] = ()
+    """The sets that MuJoCo as it comes measures."""
     drawn: Callable[[Measurement], bool] = lambda m: False
     """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is stored."""
 
-    def measures(self, level: Level) -> dict[str, Parameters]:
-        """The sets that it measures at a level, by name."""
-        return {name: p for name, p in sets(level).items() if level > Level.QUICK or name in self.quick}
+    def measures(self, lab: Lab) -> dict[str, Parameters]:
+        """The sets that it measures at a level with an engine, by name."""
+        asked = {PLAIN.name: self.plain, NEWCOMER.name: self.defaults}.get(lab.engine.name, self.quick)
+        known = sets(lab.level)
+        if lab.level > Level.QUICK:
+            asked = tuple(known)
+            if lab.beside:
+                asked = asked[: 1 if not self.plain else TWELVE] if lab.engine is PLAIN else self.defaults
+        return {name: p for name, p in known.items() if name in asked}
 
 
-def file(
-    protocol: Protocol, results: Path, engine: Engine, level: Level, chosen: Mapping[str, Parameters] | None
-) -> Path:
-    """Where measurements are kept; those of another engine, level, choice of sets, or program are apart."""
-    engine, sets = protocol.engine or engine, protocol.measures(level) if chosen is None else chosen
+Job = tuple[Protocol, Lab]
+"""A protocol, and where it is carried out."""
+
+
+def file(protocol: Protocol, results: Path, lab: Lab, chosen: Mapping[str, Parameters] | None) -> Path:
+    """Where measurements are kept; those of another engine, step, level, choice of sets, or program are apart."""
+    engine, sets = protocol.engine or lab.engine, protocol.measures(lab) if chosen is None else chosen
     identity = [
         engine.name,
-        level.name,
+        lab.refine,
+        lab.level.name,
         {name: asdict(p) for name, p in sets.items()},
         _program(engine, protocol.measure.__module__),
     ]
@@ -95,6 +115,18 @@ def _program(engine: Engine, module: str) -> str:
     """Digest of the sources of an engine, of what all protocols share, and of those of a subject."""
     subject, measure, _ = module.partition(".measure")
     return sources(*engine.sources, "compare.kit", *([subject + measure] if measure else []))
+
+
+def called(protocol: str, lab: Lab) -> str:
+    """The name of a protocol, and of the engine and its step where these are not those on trial."""
+    return f"{protocol} by {lab.engine.name}, step/{lab.refine}" if lab.beside else protocol
+
+
+def cost(job: Job) -> float:
+    """Processor time at the quick level, about."""
+    protocol, lab = job
+    asked = len(protocol.measures(replace(lab, level=Level.QUICK))) / max(len(protocol.quick), 1)
+    return protocol.cost * asked * lab.refine if lab.beside else protocol.cost
 
 
 def needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
@@ -110,37 +142,42 @@ def needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol
 
 
 def run(
-    protocols: Sequence[Protocol], lab: Lab, chosen: Mapping[str, Parameters] | None, results: Path
-) -> Iterator[tuple[Protocol, Records | Exception]]:
+    jobs: Sequence[Job], chosen: Mapping[str, Parameters] | None, results: Path
+) -> Iterator[tuple[Job, Records | Exception]]:
     """Carry out protocols, some at once if they need nothing of each other; yield each as it ends, with its records.
 
     A protocol that breaks down comes with its exception, and takes no other with it: those that need it go without.
     The sets are those `chosen`, or each protocol's own. Raises `StorageError` where files can't be read or written.
     """
-    known = {protocol.name: protocol for protocol in protocols}
-    order = TopologicalSorter({p.name: [name for name in p.needs if name in known] for p in protocols})
+    known = {called(protocol.name, lab): (protocol, lab) for protocol, lab in jobs}
+    needs = {name: [called(other, lab) for other in protocol.needs] for name, (protocol, lab) in known.items()}
+    for name, (protocol, _) in known.items():
+        if name != protocol.name and protocol.follows:
+            needs[name].append(protocol.name)
+    order = TopologicalSorter({name: [each for each in those if each in known] for name, those in needs.items()})
     order.prepare()
     found: dict[str, Records] = {}
-    running: dict[Future[Records], Protocol] = {}
-    with ThreadPoolExecutor(lab.campaign.at_once) as threads:
+    running: dict[Future[Records], str] = {}
+    campaign = jobs[0][1].campaign if jobs else None
+    with ThreadPoolExecutor(campaign.at_once if campaign else 1) as threads:
         try:
             while order.is_active():
-                ready = [known[name] for name in order.get_ready()]
-                for protocol in sorted(ready, key=lambda each: (not each.first, -each.cost)):
-                    before = sum((found[name] for name in protocol.needs if name in found), Records())
-                    running[threads.submit(carry_out, protocol, lab, chosen, before, results)] = protocol
+                for name in sorted(order.get_ready(), key=lambda name: (not known[name][0].first, -cost(known[name]))):
+                    before = sum((found[other] for other in needs[name] if other in found), Records())
+                    running[threads.submit(carry_out, *known[name], chosen, before, results)] = name
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    protocol, error = running.pop(future), future.exception()
-                    order.done(protocol.name)
+                    name, error = running.pop(future), future.exception()
+                    order.done(name)
                     if error is None:
-                        found[protocol.name] = future.result()
-                        yield protocol, future.result()
+                        found[name] = future.result()
+                        yield known[name], future.result()
                     elif isinstance(error, StorageError) or not isinstance(error, Exception):
                         raise error  # a full disk, or a file that was touched, is for the user to mend
                     else:
-                        yield protocol, error
+                        yield known[name], error
         except BaseException:
-            lab.campaign.give_up()  # else the threads would wait for runs that nobody wants any more
+            assert campaign
+            campaign.give_up()  # else the threads would wait for runs that nobody wants any more
             threads.shutdown(cancel_futures=True)
             raise
 
@@ -155,12 +192,12 @@ def carry_out(
     Raises `StorageError` where measurements can't be read or written; a run that breaks down raises
     `SimulationError`, as far as the protocol can't go on without it.
     """
-    path = file(protocol, results, lab.engine, lab.level, chosen)
+    path = file(protocol, results, lab, chosen)
     label = f"{protocol.name}-{path.parent.name}"
-    campaign = lab.campaign.under(label, protocol.name)
+    campaign = lab.campaign.under(label, called(protocol.name, lab))
     lab = replace(lab, engine=protocol.engine or lab.engine, campaign=campaign)
     if not path.exists():
-        sets = protocol.measures(lab.level) if chosen is None else chosen
+        sets = protocol.measures(lab) if chosen is None else chosen
         weak = {name: why for name, p in sets.items() if (why := _too_weak(p, protocol))}
         strong = {name: p for name, p in sets.items() if name not in weak}
         rows: list[Measurement | Missing] = [Missing(protocol.name, name, why) for name, why in weak.items()]
@@ -172,7 +209,7 @@ def carry_out(
         about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
         place = f"{campaign.directory.name}/{label}.h5"
         for k, row in enumerate(rows):
-            if isinstance(row, Measurement) and protocol.drawn(row):
+            if isinstance(row, Measurement) and protocol.drawn(row) and not lab.beside:
                 rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
         record.save(Records.of(rows), path, about)
     records = record.load(path)

@@ -92,7 +92,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         )
     measured = {name for m in material.records.measurements for name in m.runs}
     sets = {m.set for m in material.records.measurements}
-    known = summary.provenance
+    known, made = summary.provenance, [files for each in summary.measurements.values() for files in each.values()]
     return pages.render(
         "compare.report",
         "report.html",
@@ -101,6 +101,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         missing=wording.missing(ran),
         lead=f"A ball rolls and slips round a cylinder. {lead}",
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
+        witnesses=wording.witnesses(ran),
         tiles=[*wording.totals(ran), (str(len(measured)), f"simulations with {len(sets)} parameter sets")],
         figures=[figure for figure in apart if not figure["gap"]],
         sections=sections,
@@ -118,7 +119,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
             "versions": ", ".join(f"{name} {version}" for name, version in known.get("versions", {}).items()),
             "commit": known.get("commit", "") or "not from a checkout",
             "machine": known.get("machine", ""),
-            "measurements": ", ".join(summary.measurements) or "none",
+            "measurements": ", ".join(each for files in made for each in files) or "none",
         },
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,17 +13,21 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from compare.claim import Verdict
+from compare.claim import Verdict, Witness
 from compare.kit import record
 from compare.kit.levels import Level
-from compare.kit.record import Records
+from compare.kit.record import Records, Testimony
 from compare.kit.statistics import plain
 from model.errors import StorageError
 from model.files import make_directory, write_text
 from model.trajectory import current_commit, current_versions
 
 SUMMARY, REPORT, RUNS, FIGURES = "summary.json", "report.html", "runs", "figures"
-SCHEMA, SCHEMA_VERSION = "dualball-summary", 4
+SCHEMA, SCHEMA_VERSION = "dualball-summary", 5
+
+
+Files = Mapping[str, Mapping[int, Sequence[Path]]]
+"""Files of measurements by engine and time steps in one that a protocol asks for."""
 
 
 @dataclass(frozen=True)
@@ -30,16 +35,20 @@ class Summary:
     """What a validation came to, as JSON-able data."""
 
     level: str = Level.QUICK.name
-    measurements: tuple[str, ...] = ()
-    """Files of the measurements that were judged, relative to the results directory."""
+    measurements: Mapping[str, Mapping[str, Sequence[str]]] = field(default_factory=dict)
+    """Files of the measurements that were judged, relative to the results directory: by engine, the one on trial first,
+    and time steps in one that a protocol asks for."""
     verdicts: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """By claim id: outcome, number of checks, resolving power; the checks follow from the measurements."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, directory: Path, verdicts: Iterable[Verdict], level: Level, measured: Sequence[Path]) -> Summary:
+    def of(cls, directory: Path, verdicts: Iterable[Verdict], level: Level, measured: Files) -> Summary:
         """The verdicts of now on the measurements in the files `measured`."""
-        files = tuple(path.relative_to(directory).as_posix() for path in measured)
+        files = {
+            engine: {str(n): [path.relative_to(directory).as_posix() for path in paths] for n, paths in steps.items()}
+            for engine, steps in measured.items()
+        }
         provenance = {
             "versions": dict(current_versions()),
             "commit": current_commit(),
@@ -48,9 +57,20 @@ class Summary:
         }
         return cls(level.name, files, {verdict.claim.id: _outcome(verdict) for verdict in verdicts}, provenance)
 
-    def records(self, directory: Path) -> Records:
-        """The measurements that were judged, to be judged again; raises `StorageError` for a file that is not whole."""
-        return sum((record.load(directory / name) for name in self.measurements), Records())
+    def files(self, directory: Path) -> Files:
+        """The files of the measurements that were judged."""
+        return {
+            engine: {int(n): [directory / name for name in names] for n, names in steps.items()}
+            for engine, steps in self.measurements.items()
+        }
+
+
+def testimony(files: Files) -> Testimony:
+    """The measurements that were judged, to be judged again; raises `StorageError` for a file that is not whole."""
+    return {
+        engine: {refine: sum(map(record.load, paths), Records()) for refine, paths in steps.items()}
+        for engine, steps in files.items()
+    }
 
 
 def described(verdict: Verdict) -> dict[str, Any]:
@@ -74,8 +94,17 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
     counts["left_out"] = verdict.left_out
     power = {"resolving_power": dict(verdict.resolving_power), "worst": verdict.worst}
     less = {"expected": verdict.claim.expected, "missing": [*map(str, verdict.missing)], "error": verdict.error}
+    about["witnesses"] = {each.engine: _said(each) for each in verdict.witnesses}
     told: dict[str, Any] = plain(about | {"checks": len(verdict.checks)} | counts | power | less)
     return told
+
+
+def _said(witness: Witness) -> dict[str, Any]:
+    """What one engine says of a claim."""
+    share = max((check.share for check in witness.checks), default=math.nan)
+    said = {name: getattr(witness, name) for name in ("outcome", "reason", "order", "left_out")}
+    usual = {"typical": witness.typical, "worst": witness.worst}
+    return said | {"checks": len(witness.checks), "worst": share, "deviation_at_2ms": usual}
 
 
 def open_directory(directory: Path) -> None:
@@ -104,10 +133,12 @@ def load(directory: Path) -> Summary:
         raise StorageError(f"{path} is in another format than this program's: choose another directory with --output")
     try:
         Level[content["level"]]
-        files = tuple(str(name) for name in content["measurements"])
-        summary = Summary(content["level"], files, dict(content["verdicts"]), dict(content["provenance"]))
+        summary = Summary(
+            content["level"], dict(content["measurements"]), dict(content["verdicts"]), dict(content["provenance"])
+        )
+        summary.files(directory)
         version, ours = summary.provenance["versions"]["dualball"], current_versions()["dualball"]
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise StorageError(f"{path} is damaged: it is not what a validation writes") from error
     if version != ours:
         raise StorageError(

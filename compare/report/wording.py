@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from statistics import median
 
-from compare.claim import Outcome, Text, Verdict
+from compare.claim import Outcome, Text, Verdict, Witness
 from compare.kit.check import Check
+from compare.kit.engines import ENGINES
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES, quantity
 from compare.kit.record import Condition, Measurement
@@ -26,6 +28,7 @@ MARKS = {
     Outcome.INCONCLUSIVE: ("other", "?"),
     Outcome.ERROR: ("fail", "!"),
     Outcome.NOT_RUN: ("none", "…"),
+    Outcome.NOT_ASKED: ("none", "–"),
 }
 """Class and sign of each outcome."""
 
@@ -94,6 +97,39 @@ def findings(verdict: Verdict) -> dict[str, str]:
     if verdict.left_out:
         found["Left out by its protocols"] = str(verdict.left_out)
     return found
+
+
+def heard(witness: Witness) -> str:
+    """What an engine beside the one on trial says of a claim, in a sentence."""
+    if witness.outcome in (Outcome.NOT_ASKED, Outcome.ERROR):
+        return f"{witness.outcome}: {witness.reason}"
+    order = f", converging with order {witness.order:.1f}" if math.isfinite(witness.order) else ""
+    at = f"; at 2 ms typically off by {witness.typical:.1g}, at most {witness.worst:.1g}"
+    left_out = f"; {witness.left_out} not measured" if witness.left_out else ""
+    numbers = f" on {len(witness.checks)} numbers" if witness.checks else ""
+    return f"{witness.outcome}{numbers}{order}{at if math.isfinite(witness.worst) else ''}{left_out}"
+
+
+def witnesses(ran: Sequence[Verdict]) -> list[dict[str, str]]:
+    """What each engine says of all claims: what it is, how many claims came out how, and its deviations."""
+    rows = []
+    for name in dict.fromkeys(each.engine for verdict in ran for each in verdict.witnesses):
+        own = [(verdict, each) for verdict in ran for each in verdict.witnesses if each.engine == name]
+        counts = Counter(each.outcome for _, each in own)
+        expected = sum(each.outcome is v.claim.expected is not Outcome.CONFIRMED for v, each in own)
+        off = [each for _, each in own if math.isfinite(each.typical)]
+        row = {
+            "engine": name,
+            "about": ENGINES[name].about,
+            "asked": str(len(own) - counts[Outcome.NOT_ASKED]),
+            "confirmed": f"{counts[Outcome.CONFIRMED]}",
+            "refuted": f"{counts[Outcome.REFUTED]}" + (f" ({expected} as expected)" if expected else ""),
+            "open": str(counts[Outcome.INCONCLUSIVE] + counts[Outcome.ERROR] + counts[Outcome.NOT_RUN]),
+            "typical": f"{median(each.typical for each in off):.1g}" if off else "–",
+            "worst": f"{max(each.worst for each in off):.1g}" if off else "–",
+        }
+        rows.append(row)
+    return rows
 
 
 def headline(ran: Sequence[Verdict]) -> str:

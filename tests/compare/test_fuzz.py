@@ -171,7 +171,7 @@ def test_damage_is_one_line(
 def results_of(measurements: Path) -> Path:
     """A results directory with these measurements, before they are damaged."""
     directory = measurements.parents[1]
-    results.save(results.Summary.of(directory, [], Level.QUICK, [measurements]), directory)
+    results.save(results.Summary.of(directory, [], Level.QUICK, {"mujoco": {1: [measurements]}}), directory)
     return directory
 
 
@@ -243,11 +243,12 @@ def test_a_damaged_summary_is_one_line(
         summary.write_bytes(mutated(good, rng))
         try:
             stored = results.load(tmp_path)
-            stored.records(tmp_path)
+            results.testimony(stored.files(tmp_path))
         except StorageError as error:
             refusals.append(str(error))
         else:  # what is not a reference to measurements is made anew by judging
-            assert set(stored.measurements) <= {"measurements/settled.h5"}
+            files = [path for steps in stored.files(tmp_path).values() for paths in steps.values() for path in paths]
+            assert set(files) <= {tmp_path / "measurements/settled.h5"}
     assert len(refusals) > count / 2
     assert not any("\n" in message for message in refusals)
 

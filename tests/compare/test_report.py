@@ -95,7 +95,7 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def page(directory: Path, few_figures: None) -> Path:
     records = Records(tuple(check.measurement for check in VERDICTS[0].checks))
     material = Material({verdict.claim.id: verdict.checks for verdict in VERDICTS}, records, directory)
-    return report.write(material, VERDICTS, Summary.of(directory, VERDICTS, Level.QUICK, []))
+    return report.write(material, VERDICTS, Summary.of(directory, VERDICTS, Level.QUICK, {}))
 
 
 def row(text: str, name: str) -> str:
@@ -190,7 +190,7 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path: Path, mo
     }
     monkeypatch.setattr(report, "FIGURES", {})
     monkeypatch.setattr(report, "figures_of", lambda claim: {n: f for n, f in figures.items() if claim in f.claims})
-    page = report.write(Material(directory=tmp_path), VERDICTS[:2], Summary.of(tmp_path, [], Level.QUICK, []))
+    page = report.write(Material(directory=tmp_path), VERDICTS[:2], Summary.of(tmp_path, [], Level.QUICK, {}))
     text = page.read_text("utf-8")
     assert text.count("data:image/svg+xml") == 1
     assert '<a href="#figure-fall">A fall</a>: see good.' in row(text, "bad")
@@ -198,7 +198,7 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path: Path, mo
 
 
 def test_an_empty_page_is_a_page_too(tmp_path: Path) -> None:
-    page = report.write(Material(directory=tmp_path), [], Summary.of(tmp_path, [], Level.QUICK, []))
+    page = report.write(Material(directory=tmp_path), [], Summary.of(tmp_path, [], Level.QUICK, {}))
     text = page.read_text("utf-8")
     assert "Nothing has been checked yet" in text
     assert 'id="claims"' not in text
@@ -239,8 +239,8 @@ def test_measurements_are_found_again(tmp_path: Path) -> None:
     kept.parent.mkdir()
     measured = Records(tuple(check.measurement for check in checks(3)))
     record.save(measured, kept, {})
-    results.save(Summary.of(tmp_path, [], Level.FULL, [kept]), tmp_path)
-    again = results.load(tmp_path).records(tmp_path)
+    results.save(Summary.of(tmp_path, [], Level.FULL, {"mujoco": {1: [kept]}}), tmp_path)
+    again = results.testimony(results.load(tmp_path).files(tmp_path))["mujoco"][1]
     assert [m.value for m in again.measurements] == [m.value for m in measured.measurements]
 
 
@@ -249,13 +249,13 @@ def test_measurements_are_found_again(tmp_path: Path) -> None:
     [
         (lambda text: "{", "is not JSON"),
         (lambda text: "[]", "is not a dualball-summary"),
-        (lambda text: text.replace('"schema_version": 4', '"schema_version": 3'), "in another format"),
+        (lambda text: text.replace('"schema_version": 5', '"schema_version": 4'), "in another format"),
         (lambda text: re.sub(r'"dualball": "[^"]*"', '"dualball": "0.0.0"', text), "holds results of dualball 0.0.0"),
     ],
     ids=["cut", "other", "old", "version"],
 )
 def test_a_foreign_summary_is_refused_in_one_line(tmp_path: Path, change: Any, message: str) -> None:
-    results.save(Summary.of(tmp_path, [], Level.QUICK, []), tmp_path)
+    results.save(Summary.of(tmp_path, [], Level.QUICK, {}), tmp_path)
     path = tmp_path / results.SUMMARY
     path.write_text(change(path.read_text("utf-8")))
     with pytest.raises(StorageError, match=message) as refusal:
@@ -293,7 +293,7 @@ def test_processes_draw_every_figure(tmp_path: Path) -> None:
     """They draw what this process would, and nothing is drawn again."""
     for name, drawing in FIGURES.items():
         assert pickle.loads(pickle.dumps(drawing)).title == drawing.title, name
-    summary, pages = Summary.of(tmp_path, VERDICTS, Level.QUICK, []), []
+    summary, pages = Summary.of(tmp_path, VERDICTS, Level.QUICK, {}), []
     with spread(2) as over:
         for name, how in (("there", over), ("here", map)):
             material = Material({v.claim.id: v.checks for v in VERDICTS}, directory=tmp_path / name)

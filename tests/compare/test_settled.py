@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.kit import engines, settling
+from compare.kit import engines, levels, settling
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import EFFORT, Level
 from compare.kit.quantities import quantity
@@ -74,7 +74,7 @@ class TestSettled:
             assert 0 < 3 * m.uncertainty <= quantity(m.quantity).resolves * settling.scale(m.quantity, m.parameters)
 
     def test_what_does_not_settle_is_missing(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(settling, "ROUNDS", (1.0,))
+        monkeypatch.setitem(levels.EFFORT, "settling.rounds", ((1.0,),) * 3)
         monkeypatch.setattr(settling, "SOLVED", 1e-3)
         measured = _measured(lab, monkeypatch, THICK, 0.6)
         assert not measured.measurements

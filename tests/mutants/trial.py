@@ -120,12 +120,18 @@ class Judged:
     """Whether by all claims, or by the quickest ones first and only until one notices."""
 
 
+def _measured(directory: Path) -> Records:
+    """What the engine on trial measured."""
+    (steps, *_) = validation.stored(directory).values()
+    return steps[1]
+
+
 def judged(directory: Path, workers: int = 2, whole: bool = True) -> Judged:
     """Every wrong theory judged on the measurements stored in a results directory, and their resolving power.
 
     By all claims; unless `whole`, by the quickest ones first and only until one notices it.
     """
-    power, records = defaultdict[str, list[Resolved]](list), validation.stored(directory)
+    power, records = defaultdict[str, list[Resolved]](list), _measured(directory)
     verdicts, called = watched(lambda: judge(CLAIMS, records))
     for each in verdicts:
         if each.claim.text is not Text.FORMAL and each.outcome is Outcome.CONFIRMED:
@@ -223,7 +229,7 @@ def _right(directory: Path) -> tuple[Outcomes, Sequence[Claim]]:
     outcomes, took = Outcomes(), dict[str, float]()
     for claim in CLAIMS:
         begun = time.process_time()
-        outcomes[claim.id] = verdict(claim, validation.stored(directory)).outcome
+        outcomes[claim.id] = verdict(claim, _measured(directory)).outcome
         took[claim.id] = time.process_time() - begun
     return outcomes, sorted(CLAIMS, key=lambda claim: took[claim.id])
 
@@ -241,7 +247,7 @@ def _theory(directory: Path, whole: bool, number: int) -> Trial:
     with believed(wrong):
         for claim in CLAIMS if whole else quickest_first:
             try:
-                noticed |= _changed(right, [_patiently(claim, validation.stored(directory))])
+                noticed |= _changed(right, [_patiently(claim, _measured(directory))])
             except HangError:  # as when a wrong theory never comes to the end of a motion
                 hung.append(claim.id)
             if noticed and not whole:

@@ -62,8 +62,8 @@ class Settings:
     coordinates: str = "joints"
     """``joints``, or ``free`` for a free ball."""
 
-    memory: ClassVar[bool] = False
-    """Nothing corrects for friction that is regularised."""
+    rolls: ClassVar[float] = 3.0
+    """Share of `regularisation_speed` below which a contact rolls: how exact that speed is isn't known."""
     midpoint: ClassVar[float] = 0.0
     """Forces are those at the beginning of a step."""
 

@@ -21,7 +21,7 @@ import numpy as np
 from compare.kit.engines import MOREAU
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
-from compare.kit.programme import Protocol
+from compare.kit.programme import ONE, Protocol
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import settle
 from compare.kit.short import constrained
@@ -319,7 +319,7 @@ _HOPS = "hops that last are those of the set hopping"
 PROTOCOLS = (
     Protocol("recurrent", hopping, alone=_HOPS, first=True, cost=5),
     Protocol("stepped", stepped, engine=MOREAU, alone=_HOPS, first=True),
-    Protocol("choice", choice, alone="the choice is that of sets of its own with mu > 1", first=True),
+    Protocol("choice", choice, alone="the choice is that of sets of its own with mu > 1", plain=ONE, first=True),
     Protocol("followed", followed, level=Level.DEFAULT, alone=_HOPS),
     Protocol("rebounding", rebounding, engine=MOREAU, level=Level.DEFAULT, alone=_HOPS),
     Protocol(

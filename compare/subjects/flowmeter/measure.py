@@ -304,7 +304,12 @@ def first_top(run: Trajectory) -> float:
 PROTOCOLS = (
     Protocol("hysteresis", hysteresis, ("settled",), quick=ONE),
     Protocol(
-        "unloading", unloading, ("thresholds",), quick=TWO, drawn=lambda m: m.conditions["start"] == UNLOADED, cost=4
+        "unloading",
+        unloading,
+        ("thresholds",),
+        quick=TWO,
+        cost=4,
+        drawn=lambda m: m.conditions["start"] == UNLOADED,
     ),
     Protocol("slope", slope, ("settled", "thresholds"), cost=6),
 )

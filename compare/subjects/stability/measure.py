@@ -22,7 +22,7 @@ import numpy.typing as npt
 from compare.kit.engines import STUDY_SLIP
 from compare.kit.fits import exponents, matched, propagator
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
-from compare.kit.programme import LAWS, Protocol
+from compare.kit.programme import LAWS, ONE, Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.kit.settling import SOLVED, SPIN, family, high
@@ -299,4 +299,6 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
     return 1 / time_unit(p)
 
 
-PROTOCOLS = (Protocol("rates", measure, ("settled",), quick=(*LAWS, "high-wall-friction", "thick-fluid"), cost=7),)
+PROTOCOLS = (
+    Protocol("rates", measure, ("settled",), quick=(*LAWS, "high-wall-friction", "thick-fluid"), plain=ONE, cost=7),
+)

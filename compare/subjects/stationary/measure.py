@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from compare.kit import engines
 from compare.kit.lab import Lab, time_unit
-from compare.kit.programme import Protocol
+from compare.kit.programme import FOUR, ONE, Protocol
 from compare.kit.record import Measurement, Missing, Records, measurement
 from compare.kit.settling import GROUPS, SPIN, Settled, begin, duration, family, judged, scale, settle
 from compare.kit.statistics import Measured
@@ -64,7 +64,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for state, *_ in alike:
         x0 = State.of(state.mean)._replace(y=max(State.of(state.start.x0).y, 0.0))
         again.append(replace(state.start, x0=x0.stacked()))
-    refined = settle(lab, again, refine=2, span=20.0, sharp=sharp)
+    # With several time steps, their limit is found from all of them, and no single one says how far it is.
+    refined = settle(lab, again, refine=2, span=20.0, sharp=sharp) if not lab.beside else [same for same, *_ in alike]
     for same, fine in zip(alike, refined, strict=True):
         if fine.failure:
             yield _unsettled(fine, len(fine.values))
@@ -118,6 +119,6 @@ def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> 
 
 
 PROTOCOLS = (
-    Protocol("settled", measure, cost=11),
+    Protocol("settled", measure, plain=FOUR, defaults=ONE, cost=11),
     Protocol("newcomer", newcomer, alone="the engine's own settings are measured on reference only"),
 )

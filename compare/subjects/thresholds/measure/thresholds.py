@@ -61,6 +61,11 @@ from those two, so far off that states still settle soon."""
 BEFORE_END = (0.02, 0.035, 0.055, 0.08, 0.12)
 """Distances of the states from omega_02 there, in parts of the range of slipping."""
 
+FOUND = {"rolling": ("omega_01", "omega_03"), "riding": ("omega_02",), "slipping": ("omega_04",)}
+"""The thresholds at which each ends or begins."""
+AWAY = 0.03
+"""Relative distance from there at which an engine beside the one on trial looks for the end of rolling."""
+
 Key = tuple[str, str]
 """A set, and what is looked for: the end of "rolling", "slipping", "leaning" or the "fold", the begin of "riding"."""
 From = str | Array | Callable[[Parameters], Array]
@@ -82,13 +87,18 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             ended = {Case.NR} if key[1] != "rolling" else set(Case) - {Case.RR}
             low = max((flow for flow in flows if cases[flow] not in ended), default=flows[0] / 2)
             around[key] = Bracket(low, next((flow for flow in flows if flow > low), 2 * flows[-1]))
+        if any(m.set == key[0] for m in records.select(PROTOCOL)):  # look where the engine on trial found something
+            around.pop(key, None)
+            for known in filter(None, (records.threshold(key[0], quantity) for quantity in FOUND[key[1]])):
+                away = AWAY if key[1] == "rolling" else COARSE / 3
+                around[key] = Bracket(known.value * (1 - away), known.value * (1 + away))
 
     # The largest flow at which a ball that rolls on both goes on so; and roughly, where sinking and slipping end.
     searches: dict[Key, Search] = {}
     for (name, kind), change in around.items():
         if kind == "rolling":
             searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], fine * change.high)
-    brackets, searches = _narrowed(lab, searches), {}
+    brackets, searches = _narrowed(lab, searches, careful=not lab.beside), {}
     for (name, kind), change in around.items():
         if kind == "riding":
             searches[name, kind] = _search(lab, sets[name], "sinking", change, kinds[kind], COARSE * change.low)
@@ -97,7 +107,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             change = replace(change, low=max(change.low, end.high))
             searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], COARSE * change.low)
     brackets |= _narrowed(lab, searches, careful=False)
-    brackets = {key: bracket for key, bracket in brackets.items() if bracket.runs[1] or bracket.high in seen[key]}
+    if not lab.beside:
+        brackets = {key: bracket for key, bracket in brackets.items() if bracket.runs[1] or bracket.high in seen[key]}
     states, searches = _settled_beside(lab, sets, brackets), {}
 
     # Where a ball that rides the wall begins to slip on it, and up to where one pressed to the floor rolls again. They
@@ -321,7 +332,8 @@ def _rows(
         if rolling and not lifts(rolling):
             yield missing("no end of slipping at both points was found", 3)
         return
-    yield measurement(lab, PROTOCOL, name, p, "folds", ends - smooth, tasks["turning"])
+    if ends or not lab.beside:  # which looks beside known flows only, and may have settled at none beyond the last
+        yield measurement(lab, PROTOCOL, name, p, "folds", ends - smooth, tasks["turning"])
     if smooth:
         yield from vanishes("turning", "force_Ay", "omega_02", "from below", "floor force of settled slipping")
     elif top is None:

@@ -1,0 +1,204 @@
+"""What engines other than the one on trial say of a claim: in the limit of no time step, or as they come.
+
+An engine in the limit measures the same with several time steps. Of every check the deviation from theory, divided by
+its scale, is extrapolated to no step, by polynomials in h through the steps: from h on, or also from h^2 on where the
+order found is above 1.5. What the last term changes bounds the error, so that a third of it is the standard
+uncertainty; to which belongs what both kinds of polynomials differ by. A claim is then judged as always, with a ceiling
+on what a check may overlook.
+
+An engine as it comes measures with its own step alone, and a claim holds if no number is off by more than a share of
+its scale, `Engine.allowance`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from statistics import median
+
+import numpy as np
+from scipy.optimize import brentq, linear_sum_assignment
+
+from compare.claim import Claim, Outcome, Verdict, Witness
+from compare.judge import checks_of, outcome, verdict
+from compare.kit.check import Check, Relation
+from compare.kit.engines import Engine, engine
+from compare.kit.lab import coarse_step, state_units, time_unit
+from compare.kit.quantities import quantity
+from compare.kit.record import Measurement, Records, Testimony
+from compare.kit.statistics import COVERAGE, Measured
+from model.arrays import Array
+from model.kinematics import VARIABLES
+
+CEILING, COARSEST = 100.0, 2e-2
+"""A check in the limit may overlook so many times as much as one of the engine on trial, but no more than 2 %, unless
+that may, too."""
+USUAL = 2e-3
+"""MuJoCo's own time step, s, at which users meet its deviations."""
+NEAR = 0.1
+"""Largest difference of the conditions of two measurements of the same thing with different steps, by their size."""
+LEAST = 3
+"""Time steps with which a number must have been measured to have a limit."""
+
+
+def hear(claim: Claim, testimony: Testimony) -> Verdict:
+    """The verdict on a claim by the engine on trial, and what each engine says, that one first."""
+    named = {name: engine(name) for name in testimony}
+    heard = tuple(_heard(claim, named[name], steps) for name, steps in testimony.items())
+    (name, steps), *_ = testimony.items()
+    if len(steps) == 1 and not named[name].allowance:
+        return replace(verdict(claim, next(iter(steps.values()))), witnesses=heard)
+    said = Verdict(claim=claim, outcome=heard[0].outcome, checks=heard[0].checks, error=heard[0].reason)
+    return replace(said, witnesses=heard)
+
+
+def _heard(claim: Claim, by: Engine, steps: Mapping[int, Records]) -> Witness:
+    finest = steps[max(steps)]
+    try:
+        found = {refine: checks_of(claim, records) for refine, records in steps.items()} if not claim.algebra else {}
+    except Exception as error:  # a theory that breaks down loses its claim, whoever measured
+        return Witness(engine=by.name, outcome=Outcome.ERROR, reason=f"{type(error).__name__}: {error}")
+    missing = [each for each in finest.missing if each.protocol in claim.protocols]
+    if not found or not any(found.values()):
+        reason = "formal: theory against theory" if claim.algebra else ""
+        reason = reason or next(
+            (f"nothing measured: {each}" for each in missing), "its protocols don't ask this engine"
+        )
+        return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason)
+    usual = [
+        abs(check.deviation / check.scale)
+        for refine, own in found.items()
+        for _, check in own
+        if quantity(check.measurement.quantity).resolves and check.relation is Relation.EQUAL
+        if check.scale > 10 * check.tolerance
+        if by.allowance or len(steps) == 1 or math.isclose(coarse_step(check.measurement.parameters) / refine, USUAL)
+    ]
+    usual = [each for each in usual if math.isfinite(each)]
+    order, left_out = math.nan, sum(each.rows for each in missing)
+    if by.allowance:
+        checks = [_allowed(check, by.allowance) for _, check in found[max(found)]]
+    elif len(steps) == 1:
+        checks = [check for _, check in found[max(found)]]
+    else:
+        rows = [_limit(row, sorted(found)) for row in _aligned([found[refine] for refine in sorted(found)])]
+        limits = [row for row in rows if row]
+        checks, orders = [check for check, _ in limits], [p for _, p in limits if math.isfinite(p)]
+        order, left_out = median(orders) if orders else math.nan, left_out + len(rows) - len(limits)
+    return Witness(
+        engine=by.name,
+        outcome=outcome(checks) if checks else Outcome.INCONCLUSIVE,
+        reason="" if checks else "; ".join(["nothing was measured with three time steps", *map(str, missing[:3])]),
+        checks=tuple(checks),
+        order=order,
+        typical=median(usual) if usual else math.nan,
+        worst=max(usual, default=math.nan),
+        left_out=left_out,
+    )
+
+
+def _allowed(check: Check, share: float) -> Check:
+    """The same with a share of its scale as its tolerance."""
+    exact = quantity(check.measurement.quantity).resolves == 0
+    return check if exact else replace(check, tolerance=share * check.scale, ceiling=2 * share)
+
+
+def _aligned(found: Sequence[Sequence[tuple[int, Check]]]) -> list[tuple[Check | None, ...]]:
+    """The checks with the finest step, each after those of the same with coarser ones, None where there is none."""
+
+    def kind(bearing: int, m: Measurement) -> tuple[object, ...]:
+        return bearing, m.set, m.quantity, *sorted((k, v) for k, v in m.conditions.items() if isinstance(v, str))
+
+    def place(m: Measurement) -> dict[str, float]:
+        numbers = {name: v for name, v in m.conditions.items() if not isinstance(v, str)}
+        p = m.parameters
+        return numbers | {"omega_0": p.omega_0, "c": p.c, "mu": p.mu, "eta": p.eta}
+
+    groups: list[dict[tuple[object, ...], list[Check]]] = []
+    for own in found:
+        groups.append({})
+        for bearing, check in own:
+            groups[-1].setdefault(kind(bearing, check.measurement), []).append(check)
+    rows: list[tuple[Check | None, ...]] = []
+    for key, finest in groups[-1].items():
+        p, names = finest[0].measurement.parameters, sorted(place(finest[0].measurement))
+        natural = dict(zip(VARIABLES, state_units(p), strict=True))
+        natural |= dict.fromkeys(("frequency", "decay_rate"), 1 / time_unit(p))
+        here = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in finest])
+        fellows: list[list[Check | None]] = []
+        for group in groups[:-1]:
+            fellows.append([None] * len(finest))
+            if others := group.get(key, []):
+                there = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in others])
+                largest = np.maximum(np.abs(here).max(axis=0), np.abs(there).max(axis=0))
+                size = np.maximum(largest, [natural.get(name, 1e-300) for name in names])
+                apart = np.abs((here[:, None] - there[None]) / size).max(axis=2)
+                for i, k in zip(*linear_sum_assignment(apart), strict=True):
+                    if apart[i, k] <= NEAR:
+                        fellows[-1][i] = others[k]
+        rows += [(*coarser, check) for *coarser, check in zip(*fellows, finest, strict=True)]
+    return rows
+
+
+def _limit(row: Sequence[Check | None], refine: Sequence[int]) -> tuple[Check, float] | None:
+    """A check in the limit of no step, and the order found, nan where the step shows nothing.
+
+    None where it wasn't measured with three steps.
+    """
+    there = [(n, each) for n, each in zip(refine, row, strict=True) if each]
+    last = there[-1][1]
+    m, scale = last.measurement, last.scale or 1.0
+    wanted = quantity(m.quantity).resolves
+    if wanted == 0 or math.isnan(last.predicted):
+        return last, math.nan  # what is counted has no limit but what the finest step says
+    errors = np.array([(each.measurement.value - each.predicted) / (each.scale or 1.0) for _, each in there])
+    own = np.array([each.measurement.uncertainty / (each.scale or 1.0) for _, each in there])
+    if len(there) < LEAST or not np.all(np.isfinite(errors)):
+        return None
+    value, order = extrapolated(1 / np.array([n for n, _ in there], float), errors, own)
+    measured = replace(m, value=last.predicted + value.value * scale, uncertainty=value.uncertainty * scale)
+    ceiling = max(wanted, min(CEILING * wanted, COARSEST))
+    return replace(last, measurement=measured, tolerance=COVERAGE * measured.uncertainty, ceiling=ceiling), order
+
+
+def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, float]:
+    """The limit of errors (n,) with steps (n,), the coarsest first, and the order found from the last three.
+
+    `own` (n,) are standard uncertainties of the errors that have nothing to do with the step. Where the last two errors
+    differ by no more than these, the last is the limit, and the order nan; at worst their difference goes on to no step.
+    """
+    change = abs(float(errors[-1] - errors[-2]))
+    if change <= COVERAGE * math.hypot(own[-1], own[-2]):
+        further = change * float(steps[-1] / (steps[-2] - steps[-1]))
+        return Measured(float(errors[-1]), math.hypot(further / COVERAGE, float(own[-1]))), math.nan
+    h, (coarse, middle, fine) = steps[-3:], errors[-3:]
+
+    def misfit(p: float) -> float:
+        first, second = h[0] ** p - h[1] ** p, h[1] ** p - h[2] ** p
+        return float((coarse - middle) * second - (middle - fine) * first)
+
+    def fit(q: int, terms: int) -> tuple[float, float]:
+        powers = np.array([0, *(q + k for k in range(terms))])
+        weights = np.linalg.inv((steps[-terms - 1 :, None] / steps[-1]) ** powers)[0]
+        return float(weights @ errors[-terms - 1 :]), float(np.linalg.norm(weights * own[-terms - 1 :]))
+
+    def limit(q: int) -> Measured:
+        """By as many terms as give the surest: more leave less out, but make more of the noise."""
+        found, (before, _) = [], fit(q, 0)
+        for terms in range(1, len(steps)):
+            value, noise = fit(q, terms)
+            # Terms left out are smaller than those fitted by the step in natural units, a coarse one of which is 1/20.
+            least = abs(value - errors[-1]) * (float(steps[0]) / 20) ** terms
+            found.append(Measured(value, math.hypot(noise, abs(value - before) / COVERAGE, least)))
+            before = value
+        return min(found, key=lambda each: each.uncertainty)
+
+    low, high = 0.2, 6.0
+    order = float(brentq(misfit, low, high)) if misfit(low) * misfit(high) < 0 else math.nan
+    first = limit(1)
+    if order < 1.5:
+        return first, order
+    second = limit(2)
+    surer = min(first, second, key=lambda each: each.uncertainty)
+    apart = abs(first.value - second.value) / COVERAGE
+    return Measured(surer.value, math.hypot(surer.uncertainty, apart)), order
