@@ -165,7 +165,7 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
     """The limit of errors (n,) with steps (n,), the coarsest first, and the order found from the last three.
 
     `own` (n,) are standard uncertainties of the errors that have nothing to do with the step. Where the last two errors
-    differ by no more than these, the last is the limit, and the order nan; at worst their difference goes on to no step.
+    differ by no more than these, the last is the limit, and the order nan; at worst they go on so to no step.
     """
     change = abs(float(errors[-1] - errors[-2]))
     if change <= COVERAGE * math.hypot(own[-1], own[-2]):
