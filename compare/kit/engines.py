@@ -149,7 +149,7 @@ def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, c
         settings=adapter.Settings,
         options=("timestep",),
         configure=lambda given, p: adapter.Settings(**given),
-        simulate=partial(loop.simulate, name, library, adapter.scene),
+        simulate=partial(loop.simulate, name, library, adapter.Scene),
         sources=("model", "mjsim", "compare.kit.adapters"),
         stands_on=("numpy",),
         needs=library,
@@ -160,8 +160,8 @@ def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, c
     return best, replace(
         best,
         name=other,
-        configure=lambda given, p: adapter.newcomer(given.get("timestep", newcomer_step)),
-        simulate=partial(loop.simulate, other, library, adapter.scene),
+        configure=lambda given, p: adapter.Settings(**{"timestep": newcomer_step, **adapter.DEFAULTS, **given}),
+        simulate=partial(loop.simulate, other, library, adapter.Scene),
         mark=marks[1],
     )
 

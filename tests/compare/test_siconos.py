@@ -45,7 +45,7 @@ def test_where_it_is_missing_the_program_says_what_to_do(named, says, elsewhere,
 
 def test_a_python_without_its_libraries_is_the_person_s_error():
     with pytest.raises(InputError, match=r"siconos ended \(ModuleNotFoundError: No module named 'siconos"):
-        siconos.scene(sys.executable, REFERENCE, Settings())
+        siconos.Scene(sys.executable, REFERENCE, Settings())
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,6 @@ class Dart(Free):
     )
 
     def make(self) -> None:
-        """As in `Free`."""
         case, body, bodies = self.case, self.case.body, engine.dynamics
         self.world = engine.simulation.World()
         self.world.setTimeStep(self.timestep)
@@ -70,21 +69,17 @@ class Dart(Free):
         self.world.addSkeleton(skeleton)
 
     def advance(self) -> None:
-        """As in `Free`."""
         for joint, turning in self.tables:
             joint.setCommand(0, turning)
         self.world.step()
 
     def state(self) -> State:
-        """As in `Free`."""
         return self.node.getCOM(), self.node.getLinearVelocity(), self.node.getAngularVelocity()
 
     def push(self, force: Vector) -> None:
-        """As in `Free`."""
         self.node.setExtForce(force, np.zeros(3), False, True)
 
     def turn(self, point: Array, normal: Array) -> None:
-        """As in `Free`."""
         self.wall.setNormalAndPoint(normal, point)
 
 

@@ -30,7 +30,6 @@ class Drake(Free):
     )
 
     def make(self) -> None:
-        """As in `Free`."""
         case, body = self.case, self.case.body
         builder = engine.DiagramBuilder()
         plant, _ = engine.AddMultibodyPlantSceneGraph(builder, engine.MultibodyPlant(self.timestep))
@@ -94,21 +93,17 @@ class Drake(Free):
         plant.RegisterCollisionGeometry(of, place, shape, name, material)
 
     def advance(self) -> None:
-        """As in `Free`."""
         self.plant.SetPositionsAndVelocities(self.context, self.x)
         self.x = self.plant.EvalUniquePeriodicDiscreteUpdate(self.context).get_vector(0).CopyToVector()
 
     def state(self) -> State:
-        """As in `Free`."""
         return self.x[self.q + 4 :][:3], self.x[self.v + 3 :][:3], self.x[self.v :][:3]
 
     def push(self, force: Vector) -> None:
-        """As in `Free`."""
         self.force[self.v - self.plant.num_positions() + 3 :][:3] = force
         self.input.FixValue(self.context, self.force)
 
     def turn(self, point: Array, normal: Array) -> None:
-        """As in `Free`."""
         self.x[self.wall] = math.atan2(-normal[1], -normal[0])
 
 

@@ -34,7 +34,6 @@ class Newton(Free):
         self.TIMESTEPS: tuple[float, ...] = STEPS
 
     def make(self) -> None:
-        """As in `Free`."""
         body, builder = self.case.body, engine.ModelBuilder(gravity=(0.0, 0.0, -self.case.g))
         rooted = self.solver is engine.solvers.SolverVBD
 
@@ -63,23 +62,19 @@ class Newton(Free):
         self.old, self.new = self.model.state(), self.model.state()
 
     def advance(self) -> None:
-        """As in `Free`."""
         self.model.collide(self.old, self.contacts)
         self.solves.step(self.old, self.new, None, self.contacts, self.timestep)
         self.old, self.new = self.new, self.old
         self.old.clear_forces()
 
     def state(self) -> State:
-        """As in `Free`."""
         place, rate = self.old.body_q.numpy()[0].astype(float), self.old.body_qd.numpy()[0].astype(float)
         return place[:3], rate[:3], rate[3:]
 
     def push(self, force: Vector) -> None:
-        """As in `Free`."""
         self.old.body_f.numpy()[0, :3] = force  # on a processor this is the engine's own memory
 
     def turn(self, point: Array, normal: Array) -> None:
-        """As in `Free`."""
         self.model.shape_transform.numpy()[self.wall] = pose(point, normal)
 
 

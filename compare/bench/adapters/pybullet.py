@@ -25,7 +25,6 @@ class PyBullet(Free):
     )
 
     def make(self) -> None:
-        """As in `Free`."""
         case, body = self.case, self.case.body
         if engine.isConnected():
             engine.disconnect()
@@ -67,22 +66,18 @@ class PyBullet(Free):
         engine.resetBasePositionAndOrientation(body, [each * self.scale for each in position], [*axis, w])
 
     def advance(self) -> None:
-        """As in `Free`."""
         engine.stepSimulation()
 
     def state(self) -> State:
-        """As in `Free`."""
         position, _ = engine.getBasePositionAndOrientation(self.body)
         velocity, spin = engine.getBaseVelocity(self.body)
         return [each / self.scale for each in position], [each / self.scale for each in velocity], spin
 
     def push(self, force: Vector) -> None:
-        """As in `Free`."""
         where, _ = engine.getBasePositionAndOrientation(self.body)
         engine.applyExternalForce(self.body, -1, [each * self.scale for each in force], where, engine.WORLD_FRAME)
 
     def turn(self, point: Array, normal: Array) -> None:
-        """As in `Free`."""
         self.place(self.wall, point, upright(normal))
 
 

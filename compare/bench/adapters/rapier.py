@@ -24,7 +24,6 @@ class Rapier(Free):
     NOTE = f"worst round the cylinder and where the wall carries the ball: {CHORD}"
 
     def make(self) -> None:
-        """As in `Free`."""
         case, body = self.case, self.case.body
         self.world = engine.PhysicsWorld(gravity=(0.0, 0.0, -case.g))
         settings, multiply = self.world.integration_parameters, engine.CoefficientCombineRule.MULTIPLY
@@ -48,23 +47,19 @@ class Rapier(Free):
         self.body = self.world.add_body(moving, [shape])
 
     def advance(self) -> None:
-        """As in `Free`."""
         self.world.step()
 
     def state(self) -> State:
-        """As in `Free`."""
         body = self.world.rigid_bodies[self.body]
         position, velocity, spin = ([v.x, v.y, v.z] for v in (body.translation, body.linvel, body.angvel))
         return position, velocity, spin
 
     def push(self, force: Vector) -> None:
-        """As in `Free`."""
         body = self.world.rigid_bodies[self.body]
         body.reset_forces()
         body.add_force(force)
 
     def turn(self, point: Array, normal: Array) -> None:
-        """As in `Free`."""
         half = math.atan2(-normal[1], -normal[0]) / 2
         turned = engine.Quaternion(math.cos(half), 0.0, 0.0, math.sin(half))
         self.world.rigid_bodies[self.wall].position = engine.Isometry3(point.tolist(), turned)

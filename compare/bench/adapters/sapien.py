@@ -32,7 +32,6 @@ class Sapien(Free):
     )
 
     def make(self) -> None:
-        """As in `Free`."""
         case, body = self.case, self.case.body
         config, bodies = physx.PhysxSceneConfig(), physx.PhysxBodyConfig()
         config.gravity = [0.0, 0.0, -case.g]
@@ -67,19 +66,15 @@ class Sapien(Free):
         return entity
 
     def advance(self) -> None:
-        """As in `Free`."""
         self.scene.step()
 
     def state(self) -> State:
-        """As in `Free`."""
         return self.entity.pose.p, self.body.linear_velocity, self.body.angular_velocity
 
     def push(self, force: Vector) -> None:
-        """As in `Free`."""
         self.body.add_force_at_point(force, self.entity.pose.p)
 
     def turn(self, point: Array, normal: Array) -> None:
-        """As in `Free`."""
         self.wall.set_pose(pose(point, normal))
 
 

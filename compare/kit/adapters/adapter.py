@@ -6,7 +6,7 @@ import importlib
 import importlib.util
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from model import InputError, Parameters
 from model.arrays import Array
-from model.parameters import POSITIVE, Range, check_choice, check_number
+from model.parameters import POSITIVE, check_choice, check_number
 from model.trajectory import version
 
 Floats = Sequence[float]
@@ -48,16 +48,11 @@ class Library:
             raise InputError(self.missing or f"{self.name} can't be imported: {error}") from error
 
 
-def number(default: Any, unit: str, allowed: Range = POSITIVE) -> Any:
-    """Declare a field of `Settings` that has to be in a range."""
-    return field(default=default, metadata={"unit": unit, "allowed": allowed})
-
-
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """What the settings of all engines have."""
 
-    timestep: float = number(1e-3, "s")
+    timestep: float = 1e-3
     """s"""
     coordinates: str = "joints"
     """``joints``, or ``free`` for a free ball."""
@@ -68,9 +63,7 @@ class Settings:
     """Forces are those at the beginning of a step."""
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            if each.metadata:
-                check_number(each.name, getattr(self, each.name), each.metadata["unit"], each.metadata["allowed"])
+        check_number("timestep", self.timestep, "s", POSITIVE)
         check_choice("coordinates", self.coordinates, ("joints", "free"))
 
     @property

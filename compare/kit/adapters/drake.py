@@ -19,12 +19,10 @@ from typing import Any
 import numpy as np
 
 from compare.kit.adapters import adapter
-from compare.kit.adapters.adapter import BreakdownError, Floats, Scene, Touch, number, tangents
+from compare.kit.adapters.adapter import BreakdownError, Floats, Touch, tangents
 from model import Parameters
 from model.arrays import Array
-from model.parameters import Range, check_choice
 
-_APPROXIMATIONS = {"tamsi": "kTamsi", "sap": "kSap", "lagged": "kLagged", "similar": "kSimilar"}
 _SIZE = 100.0
 """Edge of the cubes of which a vessel of many facets is made, in units of its radius."""
 
@@ -33,22 +31,18 @@ _SIZE = 100.0
 class Settings(adapter.Settings):
     """The engine's settings: by default the best known, massless joints, TAMSI, stiff contacts and a low v_s."""
 
-    facets: int = number(1, "planes", Range(1, whole=True))
+    facets: int = 1
     """Planes that make up the wall."""
     approximation: str = "tamsi"
-    """`discrete_contact_approximation`."""
+    """`discrete_contact_approximation`: ``tamsi``, ``sap``, ``lagged`` or ``similar``."""
     stiffness: float | None = 1e10
     """Of ball, floor and wall, N/m; None for what the engine takes from its `penetration_allowance` of 1 mm."""
     dissipation: float | None = 100.0
     """Of each of them, s/m; None for the engine's own. A ball that has landed comes out of its overlap at up to the
     reciprocal: with less it is thrown back, with more it stays sunk in for long."""
-    stiction: float = number(1e-8, "m s-1")
+    stiction: float = 1e-8
     """`stiction_tolerance` v_s, m s-1. With a hundredth of it TAMSI fails when a ball that rolls on both contacts lifts
     off the floor, and so it does at the first step with a ten times larger v_s and stiffness."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_choice("approximation", self.approximation, tuple(_APPROXIMATIONS))
 
     @property
     def resolution(self) -> float:
@@ -56,33 +50,24 @@ class Settings(adapter.Settings):
         return self.stiction
 
 
-def newcomer(timestep: float) -> Settings:
-    """The engine's defaults: a free ball in a prism of 64 boxes."""
-    return Settings(
-        timestep=timestep,
-        coordinates="free",
-        facets=64,
-        approximation="lagged",
-        stiffness=None,
-        dissipation=None,
-        stiction=1e-4,
-    )
+DEFAULTS = {"coordinates": "free", "facets": 64, "approximation": "lagged", "stiction": 1e-4,
+    "stiffness": None,
+    "dissipation": None,
+}
+"""The engine's own settings: a free ball in a prism of 64 boxes."""
 
 
-def scene(engine: Any, p: Parameters, settings: Settings) -> Scene:
+class Scene(adapter.Scene):
     """The ball in a plant of its own."""
-    logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
-    return _Plant(engine, p, settings)
 
-
-class _Plant(Scene):
     def __init__(self, engine: Any, p: Parameters, settings: Settings) -> None:
+        logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
         self._joints = settings.coordinates == "joints"
         builder = engine.DiagramBuilder()
         plant, _ = engine.AddMultibodyPlantSceneGraph(builder, engine.MultibodyPlant(settings.timestep))
         plant.set_contact_model(engine.ContactModel.kPoint)
-        approximations = engine.DiscreteContactApproximation
-        plant.set_discrete_contact_approximation(getattr(approximations, _APPROXIMATIONS[settings.approximation]))
+        approximation = f"k{settings.approximation.capitalize()}"
+        plant.set_discrete_contact_approximation(getattr(engine.DiscreteContactApproximation, approximation))
         plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -p.g])
         plant.SetUseSampledOutputPorts(False)
         turning = engine.UnitInertia(*[p.j * p.r**2] * 3)

@@ -14,19 +14,18 @@ from typing import Any
 import numpy as np
 
 from compare.kit.adapters import adapter
-from compare.kit.adapters.adapter import BreakdownError, Floats, Scene, Touch, number, tangents
+from compare.kit.adapters.adapter import BreakdownError, Floats, Touch, tangents
 from model import Parameters
 from model.arrays import Array
-from model.parameters import Range
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings(adapter.Settings):
     """The engine's settings: by default the best known, massless joints and contacts solved to round-off."""
 
-    facets: int = number(1, "planes", Range(1, whole=True))
+    facets: int = 1
     """Planes that make up the wall."""
-    scale: float = number(100.0, "m-1")
+    scale: float = 100.0
     """Length unit of the engine, in 1/m: its tolerances are absolute lengths."""
     iterations: int = 200
     """Most iterations of the contact solver."""
@@ -45,27 +44,17 @@ class Settings(adapter.Settings):
         return math.sqrt(self.residual) / self.scale
 
 
-def newcomer(timestep: float) -> Settings:
-    """The engine's defaults: a free ball in a prism of 64 planes, SI units."""
-    return Settings(
-        timestep=timestep,
-        coordinates="free",
-        facets=64,
-        scale=1.0,
-        iterations=50,
-        residual=1e-7,
-        cone=False,
-        slop=1e-5,
-        breaking=0.02,
-    )
+DEFAULTS = {"coordinates": "free", "facets": 64, "scale": 1.0, "iterations": 50, "residual": 1e-7,
+    "cone": False,
+    "slop": 1e-5,
+    "breaking": 0.02,
+}
+"""The engine's own settings: a free ball in a prism of 64 planes, SI units."""
 
 
-def scene(engine: Any, p: Parameters, settings: Settings) -> Scene:
+class Scene(adapter.Scene):
     """The ball in a physics server of its own."""
-    return _Server(engine, p, settings)
 
-
-class _Server(Scene):
     def __init__(self, engine: Any, p: Parameters, settings: Settings) -> None:
         self._engine, self._p, self._scale = engine, p, settings.scale
         self._joints = settings.coordinates == "joints"

@@ -25,9 +25,8 @@ from typing import Any
 import numpy as np
 
 from compare.kit.adapters import adapter
-from compare.kit.adapters.adapter import BreakdownError, Floats, Library, Scene, Touch, number
+from compare.kit.adapters.adapter import BreakdownError, Floats, Library, Touch
 from model import InputError, Parameters
-from model.parameters import Range
 
 PROGRAM = Path(__file__).with_name("_siconos_worker.py")
 PATIENCE = 60.0
@@ -41,7 +40,7 @@ class Settings(adapter.Settings):
     A free ball is in a true cylinder.
     """
 
-    theta: float = number(0.5, "1", Range(0.5, 1))
+    theta: float = 0.5
     """Of `MoreauJeanOSI`: the share of forces that is taken at the end of a step."""
     activation: float = 1e-9
     """`ConstraintActivationThreshold`, m: a contact counts as closed if half a step further its gap is less than that.
@@ -49,17 +48,16 @@ class Settings(adapter.Settings):
     projection: float | None = 1e-12
     """`ConstraintTolUnilateral`, m, up to which `TimeSteppingDirectProjection` takes a ball out of an overlap. None for
     `TimeStepping`, which leaves it there: up to a step's way after an impact, for as long as the contact lasts."""
-    newton: float = number(1e-15, "N s")
+    newton: float = 1e-15
     """`NewtonTolerance`, N s, of the iteration on the equations of motion; with 1e-10 spin changes in flight."""
-    tolerance: float = number(1e-14, "1")
+    tolerance: float = 1e-14
     """Of `FrictionContact`'s solver, non-smooth Gauss-Seidel, relative."""
-    iterations: int = number(1000, "iterations", Range(1, whole=True))
+    iterations: int = 1000
     """Most iterations of that solver."""
 
 
-def newcomer(timestep: float) -> Settings:
-    """The engine's defaults: a free ball in a true cylinder, since the user of Siconos writes the contacts."""
-    return Settings(timestep=timestep, coordinates="free", activation=0.0, projection=None, newton=1e-6, tolerance=1e-4)
+DEFAULTS = {"coordinates": "free", "activation": 0.0, "projection": None, "newton": 1e-6, "tolerance": 1e-4}
+"""The engine's own settings: a free ball in a true cylinder, since the user of Siconos writes the contacts."""
 
 
 class _Installation(Library):
@@ -67,7 +65,6 @@ class _Installation(Library):
 
     @property
     def missing(self) -> str:
-        """As in `Library`."""
         named = os.environ.get(_NAMED)
         if locate(named)[0]:
             return ""
@@ -77,7 +74,6 @@ class _Installation(Library):
 
     @property
     def version(self) -> str:
-        """As in `Library`."""
         return locate(os.environ.get(_NAMED))[1]
 
     def load(self) -> str:
@@ -104,12 +100,9 @@ def locate(named: str | None) -> tuple[str, str]:
     return "", "not installed"
 
 
-def scene(python: str, p: Parameters, settings: Settings) -> Scene:
+class Scene(adapter.Scene):
     """The ball in a process of its own; `InputError` if Siconos doesn't work there."""
-    return _Remote(python, p, settings)
 
-
-class _Remote(Scene):
     def __init__(self, python: str, p: Parameters, settings: Settings) -> None:
         self._process = subprocess.Popen(
             [python, "-I", PROGRAM],  # -I: its own packages, not ours
