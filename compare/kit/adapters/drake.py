@@ -50,7 +50,11 @@ class Settings(adapter.Settings):
         return self.stiction
 
 
-DEFAULTS = {"coordinates": "free", "facets": 64, "approximation": "lagged", "stiction": 1e-4,
+DEFAULTS = {
+    "coordinates": "free",
+    "facets": 64,
+    "approximation": "lagged",
+    "stiction": 1e-4,
     "stiffness": None,
     "dissipation": None,
 }

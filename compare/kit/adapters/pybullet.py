@@ -44,7 +44,12 @@ class Settings(adapter.Settings):
         return math.sqrt(self.residual) / self.scale
 
 
-DEFAULTS = {"coordinates": "free", "facets": 64, "scale": 1.0, "iterations": 50, "residual": 1e-7,
+DEFAULTS = {
+    "coordinates": "free",
+    "facets": 64,
+    "scale": 1.0,
+    "iterations": 50,
+    "residual": 1e-7,
     "cone": False,
     "slop": 1e-5,
     "breaking": 0.02,
