@@ -72,29 +72,9 @@ class Contacts:
     def _frictional(self) -> Array:
         return np.arange(1, 6) < self.dim[:, None]
 
-    def impedance(self, depth: Array) -> Array:
-        """d at a depth below the margin."""
-        low, high = np.clip(self.solimp[:, :2], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
-        width, middle, power = np.maximum(self.solimp[:, 2], 1e-15), self.solimp[:, 3], self.solimp[:, 4]
-        middle, power = np.clip(middle, mujoco.mjMINIMP, mujoco.mjMAXIMP), np.maximum(power, 1)
-        x = np.minimum(depth / width, 1)
-        rising = x**power / middle ** (power - 1)
-        falling = (1 - x) ** power / (1 - middle) ** (power - 1)
-        d: Array = low + (high - low) * np.where(x <= middle, rising, 1 - falling)
-        return d
-
     def reference(self, solref: Array) -> tuple[Array, Array]:
-        """Stiffness for an impedance of one, s-2, and damping, s-1, of rows, after what the engine replaces."""
-        high = np.clip(self.solimp[:, 1], mujoco.mjMINIMP, mujoco.mjMAXIMP)
-        ref = np.where(((solref > 0).sum(1) == 1)[:, None], SOLREF, solref)
-        time, ratio = ref.T
-        if self.refsafe and self.discrete:
-            time = np.where((time > 0) & (time * ratio < self.timestep), self.timestep / (np.sqrt(high) * ratio), time)
-        elif self.refsafe:
-            time = np.where(time > 0, np.maximum(time, 2 * self.timestep), time)
-        positive = time > 0
-        stiffness = np.where(positive, 1 / (high * time * ratio) ** 2, -time / high**2)
-        return stiffness, np.where(positive, 2 / (high * time), -ratio / high)
+        """`reference` of rows of these contacts."""
+        return reference(solref, self.solimp, self.timestep, self.discrete, self.refsafe)
 
     @np.errstate(all="ignore")  # a contact without stiffness or friction divides by zero
     def law(self) -> Law:
@@ -112,7 +92,7 @@ class Contacts:
 
         def rows(depth: Array) -> tuple[Array, Array, Array]:
             """Softness of a row, its stiffness, and the damping of friction as a steady state sees it."""
-            d = self.impedance(depth)
+            d = impedance(self.solimp, depth)
             softness, k = (1 - d) / d * estimate, spring * d
             if not self.discrete:
                 return softness, k, b_f
@@ -235,6 +215,32 @@ class Law:
     """Force per acceleration of each row, kg."""
     stiffness: Array
     damping: Array
+
+
+def impedance(solimp: Array, depth: Array) -> Array:
+    """d at a depth below the margin, of contacts with these `solimp` (n, 5)."""
+    low, high, middle = np.clip(solimp[:, [0, 1, 3]], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
+    width, power = np.maximum(solimp[:, 2], 1e-15), np.maximum(solimp[:, 4], 1)
+    x = np.minimum(depth / width, 1)
+    rising, falling = x**power / middle ** (power - 1), (1 - x) ** power / (1 - middle) ** (power - 1)
+    d: Array = low + (high - low) * np.where(x <= middle, rising, 1 - falling)
+    return d
+
+
+@np.errstate(all="ignore")  # what is not chosen divides by zero
+def reference(
+    solref: Array, solimp: Array, timestep: float, discrete: bool = False, refsafe: bool = True
+) -> tuple[Array, Array]:
+    """Stiffness for an impedance of one, s-2, and damping, s-1, of rows, after what the engine replaces."""
+    high = np.clip(solimp[:, 1], mujoco.mjMINIMP, mujoco.mjMAXIMP)
+    time, ratio = np.where(((solref > 0).sum(1) == 1)[:, None], SOLREF, solref).T
+    if refsafe and discrete:
+        time = np.where((time > 0) & (time * ratio < timestep), timestep / (np.sqrt(high) * ratio), time)
+    elif refsafe:
+        time = np.where(time > 0, np.maximum(time, 2 * timestep), time)
+    positive = time > 0
+    stiffness = np.where(positive, 1 / (high * time * ratio) ** 2, -time / high**2)
+    return stiffness, np.where(positive, 2 / (high * time), -ratio / high)
 
 
 def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:

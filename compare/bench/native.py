@@ -7,7 +7,6 @@ knows yet whether they work.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 
 from compare.bench.adapters.mujoco_free import pairs
 from compare.bench.case import Case
+from compare.bench.contact_law import impedance, reference
 from mjsim import ContactSettings, scene
 from model import InputError, Parameters, StorageError
 from model.parameters import NOT_NEGATIVE, POSITIVE, check_choice, check_number
@@ -47,17 +47,6 @@ class Pair:
     """Zeros: as `solref`."""
     solimp: tuple[float, float, float, float, float] = (0.9, 0.95, 0.001, 0.5, 2.0)
     margin: float = 0.0
-
-    def impedance(self, depth: float) -> float:
-        """d at a depth in m: from solimp[0] at none to solimp[1] at solimp[2] and beyond."""
-        low, high, width, middle, power = self.solimp
-        low, high = (min(max(d, 1e-4), 0.9999) for d in (low, high))
-        x = min(abs(depth) / width, 1.0) if width > 0 else 1.0
-        if x <= middle:
-            y = x**power / middle ** (power - 1) if middle > 0 else 0.0
-        else:
-            y = 1 - (1 - x) ** power / (1 - middle) ** (power - 1)
-        return low + y * (high - low)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,26 +111,19 @@ class Native:
         The impedance is that at the depth of rest; time constants follow from b = 2/(dmax tc) and
         k = d/(dmax tc dr)^2, and are those that the engine puts in the place of ones shorter than two steps.
         """
-        highest, depth = pair.solimp[1], 0.0
-
-        def rates(solref: tuple[float, float], d: float) -> tuple[float, float]:
-            """Damping b (s-1) and stiffness k (s-2) of a row, as MuJoCo's chapter on computation gives them."""
-            first, second = solref
-            if first <= 0 or second <= 0:
-                return -second / highest, -first * d / highest**2
-            first = max(first, 2 * self.timestep)
-            return 2 / (highest * first), d / (highest * first * second) ** 2
-
+        solimp = np.array([pair.solimp])
+        of_friction = pair.solreffriction if any(pair.solreffriction) else pair.solref
+        refs, discrete = np.array([pair.solref, of_friction]), self.integrator == "discrete"
+        (stiffness, _), (b, b_f) = reference(refs, solimp[[0, 0]], self.timestep, discrete)
+        depth = np.zeros(1)
         impratio = min(max(self.impratio, 0.1), 1e7)
         bare = ContactSettings(timestep=1e-12, impratio=impratio, memory=False, servo=0.0, order=1)
         for _ in range(50):
-            d = pair.impedance(depth)
-            b, k = rates(pair.solref, d)
-            b_f, _ = rates(pair.solreffriction if any(pair.solreffriction) else pair.solref, d)
+            d = impedance(solimp, depth).item()
             tc = 2 / (d * b)
-            solref = tc, 1 / (tc * math.sqrt(d * k))
-            formal = dataclasses.replace(bare, solimp=d, solref=solref, solreffriction=2 / (d * b_f))
-            depth = formal.margin(load)
+            solref = float(tc), float(1 / (tc * d * np.sqrt(stiffness)))
+            formal = dataclasses.replace(bare, solimp=d, solref=solref, solreffriction=float(2 / (d * b_f)))
+            depth = np.array([formal.margin(load)])
         return formal
 
 

@@ -13,6 +13,7 @@ import pytest
 
 import analytic
 from compare.bench import cases, grade, native
+from compare.bench.contact_law import impedance
 from compare.bench.grade import Column
 from compare.bench.native import Native, Pair
 from compare.bench.two_contacts import SMOOTH
@@ -146,7 +147,7 @@ def test_impedance_is_the_engines(depth: float) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     if data.nefc:
-        assert Pair().impedance(depth) == pytest.approx(data.efc_KBIP[0, 2], rel=1e-6)
+        assert impedance(np.array([Pair().solimp]), np.array([depth])) == pytest.approx(data.efc_KBIP[0, 2], rel=1e-6)
     else:
         assert depth == 0
 
