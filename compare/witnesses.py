@@ -166,6 +166,9 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
 
     `own` (n,) are standard uncertainties of the errors that have nothing to do with the step. Where the last two errors
     differ by no more than these, the last is the limit, and the order nan; at worst they go on so to no step.
+
+    The uncertainty covers the truth where the leading term is at least a third of what the next one would be with a
+    step of a natural time unit. Of random series whose leading term may vanish by chance it misses one in a hundred.
     """
     change = abs(float(errors[-1] - errors[-2]))
     if change <= COVERAGE * math.hypot(own[-1], own[-2]):

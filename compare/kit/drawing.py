@@ -39,9 +39,10 @@ class Material:
     """What other engines measured at steps that users take."""
 
     def select(self, quantity: str, *conditions: str) -> Iterator[Measurement]:
-        """Measurements of a quantity that have conditions of these names."""
+        """Measurements of a quantity, by whichever engine, that have conditions of these names."""
         named = set(conditions)
-        return (m for m in self.records.measurements if m.quantity == quantity and named <= m.conditions.keys())
+        measured = (*self.records.measurements, *self.beside.measurements)
+        return (m for m in measured if m.quantity == quantity and named <= m.conditions.keys())
 
     def motions(self, m: Measurement) -> list[Motion]:
         """The runs of a measurement whose files are there."""

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from compare.kit.engines import ENGINES
+from compare.kit.lab import coarse_step
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Measurement
@@ -99,8 +100,14 @@ def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = (), 
 
 def marks(states: Sequence[Measurement]) -> str:
     """What a caption says of measured points; nothing where there are none."""
-    many = f" Marks: {len(states)} measured values; three standard uncertainties are smaller than most marks."
-    return many if states else ""
+    if not states:
+        return ""
+    said = f" Marks: {len(states)} measured values; three standard uncertainties are smaller than most marks."
+    if alone := dict.fromkeys(m.engine for m in states if ENGINES[m.engine].refine != (1,)):
+        steps = sorted({500 * coarse_step(m.parameters) for m in states if m.engine in alone})
+        at = " or ".join(f"{step:g}" for step in steps)
+        said += f" {' and '.join(alone)}: as measured with a time step of {at} ms, not in the limit of no step."
+    return said
 
 
 def edge(states: Sequence[Measurement]) -> str:

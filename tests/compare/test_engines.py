@@ -12,13 +12,8 @@ from scipy.integrate import solve_ivp
 
 import analytic
 from compare.commands import cli
-from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, NEWCOMER
-from compare.kit.lab import Lab
-from compare.kit.levels import Level
-from compare.kit.record import Records
 from compare.kit.tasks import Task, carry_out, store
-from compare.subjects.stationary import measure as settled
 from docs.studies.states import HITTING, LANDING, STATES
 from model import InputError, Parameters, State
 from model.drag import LAWS
@@ -187,13 +182,6 @@ def test_only_settings_can_be_graded(options, says, monkeypatch, capsys):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert cli.main(["grade", *options]) == 2
     assert says in capsys.readouterr().err
-
-
-def test_an_engine_without_defaults_of_its_own_says_so(tmp_path):
-    with Campaign(tmp_path, workers=0) as campaign:
-        lab = Lab(campaign, ENGINES["event"], Level.QUICK)
-        (missing,) = settled.newcomer(lab, {"reference": REFERENCE}, Records())
-    assert missing.reason == "event has no settings of its own to be compared with"
 
 
 def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):

@@ -53,7 +53,6 @@ def material() -> Material:
     """A few results of every kind that a figure shows."""
     states = [
         measurement("omega_c", 10.0),
-        measurement("omega_c", 9.0, engine="mujoco-defaults", protocol="newcomer"),
         measurement("omega_c", 35.0, omega_0=35.0, conditions={"case": "NR", "start": "on the wall"}),
         measurement("omega_c", 12.0, "high-wall-friction", 12.0),
         measurement("omega_c", 40.0, omega_0=40.0, protocol="hysteresis", conditions={"case": "NR", "side": "up"}),
@@ -68,7 +67,8 @@ def material() -> Material:
         "fig-7": (check(plane[0], 129.0, 0.0), check(plane[1], 1.0, 0.0)),
         "prop-1": (check(states[0], 10.0), check(states[1], 10.0)),
     }
-    return Material(checks, Records((*states, *plane)), Path("nowhere"))
+    beside = [measurement("omega_c", 9.0, engine=name) for name in ("mujoco-plain", "mujoco-defaults")]
+    return Material(checks, Records((*states, *plane)), Path("nowhere"), Records(tuple(beside)))
 
 
 @pytest.fixture
@@ -181,10 +181,12 @@ def test_the_bistable_region_is_named_and_points_not_as_predicted_are_crossed(ma
 
 
 def test_measured_states_have_their_engines_marks(material: Material) -> None:
-    """MuJoCo's defaults stand beside the study's settings."""
-    axes = FIGURES["characteristic"].draw(FIGURES["characteristic"].select(material)).axes[0]
+    """Plain MuJoCo and MuJoCo as it comes stand beside the engine on trial, and the caption says with which step."""
+    data = FIGURES["characteristic"].select(material)
+    assert "mujoco-plain and mujoco-defaults: as measured with a time step of 2 ms" in flowmeter.caption_curves(data)
+    axes = FIGURES["characteristic"].draw(data).axes[0]
     shown = {line.get_marker(): line.get_color() for line in axes.lines}
-    for engine in ("mujoco", "mujoco-defaults"):
+    for engine in ("mujoco", "mujoco-plain", "mujoco-defaults"):
         assert shown[ENGINES[engine].mark] == ENGINES[engine].colour
 
 

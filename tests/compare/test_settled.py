@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.kit import engines, levels, settling
+from compare.kit import levels, settling
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import EFFORT, Level
 from compare.kit.quantities import quantity
@@ -149,11 +149,6 @@ class TestOthers:
 
     def test_no_loop_without_a_change_from_slipping_to_riding(self, lab: Lab) -> None:
         assert [type(row) for row in characteristic.hysteresis(lab, {"thick": THICK}, Records())] == [Missing]
-
-    def test_the_newcomer_is_another_engine(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setitem(EFFORT, "settled.flows", ((0.6,),) * 3)
-        rows = list(settled.newcomer(lab, {"reference": THICK}, Records()))
-        assert {row.engine for row in rows if isinstance(row, Measurement)} == {engines.NEWCOMER.name}
 
 
 class TestPlane:

@@ -14,14 +14,14 @@ from analytic.simulation import simulator
 from compare.branches import fold_state, slipping
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, GapError, Material, Motion
-from compare.kit.engines import EVENT, NEWCOMER
+from compare.kit.engines import EVENT
 from compare.kit.record import Measurement
 from model import Case, Contact, Parameters
 
 SETS = {"fig-13-left": "reference", "fig-13-right": "high-wall-friction"}
 """The parameter set of each panel, eta < j and eta > j."""
 _WAYS = {"up": ("^", ", flow raised"), "down": ("v", ", flow lowered")}
-_SETTLED = frozenset({"settled", "newcomer", "hysteresis"})
+_SETTLED = frozenset({"settled", "hysteresis"})
 """Protocols whose omega_c is that of a settled state."""
 
 
@@ -44,12 +44,10 @@ def caption_curves(curves: tuple[Diagram, ...]) -> str:
     """Of the characteristic curves with all settled states."""
     sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in zip(("left", "right"), curves, strict=True))
     states = [m for curve in curves for m in curve.states]
-    own = any(m.engine == NEWCOMER.name for m in states)
-    crosses = ", crosses: MuJoCo's own contact parameters from rest" if own else ""
     return (
         f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
         "dashed where unstable; SR and NR lie on one line. Settled states were measured from rest, going round "
-        f"with the fluid, and high up on the wall{crosses}. Below: relative deviation from the nearest attracting "
+        f"with the fluid, and high up on the wall. Below: relative deviation from the nearest attracting "
         f"solution; what is below 1e-16 is drawn there.{style.marks(states)}"
     )
 

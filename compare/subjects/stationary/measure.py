@@ -1,8 +1,7 @@
 """Settled states: where the ball ends from fixed starts at fixed flows, with the forces that mechanics determine.
 
 Flows are the same multiples of sqrt(g/R) for every set. States are measured with the coarse step, and once more with
-half of it: what that changes belongs to their uncertainty, as does what different starts make of the same state. For
-display, the characteristic curve is measured with the engine's own contact parameters, too.
+half of it: what that changes belongs to their uncertainty, as does what different starts make of the same state.
 """
 
 from __future__ import annotations
@@ -11,11 +10,10 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from compare.kit import engines
 from compare.kit.lab import Lab, time_unit
 from compare.kit.programme import FOUR, ONE, Protocol
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.settling import GROUPS, SPIN, Settled, begin, duration, family, judged, scale, settle
+from compare.kit.settling import GROUPS, SPIN, Settled, begin, duration, family, scale, settle
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start
 from model import Parameters, State
@@ -82,25 +80,6 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                     yield _record(lab, fine, n, Measured(fine.values[n].value, uncertainty))
 
 
-def newcomer(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """omega_c and case from rest with the engine's own contact parameters, with what they drift or swing by the end."""
-    protocol, name, p = "newcomer", "reference", sets["reference"]
-    if not lab.engine.as_it_comes:
-        yield Missing(protocol, name, f"{lab.engine.name} has no settings of its own to be compared with")
-        return
-    plain = replace(lab, engine=engines.engine(lab.engine.as_it_comes))
-    starts = [begin(name, q, "rest") for q in _flows(lab, p)]
-    tasks = [plain.task(start.p, start.x0, 40.0 / p.c, 1e-3, samples=1000) for start in starts]
-    for start, task, run in zip(starts, tasks, plain.each(tasks), strict=True):
-        if isinstance(run, str):
-            yield Missing(protocol, name, f"the run at {start.p.omega_0:.4g} rad/s {run}")
-            continue
-        ended = judged(start, task, run)
-        at = {"case": ended.case.name, "start": start.name}
-        for quantity, value in (("omega_c", ended.values["omega_c"]), ("case", ended.case)):
-            yield measurement(plain, protocol, name, start.p, quantity, value, [task], **at)
-
-
 def _flows(lab: Lab, p: Parameters) -> list[Parameters]:
     """A set at the flows of a level."""
     return [p.replace(omega_0=flow / time_unit(p)) for flow in lab.effort("settled.flows")]
@@ -118,7 +97,4 @@ def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> 
     return measurement(lab, PROTOCOL, start.set, start.p, quantity, value, [each.task], **at)
 
 
-PROTOCOLS = (
-    Protocol("settled", measure, plain=FOUR, defaults=ONE, cost=11),
-    Protocol("newcomer", newcomer, alone="the engine's own settings are measured on reference only"),
-)
+PROTOCOLS = (Protocol("settled", measure, plain=FOUR, defaults=ONE, cost=11),)
