@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import itertools
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,7 +28,7 @@ from compare.subjects.attractors import search
 from compare.subjects.attractors.search import BOX, FATES, Search, Searched
 from model import Parameters, State, Trajectory
 from model.arrays import Array
-from model.files import check_writable, write_text
+from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import POSITIVE
 
@@ -39,17 +40,14 @@ def add(commands: options.Commands) -> None:
     running.add_engine(command)
     command.set_defaults(engine=EVENT)
     running.add_start(command)
-    command.add_argument(
-        "--starts", type=options.count, default=20, help="random starts, unless one is given by --start"
-    )
+    unless, most = "random starts, unless one is given by --start", "how long to follow a run at most"
+    command.add_argument("--starts", type=options.count, default=20, help=unless)
     command.add_argument("--seed", type=options.seed, default=0, help="of the random starts")
-    command.add_argument(
-        "--time", type=options.seconds, help=f"how long to follow a run at most (default {LASTING:g}/c)"
-    )
+    command.add_argument("--time", type=options.seconds, help=f"{most} (default {LASTING:g}/c)")
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several: grid")
     follow = "follow each periodic motion in a parameter, to where it is born and ends"
     options.add_axes(command, "--follow", follow, "NAME=FROM:TO")
-    command.add_argument("--page", type=Path, help="write the tables as Markdown, too (default: don't)")
+    command.add_argument("--page", type=options.written, help="write the tables as Markdown, too (default: don't)")
     options.outputs(command, shown="print as JSON")
 
     command = options.command(commands, "search", searched, "--sets 200 --range mu=0.5:1")
@@ -59,8 +57,8 @@ def add(commands: options.Commands) -> None:
     options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
     running.add_workers(command)
     command.add_argument("--kept", type=Path, nargs="+", help="show what --save wrote instead")
-    command.add_argument("--save", type=Path, help="write the sets with hopping as JSON")
-    command.add_argument("--page", type=Path, help="write the table as Markdown")
+    command.add_argument("--save", type=options.written, help="write the sets with hopping as JSON")
+    command.add_argument("--page", type=options.written, help="write the table as Markdown")
     options.outputs(command, "search", "print the sets with hopping as JSON")
 
     example = "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21"
@@ -74,14 +72,12 @@ def add(commands: options.Commands) -> None:
     command.add_argument("--mujoco", type=options.count_or_none, default=0, help=points)
     command.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="that of MuJoCo")
     running.add_workers(command)
-    command.add_argument("--save", type=Path, help="write the map as JSON")
+    command.add_argument("--save", type=options.written, help="write the map as JSON")
     options.outputs(command, "basins", "print the shares as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Find the attractors of every set of parameters, and show them."""
-    if args.page:
-        check_writable(args.page)
     axes, ways = map(Axis.several, (args.vary, args.follow))
     ranges = {way.name: way.ends for way in ways}
     starts = np.array([running.start(args)]) if args.start else args.starts
@@ -103,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     if args.page:
         write_text(args.page, _page(args.page.stem.capitalize(), args.words, options.parameters(args), data, table))
     title, lines = f"What balls come to ({args.engine.name})", []
-    for branch in _branches(data):
+    for branch in itertools.chain.from_iterable(each["branches"] for each in rows):
         name, values = branch["parameter"], [orbit[branch["parameter"]] for orbit in branch["orbits"]]
         lines.append(f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:")
         lines += [f"  {place['kind']} at {place['value']:.7g} {place['reason']}" for place in branch["places"]]
@@ -154,11 +150,6 @@ def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
     return {"parameter": branch.name, "places": places, "orbits": list(map(data, branch.orbits))}
 
 
-def _branches(data: dict[str, Any]) -> list[dict[str, Any]]:
-    """Those of all sets."""
-    return [branch for each in data["sets"] for branch in each["branches"]]
-
-
 def _table(data: dict[str, Any]) -> pages.Rows:
     """A row for each attractor of each set."""
     varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
@@ -189,7 +180,7 @@ def _page(title: str, words: Sequence[str], p: Parameters, data: dict[str, Any],
     lines = [f"# {title}: what balls come to", ""]
     lines += [f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by", ""]
     lines += ["```sh", shlex.join(words), "```", "", pages.markdown(table)]
-    for branch in _branches(data):
+    for branch in itertools.chain.from_iterable(each["branches"] for each in data["sets"]):
         name = branch["parameter"]
         lines += ["", f"## Followed in {name}", ""]
         lines += [*(f"* {p['kind']} at {name} = {p['value']:.6g} {p['reason']}".rstrip() for p in branch["places"]), ""]
@@ -208,8 +199,6 @@ def _largest(row: dict[str, Any]) -> float:
 
 def searched(args: argparse.Namespace) -> int:
     """Search what hasn't been searched yet, and show the table."""
-    for path in filter(None, (args.save, args.page)):
-        check_writable(path)
     if args.kept:
         searches = [Searched.load(path) for path in args.kept]
     else:
@@ -228,8 +217,6 @@ def searched(args: argparse.Namespace) -> int:
 def plane(args: argparse.Namespace) -> int:
     """Map the basins and show their shares."""
     p, start = options.parameters(args), running.start(args)
-    if args.save:
-        check_writable(args.save)
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
     with running.campaign(args, "basins") as campaign:

@@ -21,7 +21,7 @@ from compare.commands import options, running
 from compare.kit import engines, pages, progress
 from mjsim import ContactSettings
 from model import InputError
-from model.files import check_writable, make_directory, write_text
+from model.files import make_directory, write_text
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names
 
 JSON, PAGE = "league.json", "league.html"
@@ -45,9 +45,8 @@ _PAIR: dict[str, tuple[Any, Any, str]] = {
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
     command = options.command(commands, "grade", graded, "mine.xml -o card.html")
-    command.add_argument(
-        "file", type=Path, nargs="?", metavar="FILE.xml", help="MJCF file with a ball and its contacts"
-    )
+    mine = "MJCF file with a ball and its contacts"
+    command.add_argument("file", type=Path, nargs="?", metavar="FILE.xml", help=mine)
     group = command.add_argument_group("settings", "as in MJCF; where not given, those of FILE.xml or MuJoCo's own")
     for name, (parse, meaning) in _NUMBERS.items():
         metavar = "s" if name == "timestep" else "N"
@@ -57,14 +56,13 @@ def add(commands: options.Commands) -> None:
     for name, (count, metavar, meaning) in _PAIR.items():
         group.add_argument(f"--{name}", type=options.number, nargs=count, metavar=metavar, help=meaning)
     running.add_engine_name(command)
-    command.add_argument("-o", "--output", type=Path, help="HTML page to write (default: none)")
+    command.add_argument("-o", "--output", type=options.written, help="HTML page to write (default: none)")
     options.outputs(command)
 
     command = options.command(commands, "cases", listed, "-o cases")
     command.add_argument("name", nargs="?", metavar="NAME", help="show this case")
-    command.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="write JSON, HDF5, MJCF and the scoring rule (default: none)"
-    )
+    files = "write JSON, HDF5, MJCF and the scoring rule (default: none)"
+    command.add_argument("-o", "--output", type=Path, metavar="DIR", help=files)
     options.outputs(command)
 
     command = options.command(commands, "league", ranked, "--quick")
@@ -86,23 +84,19 @@ def listed(args: argparse.Namespace) -> int:
     chosen = own[args.name] if args.name else None
     data = chosen.to_mapping() if chosen else {"version": VERSION, "cases": [c.to_mapping() for c in own.values()]}
     if chosen:
-        shown: list[Any] = [
-            pages.pairs(
-                {
-                    "case": chosen.name,
-                    "about": chosen.about,
-                    "body": str(chosen.body),
-                    "surfaces": "\n".join(map(str, chosen.surfaces)),
-                    "force": f"pull {chosen.pull} N, growth {chosen.growth} N/s, drag {chosen.drag} 1/s, "
-                    f"flow {chosen.flow} rad/s",
-                    "scales": f"{chosen.scales} of position (m), velocity (m/s), spin (rad/s)",
-                    "source": f"{chosen.source}; error below {chosen.bound:g}",
-                    "notices": "; ".join(f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()),
-                    "ends at": f"t = {chosen.times[-1]:g} s: {np.array2string(chosen.exact[-1], precision=6)}",
-                }
-            ),
-            chosen.mjcf(),
-        ]
+        about = {
+            "case": chosen.name,
+            "about": chosen.about,
+            "body": str(chosen.body),
+            "surfaces": "\n".join(map(str, chosen.surfaces)),
+            "force": f"pull {chosen.pull} N, growth {chosen.growth} N/s, drag {chosen.drag} 1/s, "
+            f"flow {chosen.flow} rad/s",
+            "scales": f"{chosen.scales} of position (m), velocity (m/s), spin (rad/s)",
+            "source": f"{chosen.source}; error below {chosen.bound:g}",
+            "notices": "; ".join(f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()),
+            "ends at": f"t = {chosen.times[-1]:g} s: {np.array2string(chosen.exact[-1], precision=6)}",
+        }
+        shown: list[Any] = [pages.pairs(about), chosen.mjcf()]
     else:
         rows = [["case", "contacts", "kind", "what happens"]]
         rows += [[c.name, str(len(c.surfaces)), league.kind(c), c.about] for c in own.values()]
@@ -113,8 +107,6 @@ def listed(args: argparse.Namespace) -> int:
 
 def graded(args: argparse.Namespace) -> int:
     """Grade the settings and show the card."""
-    if args.output:
-        check_writable(args.output)
     if args.engine is engines.MUJOCO:
         yours, described = _of_mujoco(args)
         others = grade.OTHERS

@@ -11,7 +11,7 @@ from analytic.flowmeter import design
 from analytic.flowmeter.design import Interval, Request
 from compare.commands import options
 from model import InputError, Parameters, drag, parameters
-from model.files import check_writable, write_text
+from model.files import write_text
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names, check_number, refuse_missing
 
 Kinds = Mapping[str, tuple[str, Range]]
@@ -29,7 +29,7 @@ def add(commands: options.Commands) -> None:
     """Declare the command."""
     command = options.command(commands, "design", run, "meter.toml -o meter.html")
     command.add_argument("file", type=Path, metavar="FILE.toml", help="fluid, flow, bounds, materials, tolerances")
-    command.add_argument("-o", "--output", type=Path, help="HTML page to write (default: none)")
+    command.add_argument("-o", "--output", type=options.written, help="HTML page to write (default: none)")
     command.add_argument("--seed", type=options.seed, default=0, help="of the random numbers of the search")
     options.outputs(command, shown="print JSON instead of tables")
 
@@ -38,8 +38,6 @@ def run(args: argparse.Namespace) -> int:
     """Design and show; 1 if no meter covers the flows."""
     from compare.report import meter  # here, because nothing else needs it
 
-    if args.output:
-        check_writable(args.output)
     asked = parameters.read_toml(args.file)
     try:
         made = design.design(request(asked), args.seed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import itertools
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,8 @@ from rich.text import Text
 from compare.bench import forecast
 from compare.commands import options
 from compare.kit import pages
-from model.files import check_writable, write_text
-from model.parameters import NOT_NEGATIVE, POSITIVE, check_number
+from model.files import write_text
+from model.parameters import POSITIVE
 
 LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
 
@@ -25,32 +26,21 @@ def add(commands: options.Commands) -> None:
     command = options.command(commands, "forecast", foretold, "scene.xml --try")
     command.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
     command.add_argument("--keyframe", metavar="NAME", help="begin with this keyframe, by name or number")
-    text = "longest time to wait until the model has settled; 0 takes the state as it stands"
-    command.add_argument("--settle", type=options.number, metavar="s", default=10.0, help=text)
-    text = "exit with 1 if a pair creeps faster, measured"
-    command.add_argument("--max-creep", type=options.number, metavar="m/s", help=text)
-    text = "exit with 1 if a pair sinks in deeper, measured"
-    command.add_argument("--max-depth", type=options.number, metavar="m", help=text)
+    longest = "longest time to wait until the model has settled; 0 takes the state as it stands"
+    command.add_argument("--settle", type=options.moment, default=10.0, help=longest)
+    for name, unit, how in (("creep", "m s-1", "creeps faster"), ("depth", "m", "sinks in deeper")):
+        limit = options.Number(unit, POSITIVE)
+        command.add_argument(f"--max-{name}", type=limit, help=f"exit with 1 if a pair {how}, measured")
     command.add_argument("--try", dest="tries", action="store_true", help="make the advised change and measure again")
-    command.add_argument("-o", "--output", type=Path, help="HTML page to write")
+    command.add_argument("-o", "--output", type=options.written, help="HTML page to write")
     options.outputs(command)
 
 
 def foretold(args: argparse.Namespace) -> int:
     """Settle the model, print the forecast, and check the limits."""
-    check_number("--settle", args.settle, "s", NOT_NEGATIVE)
-    for name in ("max_creep", "max_depth"):
-        if getattr(args, name) is not None:
-            check_number(
-                f"--{name.replace('_', '-')}", getattr(args, name), "m/s" if "creep" in name else "m", POSITIVE
-            )
-    if args.output:
-        check_writable(args.output)
     good = {"creep": args.max_creep or forecast.CREEP, "depth": args.max_depth}
     heard = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(
-        lambda _: None
-    )  # or it writes a log where the user is; what it warns of is in the table
+    mujoco.set_mju_user_warning(lambda _: None)  # it would write a log here; what it warns of is in the table
     try:
         model, data = forecast.load(args.file, args.keyframe)
         found = forecast.forecast(model, data, forecast.settle(model, data, args.settle), **good)
@@ -69,15 +59,11 @@ def foretold(args: argparse.Namespace) -> int:
     if after:
         shown += [Text(""), pages.table("After the change", forecast.rows(after), **LOOK)]
     options.show({"before": dataclasses.asdict(found), "after": after and dataclasses.asdict(after)}, args.json, *shown)
-    beyond = [
-        f"{pair.name}: {name} {value:.3g} {unit}, more than {limit:g}"
-        for pair in found.pairs
-        for name, value, limit, unit in (
-            ("creep", pair.creep_measured, args.max_creep, "m/s"),
-            ("depth", pair.depth_measured, args.max_depth, "m"),
-        )
-        if limit and value > limit
-    ]
-    for line in beyond:
-        print(f"dualball: {line}", file=sys.stderr)
-    return int(bool(beyond))
+    limits = ("creep", "m/s", args.max_creep), ("depth", "m", args.max_depth)
+    code = 0
+    for pair, (name, unit, limit) in itertools.product(found.pairs, limits):
+        value = getattr(pair, f"{name}_measured")
+        if limit and value > limit:
+            print(f"dualball: {pair.name}: {name} {value:.3g} {unit}, more than {limit:g}", file=sys.stderr)
+            code = 1
+    return code

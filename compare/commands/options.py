@@ -65,11 +65,22 @@ seconds = Number("s", Range(1e-9, 1e9))
 moment = Number("s", NOT_NEGATIVE)
 
 
+def written(text: str) -> Path:
+    """A file to be written, for argparse: that it can't be is better known before a long run than after."""
+    from model.files import check_writable  # here, because what only shows needs no HDF5
+
+    try:
+        check_writable(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return Path(text)
+
+
 def hdf5(text: str) -> Path:
-    """A file to be written as HDF5, for argparse: other names would promise another format."""
+    """The same of a file to be written as HDF5: other names would promise another format."""
     if Path(text).suffix not in (".h5", ".hdf5", ".nc"):
         raise argparse.ArgumentTypeError(f"{text!r} would hold HDF5: its name must end in .h5, .hdf5 or .nc")
-    return Path(text)
+    return written(text)
 
 
 class _Help(argparse.HelpFormatter):
@@ -78,7 +89,7 @@ class _Help(argparse.HelpFormatter):
     def _get_default_metavar_for_optional(self, action: argparse.Action) -> str:
         if isinstance(action.type, Number):
             return action.type.metavar
-        return "FILE" if action.type in (Path, hdf5) else super()._get_default_metavar_for_optional(action)
+        return "FILE" if action.type in (Path, written, hdf5) else super()._get_default_metavar_for_optional(action)
 
     _get_default_metavar_for_positional = _get_default_metavar_for_optional
 

@@ -101,7 +101,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     off = data["model_error"]
 
     def shown_to(value: float, most: int) -> str:
-        return meter.rounded(value, most, off)
+        return meter.rounded(value, off, most)
 
     first = [Text(doubt, "bold yellow") for doubt in meter.doubts(off)]
     given = [["", "", ""]]
@@ -135,8 +135,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         if math.isinf(data["reading_range"]):
             reach += "; ω_c = ω₀ holds in every motion, however fast the flow"
     remarks: list[Text | str] = [f"Flowmeter at ω₀ = {p.omega_0:g} rad/s: {data['reading']}; {reach}."]
-    if p.c and p.omega_0:
-        remarks.append(meter.torque(p))
+    remarks += [meter.torque(p)] if p.c and p.omega_0 else []
     if data["fluid_inertia"]:
         shifts = ", ".join(
             f"{QUANTITIES[name].symbol if name in QUANTITIES else 'the rate at which rolling follows the flow'} "
@@ -144,10 +143,8 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
             for name, shift in data["fluid_inertia"].items()
             if math.isfinite(shift)
         )
-        remarks.append(
-            f"Left out is the fluid's inertia (added mass, pressure gradient): it would shift {shifts}; not ω₀₃."
-        )
-        remarks.append(meter.AT_WALLS)
+        inertia = "Left out is the fluid's inertia (added mass, pressure gradient)"
+        remarks += [f"{inertia}: it would shift {shifts}; not ω₀₃.", meter.AT_WALLS]
     outside = [f"{s['Re']:.3g} in {s['case']}" for s in solutions if s["exists"] and s["drag_law_covers_Re"] is False]
     if outside:
         (low, high), (_, most) = REYNOLDS[p.drag], REYNOLDS[SCHILLER_NAUMANN]
@@ -166,9 +163,7 @@ _MEANING = {
 }
 
 
-Shown = Callable[[float, int], str]
-"""A number with so many digits at most."""
-_ROWS: dict[str, Callable[[dict[str, Any], Shown], str]] = {
+_ROWS: dict[str, Callable[[dict[str, Any], Callable[[float, int], str]], str]] = {
     "ω_c (rad/s)": lambda s, shown: shown(s["x"]["omega_c"], 8),
     "ω̃_x (rad/s)": lambda s, shown: shown(s["x"]["slip_x"], 8),
     "ω̃_y (rad/s)": lambda s, shown: shown(s["x"]["slip_y"], 8),

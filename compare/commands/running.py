@@ -27,10 +27,8 @@ def add_flow(parser: argparse.ArgumentParser) -> None:
     choice = group.add_mutually_exclusive_group()
     ramp = "rises or falls evenly within so many seconds, and stays"
     choice.add_argument("--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp)
-    choice.add_argument(
-        "--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help="levels, each held HOLD s"
-    )
-    wave = "a mean with waves on it, frequencies in Hz"
+    held, wave = "levels, each held HOLD s", "a mean with waves on it, frequencies in Hz"
+    choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help=held)
     choice.add_argument("--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave)
     choice.add_argument("--flow", type=Path, help="measured, as CSV: time, omega_0 on each line")
     longest = "longest time between lines of --flow (default: ten times the usual one)"
@@ -51,9 +49,7 @@ def flow(args: argparse.Namespace) -> Flow | None:
     if args.sine:
         mean, *waves = args.sine
         if not waves or len(waves) % 2:
-            raise InputError(
-                "--sine needs a mean in rad/s, then for each wave its amplitude in rad/s and frequency in Hz"
-            )
+            raise InputError("--sine needs a mean in rad/s, then each wave's amplitude in rad/s and frequency in Hz")
         return Flow.sines(mean, zip(waves[::2], waves[1::2], [0.0] * (len(waves) // 2), strict=True))
     return Flow.from_csv(args.flow, args.longest_interval) if args.flow else None
 

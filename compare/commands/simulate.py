@@ -15,7 +15,7 @@ from compare.kit.tasks import failed_path, journal_path, store
 from compare.kit.workers import interrupts
 from compare.view import inspection
 from model import Flow, InputError, Parameters
-from model.files import check_writable, reading_json, write_text
+from model.files import reading_json, write_text
 from model.parameters import Range, check_number
 
 
@@ -27,9 +27,8 @@ def add(commands: options.Commands) -> None:
     running.add_flow(command)
     running.add_start(command)
     command.add_argument("--time", type=options.seconds, default=10.0, help="duration")
-    command.add_argument(
-        "--sample-interval", type=options.seconds, help="time between samples (default: duration/1000)"
-    )
+    between = "time between samples (default: duration/1000)"
+    command.add_argument("--sample-interval", type=options.seconds, help=between)
     command.add_argument("-o", "--output", type=options.hdf5, help="HDF5 file to write (default: none)")
     options.outputs(command, shown="print the description as JSON")
 
@@ -39,12 +38,8 @@ def add(commands: options.Commands) -> None:
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
     command.add_argument("--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead")
     command.add_argument("--seed", type=options.seed, default=0, help="of the points of --random")
-    command.add_argument(
-        "--direction",
-        choices=("held", "up", "down", "both"),
-        default="held",
-        help="held: a run a point; else omega_0 in steps within one run",
-    )
+    ways, meaning = ("held", "up", "down", "both"), "held: a run a point; else omega_0 in steps within one run"
+    command.add_argument("--direction", choices=ways, default="held", help=meaning)
     command.add_argument("--hold", type=options.seconds, default=20.0, help="time at each step")
     running.add_engine(command)
     command.add_argument("--time", type=options.seconds, default=30.0, help="duration of a run that is held")
@@ -62,8 +57,6 @@ def run(args: argparse.Namespace) -> int:
     task = running.task(args, options.parameters(args), flow=running.flow(args), sample_interval=args.sample_interval)
     if args.sample_interval is not None:
         check_number("sample_interval", args.sample_interval, "s", Range(high=args.time), "with this --time it")
-    if args.output:
-        check_writable(args.output)
     with tempfile.TemporaryDirectory() as scratch, interrupts() as interrupted:
         path = args.output or Path(scratch) / "run.h5"
         try:
@@ -118,9 +111,8 @@ def _keep_apart(args: argparse.Namespace, p: Parameters) -> None:
         with reading_json(path, "sweep") as held:
             differ = [f"{name} = {held[name]}, not {value}" for name, value in asked.items() if held[name] != value]
         if differ:
-            raise InputError(
-                f"{args.output} holds another sweep ({'; '.join(differ)}): choose another directory with --output"
-            )
+            other = f"{args.output} holds another sweep ({'; '.join(differ)})"
+            raise InputError(f"{other}: choose another directory with --output")
     write_text(path, json.dumps(asked))
 
 

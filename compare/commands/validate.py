@@ -26,12 +26,9 @@ def add(commands: options.Commands) -> None:
     """Declare the commands."""
     command = options.command(commands, "validate", run, "--quick")
     level = command.add_mutually_exclusive_group()
-    level.add_argument(
-        "--quick", dest="level", action="store_const", const=Level.QUICK, default=Level.DEFAULT, help="a minute or two"
-    )
-    level.add_argument(
-        "--full", dest="level", action="store_const", const=Level.FULL, help="an hour or more (default: in between)"
-    )
+    for each, takes in ((Level.QUICK, "a minute or two"), (Level.FULL, "an hour or more (default: in between)")):
+        option, usual = f"--{each.name.lower()}", Level.DEFAULT
+        level.add_argument(option, dest="level", action="store_const", const=each, default=usual, help=takes)
     own = command.add_mutually_exclusive_group()
     own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
     own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
@@ -43,12 +40,11 @@ def add(commands: options.Commands) -> None:
     again.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="of a validation")
     running.add_processes(again)
 
-    for each, directory in ((command, "results"), (again, "")):
-        each.add_argument(
-            "--claim", action="append", metavar="ID", help="only this claim; may be repeated (default: all)"
-        )
-        each.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
-        options.outputs(each, directory, "print the verdicts as JSON")
+    for parser, directory in ((command, "results"), (again, "")):
+        one = "only this claim; may be repeated (default: all)"
+        parser.add_argument("--claim", action="append", metavar="ID", help=one)
+        parser.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
+        options.outputs(parser, directory, "print the verdicts as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -67,9 +63,8 @@ def run(args: argparse.Namespace) -> int:
     with progress.shown(quiet=args.quiet or args.json) as show:
         wanted = {"level": args.level, "claims": args.claim, "sets": chosen, "limit": args.limit, "engine": args.engine}
         wanted |= {"workers": running.workers(args), "progress": show}
-        verdicts = validation.validate(
-            args.output, **wanted, announce=lambda verdict: console.print(line(verdict), soft_wrap=True)
-        )
+        wanted |= {"announce": lambda verdict: console.print(line(verdict), soft_wrap=True)}
+        verdicts = validation.validate(args.output, **wanted)
     admitted = [v for v in verdicts if v.outcome is not Outcome.NOT_RUN] if chosen else verdicts
     return _finish(verdicts, admitted, args, console)
 
@@ -121,11 +116,9 @@ def summary(verdicts: Sequence[Verdict]) -> Text:
     said = "; ".join([wording.headline(ran), *map(" ".join, wording.totals(ran))])
     shown = Text(f"{said}. {wording.missing(ran)}".strip(), "bold")
     for each in wording.witnesses(ran):
-        shown.append(
-            f"\n{each['engine']}: {each['confirmed']} of {each['asked']} claims confirmed, {each['refuted']} refuted; "
-            f"typical deviation {each['typical']}, worst {each['worst']} ({each['about']})",
-            "not bold",
-        )
+        counts = f"{each['confirmed']} of {each['asked']} claims confirmed, {each['refuted']} refuted"
+        off = f"typical deviation {each['typical']}, worst {each['worst']}"
+        shown.append(f"\n{each['engine']}: {counts}; {off} ({each['about']})", "not bold")
     return shown
 
 

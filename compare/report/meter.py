@@ -50,11 +50,8 @@ def torque(p: Parameters) -> str:
         said += f"; with a boundary layer, as for the spin's Re = {layer.Re:.2g}, at {layer_told}"
     if max(stokes.friction, layer.friction) > 1:
         said += ". More than 1 means that the ball can't roll at both points"
-    return (
-        said
-        + "."
-        + (" (If a fluid made c by Stokes' drag: which fluid isn't known.)" if not (p.nu_f or p.fluid_torque) else "")
-    )
+    known = p.nu_f or p.fluid_torque
+    return f"{said}." if known else f"{said}. (If a fluid made c by Stokes' drag: which fluid isn't known.)"
 
 
 AT_WALLS = (
@@ -63,7 +60,7 @@ AT_WALLS = (
 )
 
 
-def rounded(value: float, most: int, off: float) -> str:
+def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
     """A number with so many digits at most, the last of them where the first digit of its relative error `off` is."""
     if not math.isfinite(value):
         return _NONE
@@ -83,8 +80,8 @@ def sentences(made: Design) -> list[str]:
     if chosen.margin:
         said.append(
             "Rolling at both points is the ball's only lasting motion up to at worst "
-            f"ω₀ = {_number(chosen.worst.omega_0, off)} rad/s, {_number(chosen.margin, off)} times the fastest flow, "
-            f"{request.fastest:g} rad/s ({_number(chosen.limit.omega_0, off)} nominally): there "
+            f"ω₀ = {rounded(chosen.worst.omega_0, off)} rad/s, {rounded(chosen.margin, off)} times the fastest flow, "
+            f"{request.fastest:g} rad/s ({rounded(chosen.limit.omega_0, off)} nominally): there "
             f"{chosen.worst.end.value}."
         )
     else:
@@ -94,13 +91,13 @@ def sentences(made: Design) -> list[str]:
     if chosen.margin:
         said.append(
             "The inertia of the fluid, which the model leaves out, would make the limit at worst about "
-            f"{_number(made.with_inertia, off)} rad/s."
+            f"{rounded(made.with_inertia, off)} rad/s."
         )
     if math.isfinite(chosen.response):
-        said.append(f"It follows small changes of the flow with a time constant of {_number(chosen.response, off)} s.")
+        said.append(f"It follows small changes of the flow with a time constant of {rounded(chosen.response, off)} s.")
     if request.slowest > 0:
         turn, ratio = 2 * math.pi / request.slowest, request.fastest / request.slowest
-        said.append(f"At the slowest flow, 1/{_number(ratio)} of the fastest, a turn takes {_number(turn)} s.")
+        said.append(f"At the slowest flow, 1/{rounded(ratio)} of the fastest, a turn takes {rounded(turn)} s.")
     said += [torque(chosen.p.replace(omega_0=request.fastest)), AT_WALLS]
     p = chosen.p
     Re = float(np.max(drag.reynolds(p.R * (curve.omega_0 - curve.band[0]), p)))
@@ -122,22 +119,22 @@ def rows(made: Design) -> dict[str, pages.Rows]:
         "margin at worst": [c.margin for c in best.values()],
         "time constant (s)": [c.response for c in best.values()],
     }
-    limits = {name: [_number(x, off) for x in row] for name, row in numbers.items()}
+    limits = {name: [rounded(x, off) for x in row] for name, row in numbers.items()}
     spread = {key: [getattr(made.thresholds, key), *made.spread[key]] for key in THRESHOLDS}
-    values = {_named(name): [_number(c.values[name]) for c in best.values()] for name in made.choice.values}
+    values = {_named(name): [rounded(c.values[name]) for c in best.values()] for name in made.choice.values}
     sensitivities = [["% per %", *(SYMBOLS[key] for key in THRESHOLDS)]]
     for name in made.sensitivities[THRESHOLDS[0]]:
         slopes = [made.sensitivities[key][name].value for key in THRESHOLDS]
         # Differences of two widths leave 1e-4 of what should be zero.
         shown = [
-            _number(value, off) if abs(value) >= 5e-4 else "0" if math.isfinite(value) else _NONE for value in slopes
+            rounded(value, off) if abs(value) >= 5e-4 else "0" if math.isfinite(value) else _NONE for value in slopes
         ]
         sensitivities.append([SYMBOLS.get(name, name), *shown])
     return {
         "The best of each material": [["", *best], *([name, *row] for name, row in (values | limits).items())],
         "Thresholds": [
             ["threshold", "nominal (rad/s)", "lowest", "highest"],
-            *([SYMBOLS[key], *(_number(x, off) for x in row)] for key, row in spread.items()),
+            *([SYMBOLS[key], *(rounded(x, off) for x in row)] for key, row in spread.items()),
         ],
         "Sensitivities": sensitivities,
     }
@@ -213,13 +210,9 @@ def page(made: Design) -> str:
 
 
 def _values(values: Mapping[str, Any]) -> str:
-    shown = {n: x if isinstance(x, str) else f"{_number(x)} {UNITS.get(n, '')}".rstrip() for n, x in values.items()}
+    shown = {n: x if isinstance(x, str) else f"{rounded(x)} {UNITS.get(n, '')}".rstrip() for n, x in values.items()}
     return ", ".join(f"{SYMBOLS.get(name, name)} = {text}" for name, text in shown.items())
 
 
 def _named(name: str) -> str:
     return SYMBOLS.get(name, name) + (f" ({UNITS[name]})" if name in UNITS else "")
-
-
-def _number(x: float, off: float = 0.0) -> str:
-    return rounded(x, 4, off)

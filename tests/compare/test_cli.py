@@ -327,7 +327,9 @@ def drawn(command: str) -> Iterator[list[str]]:
             bad += ["1e300"] if action.dest in ("ramp", "staircase", "sine") else []
             values += [[text] * (action.nargs if isinstance(action.nargs, int) else 1) for text in bad]
         else:
-            values.append(["file/absent.h5" if action.type in (Path, options.hdf5) else "no such thing"])
+            values.append(
+                ["file/absent.h5" if action.type in (Path, options.written, options.hdf5) else "no such thing"]
+            )
         if action.dest == "start":
             values += [[f"omega_c={text}"] for text in ("x", "nan", "1e300", "")]
         yield from ([*option, *value] for value in values)
