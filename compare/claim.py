@@ -16,6 +16,7 @@ from compare.kit.check import Check, Relation
 from compare.kit.levels import Level
 from compare.kit.quantities import quantity
 from compare.kit.record import Condition, Measurement, Missing
+from compare.kit.sets import sets
 from compare.kit.statistics import Measured
 
 When = Callable[[Measurement], bool]
@@ -150,7 +151,12 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        """Whether the outcome is the one to be expected."""
+        """Whether the outcome is the one to be expected.
+
+        What is refuted by an example is so on the sets of the study: a set of one's own may show none.
+        """
+        if self.outcome is Outcome.CONFIRMED and self.claim.expected is Outcome.REFUTED:
+            return not {check.measurement.set for check in self.checks} & sets(Level.FULL).keys()
         return self.outcome is self.claim.expected
 
     @property

@@ -75,6 +75,8 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other
         reason = f"{type(error).__name__}: {error}"
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
+    if not checks and not missing and (known := {m.protocol for m in records.measurements} & claim.protocols):
+        missing = tuple(Missing(name, "all", "no number is of what the claim is about", 0) for name in sorted(known))
     return Verdict(claim=claim, outcome=outcome(checks), checks=checks, missing=missing)
 
 

@@ -42,6 +42,8 @@ class Bracket:
     """How far the place moves with half the time step."""
     said: tuple[tuple[float, bool | None], ...] = ()
     """All that was asked so far: values and answers."""
+    failure: str = ""
+    """Why a run broke down, the last one if several did."""
 
     @property
     def place(self) -> Measured:
@@ -61,28 +63,43 @@ class Search:
     """Width at which it is narrow enough."""
 
 
+Question = tuple[Search, float, Bracket]
+"""What is asked, at which value, given the bracket so far."""
+
+
 def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
     """Narrow every search down to its width, or as far as runs show it, all of them together, round by round.
 
-    A round asks inside every bracket, and once more, for longer, where the run doesn't show the answer. The new bracket
-    is from the last yes before the first no to that no.
+    A round asks inside every bracket, and once more, for longer, where the run doesn't show the answer; one that breaks
+    down shows none. The new bracket is from the last yes before the first no to that no.
 
     With `careful` the ends of the brackets are asked once more with half the time step: one that doesn't hold is as
     uncertain as the bracket before it was wide, see `Bracket.shift`.
     """
+    failures: dict[Search, str] = {}
+
+    def ask(questions: Sequence[Question], care: Care) -> tuple[list[Task], list[Trajectory | None], list[bool | None]]:
+        tasks, runs = [search.task(value, bracket, care) for search, value, bracket in questions], []
+        for (search, *_), run in zip(questions, lab.each(tasks), strict=True):
+            if isinstance(run, str):
+                failures[search] = run
+            runs.append(None if isinstance(run, str) else run)
+        return (
+            tasks,
+            runs,
+            [None if run is None else search.answer(run) for (search, *_), run in zip(questions, runs, strict=True)],
+        )
+
     brackets = [search.begin for search in searches]
     before = list(brackets)
     todo = list(range(len(searches)))
     while todo := [k for k in todo if brackets[k].high - brackets[k].low > searches[k].width]:
         values = {k: np.linspace(brackets[k].low, brackets[k].high, SECTIONS + 2).tolist() for k in todo}
         asked = [(searches[k], value, brackets[k]) for k in todo for value in values[k][1:-1]]
-        tasks = [search.task(value, bracket, USUAL) for search, value, bracket in asked]
-        runs = lab.run(tasks)
-        answers = [search.answer(run) for (search, _, _), run in zip(asked, runs, strict=True)]
-        unclear = [n for n, answer in enumerate(answers) if answer is None]
-        longer = [search.task(value, bracket, LONGER) for search, value, bracket in (asked[n] for n in unclear)]
-        for n, task, run in zip(unclear, longer, lab.run(longer), strict=True):
-            tasks[n], runs[n], answers[n] = task, run, asked[n][0].answer(run)
+        tasks, runs, answers = ask(asked, USUAL)
+        unclear = [n for n, answer in enumerate(answers) if answer is None and runs[n] is not None]
+        for n, task, run, answer in zip(unclear, *ask([asked[n] for n in unclear], LONGER), strict=True):
+            tasks[n], runs[n], answers[n] = task, run, answer
         for n, k in enumerate(todo):
             inside = slice(n * SECTIONS, (n + 1) * SECTIONS)
             ends = brackets[k].runs
@@ -96,9 +113,9 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
         todo = [k for k in todo if brackets[k].high - brackets[k].low < (before[k].high - before[k].low) / 2]
     if careful:
         asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in (b.low, b.high)]
-        checks = iter(lab.run([search.task(value, bracket, FINER) for search, value, bracket in asked]))
-        for k, search in enumerate(searches):
-            low, high = search.answer(next(checks)), search.answer(next(checks))
-            if low is False or high is True:
+        _, runs, answers = ask(asked, FINER)
+        for k in range(len(searches)):
+            low, high = answers[2 * k : 2 * k + 2]
+            if low is False or high is True or None in runs[2 * k : 2 * k + 2]:
                 brackets[k] = replace(brackets[k], shift=before[k].high - before[k].low)
-    return brackets
+    return [replace(b, failure=failures.get(search, "")) for search, b in zip(searches, brackets, strict=True)]

@@ -22,7 +22,7 @@ from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
 from compare.kit.tasks import sources
-from model import Parameters, StorageError
+from model import Parameters, SimulationError, StorageError
 from model.files import make_directory
 
 DIRECTORY = "measurements"
@@ -189,8 +189,7 @@ def carry_out(
 
     Its measurement file is the record of what is done: once it is there, only the runs that a figure draws are kept.
 
-    Raises `StorageError` where measurements can't be read or written; a run that breaks down raises
-    `SimulationError`, as far as the protocol can't go on without it.
+    Raises `StorageError` where measurements can't be read or written.
     """
     path = file(protocol, results, lab, chosen)
     label = f"{protocol.name}-{path.parent.name}"
@@ -204,7 +203,7 @@ def carry_out(
         if protocol.alone and "reference" not in strong:
             rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.alone, 0))
         else:
-            rows = [*protocol.measure(lab, strong, before), *rows]
+            rows = [*_measured(protocol, lab, strong, before), *rows]
         make_directory(path.parent)
         about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
         place = f"{campaign.directory.name}/{label}.h5"
@@ -215,6 +214,18 @@ def carry_out(
     records = record.load(path)
     campaign.reduce(label, {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run})
     return records
+
+
+def _measured(
+    protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], before: Records
+) -> list[Measurement | Missing]:
+    """What a protocol measures; a run that it can't go on without leaves out its set, and no other."""
+    try:
+        return list(protocol.measure(lab, sets, before))
+    except SimulationError as error:
+        if len(sets) > 1:  # what was run is not run again
+            return [row for name, p in sets.items() for row in _measured(protocol, lab, {name: p}, before)]
+        return [Missing(protocol.name, next(iter(sets)), str(error))]
 
 
 def _too_weak(p: Parameters, protocol: Protocol) -> str:

@@ -126,3 +126,16 @@ def test_only_what_is_formal_goes_without_measurements() -> None:
 def test_an_unknown_claim_is_refused_with_a_suggestion() -> None:
     with pytest.raises(InputError, match="did you mean"):
         select([claim(), replace(claim(), id="prop-1")], ["prop-2"])
+
+
+def test_a_set_of_ones_own_need_not_show_what_refutes_a_claim():
+    false = replace(claim(), expected=Outcome.REFUTED)
+    (mine,) = judge([false], measured(P.omega_0, FINE))
+    assert mine.outcome is Outcome.CONFIRMED
+    assert mine.passed
+    of_the_study = [replace(m, set="reference") for m in measured(P.omega_0, FINE).measurements]
+    assert not judge([false], Records(tuple(of_the_study)))[0].passed
+
+
+def test_what_is_not_run_says_why():
+    assert "about" in str(judge([claim()], measured(1.0, FINE, "v_y"))[0].missing[0])

@@ -28,7 +28,7 @@ from model import Case, Parameters
 from tests.measured import measured
 
 REFERENCE = Parameters.named("reference")
-NUMBERS = SimpleNamespace(run=list)
+NUMBERS = SimpleNamespace(each=list)
 """Stands for a lab whose tasks are their own runs."""
 
 
@@ -62,6 +62,20 @@ def test_a_change_that_moves_with_the_time_step_is_uncertain():
     assert bracket.low < 0.3 < bracket.high
     assert bracket.shift > 0
     assert bracket.place.uncertainty >= bracket.shift
+
+
+def test_a_run_that_breaks_down_leaves_the_place_open_and_says_why():
+    search = Search(Bracket(0.0, 1.0), lambda v, b, care: v if abs(v - 0.5) > 0.1 else "broke", lambda v: v < 0.5, 1e-3)
+    (bracket,) = narrow(NUMBERS, [search])
+    assert bracket.low < 0.4 < 0.6 < bracket.high
+    assert bracket.failure == "broke"
+
+
+def test_a_floor_that_carries_little_is_not_lost_where_the_wall_slips():
+    p = REFERENCE.replace(eta=1.01 * REFERENCE.j, omega_0=1.05 / math.sqrt(REFERENCE.j) / time_unit(REFERENCE))
+    run = analytic.simulate(p, [0, 0, p.omega_0, 0, 0, 0, 0, 0], 2.0)
+    sliding = dataclasses.replace(run, slip_speed_B=run.slip_speed_B + 1e-3)
+    assert [thresholds.lifts(Bracket(0.0, 1.0, (None, each))) for each in (run, sliding)] == [True, False]
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6])

@@ -20,7 +20,7 @@ from compare.kit.levels import Level
 from compare.kit.programme import UNDAMPED, Measure, Protocol
 from compare.kit.record import Measurement, Missing, Records
 from compare.report import results
-from model import InputError, Parameters, SimulationError, StorageError
+from model import InputError, Parameters, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 SETS = {"mine": Parameters.named("reference"), "undamped": Parameters.named("reference").replace(c=0.0)}
@@ -205,17 +205,21 @@ def test_an_unknown_claim_leaves_nothing_behind(tmp_path: Path, counted: list[st
     assert not (tmp_path / "new").exists()
 
 
-def test_a_run_that_breaks_down_loses_its_protocol(
+def test_a_run_that_breaks_down_loses_its_set_and_no_other(
     tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def diverging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
-        (failed,) = lab.run([lab.task(SETS["mine"], [0, 0, 1e9, 0, 0, 0], 0.1, 4e-3)])
-        yield Missing("broken", "mine", failed.header.failure)
+        for name, p in sets.items():
+            lab.run([lab.task(p, [0, 0, 1e9 if name == "mine" else 1.0, 0, 0, 0], 0.1, 4e-3)])
+            yield Missing("broken", name, "whole")
 
     monkeypatch.setattr(validation, "PROTOCOLS", (Protocol("broken", diverging),))
-    verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=SETS, workers=0, claims=["of-broken"])
-    assert verdicts[0].outcome is Outcome.ERROR
-    assert SimulationError.__name__ in verdicts[0].error
+    both = {"yours": Parameters.named("reference"), **SETS}
+    verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=both, workers=0, claims=["of-broken"])
+    assert verdicts[0].outcome is Outcome.NOT_RUN
+    yours, mine, _ = verdicts[0].missing
+    assert (yours.reason, mine.set) == ("whole", "mine")
+    assert mine.reason.startswith("the run ")
 
 
 @pytest.mark.parametrize("command", ["validate", "judge"])

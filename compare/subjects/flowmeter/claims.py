@@ -102,10 +102,11 @@ def _ends(*starts: str) -> Bearing:
 
 def _at_event(m: Measurement) -> Measured:
     """A number at an event of theory's motion; LookupError if there is no such event."""
-    run, events, event = _run(m), _run(m).events, m.conditions["event"]
+    run, events, event, unsure = _run(m), _run(m).events, m.conditions["event"], 0.0
     changes = list(zip(map(Case, events.from_case), map(Case, events.to_case), strict=True))
     if m.quantity == "lift":
-        value = float(run.y[-1]) if event == "end" else first_top(run)
+        top = Measured(float(run.y[-1]), 0.0) if event == "end" else first_top(run)
+        value, unsure = top.value, top.uncertainty
     else:
         slips = [after.B is Contact.S for _, after in changes]
         lands = [before.A is Contact.N and after.A is not Contact.N for before, after in changes]
@@ -119,7 +120,9 @@ def _at_event(m: Measurement) -> Measured:
         # A landing without restitution takes away all of the speed.
         values = {"time": float(time), "landing_impulse": impulse, "landing_speed": -impulse / m.parameters.m}
         value = values[m.quantity]
-    return Measured(value, 100 * RTOL * abs(value))  # errors of some 100 steps of the integrator may be of one sign
+    return Measured(
+        value, math.hypot(unsure, 100 * RTOL * value)
+    )  # errors of some 100 steps of the integrator may be of one sign
 
 
 TOLERANCES = {"mu": 0.05, "eta": 0.05}

@@ -261,7 +261,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
         if name == LANDING:
             numbers = _landed(run)
         elif name == UPWARDS:  # it falls on the floor soon after
-            numbers = {("lift", "first top"): Measured(first_top(run), 0.0)}
+            numbers = {("lift", "first top"): first_top(run)}
         elif name == BY_SPIN:  # it leaves the floor at a step, up to one late or early, and rises so much less or more
             numbers = {("lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
         return family(settled_case(run)), numbers
@@ -293,12 +293,16 @@ def _landed(run: Trajectory) -> Numbers:
     }
 
 
-def first_top(run: Trajectory) -> float:
-    """Height in m at which v_y first falls to zero, between the samples as under constant acceleration."""
+def first_top(run: Trajectory) -> Measured:
+    """Height in m at which v_y first falls to zero.
+
+    It lies between those that constant acceleration gives from the samples on either side: half of that is unsure.
+    """
     k = int(np.argmax(run.v_y < 0))
-    before, after = run.v_y[k - 1], run.v_y[k]
-    wait = (run.time[k] - run.time[k - 1]) * before / (before - after)
-    return float(run.y[k - 1] + before * wait / 2)
+    ends = [k - 1, k]
+    before, after = run.v_y[ends]
+    heights = run.y[ends] + run.v_y[ends] ** 2 * (run.time[k] - run.time[k - 1]) / (before - after) / 2
+    return Measured(float(heights.mean()), float(np.ptp(heights)) / 2)
 
 
 PROTOCOLS = (

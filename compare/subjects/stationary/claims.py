@@ -115,11 +115,15 @@ def _leaning(m: Measurement) -> float:
 
 
 def _born(m: Measurement) -> float:
-    """The drag c at which the point where the fold is born, whose eta goes like c^2, is at the eta of the set."""
-    born = bifurcation.double_points(m.parameters)[0]
+    """The drag c at which the point where the fold is born, whose eta goes like c^2, is at the eta of the set.
+
+    From that point in the drag that was measured: with the set's own, no fold may be born for any eta below j.
+    """
+    p = m.parameters.replace(c=m.value)
+    born = bifurcation.double_points(p)[0]
     if born.meets != ("omega_02", "omega_04"):
         raise LookupError("no fold is born")
-    return m.parameters.c * math.sqrt(m.parameters.eta / born.eta)
+    return p.c * math.sqrt(p.eta / born.eta)
 
 
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
