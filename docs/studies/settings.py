@@ -18,11 +18,14 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.figure import Figure
 
+import mjsim
 from compare.kit import drawing, progress, style
 from compare.kit.campaign import BATCH, Campaign
-from compare.kit.engines import ENGINES, EVENT, MOREAU, NEWCOMER, as_it_comes, newcomer
+from compare.kit.engines import ENGINES, EVENT, MOREAU, NEWCOMER, as_it_comes, newcomer, plain
+from compare.kit.pages import Rows
 from compare.kit.tasks import Task
 from docs.studies import states
 from docs.studies.states import CONTACT, ERRORS, OPEN, Contestant, Entry
@@ -81,6 +84,48 @@ def rivals(step: float) -> Ways:
 def reached(campaign: Campaign, ways: Ways) -> list[Entry]:
     """Errors of ways to set MuJoCo, and how often contact is lost."""
     return states.scored(campaign, _contestants(ways), [*ERRORS, CONTACT])
+
+
+class _Unwatched(ContactSettings):
+    """Settings whose landings are left to the contacts."""
+
+    def slowest_fall(self, g: float) -> float:
+        return math.inf
+
+
+def landings(step: float) -> Rows:
+    """What a landing, and motions with one, come to as corrections are taken away: relative errors of omega_c.
+
+    That of `states.LANDING` 5 ms after it has landed and its rms over the motion, how high the ball rebounds within
+    0.1 s, and the rms over the motion of `states.HITTING`.
+    """
+    lone, theirs = "MuJoCo's defaults", "coordinates free, wall prism, cone pyramidal"
+    ways: Ways = {
+        "ours (mujoco)": ContactSettings.at(step),
+        "ours, memory off": ContactSettings.at(step, memory=False),
+        "ours, servo 0, landings left to the contacts": ContactSettings.at(step, servo=0.0),
+        "ours, landings left to the contacts": _Unwatched(**vars(ContactSettings.at(step))),
+        "ours, memory off, servo 0, order 1, integrator implicit (mujoco-plain)": plain(step),
+        lone: newcomer(step),
+        f"{lone}, {theirs} (mujoco-defaults)": as_it_comes(step),
+    }
+    rows = [["settings", "ω_c 5 ms after a landing", "rebound", "motion with it", "motion that hits the wall"]]
+    for name, way in ways.items():
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of contacts that hover
+            lands, hits = (
+                mjsim.simulate(each.p, each.x0, each.lasts, settings=way, sample_interval=step)
+                for each in (states.LANDING, states.HITTING)
+            )
+        exact = states.LANDING.exact
+        landed = float(exact.time[np.flatnonzero(exact.y <= 0)[0]])
+        after = float(np.interp(landed + 5e-3, lands.time, lands.omega_c))
+        off = after / float(np.interp(landed + 5e-3, exact.time, exact.omega_c)) - 1
+        height = float(lands.y[(lands.time > landed + 2e-3) & (lands.time < landed + 0.1)].max())
+        motions = (each.errors(run.time, run.x)[0] for each, run in ((states.LANDING, lands), (states.HITTING, hits)))
+        rebound = f"{1e3 * height:.2g} mm" if height > 1e-5 else "none"
+        rows.append([name, states.number(abs(off)), rebound, *map(states.number, motions)])
+    return rows
 
 
 def frontier(campaign: Campaign, steps: Sequence[float]) -> list[Entry]:

@@ -22,7 +22,7 @@ from compare.kit import drawing, pages, progress
 from compare.kit.campaign import Campaign
 from compare.kit.engines import newcomer
 from compare.kit.pages import Rows
-from docs.studies import accuracy, confirmation, settings, states
+from docs.studies import accuracy, confirmation, settings, states, witnesses
 from docs.studies.states import Entry
 from mjsim import ContactSettings
 from model import InputError
@@ -66,6 +66,10 @@ def variants(step: float) -> settings.Ways:
 
 
 TABLES: dict[str, Callable[[Campaign], Rows]] = {
+    "witnesses": lambda campaign: witnesses.counted(campaign.directory.parent),
+    "limits": lambda campaign: witnesses.limits(campaign.directory.parent),
+    "not-confirmed": lambda campaign: witnesses.not_confirmed(campaign.directory.parent),
+    "landings": lambda campaign: settings.landings(settings.STEP),
     "formulas": lambda campaign: confirmation.table(),
     "reached": accuracy.reached,
     "transient": accuracy.transient,

@@ -1,0 +1,67 @@
+"""What three witnesses say in a validation that was kept: rows for the page on MuJoCo's settings."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from statistics import median
+
+from compare.catalogue import CLAIMS
+from compare.claim import Outcome, Verdict
+from compare.kit.check import Relation
+from compare.kit.engines import PLAIN
+from compare.kit.pages import Rows
+from compare.report import wording
+from compare.validation import stored
+from compare.witnesses import hear
+
+QUANTITIES = {
+    "angular velocity ω_c": ("omega_c",),
+    "slip": ("slip_",),
+    "forces": ("force_",),
+    "thresholds ω₀₁, ω₀₂, ω₀₄": ("omega_0",),
+    "decay rates and frequencies": ("decay_rate", "slowest_decay", "frequency"),
+    "accelerations and forces in motion": ("rate_", "moving_force_"),
+    "where motions end": ("end_",),
+}
+"""Beginnings of the names of quantities, by what they are together."""
+
+
+def verdicts(results: Path) -> list[Verdict]:
+    """Of all claims of the last validation in a results directory; raises as `compare.report.results.load`."""
+    return [hear(claim, stored(results)) for claim in CLAIMS]
+
+
+def counted(results: Path) -> Rows:
+    """How many claims each witness was asked, and how they came out, with its deviations at a step of 2 ms."""
+    told = wording.witnesses(verdicts(results))
+    head = ["witness", "asked", "confirmed", "refuted", "undecided", "typical deviation", "worst"]
+    return [head, *([row[name] for name in ("engine", *head[1:4], "open", "typical", "worst")] for row in told)]
+
+
+def limits(results: Path) -> Rows:
+    """How far plain MuJoCo is from theory in the limit of no step, and how sure that is, by quantity."""
+    rows = [["in the limit of no step", "numbers", "median deviation", "worst deviation", "tolerance of the worst"]]
+    own = [w for v in verdicts(results) for w in v.witnesses if w.engine == PLAIN.name]
+    for text, names in QUANTITIES.items():
+        checks = {(c.measurement.quantity, c.measurement.value): c for w in own for c in w.checks if c.scale > 0}
+        equal = [c for c in checks.values() if c.relation is Relation.EQUAL]
+        found = [c for c in equal if c.measurement.quantity.startswith(names)]
+        off = [(abs(c.deviation) / c.scale, c.resolves) for c in found if math.isfinite(c.predicted)]
+        worst, tolerance = max(off)
+        rows.append([text, str(len(off)), *(f"{x:.1e}" for x in (median(x for x, _ in off), worst, tolerance))])
+    return rows
+
+
+def not_confirmed(results: Path) -> Rows:
+    """The claims that plain MuJoCo was asked and did not confirm."""
+    rows = [["claim", "outcome", "why"]]
+    for verdict in verdicts(results):
+        for said in verdict.witnesses:
+            if said.engine == PLAIN.name and said.outcome not in (Outcome.CONFIRMED, Outcome.NOT_ASKED):
+                coarse = [c for c in said.checks if not c.conclusive]
+                wrong = [c for c in said.checks if not c.agrees]
+                of = f"{len(wrong)} of {len(said.checks)} numbers disagree" if wrong else ""
+                of = of or (f"{len(coarse)} of {len(said.checks)} numbers are too coarse" if coarse else "")
+                rows.append([verdict.claim.id, said.outcome, of or said.reason.split(";")[0]])
+    return rows
