@@ -64,19 +64,13 @@ class Balls:
         self.g = np.array([p.g for p in parameters])
         self.reach = np.array([settings.touching(p.g) for p in parameters])
         """Gaps within which a contact touches at the start, shape (runs,), m."""
-        self._take_views(models[0])
-        self._ball = Ball(*self._quantities(self.table))
-        self._alike = True
-        """Whether no run has ever had another step: what goes with it is then a batch's, which costs less."""
-
-    def _take_views(self, model: Any) -> None:
         array, lean = self.engine.array, self._form.lean
         self.qpos, self.qvel, self.sensors = array("qpos"), array("qvel"), array("sensordata")
         self.gaps, self.speeds = self.qpos[GAPS], self.qvel[GAPS]
         self.acceleration, self.force = array("qacc"), array("qfrc_smooth")
         self.margins, self.applied = array("pair_margin")[:2], array("qfrc_applied")
         surfaces = array("geom_surfacevel")
-        floor, wall = (lean(surfaces[6 * model.geom(name).id :][:2]) for name in ("floor", "wall"))
+        floor, wall = (lean(surfaces[6 * models[0].geom(name).id :][:2]) for name in ("floor", "wall"))
         self._driven = lean(array("mocap_quat")), lean(self.applied), floor, wall
         self._place, self._velocity, self._lean_margins = lean(self.qpos[:3]), lean(self.qvel), lean(self.margins)
         self._orientation = lean(self.qpos[3:7])
@@ -89,6 +83,9 @@ class Balls:
         self._written = self.last, self.qpos, self.margins, *self._driven
         carried = ("qpos", "qvel", "qacc_warmstart", "pair_margin", "pair_solreffriction", "geom_surfacevel")
         self._carried = {name: array(name) for name in carried} | {"last": self.last}
+        self._ball = Ball(*self._quantities(self.table))
+        self._alike = True
+        """Whether no run has ever had another step: what goes with it is then a batch's, which costs less."""
 
     @property
     def solref(self) -> Array:

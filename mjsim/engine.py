@@ -94,7 +94,12 @@ class Run:
         scenes = [p.replace(omega_0=0.0) for p in parameters]  # the fluid is no part of a scene
         built = {p: (build or scene.build)(p, settings) for p in dict.fromkeys(scenes)}
         models = [built[p][0] for p in scenes]
-        self._stepper = start(models, parameters, settings, states, theta_0, next(self._omega_0(0, 1)), batched)
+        given = models, parameters, settings, states, theta_0
+        self._stepper: Stepper = (
+            Free(*given)
+            if settings.coordinates == "free"
+            else Polar(*given, next(self._omega_0(0, 1)), batched or len(models) > 1)
+        )
         shown = settings.to_mapping() | {"t_end": float(t_end), "sample_interval": self._interval * settings.timestep}
         shown |= {"x0": None, "theta_0": theta_0, "event_times": EVENT_TIMES}
         self.headers = [
@@ -195,21 +200,6 @@ class Run:
         names = zip(VARIABLES, UNITS, strict=True)
         last = [f"{name} = {block[name][-1]:.6g} {unit}" for name, unit in names] if len(block) else []
         return f"{why}{', after ' * bool(last)}{', '.join(last)}"
-
-
-def start(
-    models: Sequence[Any],
-    parameters: Sequence[Parameters],
-    settings: ContactSettings,
-    x0s: Sequence[npt.ArrayLike],
-    theta_0: float,
-    omega_0: Array,
-    batched: bool,
-) -> Stepper:
-    """Simulations in the coordinates that the settings ask for; arguments as for `mjsim.stepping.Polar`."""
-    if settings.coordinates == "free":
-        return Free(models, parameters, settings, x0s, theta_0)
-    return Polar(models, parameters, settings, x0s, theta_0, omega_0, batched or len(models) > 1)
 
 
 def simulate(

@@ -44,7 +44,11 @@ class Free(Stepper):
     def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
         if row is not None:
             for k, ball in enumerate(self._balls):
-                row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = ball.joint_coordinates()
+                (position, quaternion), (velocity, spin) = (np.split(v, [3]) for v in (ball.data.qpos, ball.data.qvel))
+                x, azimuth = from_world(Motion(position, velocity, rotated(quaternion, spin)), ball.p)
+                ball.unwrap(float(azimuth))  # coordinates of the joint chain, with the orientation upright
+                joints = recorder.joint_state(x, ball.theta, ball.p)
+                row[k, : recorder.NQ], row[k, recorder.NQ : recorder.SENSORS] = joints
         for number, fluid in enumerate(omega_0):
             for k, (ball, omega) in enumerate(zip(self._balls, fluid.tolist(), strict=True)):
                 gaps = ball.step(omega)
@@ -55,8 +59,11 @@ class Free(Stepper):
             row[:, recorder.SENSORS : -1], row[:, -1] = sensors[0], 0.0
 
     def state(self) -> dict[str, Array]:
+        kept = np.empty((len(self._balls), mujoco.mj_stateSize(self._balls[0].model, _INTEGRATION)))
+        for ball, own in zip(self._balls, kept, strict=True):
+            mujoco.mj_getState(ball.model, ball.data, own, _INTEGRATION)
         return {
-            "integration": np.stack([ball.integration_state() for ball in self._balls]),
+            "integration": kept,
             "theta": np.array([ball.theta for ball in self._balls]),
             "margins": self.margins.copy(),
         }
@@ -73,7 +80,7 @@ class _Ball:
     def __init__(self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float) -> None:
         self.model = copy.copy(model)  # its margins move
         self.data = mujoco.MjData(self.model)
-        self._p, self._settings, self._ball, self.theta = p, settings, Ball.of(p, settings), theta_0
+        self.p, self._settings, self._ball, self.theta = p, settings, Ball.of(p, settings), theta_0
         start = to_world(x, theta_0, p)
         self.data.qpos[:] = [*start.position, 1.0, 0.0, 0.0, 0.0]
         self.data.qvel[:] = [*start.velocity, *start.spin]
@@ -82,7 +89,7 @@ class _Ball:
 
     def step(self, omega_0: float) -> tuple[float, float]:
         """Take a step; return the gaps of A and B before it, m."""
-        data, p, gain = self.data, self._p, self._settings.servo_gain
+        data, p, gain = self.data, self.p, self._settings.servo_gain
         x, y, z, *_ = data.qpos.tolist()
         v_x, v_y, v_z, *_ = data.qvel.tolist()
         w_x, w_y, gaps = v_x + omega_0 * y, v_y - omega_0 * x, (z - p.r, p.R - math.hypot(x, y))
@@ -91,7 +98,7 @@ class _Ball:
         if self._ball.torque:  # the spin is along the ball's own axes, that of the fluid along the vessel's
             fluid = rotated(data.qpos[3:7] * [1, -1, -1, -1], np.array([0.0, 0.0, omega_0]))
             data.qfrc_applied[3:] = -self._ball.torque * (data.qvel[3:] - fluid)
-        self._unwrap(math.atan2(y, x))
+        self.unwrap(math.atan2(y, x))
         if self._turns:
             data.mocap_quat[0] = (math.cos(self.theta / 2), 0.0, 0.0, math.sin(self.theta / 2))
         if gain:
@@ -101,21 +108,7 @@ class _Ball:
         mujoco.mj_step(self.model, data)
         return gaps
 
-    def joint_coordinates(self) -> tuple[Array, Array]:
-        """The state as coordinates of the joint chain, with the orientation upright."""
-        qpos, qvel = self.data.qpos, self.data.qvel
-        (position, quaternion), (velocity, spin) = np.split(qpos, [3]), np.split(qvel, [3])
-        x, azimuth = from_world(Motion(position, velocity, rotated(quaternion, spin)), self._p)
-        self._unwrap(float(azimuth))
-        return recorder.joint_state(x, self.theta, self._p)
-
-    def _unwrap(self, azimuth: float) -> None:
+    def unwrap(self, azimuth: float) -> None:
         """Take the turn of this azimuth that is nearest to the last one; leave it in a run that has diverged."""
         if math.isfinite(azimuth):
             self.theta = azimuth + math.tau * round((self.theta - azimuth) / math.tau)
-
-    def integration_state(self) -> Array:
-        """All that the engine carries from one step to the next."""
-        state = np.empty(mujoco.mj_stateSize(self.model, _INTEGRATION))
-        mujoco.mj_getState(self.model, self.data, state, _INTEGRATION)
-        return state

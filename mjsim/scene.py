@@ -31,18 +31,39 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
     """The scene as an `mujoco.MjSpec`."""
     spec = mujoco.MjSpec.from_string(SCENE.read_text("utf-8"))
     named = {kind: {name: getattr(spec, kind)(name) for name in names} for kind, names in _ELEMENTS.items()}
-    _set_options(spec.option, p, settings)
-    _set_geometry(named["body"], named["geom"], named["joint"], p)
+    option, body, geom, height = spec.option, named["body"]["ball"], named["geom"], 2 * p.r
+    option.gravity = (0.0, 0.0, -p.g)
+    for name in ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations"):
+        setattr(option, name, getattr(settings, name))
+    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
+    body.pos, body.mass, body.inertia = (p.R, 0.0, p.r), p.m, (p.j * p.m * p.r**2,) * 3
+    named["joint"]["azimuth"].pos = (p.R, -p.r, 0.0)
+    geom["ball"].size = (p.r, 0.0, 0.0)
+    geom["wall"].pos, geom["wall"].size = (p.R + p.r, 0.0, height), (height, height, p.r)
+    geom["floor"].size = (4 * p.R, 4 * p.R, p.r)
+    geom["vessel"].pos, geom["vessel"].size = (0.0, 0.0, height * 1.005), (p.R + p.r, height, 0.0)
     for name, friction in (("A", p.mu), ("B", p.eta)):
         _set_pair(named["pair"][name], friction, settings)
     if settings.coordinates == "free":
-        for name in ("gap A", "gap B"):
-            spec.delete(spec.sensor(name))
-        for joint in named["joint"].values():
-            spec.delete(joint)
-        named["body"]["ball"].add_freejoint(name="free")
-    if settings.wall == "prism":
-        _replace_wall(spec, named, p, settings)
+        for each in (*(spec.sensor(name) for name in ("gap A", "gap B")), *named["joint"].values()):
+            spec.delete(each)
+        body.add_freejoint(name="free")
+    if settings.wall == "prism":  # of fixed planes, tangent to the vessel's cylinder
+        wall, sensor = geom["wall"], named["sensor"]["B"]
+        for facet in range(settings.facets):
+            azimuth = 2 * math.pi * facet / settings.facets
+            outwards = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+            place, plane = (p.R + p.r) * outwards + [0.0, 0.0, height], mujoco.mjtGeom.mjGEOM_PLANE
+            part = spec.worldbody.add_geom(name=f"facet{facet}", type=plane, pos=place, size=wall.size, rgba=wall.rgba)
+            part.contype, part.conaffinity = 0, 0
+            part.alt.type, part.alt.zaxis = mujoco.mjtOrientation.mjORIENTATION_ZAXIS, -outwards
+            _set_pair(spec.add_pair(name=f"B{facet}", geomname1=part.name, geomname2="ball"), p.eta, settings)
+        # Where two facets meet, the one that carries more is reported.
+        sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_BODY, "world"
+        sensor.intprm[1] = _MAXFORCE
+        spec.delete(named["pair"]["B"])
+        spec.delete(wall)
     return spec
 
 
@@ -67,47 +88,6 @@ def _compiled(p: Parameters, settings: ContactSettings) -> tuple[Any, str]:
     return model, str(filled.to_xml())
 
 
-def _set_options(option: Any, p: Parameters, settings: ContactSettings) -> None:
-    option.gravity = (0.0, 0.0, -p.g)
-    for name in ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations"):
-        setattr(option, name, getattr(settings, name))
-    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
-    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
-
-
-def _set_geometry(body: dict[str, Any], geom: dict[str, Any], joint: dict[str, Any], p: Parameters) -> None:
-    height = 2 * p.r
-    body["ball"].pos = (p.R, 0.0, p.r)
-    body["ball"].mass = p.m
-    body["ball"].inertia = (p.j * p.m * p.r**2,) * 3
-    joint["azimuth"].pos = (p.R, -p.r, 0.0)
-    geom["ball"].size = (p.r, 0.0, 0.0)
-    geom["wall"].pos = (p.R + p.r, 0.0, height)
-    geom["wall"].size = (height, height, p.r)
-    geom["floor"].size = (4 * p.R, 4 * p.R, p.r)
-    geom["vessel"].pos = (0.0, 0.0, height * 1.005)
-    geom["vessel"].size = (p.R + p.r, height, 0.0)
-
-
-def _replace_wall(spec: Any, named: dict[str, dict[str, Any]], p: Parameters, settings: ContactSettings) -> None:
-    """Put a regular prism of fixed planes, tangent to the vessel's cylinder, in the place of the wall."""
-    wall = named["geom"]["wall"]
-    for facet in range(settings.facets):
-        azimuth = 2 * math.pi * facet / settings.facets
-        outwards = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-        place, plane = (p.R + p.r) * outwards + [0.0, 0.0, 2 * p.r], mujoco.mjtGeom.mjGEOM_PLANE
-        geom = spec.worldbody.add_geom(name=f"facet{facet}", type=plane, pos=place, size=wall.size, rgba=wall.rgba)
-        geom.contype, geom.conaffinity = 0, 0
-        geom.alt.type, geom.alt.zaxis = mujoco.mjtOrientation.mjORIENTATION_ZAXIS, -outwards
-        _set_pair(spec.add_pair(name=f"B{facet}", geomname1=geom.name, geomname2="ball"), p.eta, settings)
-    # Where two facets meet, the one that carries more is reported.
-    sensor = named["sensor"]["B"]
-    sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_BODY, "world"
-    sensor.intprm[1] = _MAXFORCE
-    spec.delete(named["pair"]["B"])
-    spec.delete(wall)
-
-
 def _set_pair(pair: Any, friction: float, settings: ContactSettings) -> None:
     # The engine raises friction coefficients to 1e-5; no friction at all takes a contact of one row.
     pair.condim = 3 if friction > 0 else 1
@@ -115,5 +95,4 @@ def _set_pair(pair: Any, friction: float, settings: ContactSettings) -> None:
     pair.solref = settings.spring
     pair.solreffriction = (settings.solreffriction, 1.0)
     pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
-    pair.margin = 0.0
-    pair.gap = 0.0
+    pair.margin = pair.gap = 0.0

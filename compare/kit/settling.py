@@ -7,14 +7,14 @@ free of it. Three overlapping windows show how far the mean still drifts.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.kit.quantities import quantity
-from compare.kit.record import Records
+from compare.kit.record import Measurement, Missing, Records, measurement
 from compare.kit.statistics import COVERAGE, Measured, settled_case, tail
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
@@ -108,6 +108,16 @@ def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
     """In which case a ball of a set settled from one kind of start, by flow in rad s-1, the slowest first."""
     found = records.select("settled", "case", lambda m: m.set == set and m.conditions["start"] == how)
     return dict(sorted((m.parameters.omega_0, family(Case(int(m.value)))) for m in found))
+
+
+def reading(lab: Lab, protocol: str, starts: Sequence[Start]) -> Iterator[Measurement | Missing]:
+    """Case and omega_c to which the ball settles from each start."""
+    for start, settled in zip(starts, settle(lab, starts), strict=True):
+        if settled.failure:
+            yield Missing(protocol, start.set, settled.failure)
+            continue
+        for name, value in (("case", settled.case), ("omega_c", settled.values["omega_c"])):
+            yield measurement(lab, protocol, start.set, start.p, name, value, [settled.task])
 
 
 def settle(

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.programme import ONE, Protocol
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
-from compare.kit.settling import settle
+from compare.kit.settling import reading
 from compare.kit.short import constrained
 from compare.kit.statistics import Measured, hops, peaks, top
 from compare.kit.sweep import sobol
@@ -97,19 +98,18 @@ class Hops(NamedTuple):
         return {**state_of(constrained(Case.NR, self.x[-1], p)), "period": self.values["orbit_period"].value}
 
 
-def hopping(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would begin."""
-    yield from _staircase(lab, "recurrent", lab.effort("recurrent.flows"), REFINED)
-
-
-def stepped(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The same at the flow of the set, by time stepping: it lets slip begin and turn at steps only."""
-    yield from _staircase(lab, "stepped", (1.0,), (40, 80))
-
-
-def _staircase(
-    lab: Lab, protocol: str, shares: Sequence[float], refine: tuple[int, int]
+def hopping(
+    lab: Lab,
+    sets: Mapping[str, Parameters],
+    records: Records,
+    protocol: str = "recurrent",
+    refine: tuple[int, int] = REFINED,
 ) -> Iterator[Measurement | Missing]:
+    """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would begin.
+
+    With the protocol "stepped" at the flow of the set only, by time stepping, which lets slip begin and turn at steps.
+    """
+    shares = lab.effort("recurrent.flows") if protocol == "recurrent" else (1.0,)
     p = Parameters.named(SET)
     flows = [share * p.omega_0 for share in shares]
     lasts = HOLD * len(flows)
@@ -307,18 +307,13 @@ def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
     p, starts = sets["reference"], []
     for name, (mu, eta, j, ratio, *rates) in list(ROUGH.items())[: lab.effort("choice.sets")]:
         starts.append(Start(name, with_groups(p, mu, eta, j, ratio * p.R, *rates), "rest", np.zeros(8)))
-    for start, settled in zip(starts, settle(lab, starts), strict=True):
-        if settled.failure:
-            yield Missing("choice", start.set, settled.failure)
-            continue
-        for quantity, value in (("case", settled.case), ("omega_c", settled.values["omega_c"])):
-            yield measurement(lab, "choice", start.set, start.p, quantity, value, [settled.task])
+    yield from reading(lab, "choice", starts)
 
 
 _HOPS = "hops that last are those of the set hopping"
 PROTOCOLS = (
     Protocol("recurrent", hopping, alone=_HOPS, first=True, cost=5),
-    Protocol("stepped", stepped, engine=MOREAU, alone=_HOPS, first=True),
+    Protocol("stepped", partial(hopping, protocol="stepped", refine=(40, 80)), engine=MOREAU, alone=_HOPS, first=True),
     Protocol("choice", choice, alone="the choice is that of sets of its own with mu > 1", plain=ONE, first=True),
     Protocol("followed", followed, level=Level.DEFAULT, alone=_HOPS),
     Protocol("rebounding", rebounding, engine=MOREAU, level=Level.DEFAULT, alone=_HOPS),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -129,26 +130,17 @@ TOLERANCES = {"mu": 0.05, "eta": 0.05}
 """Relative tolerances with which a meter's limit is claimed to be within its spread."""
 
 
-def _limit(end: str, of: Callable[[Measurement], float], relation: Relation = Relation.EQUAL) -> Bearing:
-    """The flow at which the operating range of a meter is measured to end: omega_01 or omega_02."""
-    when = every(slips_first if end == "omega_01" else lifts_first, lambda m: m.parameters.drag == STOKES)
-    return Bearing("thresholds", end, of, when=when, relation=relation, by="analytic.flowmeter.design")
+def _limit(m: Measurement, relation: Relation) -> float:
+    """The flow at which a design says that its operating range ends; at the soonest, and at the latest, by the spread.
 
-
-def _values(m: Measurement) -> dict[str, float]:
-    return {name: getattr(m.parameters, name) for name in design.INEXACT}
-
-
-def _meant(m: Measurement) -> float:
-    return design.choice(m.parameters.replace, _values(m), {}, fastest=1.0).margin
-
-
-def _at_worst(m: Measurement) -> float:
-    return design.choice(m.parameters.replace, _values(m), TOLERANCES, fastest=1.0).worst.omega_0
-
-
-def _at_most(m: Measurement) -> float:
-    return design.threshold_spread(list(design.corners(m.parameters.replace, _values(m), TOLERANCES)))[m.quantity][1]
+    Of a meter as meant, or with the worst and the best of friction within `TOLERANCES`.
+    """
+    make, values = m.parameters.replace, {name: getattr(m.parameters, name) for name in design.INEXACT}
+    if relation is Relation.EQUAL:
+        return design.choice(make, values, {}, fastest=1.0).margin
+    if relation is Relation.AT_LEAST:
+        return design.choice(make, values, TOLERANCES, fastest=1.0).worst.omega_0
+    return design.threshold_spread(list(design.corners(make, values, TOLERANCES)))[m.quantity][1]
 
 
 def _between(m: Measurement) -> float:
@@ -245,13 +237,16 @@ CLAIMS = (
         "The operating range of a meter ends where a design says, and with friction known to 5 % not before its worst "
         "limit, nor after its thresholds' spread.",
         tuple(
-            _limit(end, of, relation)
-            for end in ("omega_01", "omega_02")
-            for of, relation in (
-                (_meant, Relation.EQUAL),
-                (_at_worst, Relation.AT_LEAST),
-                (_at_most, Relation.AT_MOST),
+            Bearing(
+                "thresholds",
+                end,
+                partial(_limit, relation=relation),
+                when=every(first, lambda m: m.parameters.drag == STOKES),
+                relation=relation,
+                by="analytic.flowmeter.design",
             )
+            for end, first in (("omega_01", slips_first), ("omega_02", lifts_first))
+            for relation in (Relation.EQUAL, Relation.AT_LEAST, Relation.AT_MOST)
         ),
     ),
     Claim(

@@ -16,7 +16,6 @@ from compare.kit.record import Measurement, state
 from compare.kit.settling import forces
 from compare.subjects.motion.measure.laws import FLUIDS
 from compare.subjects.motion.measure.motions import NAMES
-from compare.subjects.motion.measure.runs import STARTS
 from model import Case
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -42,18 +41,21 @@ def _sinking(m: Measurement) -> float:
 def _end(m: Measurement) -> float:
     """A column of theory's motion where the measured one ends."""
     motion = simulated(m.parameters, state(m), float(m.conditions["time"]))
-    return float(getattr(motion, m.quantity.removeprefix("after_"))[-1])
+    return float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
 
 
-def _end_of(name: str, *starts: str) -> Bearing:
-    """A variable at the end of motions from some starts, in units of what gravity does."""
-    return Bearing(
-        "runs",
-        f"end_{name}",
-        lambda m: float(simulated(m.parameters, state(m), float(m.conditions["time"])).x[-1, VARIABLES.index(name)]),
-        when=lambda m: m.conditions["start"] in starts,
-        size=lambda m: float(state_units(m.parameters)[VARIABLES.index(name)]),
-        by="analytic.simulate",
+def _ends(*starts: str) -> tuple[Bearing, ...]:
+    """The state at the end of motions from starts whose names begin so, in units of what gravity does."""
+    return tuple(
+        Bearing(
+            "runs",
+            f"end_{name}",
+            _end,
+            when=lambda m: str(m.conditions["start"]).startswith(starts),
+            size=lambda m: float(state_units(m.parameters)[VARIABLES.index(m.quantity.removeprefix("end_"))]),
+            by="analytic.simulate",
+        )
+        for name in VARIABLES
     )
 
 
@@ -136,7 +138,7 @@ LAWS = (
         "flight",
         "extension, (9), (20)",
         "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and keeps its spin.",
-        tuple(_end_of(name, "thrown", "thrown up") for name in VARIABLES),
+        _ends("thrown"),
         reason=_OWN,
     ),
     Claim(
@@ -144,15 +146,13 @@ LAWS = (
         "(12), section 1.1",
         "A wall contact that carries nothing, or less than friction at the floor takes from it, opens, and the ball "
         "leaves the wall as the equations say.",
-        tuple(_end_of(name, "pulled off, at rest", "pulled off, going round") for name in VARIABLES),
+        _ends("pulled off"),
     ),
     Claim(
         "sliding",
         "(20), (23)-(29)",
         "A ball that slips or rolls at one contact or both moves on from case to case as the equations say.",
-        tuple(
-            _end_of(name, *(how for how in STARTS if how.startswith(("slips", "rolls", "sinks")))) for name in VARIABLES
-        ),
+        _ends("slips", "rolls", "sinks"),
     ),
     Claim(
         "smooth-wall",

@@ -128,8 +128,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield state.missing("pushed, the ball doesn't stay in this case")
         else:
             values, sure = spectrum(state, answers, step)
-            yield from _rows(lab, state, values, sure, step, own[-count:])
-            yield from _responses(lab, state, answers, float(sure.max()), own[-count:])
+            yield from _rows(lab, state, answers, values, sure, step, own[-count:])
 
 
 def chosen(records: Records, name: str, p: Parameters, more: int) -> Iterator[Pushed | Missing]:
@@ -242,9 +241,20 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Expo
 
 
 def _rows(
-    lab: Lab, state: Pushed, exponents: Exponents, uncertainty: Array, step: float, tasks: Sequence[Task]
+    lab: Lab,
+    state: Pushed,
+    answers: Sequence[Array],
+    exponents: Exponents,
+    uncertainty: Array,
+    step: float,
+    tasks: Sequence[Task],
 ) -> Iterator[Measurement | Missing]:
-    """One of each pair of conjugates, in the order of frequency and decay, slowest first; and how many there are."""
+    """One of each pair of conjugates, in the order of frequency and decay, slowest first; how many there are; and how
+    each active variable follows one of each, in `units`, a third of the record later.
+
+    The latter shows the directions of the motions, not only their rates. It is extrapolated as `spectrum` does, to a
+    vanishing push and step.
+    """
     start, parts = state.start, []
     at: dict[str, Condition] = {"case": state.case.name, **state_of(start.x0)}
     yield measurement(lab, PROTOCOL, start.set, start.p, "modes", len(exponents), tasks, **at)
@@ -265,27 +275,17 @@ def _rows(
         least = vague * quantity(name).resolves * size / COVERAGE if vague > 1 else 0.0
         row = Measured(value, max(sure, least))
         yield measurement(lab, PROTOCOL, start.set, start.p, name, row, tasks, **at, mode=mode)
-
-
-def _responses(
-    lab: Lab, state: Pushed, answers: Sequence[Array], rate: float, tasks: Sequence[Task]
-) -> Iterator[Measurement]:
-    """How each active variable follows one of each, in `units`, a third of the record later.
-
-    This shows the directions of the motions, not only their rates, whose largest uncertainty, in s-1, is `rate`.
-    Extrapolated as `spectrum` does, to a vanishing push and step.
-    """
-    start, names = state.start, TRAITS[state.case].active
+    names = TRAITS[state.case].active
     lasts, samples = BRIEF.get(state.case, RECORD)
     length = min(map(len, answers))
     coarse, large, small = (propagator(answers[k][:length], length // 3) for k in (0, 1, -1))
-    bent, step = (small - large) / (2 ** ORDER.get(state.case, 2) - 1), (small - coarse) / 3
-    value, time = small + bent + step, length // 3 * lasts * coarse_step(start.p) / samples
-    sure = float(np.linalg.norm([np.abs(bent).max(), np.abs(step).max(), rate * time * np.abs(value).max()]))
-    at: dict[str, Condition] = {"case": state.case.name, **state_of(start.x0), "time": time}
-    for (i, of), (j, by) in product(enumerate(names), enumerate(names)):
+    bent, late = (small - large) / (2 ** ORDER.get(state.case, 2) - 1), (small - coarse) / 3
+    value, time = small + bent + late, length // 3 * lasts * coarse_step(start.p) / samples
+    turned = uncertainty.max() * time * np.abs(value).max()
+    sure = float(np.linalg.norm([np.abs(bent).max(), np.abs(late).max(), turned]))
+    for (i, of), (j, by) in product(enumerate(names), repeat=2):
         row = Measured(float(value[i, j]), sure)
-        yield measurement(lab, PROTOCOL, start.set, start.p, "response", row, tasks, **at, of=of, pushed=by)
+        yield measurement(lab, PROTOCOL, start.set, start.p, "response", row, tasks, **at, time=time, of=of, pushed=by)
 
 
 def natural_size(rate: float, other: float, p: Parameters) -> float:

@@ -171,19 +171,9 @@ CLAIMS = (
         "(40), (44)",
         "A ball that has settled slipping at both points slips inwards at the floor and up the wall, cos α > 0, and "
         "backwards, sin α < 0: there is no such motion with cos α < 0.",
-        (
-            Bearing(
-                "settled",
-                "slip_z",
-                lambda m: 0.0,
-                when=_SLIPS,
-                size=natural_size,
-                relation=Relation.AT_LEAST,
-                by="(40)",
-            ),
-            Bearing(
-                "settled", "slip_x", lambda m: 0.0, when=_SLIPS, size=natural_size, relation=Relation.AT_MOST, by="(40)"
-            ),
+        tuple(
+            Bearing("settled", slip, lambda m: 0.0, when=_SLIPS, size=natural_size, relation=relation, by="(40)")
+            for slip, relation in (("slip_z", Relation.AT_LEAST), ("slip_x", Relation.AT_MOST))
         ),
     ),
     Claim(

@@ -11,6 +11,7 @@ from compare.claim import Bearing, Claim, given
 from compare.judge import simulated, theory
 from compare.kit.check import Relation
 from compare.kit.record import Measurement, state
+from compare.settled import lifts_first, slips_first
 from compare.subjects.unsteady.measure import caught_up
 from model import Case, Flow
 from model.drag import STOKES
@@ -40,25 +41,6 @@ def _slips(rule: str, relation: Relation) -> Bearing:
     return Bearing("pulsation", "slip_amplitude", onset, relation=relation, by=by)
 
 
-def _mean_error(m: Measurement) -> float:
-    return theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m))
-
-
-def _slow(m: Measurement) -> float:
-    """The flow at which a very slow pulsation about four fifths of what is measured is greatest as the ball slips."""
-    mean = 0.8 * m.parameters.omega_0
-    return mean + pulsation.slow_onset(m.parameters.replace(omega_0=mean))
-
-
-def _ends_rolling(m: Measurement) -> bool:
-    """Whether a measured omega_01 or omega_03 is what ends rolling."""
-    return m.quantity == ("omega_01" if m.parameters.eta < m.parameters.j else "omega_03")
-
-
-def _peak(m: Measurement) -> tuple[float, float]:
-    return theory(response.peak, m.parameters, Case.SS)
-
-
 def _ramp_end(m: Measurement) -> float:
     """The flow at which a ramp ends slipping at both points by theory; LookupError if it doesn't."""
     p, rate = m.parameters, _at(m, "rate")
@@ -69,10 +51,6 @@ def _ramp_end(m: Measurement) -> float:
     if math.isnan(end):
         raise LookupError("in theory the ramp doesn't end slipping")
     return end
-
-
-def _overshoot(m: Measurement) -> float:
-    return abs(_ramp_end(m) - analytic.thresholds(m.parameters).omega_04)
 
 
 CLAIMS = (
@@ -105,8 +83,18 @@ CLAIMS = (
         "and slips where the lag alone is too much for it; none takes more than that.",
         (
             *(
-                Bearing("thresholds", end, _slow, when=_ends_rolling, by=f"{_BY}.pulsation.slow_onset")
-                for end in ("omega_01", "omega_03")
+                Bearing(
+                    "thresholds",
+                    end,
+                    # The flow at which a very slow pulsation about four fifths of it is greatest as the ball slips.
+                    lambda m: (
+                        0.8 * m.parameters.omega_0
+                        + pulsation.slow_onset(m.parameters.replace(omega_0=0.8 * m.parameters.omega_0))
+                    ),
+                    when=first,
+                    by=f"{_BY}.pulsation.slow_onset",
+                )
+                for end, first in (("omega_01", slips_first), ("omega_03", lifts_first))
             ),
             Bearing(
                 "bounds",
@@ -128,22 +116,42 @@ CLAIMS = (
         "pulsation-mean",
         "(23), (26), Definitions 1-3",
         "A pulsation that makes the ball slip makes its mean reading low.",
-        (Bearing("pulsation", "mean_error", _mean_error, by=f"{_BY}.pulsation.mean_error"),),
+        (
+            Bearing(
+                "pulsation",
+                "mean_error",
+                lambda m: theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m)),
+                by=f"{_BY}.pulsation.mean_error",
+            ),
+        ),
     ),
     Claim(
         "jump-slipping",
         "(26), (38)-(42)",
         "After a jump of the flow a ball that slips at both points overshoots its new reading and rings.",
-        (
-            Bearing("unsteady", "jump_peak", lambda m: _peak(m)[0], by=f"{_BY}.response.peak"),
-            Bearing("unsteady", "jump_height", lambda m: _peak(m)[1], by=f"{_BY}.response.peak"),
+        tuple(
+            Bearing(
+                "unsteady",
+                quantity,
+                lambda m, k=k: theory(response.peak, m.parameters, Case.SS)[k],  # type: ignore[misc]
+                by=f"{_BY}.response.peak",
+            )
+            for k, quantity in enumerate(("jump_peak", "jump_height"))
         ),
     ),
     Claim(
         "ramp-fold",
         "(26), (88)",
         "A flow that rises steadily keeps the ball slipping beyond the fold, before it catches up.",
-        (Bearing("unsteady", "ramp_end", _ramp_end, size=_overshoot, by="analytic.simulate"),),
+        (
+            Bearing(
+                "unsteady",
+                "ramp_end",
+                _ramp_end,
+                size=lambda m: abs(_ramp_end(m) - analytic.thresholds(m.parameters).omega_04),
+                by="analytic.simulate",
+            ),
+        ),
     ),
 )
 SECTIONS = {"Unsteady flow": CLAIMS}

@@ -51,6 +51,11 @@ TURN = 0.5
 about to vanish, or is held at a trace, friction turns too fast."""
 FASTEST = (3e3, 3e4)
 """Reynolds numbers of some starts under laws of drag other than Stokes', as balls in water have them."""
+MOVING = {
+    case: [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
+    for case in Case
+}
+"""The variables whose rates of change are measured."""
 COMPONENTS = ("Ax", "Ay", "Az", "Bx", "By", "Bz")
 STATE, RATES, FORCES = slice(0, 8), slice(8, 16), slice(16, 22)
 """Parts of what is read at the centre of a window (22,): state, rates of change in SI, and `COMPONENTS` in N."""
@@ -112,7 +117,12 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
             starts.append(Start(name, p.replace(omega_0=omega_0), case.name, x))
             if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < len(FASTEST):
-                starts.append(_thinner(starts[-1], FASTEST[k]))
+                # The same in a fluid so thin that the ball moves through it at this Reynolds number, and drag shows.
+                _, v_y, omega_c, *_, h, v_h = x
+                speed = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0))
+                q = starts[-1].p
+                q = q.replace(nu_f=2 * p.r * speed / FASTEST[k], c=24 / (p.C_D * FASTEST[k] * time_unit(p)))
+                starts.append(replace(starts[-1], p=q))
     steps = CENTRES[-1] + HALF_WINDOW + NEAR
     tasks = [lab.pair(start.p, start.x0, steps, coarse_step(start.p) / REFINED) for start in starts]
     runs = list(lab.groups(tasks))
@@ -133,15 +143,8 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     for name, case in product(sets, Case):
         if lacking := lab.effort("field.kept") - kept[name, sets[name].nu_f, case]:
             why = f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
-            rows = len(_moving(case)) + len(_forces(case, np.zeros(6)))
+            rows = len(MOVING[case]) + len(_forces(case, np.zeros(6)))
             yield Missing("field", name, why, lacking * rows)
-
-
-def _thinner(start: Start, Re: float) -> Start:
-    """The same in a fluid so thin that the ball moves through it at a Reynolds number, and drag still shows."""
-    x, p = State.of(start.x0), start.p
-    speed = math.hypot(x.v_h, x.v_y, (p.R - x.h) * (x.omega_c - p.omega_0))
-    return replace(start, p=p.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * time_unit(p))))
 
 
 def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
@@ -185,7 +188,7 @@ def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
     The largest relative change of the rates, or of the forces, stands for all of them: that of one may vanish by
     chance.
     """
-    moving = _moving(case)
+    moving = MOVING[case]
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
     scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
     forces = [_forces(case, row) for row in window[:, FORCES]]
@@ -196,11 +199,6 @@ def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
     rate_change, force_change = max(rate_change, lag_error(p) * (1 + p.j) / p.j), max(force_change, lag_error(p))
     rates = {f"rate_{VARIABLES[k]}": Measured(window[0, RATES][k], rate_change * scales[k]) for k in moving}
     return rates | {f"moving_force_{name}": Measured(w, force_change * weight) for name, w in forces[0].items()}
-
-
-def _moving(case: Case) -> list[int]:
-    """The variables whose rates of change are measured."""
-    return [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
 
 
 def _forces(case: Case, forces: Array) -> dict[str, float]:

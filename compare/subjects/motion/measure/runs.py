@@ -23,7 +23,7 @@ import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
-from compare.kit.settling import PRESSES, settle
+from compare.kit.settling import PRESSES, reading
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
@@ -59,12 +59,7 @@ def torque(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
     for name, p in sets.items():
         q = p.replace(mu=1.0, eta=1.0, fluid_torque=BRAKED * p.c, omega_0=SLOW / time_unit(p))
         starts.append(Start(name, q, "rest", np.zeros(8)))
-    for start, settled in zip(starts, settle(lab, starts), strict=True):
-        if settled.failure:
-            yield Missing("torque", start.set, settled.failure)
-            continue
-        for quantity, value in (("case", settled.case), ("omega_c", settled.values["omega_c"])):
-            yield measurement(lab, "torque", start.set, start.p, quantity, value, [settled.task])
+    yield from reading(lab, "torque", starts)
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
