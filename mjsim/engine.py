@@ -178,9 +178,14 @@ class Run:
             block = recorder.samples(times, rows, self._parameters[runs[0]])
             for i, part in zip(runs, np.split(block, kept.sum(axis=1).cumsum()[:-1]), strict=True):
                 if not self.headers[i].failure and len(part) < len(time):
-                    failure = self._reason(i, float(time[len(part)]), part)
+                    self._ends[i] = end = float(time[len(part)])
+                    why = f"diverged by t = {end:g} s"
+                    if (given_up := self._stepper.given_up[i]) <= end:
+                        why = f"was given up at t = {given_up:g} s, since its steps were divided again and again"
+                    names = zip(VARIABLES, UNITS, strict=True)
+                    left = [f"{name} = {part[name][-1]:.6g} {unit}" for name, unit in names] if len(part) else []
+                    failure = f"{why}{', after ' * bool(left)}{', '.join(left)}"
                     self.headers[i] = dataclasses.replace(self.headers[i], failure=failure)
-                    self._ends[i] = float(time[len(part)])
                 part = np.concatenate([self._waiting[i], part])
                 steps = np.rint(part["time"] / self._settings.timestep).astype(int)
                 over = last == self._count or self.headers[i].failure
@@ -190,16 +195,6 @@ class Run:
         if self._progress:
             self._progress(last / self._count)
         return blocks
-
-    def _reason(self, i: int, time: float, block: npt.NDArray[np.void]) -> str:
-        """Why run i has no sample at a time, after those of a block."""
-        given_up = self._stepper.given_up[i]
-        why = f"diverged by t = {time:g} s"
-        if given_up <= time:
-            why = f"was given up at t = {given_up:g} s, since its steps were divided again and again"
-        names = zip(VARIABLES, UNITS, strict=True)
-        last = [f"{name} = {block[name][-1]:.6g} {unit}" for name, unit in names] if len(block) else []
-        return f"{why}{', after ' * bool(last)}{', '.join(last)}"
 
 
 def simulate(

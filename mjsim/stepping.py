@@ -137,8 +137,15 @@ class Polar(Stepper):
             self._more[runs] += 1
             ends = (taken[runs] == _JUDGED) | (left[runs] == 0)
             judged = runs[ends & (balls.ticks[runs] < TICKS) & ~passes]
-            if len(judged):
-                self._choose_steps(judged, left[judged], before[:, judged], taken[judged])
+            if len(judged):  # halve or double their short steps by how accelerations changed in those taken
+                ticks, g, radius = balls.ticks[judged], balls.g[judged], self._R[judged]
+                change = np.abs(self._rates(judged) - before[:, judged]).max(axis=0) / taken[judged]
+                pace = np.maximum(np.abs(balls.qvel[0, judged]), np.sqrt(g / radius))
+                usual = balls.settings.timestep * pace * (g + balls.eta[judged] * radius * pace**2)
+                grows = (change < _CHANGE * usual / 4) & (left[judged] % (2 * ticks) == 0)
+                changes = grows | ((change > _CHANGE * usual) & (ticks > 1))
+                balls.damp(judged[~changes])
+                balls.resize(judged[changes], np.where(grows, 2 * ticks, ticks // 2)[changes])
                 before[:, judged], taken[judged] = self._rates(judged), 0
         lost = np.flatnonzero(self._more > _MOST)
         if len(lost):
@@ -186,19 +193,6 @@ class Polar(Stepper):
         rates[3:] += omega_c * np.stack([o_z, 0 * o_z, -o_x])
         rates[3:] *= self._r[runs]
         return rates
-
-    def _choose_steps(self, runs: Runs, left: npt.NDArray[np.int_], before: Array, taken: npt.NDArray[np.int_]) -> None:
-        """Halve or double the short steps of runs by how their accelerations changed in the last few, `taken`."""
-        balls = self._balls
-        ticks, g, radius = balls.ticks[runs], balls.g[runs], self._R[runs]
-        change = np.abs(self._rates(runs) - before).max(axis=0) / taken
-        pace = np.maximum(np.abs(balls.qvel[0, runs]), np.sqrt(g / radius))
-        usual = balls.settings.timestep * pace * (g + balls.eta[runs] * radius * pace**2)
-        allowed = _CHANGE * usual
-        grows, shrinks = (change < allowed / 4) & (left % (2 * ticks) == 0), (change > allowed) & (ticks > 1)
-        stays = ~(grows | shrinks)
-        balls.damp(runs[stays])
-        balls.resize(runs[~stays], np.where(grows, 2 * ticks, ticks // 2)[~stays])
 
     def state(self) -> dict[str, Array]:
         return (
