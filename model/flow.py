@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from model.arrays import Array
 from model.errors import InputError, StorageError
-from model.parameters import NOT_NEGATIVE, POSITIVE, REACH, Range, check_number, parse_number
+from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, REACH, Range, check_number, parse_number
 
 GAP = 10.0
 """An interval this many times the usual one (the median) is a gap in a measured flow: it wasn't measured there. A few
@@ -85,10 +85,8 @@ class Flow:
         """Linear interpolation between samples, held at both ends; times must increase."""
         if len(times) != len(omega_0):
             raise InputError(f"a sampled flow has {len(times)} times but {len(omega_0)} values of omega_0")
-        cls._check(times, omega_0)
-        t, value = np.asarray(times, dtype=float), np.asarray(omega_0, dtype=float)
-        slope = np.append(np.diff(value) / np.diff(t), 0.0)
-        return cls._pieces(kind, t, value, slope)
+        level = cls._pieces(kind, times, omega_0, [0.0] * len(times))
+        return replace(level, slope=np.append(np.diff(level.value) / np.diff(level.start), 0.0))
 
     @classmethod
     def sine(cls, mean: float, amplitude: float, frequency: float, phase: float = 0.0) -> Self:
@@ -99,13 +97,11 @@ class Flow:
     def sines(cls, mean: float, waves: Iterable[tuple[float, float, float]]) -> Self:
         """The sum of a mean and waves (amplitude, frequency, phase) as in `sine`."""
         flow = cls._pieces("sines", [0.0], [mean], [0.0])
+        frequencies = Range(0.0, REACH.high, open=True)
+        kinds = ("amplitude", "rad s-1", REACH), ("frequency", "Hz", frequencies), ("phase", "rad", ANY)
         rows = [
-            (
-                check_number(f"amplitude of wave {k}", amplitude, "rad s-1", REACH),
-                check_number(f"frequency of wave {k}", frequency, "Hz", Range(0.0, REACH.high, open=True)),
-                check_number(f"phase of wave {k}", phase, "rad"),
-            )
-            for k, (amplitude, frequency, phase) in enumerate(waves)
+            [check_number(f"{n} of wave {k}", x, unit, of) for x, (n, unit, of) in zip(wave, kinds, strict=True)]
+            for k, wave in enumerate(waves)
         ]
         return replace(flow, waves=np.array(rows).reshape(-1, 3))
 
@@ -130,7 +126,12 @@ class Flow:
         samples: list[tuple[float, float]] = []
         for n, texts in rows:
             try:
-                samples.append(_sample(texts, samples[-1][0] if samples else -np.inf))
+                if len(texts) != 2:
+                    raise InputError(f"needs two values, time and omega_0, but has {len(texts)}")
+                time, omega_0 = parse_number("time", texts[0], "s"), parse_number("omega_0", texts[1], "rad s-1")
+                if samples and time <= samples[-1][0]:
+                    raise InputError(f"times must increase, but {time:g} s comes after {samples[-1][0]:g} s")
+                samples.append((time, omega_0))
             except InputError as error:
                 raise InputError(f"{path}, line {n}: {error}") from error
         if not samples:
@@ -150,18 +151,14 @@ class Flow:
 
     @classmethod
     def _pieces(cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]) -> Self:
-        cls._check(start, value)
-        return cls(kind, *(np.array(list(a), dtype=float) for a in (start, value, slope)))
-
-    @staticmethod
-    def _check(times: Iterable[float], values: Iterable[float]) -> None:
-        t = [check_number(f"time of flow sample {k}", time, "s", REACH) for k, time in enumerate(times)]
-        v = [check_number(f"omega_0 of flow sample {k}", value, "rad s-1", REACH) for k, value in enumerate(values)]
+        t = [check_number(f"time of flow sample {k}", time, "s", REACH) for k, time in enumerate(start)]
+        v = [check_number(f"omega_0 of flow sample {k}", omega, "rad s-1", REACH) for k, omega in enumerate(value)]
         if not v:
             raise InputError("a flow needs at least one value of omega_0")
         if np.any(np.diff(t) <= 0):
             k = int(np.argmax(np.diff(t) <= 0))
             raise InputError(f"flow times must increase, but sample {k + 1} is at {t[k + 1]:g} s after {t[k]:g} s")
+        return cls(kind, np.array(t), np.array(v), np.array(list(slope), dtype=float))
 
     def to_mapping(self) -> dict[str, Any]:
         """A JSON-able description, exact."""
@@ -193,13 +190,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _sample(fields: Sequence[str], last: float) -> tuple[float, float]:
-    """Time and omega_0 of a line after that of the `last` time."""
-    if len(fields) != 2:
-        raise InputError(f"needs two values, time and omega_0, but has {len(fields)}")
-    time, omega_0 = parse_number("time", fields[0], "s"), parse_number("omega_0", fields[1], "rad s-1")
-    if time <= last:
-        raise InputError(f"times must increase, but {time:g} s comes after {last:g} s")
-    return time, omega_0

@@ -124,9 +124,7 @@ class Parameters:
     g: float = _quantity("g", "m s-2", "gravitational acceleration reduced by buoyancy", POSITIVE)
     c: float = _quantity("c", "s-1", "viscous drag coefficient divided by mass", NOT_NEGATIVE)
     omega_0: float = _quantity("ω₀", "rad s-1", "angular velocity of the fluid", ANY)
-    nu_f: float = _quantity(
-        "ν_f", "m2 s-1", "kinematic viscosity of the fluid (0: not known)", NOT_NEGATIVE, default=0.0
-    )
+    nu_f: float = _quantity("ν_f", "m2 s-1", "kinematic viscosity of the fluid (0: not known)", NOT_NEGATIVE, default=0)
     C_D: float = _quantity("C_D", "1", "drag coefficient of the quadratic law", POSITIVE, default=0.44)
     density_ratio: float = _quantity(
         "ρ_f/ρ_b",
@@ -209,9 +207,8 @@ class Parameters:
         names = [f.name for f in dataclasses.fields(cls)]
         if "fluid" not in values:
             check_names(values, [*names, "fluid"], "parameter")
-            refuse_missing(
-                values, [f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING], "parameter"
-            )
+            needed = [f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING]
+            refuse_missing(values, needed, "parameter")
             return cls(**values)
         fluid = values["fluid"]
         if not isinstance(fluid, Mapping):
@@ -230,9 +227,8 @@ class Parameters:
     def named(cls, name: str) -> Self:
         """Return the named set (`names` lists them)."""
         if name not in cls.names():
-            raise InputError(
-                f"no parameter set is named {name!r}{suggestion(name, cls.names())}; there are {', '.join(cls.names())}"
-            )
+            known = f"{suggestion(name, cls.names())}; there are {', '.join(cls.names())}"
+            raise InputError(f"no parameter set is named {name!r}{known}")
         return cls.from_mapping(tomllib.loads((_SETS / f"{name}.toml").read_text("utf-8")))
 
     @staticmethod
@@ -257,16 +253,13 @@ class Parameters:
             raise StorageError(f"cannot write parameters to {path}: {error.strerror}") from error
 
 
-def _told(field: dataclasses.Field[float]) -> str:
-    meta, usual = field.metadata, "" if field.default is dataclasses.MISSING else f", default {field.default:g}"
-    said = f"{field.name} : {meta['meaning']}, in {meta['unit']}, {meta['allowed']}{usual}"
-    return said.replace(", in 1", "").replace(", any", "")
-
-
-_TABLE = "\n    ".join(
-    ["Parameters", "----------", *map(_told, Parameters.quantities()), f"drag : one of {', '.join(laws.LAWS)}"]
-)
-Parameters.__doc__ = (Parameters.__doc__ or "").replace("QUANTITIES", _TABLE)
+_table = ["Parameters", "----------"]
+for _field in Parameters.quantities():
+    _usual = "" if _field.default is dataclasses.MISSING else f", default {_field.default:g}"
+    _said = "{name} : {meaning}, in {unit}, {allowed}{usual}".format(name=_field.name, usual=_usual, **_field.metadata)
+    _table.append(_said.replace(", in 1", "").replace(", any", ""))
+_table.append(f"drag : one of {', '.join(laws.LAWS)}")
+Parameters.__doc__ = (Parameters.__doc__ or "").replace("QUANTITIES", "\n    ".join(_table))
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

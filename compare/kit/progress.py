@@ -49,40 +49,33 @@ def shown(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
                 bar.update(line, description=what + failures, completed=done, total=total)
 
             yield show
-    else:
-        with _plain() as plain:
-            yield plain
+    else:  # what is being done at once, and how far it is every `INTERVAL`, whatever happens
+        began, ended = time.monotonic(), threading.Event()
+        before, last = -1, ("starting", 0, 0, 0)
 
+        def note(what: str, done: int, total: int, failed: int) -> None:
+            nonlocal before, last
+            if before < 0:
+                before = done  # what an earlier session did is no measure of how fast this one is
+                print(what, file=sys.stderr, flush=True)
+            last = what, done, total, failed
 
-@contextmanager
-def _plain() -> Iterator[Show]:
-    """Prints what is being done at once, and how far it is every `INTERVAL`, whatever happens."""
-    began, ended = time.monotonic(), threading.Event()
-    before, last = -1, ("starting", 0, 0, 0)
+        def tell() -> None:
+            while not ended.wait(INTERVAL):
+                what, done, total, failed = last
+                rate = (time.monotonic() - began) / (done - before) if done > before >= 0 else 0.0
+                left = f", about {rate * (total - done):.0f} s to go" if rate and total > done else ""
+                share = f", {done / total:.0%}" if total else ""
+                bad = f", {failed} failed" if failed else ""
+                print(f"{time.monotonic() - began:.0f} s: {what}{share}{bad}{left}", file=sys.stderr, flush=True)
 
-    def show(what: str, done: int, total: int, failed: int) -> None:
-        nonlocal before, last
-        if before < 0:
-            before = done  # what an earlier session did is no measure of how fast this one is
-            print(what, file=sys.stderr, flush=True)
-        last = what, done, total, failed
-
-    def tell() -> None:
-        while not ended.wait(INTERVAL):
-            what, done, total, failed = last
-            rate = (time.monotonic() - began) / (done - before) if done > before >= 0 else 0.0
-            left = f", about {rate * (total - done):.0f} s to go" if rate and total > done else ""
-            share = f", {done / total:.0%}" if total else ""
-            bad = f", {failed} failed" if failed else ""
-            print(f"{time.monotonic() - began:.0f} s: {what}{share}{bad}{left}", file=sys.stderr, flush=True)
-
-    thread = threading.Thread(target=tell, daemon=True)
-    thread.start()
-    try:
-        yield show
-    finally:
-        ended.set()
-        thread.join()
+        thread = threading.Thread(target=tell, daemon=True)
+        thread.start()
+        try:
+            yield note
+        finally:
+            ended.set()
+            thread.join()
 
 
 @dataclass

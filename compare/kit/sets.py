@@ -39,18 +39,13 @@ def sets(level: Level) -> dict[str, Parameters]:
     """The sets of a level by name."""
     named = {name: Parameters.named(name) for name in ("reference", "high-wall-friction")}
     chosen = {name: Parameters(**values, omega_0=1.0, drag=_DRAG.get(name, STOKES)) for name, values in _CHOSEN.items()}
-    by_hand = named | chosen
-    return by_hand | (_design(COUNT[level] - len(by_hand)) if level > Level.QUICK else {})
-
-
-def _design(count: int) -> dict[str, Parameters]:
-    """Sets that fill the box of `LOW` and `HIGH` evenly (scrambled Sobol sequence)."""
-    low, high = np.array(list(LOW.values())), np.array(list(HIGH.values()))
-    unit = sobol(len(LOW), count, SEED)
-    designed = {}
-    for k, row in enumerate((low + unit * (high - low)).tolist(), start=1):
-        values = dict(zip(LOW, row, strict=True))
-        ratio, kappa = values.pop("r/R"), values.pop("kappa")
-        c = kappa * math.sqrt(values["g"] / values["R"])
-        designed[f"design-{k}"] = Parameters.from_mapping(values | {"r": ratio * values["R"], "c": c, "omega_0": 1.0})
-    return designed
+    sets = named | chosen
+    if level > Level.QUICK:  # a scrambled Sobol sequence fills the box evenly
+        low, high = np.array(list(LOW.values())), np.array(list(HIGH.values()))
+        unit = sobol(len(LOW), COUNT[level] - len(sets), SEED)
+        for k, row in enumerate((low + unit * (high - low)).tolist(), start=1):
+            values = dict(zip(LOW, row, strict=True))
+            ratio, kappa = values.pop("r/R"), values.pop("kappa")
+            c = kappa * math.sqrt(values["g"] / values["R"])
+            sets[f"design-{k}"] = Parameters(**values, r=ratio * values["R"], c=c, omega_0=1.0)
+    return sets

@@ -43,9 +43,7 @@ def window_mean(time: npt.ArrayLike, values: npt.ArrayLike) -> Measured:
     """
     t, v = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
     if t.shape != v.shape or t.ndim != 1 or len(v) < 6:
-        raise InputError(
-            f"a window mean needs two equal rows of at least 6 samples, not shapes {t.shape} and {v.shape}"
-        )
+        raise InputError(f"a window mean needs two equal rows of 6 samples or more, not shapes {t.shape} and {v.shape}")
     if not np.all(np.isfinite(v)):
         raise InputError("a window mean needs finite samples")
     scatter = float(v.std(ddof=1)) / math.sqrt(len(v) / correlation_length(v))

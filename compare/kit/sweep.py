@@ -11,6 +11,7 @@ import itertools
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,9 +61,8 @@ class Axis:
             raise InputError(f"{text!r} is no range: write {name}=from:to:count")
         first, last = (parse_number(name, end, units[name], allowed) for end in (low, high))
         if first >= last:
-            raise InputError(
-                f"{name} = {first:g}:{last:g} {units[name]} is in the wrong order: a range runs from low to high"
-            )
+            given = f"{name} = {first:g}:{last:g} {units[name]}"
+            raise InputError(f"{given} is in the wrong order: a range runs from low to high")
         if not count:
             return cls(name, (first, last))
         points = int(parse_number(f"count of {name}", count[0], "points", Range(2, MOST, whole=True)))
@@ -166,13 +166,8 @@ def _attributes() -> dict[str, dict[str, Any]]:
     about: dict[str, dict[str, Any]] = {
         f.name: {"units": f.metadata["unit"], "long_name": f.metadata["meaning"]} for f in Parameters.quantities()
     }
-    texts = {
-        "run": "file and name of the run",
-        "engine": "engine",
-        "drag": "law of drag",
-        "failure": "why it broke down",
-    }
-    about |= {name: {"long_name": text} for name, text in texts.items()}
+    texts = {"run": "file and name of the run", "engine": "engine", "drag": "law of drag"}
+    about |= {name: {"long_name": text} for name, text in (texts | {"failure": "why it broke down"}).items()}
     about["duration"] = {"units": "s", "long_name": "duration of the run"}
     stored = columns(Trajectory)
     for name in VARIABLES:
@@ -244,9 +239,10 @@ def table(about: dict[str, Any]) -> Table:
 
 
 def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
-    """A run's parameters, and mean, standard uncertainty and prevailing case over its last part.
+    """A run's parameters, and mean, standard uncertainty and prevailing case over its last part, beside theory.
 
-    Those are nan, and the case -1, for a run too short for them.
+    Those are nan, and the case -1, for a run too short for them; theory, the stable stationary solution of the case, is
+    nan where there is none, where it is free, and in unsteady flow.
     """
     row: dict[str, Any] = {"run": str(name), "engine": trajectory.header.engine}
     row |= dataclasses.asdict(trajectory.header.parameters)
@@ -254,23 +250,14 @@ def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
     row["failure"] = trajectory.header.failure
     last = tail(trajectory)
     for variable in VARIABLES:
-        try:
+        row |= dict.fromkeys((variable, f"{variable}_uncertainty"), math.nan)
+        with suppress(InputError):  # too few samples for a mean
             mean = window_mean(trajectory.time[last], getattr(trajectory, variable)[last])
-        except InputError:  # too few samples for a mean
-            row |= {variable: np.nan, f"{variable}_uncertainty": np.nan}
-        else:
             row |= {variable: mean.value, f"{variable}_uncertainty": mean.uncertainty}
+    row |= dict.fromkeys((f"{name}_theory" for name in VARIABLES), math.nan)
     case = int(settled_case(trajectory)) if len(trajectory.case) else -1
-    return row | _theory(trajectory, case) | {"case": case}
-
-
-def _theory(run: Trajectory, case: int) -> dict[str, float]:
-    """The stable stationary solution of the case; nan where there is none, where it is free, and in unsteady flow."""
-    theory = dict.fromkeys((f"{name}_theory" for name in VARIABLES), math.nan)
-    if case >= 0 and run.header.flow.is_steady:
-        try:
-            of = analytic.solution(run.header.parameters, Case(case))
-        except InputError:  # it has none, or not one
-            return theory
-        theory |= {f"{n}_theory": float(x) for n, x in of.state._asdict().items() if n not in of.family}
-    return theory
+    if case >= 0 and trajectory.header.flow.is_steady:
+        with suppress(InputError):  # the case has no stable stationary solution, or not one
+            of = analytic.solution(trajectory.header.parameters, Case(case))
+            row |= {f"{n}_theory": float(x) for n, x in of.state._asdict().items() if n not in of.family}
+    return row | {"case": case}

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from compare.claim import Verdict, Witness
+from compare.claim import Verdict
 from compare.kit import record
 from compare.kit.levels import Level
 from compare.kit.record import Records, Testimony
@@ -94,17 +94,14 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
     counts["left_out"] = verdict.left_out
     power = {"resolving_power": dict(verdict.resolving_power), "worst": verdict.worst}
     less = {"expected": verdict.claim.expected, "missing": [*map(str, verdict.missing)], "error": verdict.error}
-    about["witnesses"] = {each.engine: _said(each) for each in verdict.witnesses}
+    about["witnesses"] = {
+        each.engine: {name: getattr(each, name) for name in ("outcome", "reason", "order", "left_out")}
+        | {"checks": len(each.checks), "worst": max((check.share for check in each.checks), default=math.nan)}
+        | {"deviation_at_2ms": {"typical": each.typical, "worst": each.worst}}
+        for each in verdict.witnesses
+    }
     told: dict[str, Any] = plain(about | {"checks": len(verdict.checks)} | counts | power | less)
     return told
-
-
-def _said(witness: Witness) -> dict[str, Any]:
-    """What one engine says of a claim."""
-    share = max((check.share for check in witness.checks), default=math.nan)
-    said = {name: getattr(witness, name) for name in ("outcome", "reason", "order", "left_out")}
-    usual = {"typical": witness.typical, "worst": witness.worst}
-    return said | {"checks": len(witness.checks), "worst": share, "deviation_at_2ms": usual}
 
 
 def open_directory(directory: Path) -> None:
