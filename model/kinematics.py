@@ -98,9 +98,8 @@ def full_state(x: npt.ArrayLike) -> Array:
     """
     state = np.asarray(x, dtype=float)
     if state.ndim == 0 or state.shape[-1] not in (6, 8):
-        raise InputError(
-            f"a state has 6 entries (y, v_y, omega_c, slip_x, slip_y, slip_z) or 8 (with h, v_h), not {state.shape}"
-        )
+        six = f"6 entries ({', '.join(VARIABLES[:6])})"
+        raise InputError(f"a state has {six} or 8 (with h, v_h), not {state.shape}")
     if not np.all(np.isfinite(state)):
         k = int(np.argwhere(~np.isfinite(state))[0][-1])
         raise InputError(f"{VARIABLES[k]} = {state[..., k]} {UNITS[k]} must be finite")

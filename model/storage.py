@@ -56,12 +56,7 @@ def save(trajectory: Trajectory, path: str | Path) -> None:
 
 
 class TrajectoryWriter(WholeFile):
-    """Writes a trajectory block by block; use as a context manager and call `end` at the end.
-
-    Leaving the context without `end` removes the temporary file, so that `path` exists only when it is whole.
-    Every method raises `StorageError`, in one line, when the file can't be written (no such directory, no
-    permission, disk full).
-    """
+    """Writes a trajectory block by block; a context manager, at whose end `end` is to be called, see `WholeFile`."""
 
     def __init__(self, path: str | Path, header: Header) -> None:
         super().__init__(path)
@@ -229,9 +224,8 @@ def _check_schema(file: h5py.File, name: str, newest: int) -> None:
     if not isinstance(version, (int, np.integer)) or version < 1:
         raise StorageError(f"it has no valid schema version: {version!r}")
     if version > newest:
-        raise StorageError(
-            f"it was written by a newer dualball: its schema version is {version}, this program reads up to {newest}"
-        )
+        other = f"its schema version is {version}, this program reads up to {newest}"
+        raise StorageError(f"it was written by a newer dualball: {other}")
 
 
 def _trajectory(

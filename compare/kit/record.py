@@ -27,8 +27,7 @@ from model.files import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
 from model.trajectory import current_commit, current_versions
 
-SCHEMA = "dualball-measurements"
-SCHEMA_VERSION = 1
+SCHEMA, SCHEMA_VERSION = "dualball-measurements", 1
 Condition = float | str
 
 
@@ -134,10 +133,8 @@ class Records:
     def of(cls, rows: Iterable[Measurement | Missing]) -> Records:
         """Sort what a protocol yields into the two kinds."""
         kept = list(rows)
-        return cls(
-            tuple(row for row in kept if isinstance(row, Measurement)),
-            tuple(row for row in kept if isinstance(row, Missing)),
-        )
+        missing = tuple(row for row in kept if isinstance(row, Missing))
+        return cls(tuple(row for row in kept if isinstance(row, Measurement)), missing)
 
     def __add__(self, other: Records) -> Records:
         return Records(self.measurements + other.measurements, self.missing + other.missing)

@@ -208,19 +208,11 @@ def journal_path(task: Task, path: Path) -> Path:
 
 def _begun(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
     """Runs that hand out their samples, in a batch unless they are long."""
-    first = tasks[0]
+    first, more = tasks[0], {"batched": not tasks[0].long, "journal": journal}
     parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
+    run = parameters, x0s, first.t_end, flows, first.chosen_settings
     assert first.simulator.stream
-    return first.simulator.stream(
-        parameters,
-        x0s,
-        first.t_end,
-        flows,
-        first.chosen_settings,
-        sample_interval=first.sample_interval,
-        batched=not first.long,
-        journal=journal,
-    )
+    return first.simulator.stream(*run, sample_interval=first.sample_interval, **more)
 
 
 @functools.cache

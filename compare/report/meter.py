@@ -126,9 +126,7 @@ def rows(made: Design) -> dict[str, pages.Rows]:
     for name in made.sensitivities[THRESHOLDS[0]]:
         slopes = [made.sensitivities[key][name].value for key in THRESHOLDS]
         # Differences of two widths leave 1e-4 of what should be zero.
-        shown = [
-            rounded(value, off) if abs(value) >= 5e-4 else "0" if math.isfinite(value) else _NONE for value in slopes
-        ]
+        shown = ("0" if abs(value) < 5e-4 else rounded(value, off) for value in slopes)
         sensitivities.append([SYMBOLS.get(name, name), *shown])
     return {
         "The best of each material": [["", *best], *([name, *row] for name, row in (values | limits).items())],
@@ -199,14 +197,8 @@ def page(made: Design) -> str:
         "tolerances": ", ".join(f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()) or "none",
     }
     drawn = [(pictures.svg(draw(made)), caption) for draw, caption in figures.FIGURES]
-    shown = {
-        "doubts": doubts(made.model_error),
-        "sentences": sentences(made),
-        "tables": rows(made).items(),
-        "asked": asked,
-        "figures": drawn,
-    }
-    return pages.render("compare.report", "meter.html", made=made, **shown)
+    texts = {"doubts": doubts(made.model_error), "sentences": sentences(made), "tables": rows(made).items()}
+    return pages.render("compare.report", "meter.html", made=made, **texts, asked=asked, figures=drawn)
 
 
 def _values(values: Mapping[str, Any]) -> str:

@@ -63,16 +63,14 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         claim, own = verdict.claim, beside.get(verdict.claim.id, {})
         mark, symbol = wording.MARKS[verdict.outcome]
         more = len(verdict.missing) - REASONS
+        unseen = [f"and {more} more, see {results.SUMMARY}"] if more > 0 else []
         row = {
             "claim": claim,
             "verdict": verdict,
             "mark": "other" if verdict.passed and mark == "fail" else mark,
             "symbol": symbol,
             "predicted": list(dict.fromkeys(bearing.by for bearing in claim.bearings if bearing.by)),
-            "missing": [
-                *map(str, verdict.missing[:REASONS]),
-                *([f"and {more} more, see {results.SUMMARY}"] if more > 0 else []),
-            ],
+            "missing": [*map(str, verdict.missing[:REASONS]), *unseen],
             "checks": wording.ranked(verdict.checks)[:ROWS],
             "figures": [figures[name] for name in own if name not in shown],
             "elsewhere": [(figures[name], shown[name]) for name in own if name in shown],
@@ -186,11 +184,11 @@ def _figures(material: Material, drawings: Mapping[str, Drawing], spread: Spread
             data = drawing.select(material)
         except GapError as error:
             figures[name]["gap"] = str(error)
+            continue
+        if kept := pictures.kept(path, drawing, data):
+            figures[name] |= kept
         else:
-            if kept := pictures.kept(path, drawing, data):
-                figures[name] |= kept
-            else:
-                new.append((path, drawing, data))
+            new.append((path, drawing, data))
     new.reverse()  # the last ones take longest
     for (path, *_), drawn in zip(new, spread(pictures.drawn, new), strict=True):
         figures[path.stem] |= drawn

@@ -131,16 +131,15 @@ def load(directory: Path) -> Summary:
     try:
         Level[content["level"]]
         summary = Summary(
-            content["level"], dict(content["measurements"]), dict(content["verdicts"]), dict(content["provenance"])
+            content["level"], *(dict(content[name]) for name in ("measurements", "verdicts", "provenance"))
         )
         summary.files(directory)
         version, ours = summary.provenance["versions"]["dualball"], current_versions()["dualball"]
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise StorageError(f"{path} is damaged: it is not what a validation writes") from error
     if version != ours:
-        raise StorageError(
-            f"{directory} holds results of dualball {version}, this is {ours}: choose another directory with --output"
-        )
+        held = f"{directory} holds results of dualball {version}, this is {ours}"
+        raise StorageError(f"{held}: choose another directory with --output")
     return summary
 
 

@@ -15,13 +15,10 @@ from compare.kit.quantities import QUANTITIES, quantity
 from compare.kit.record import Condition, Measurement
 from model import Case
 
-SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {
-    name: name for name in ("v_h", "n_x", "n_y", "n_z")
-}
+SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {n: n for n in ("v_h", "n_x", "n_y", "n_z")}
 """How quantities and named conditions are written, where that isn't their name without underscores."""
-_UNITS = {"h": "m", "v_h": "m s-1", "f": "Hz", "amplitude": "rad s-1", "rate": "rad s-2"} | {
-    name: each.unit for name, each in QUANTITIES.items()
-}
+_UNITS = {"h": "m", "v_h": "m s-1", "f": "Hz", "amplitude": "rad s-1", "rate": "rad s-2"}
+_UNITS |= {name: each.unit for name, each in QUANTITIES.items()}
 MARKS = {
     Outcome.CONFIRMED: ("pass", "✓"),
     Outcome.REFUTED: ("fail", "✗"),
