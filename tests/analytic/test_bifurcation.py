@@ -124,20 +124,6 @@ def test_fold_moves_away_with_vanishing_drag() -> None:
     assert errors[0] / errors[1] == pytest.approx(100, rel=0.02)
 
 
-def test_slope_is_the_derivative() -> None:
-    """`slope` times mu |j-eta| sin^2/(kappa den^2) is d Omega_0/d|alpha| by differences, on both sides of j."""
-    for mu, eta in ((0.2, 0.2), (0.2, 0.45), (1.0, 0.05)):
-        angle, h, kappa = np.linspace(0.2, 1.4, 7), 1e-6, 0.3
-        places = [np.log(np.tan(angle + k * h)) for k in (-1, 0, 1)]
-        p = groups(mu, eta, kappa)
-        low, mid, high = (sb.branch(s, p) for s in places)
-        numeric = (high.Omega_0 - low.Omega_0) / (2 * h)
-        den = (1 + 0.4 * mid.cos**2) * mu * eta + (0.4 - eta) * mid.cos
-        factor = mu * abs(0.4 - eta) * mid.sin**2 / (kappa * den**2)
-        exact = factor * sb.slope(places[1], p)
-        np.testing.assert_allclose(numeric, exact, rtol=1e-7, atol=1e-8)
-
-
 @pytest.mark.parametrize(
     ("eta", "changes"),
     [

@@ -127,7 +127,7 @@ def test_both_simulators_agree_and_balance_energy(law, seed):
     assert stepped == pytest.approx(exact, abs=10 * METHODS[1].timestep * math.sqrt(p.g / p.R) * abs(p.omega_0))
 
 
-@pytest.mark.parametrize("law", OTHERS)
+@pytest.mark.parametrize("law", LAWS)
 def test_slipping_converges_with_the_square_of_the_step(law):
     """SS without a change of case: errors of two steps, four to one, against the event-driven simulation."""
     p = BY_LAW[law].replace(mu=0.15, eta=0.15, omega_0=20.0)

@@ -338,13 +338,3 @@ def test_mean_error_of_slow_pulsations() -> None:
     near, far = (abs(pulsation.mean_error(p, 3.0, f * rolling_rate(p)) - limit) for f in (1e-2, 4e-2))
     assert near < 0.3 * far
     assert near < 1e-2 * abs(limit)
-
-
-def test_both_witnesses_of_the_azimuth() -> None:
-    """The mean of omega_c, sampled densely, is what the azimuth says."""
-    p, amplitude, frequency = PULSATING["slips at both"], 8.0, 0.5
-    x0 = [0, 0, float(pulsation.swing(p, amplitude, frequency, 0.0)[0]), 0, 0, 0]
-    run = simulate(p, x0, 40.0, Flow.sine(p.omega_0, amplitude, frequency), sample_interval=2e-3)
-    last = run.time >= 38.0
-    mean = np.trapezoid(run.omega_c[last], run.time[last]) / 2.0
-    assert mean - p.omega_0 == pytest.approx(pulsation.mean_error(p, amplitude, frequency), rel=1e-4)

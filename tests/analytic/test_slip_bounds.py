@@ -1,4 +1,4 @@
-"""The slip bounds of sections 3.2 and 4: as printed, from Newton and Euler by algebra, and at random sets by gamma."""
+"""The slip bounds of sections 3.2 and 4: as printed, from Newton and Euler by algebra, and at random sets."""
 
 from typing import Any
 
@@ -75,33 +75,18 @@ def test_from_newton_and_euler(side: int) -> None:
         assert equal(gamma, side * rate), outer
 
 
-# --- against gamma at random sets ------------------------------------------------------------------------------
+# --- at random sets --------------------------------------------------------------------------------------------
 
 
-def test_bounds_at_random_sets() -> None:
-    """Zero and slope against (53), from the vector fields, at flows on both sides; (66) with eta, (73) as printed."""
+def test_zeros_of_a_lag() -> None:
+    """(66) with eta, (73) as printed."""
     for p in random_sets(50):
-        omega_c = 0.7 * p.omega_0
         at_B = p.eta / (p.j * p.c) * (1 + p.j) * (1 + 2 * p.j) * p.omega_0**2
         at_A = (1 + 2 * p.j) * p.mu / (p.j * p.R * p.c) * (p.g - p.j * p.R * p.omega_0**2)
         for side in (1, -1):
             for bound_of, lag in ((slip_bounds.rr_to_rs, at_B), (slip_bounds.rr_to_sr, -at_A)):
                 zero = bound_of(p, p.omega_0, side).zero
                 assert zero == pytest.approx(p.omega_0 + side * lag, rel=1e-14, abs=1e-14 * abs(lag))
-            table = [
-                (slip_bounds.rr_to_rs(p, omega_c, side), Case.RS, omega_c, [side]),
-                (slip_bounds.rr_to_rs_stationary(p), Case.RS, None, [side]),
-                (slip_bounds.rr_to_sr(p, omega_c, side), Case.SR, omega_c, [side]),
-                (slip_bounds.rr_to_sr_stationary(p), Case.SR, None, [side]),
-                (slip_bounds.rr_to_ss(p, side), Case.SS, None, [0.0, 0.0, side]),
-            ]
-            for bound, outer, w, n in table:
-                flows = np.array([-1.3, 0.4, 2.1]) * abs(p.omega_0)
-                states = [(State(omega_c=flow if w is None else w), p.replace(omega_0=flow)) for flow in flows.tolist()]
-                growth = [float(slip_stability.gamma(Case.RR, outer, x, n, q)) for x, q in states]
-                other = bound.slope * flows**2 if isinstance(bound, SlipBound) else bound.slope * (flows - omega_c)
-                scale = np.abs(bound.gamma(flows)) + np.abs(other)
-                assert np.all(np.abs(bound.gamma(flows) - growth) <= 1e-13 * scale)
 
 
 def forces_at_onset(p: Parameters, omega_0: np.ndarray, side: int) -> Forces:

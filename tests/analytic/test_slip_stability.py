@@ -106,21 +106,6 @@ def directions(dimension: int) -> np.ndarray:
 # --- gamma (53); its closed forms are in test_slip_bounds --------------------------------------------------------
 
 
-def test_limit_is_the_limit() -> None:
-    """(53) as printed: f_Z at x* + eps n for shrinking eps tends to the value taken at once."""
-    p = P.replace(omega_0=10.0)
-    n = direction(0.4, -0.7)
-    rates, A_y, B_x = slip.slip_rates(Case.RR, Case.SS, State(omega_c=9.0), n, p)
-    errors = []
-    for eps in (1e-2, 1e-4, 1e-6):
-        x = np.array([0, 0, 9.0, *(eps * n), 0, 0])
-        errors.append(np.abs(vector_field(Case.SS, x, p)[3:6] - rates).max())
-    np.testing.assert_allclose(np.array(errors[:2]) / errors[1:], 100, rtol=1e-3)
-    assert min(A_y, B_x) > 0
-    with pytest.raises(InputError, match="slip_x = 1 rad s-1 must be 0 in case RR"):
-        slip.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P)
-
-
 INNER = {
     Case.RR: State(omega_c=9.0),
     Case.RS: State(omega_c=9.0, slip_y=4.0),
@@ -277,6 +262,8 @@ def test_arrows_of_figure_6() -> None:
     for inner, outer in slip.LIFT_ARROWS:
         assert inner.B is outer.B
         assert outer.A.name == "N"
+    with pytest.raises(InputError, match="slip_x = 1 rad s-1 must be 0 in case RR"):
+        slip.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P)
 
 
 def test_lift_conditions() -> None:

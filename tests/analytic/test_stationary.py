@@ -25,9 +25,8 @@ from analytic.stationary import slipping_branch as stability
 from analytic.stationary.slipping_branch import branch, fold, points_at
 from model import Case, InputError, Parameters, State
 from model.cases import TRAITS
-from model.kinematics import VARIABLES, slip_speeds
+from model.kinematics import VARIABLES
 from tests.analytic import newton_euler as ne
-from tests.directions import slip_directions
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps
@@ -69,29 +68,6 @@ def test_propositions_3_and_5(eta: float) -> None:
     for factor, kind in ((0.999, Stability.UNSTABLE), (1.001, Stability.ASYMPTOTIC)):
         (s,) = of_case(P.replace(omega_0=factor * np.sqrt(P.g / (P.j * P.R))), Case.SR)
         assert s.stability is kind
-
-
-@pytest.mark.parametrize("omega_0", [14.0, 25.0, 33.0, 41.0])
-def test_proposition_4(omega_0: float) -> None:
-    """(37)-(42) at the alpha of the solution."""
-    p = P.replace(omega_0=omega_0)
-    solutions = of_case(p, Case.SS)
-    assert len(solutions) == (1 if omega_0 < thresholds(p).omega_02 else 2)
-    for s in solutions:
-        assert s.exists
-        alpha, _ = slip_directions(s.x, p)
-        np.testing.assert_allclose(alpha, s.alpha, rtol=1e-12)
-        cos, sin = np.cos(s.alpha), np.sin(s.alpha)
-        den = (1 + p.j * cos**2) * p.mu * p.eta + (p.j - p.eta) * cos
-        omega_c = np.sqrt(p.mu * p.g / p.R) * np.sqrt((1 + p.eta * cos**2) / den)
-        v_A = -p.mu * p.g / (p.j * omega_c) * (p.j - p.eta) * sin / den
-        np.testing.assert_allclose(s.state.omega_c, omega_c, rtol=1e-12)
-        np.testing.assert_allclose(slip_speeds(s.x, p)[0], v_A, rtol=1e-12)
-        drag = p.g * p.mu / (p.R * p.c) * cos * sin * (p.j - p.eta) / den
-        np.testing.assert_allclose(omega_0, omega_c - drag, rtol=1e-12)
-        np.testing.assert_allclose(s.force_A[1], p.m * p.g * (p.j - p.eta) * cos / den, rtol=1e-12)
-        np.testing.assert_allclose(s.force_B[0], p.mu * p.m * p.g * (1 + p.j * cos**2) / den, rtol=1e-12)
-    assert [s.stability for s in solutions] == [Stability.ASYMPTOTIC, Stability.UNSTABLE][: len(solutions)]
 
 
 def test_proposition_6() -> None:
@@ -191,20 +167,6 @@ def test_jacobian_against_differences(omega_0: float) -> None:
             directions[:, 5], step = -directions[:, 7] / p.r, 1e-6
         numeric = [vector_field(case, x + step * e, p) - vector_field(case, x - step * e, p) for e in directions]
         assert np.abs(np.array(numeric)[:, active].T / (2 * step) - exact).max() <= 1e-7 * np.abs(exact).max(), case
-
-
-def test_eigenvalues_of_the_branch_in_both_coordinates() -> None:
-    """Where slip is not yet tiny the plain Jacobian gives the same eigenvalues."""
-    s = np.linspace(-5, 5, 21)
-    states, flow = stability.states(s, P)
-    values = stability.eigenvalues_at(s, P)
-    for x, omega_0, expected in zip(states, flow, values, strict=True):
-        matrix = jacobian(Case.SS, x, P.replace(omega_0=float(omega_0)))
-        values = np.linalg.eigvals(matrix)
-        # Round-off of the stiff entries is what the small eigenvalues suffer.
-        tolerance = 1e3 * EPS * np.abs(matrix).max()
-        for value in expected:
-            assert np.abs(values - value).min() <= tolerance
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])

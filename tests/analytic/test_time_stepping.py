@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from analytic import Settings, simulate, simulate_many, stationary_solutions, thresholds
+from analytic import Settings, simulate, simulate_many, stationary_solutions
 from analytic.simulation.compiling import compiled, forget_stale
 from analytic.simulation.stepping import TOLERANCE, step
 from analytic.simulation.time_stepping import prepared
@@ -48,15 +48,6 @@ def test_flight_is_of_second_order():
     assert order(steps, [abs(run.y[-1] - exact) for run in runs]) == pytest.approx(2.0, abs=0.1)
 
 
-@pytest.mark.parametrize("x0", [[0, 0, 9, 30, 60, -40], [0, 0, 20, 100, 150, -200]])
-def test_sliding_is_of_second_order(x0):
-    """Friction opposes the mean slip: against the event-driven result while both contacts slide."""
-    steps = [1e-3, 5e-4, 2.5e-4]
-    exact, errors = deviations(P.replace(omega_0=25.0), x0, 0.1, steps, sample_interval=0.1)
-    assert exact.cases == [Case.SS, Case.SS]
-    assert order(steps, errors) == pytest.approx(2.0, abs=0.1)
-
-
 def test_restitution():
     """Heights of bounces shrink by e^2, up to what a step moves the ball at impact."""
     p, y, e, dt = P.replace(c=0.0, omega_0=0.0), 0.05, 0.8, 2e-5
@@ -66,15 +57,6 @@ def test_restitution():
     t_0 = math.sqrt(2 * y / p.g)
     top = run.y[(run.time > t_0) & (run.time < t_0 * (1 + 2 * e))].max()
     assert top == pytest.approx(e**2 * y, abs=2 * dt * math.sqrt(2 * p.g * y) + p.g * 1e-6)
-
-
-@pytest.mark.parametrize("side", [0.97, 1.03])
-def test_finds_the_end_of_two_point_rolling_by_itself(side):
-    """Below omega_01 the ball ends up in RR, above it in SS, though the scheme knows of neither."""
-    omega_0 = side * thresholds(P).omega_01
-    p, x0 = P.replace(omega_0=omega_0), State(omega_c=0.9 * omega_0)
-    run = simulate(p, x0, 8.0, method="time-stepping", timestep=2e-3, sample_interval=0.1)
-    assert run.cases[-1] is (Case.RR if side < 1 else Case.SS)
 
 
 @pytest.mark.parametrize(

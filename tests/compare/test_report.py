@@ -340,11 +340,6 @@ class Tab:
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 
-    def press(self, key: str, code: int) -> None:
-        text = {"Enter": "\r", " ": " "}.get(key, "")
-        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, windowsVirtualKeyCode=code, text=text)
-        self.call("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=code)
-
     @property
     def complaints(self) -> list[Any]:
         """Errors and warnings that the page has caused."""
@@ -430,18 +425,6 @@ def test_numbers_are_found_by_flow_claim_and_words(tab: Tab) -> None:
     found = tab.value(rows)
     assert len(found) == report.ROWS + 40
     assert found[0] == ["reference", "12", "ω_c rad/s", found[0][3], "mujoco", "12", "1e-9", " 12", "0", "3e-9", "good"]
-
-
-def test_rows_open_by_keyboard(tab: Tab) -> None:
-    tab.value("document.querySelector('details.claim summary').focus()")
-    first = "document.querySelector('details.claim').open"
-    tab.press("Enter", 13)
-    assert tab.value(first) is True
-    tab.press(" ", 32)
-    assert tab.value(first) is False
-    # The next stop of the Tab key is the next row.
-    tab.press("Tab", 9)
-    assert tab.value("document.activeElement.parentElement.previousElementSibling.id") == tab.value(SHOWN)[0]
 
 
 def test_an_address_opens_its_row(tab: Tab) -> None:

@@ -16,8 +16,7 @@ from matplotlib.figure import Figure
 import analytic
 from compare.kit import pages
 from compare.kit.campaign import Campaign
-from compare.kit.engines import newcomer
-from docs.studies import accuracy, confirmation, settings, states, tables
+from docs.studies import accuracy, confirmation, settings, tables
 from docs.studies.states import APPROACH, COST, ERRORS, OPEN, ROLLING, SLIPPING, STATES, Entry
 from mjsim import ContactSettings
 from model import InputError
@@ -117,33 +116,6 @@ def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time() -> None:
         assert len(changed) == 1 or changed == contact
 
 
-@pytest.mark.parametrize("step", [1e-3, STEP])
-def test_settings_are_named_after_what_they_are(step: float) -> None:
-    """After the nearer of ours and MuJoCo's defaults, and each setting that differs, in the order of the fields."""
-
-    def text(value: object) -> str:
-        return (
-            ("off", "on")[value]
-            if isinstance(value, bool)
-            else f"{value:g}"
-            if isinstance(value, float)
-            else str(value)
-        )
-
-    bases = {"ours": ContactSettings.at(step), "MuJoCo's defaults": newcomer(step)}
-    for name, way in (settings.rungs(step) | settings.rivals(step) | tables.variants(step)).items():
-        values = dataclasses.asdict(way).items()
-        named = [[base, *(f"{n} {text(v)}" for n, v in values if v != getattr(at, n))] for base, at in bases.items()]
-        assert name == ", ".join(min(named, key=len))
-
-
-def test_no_run_begins_where_it_should_end() -> None:
-    for state, discipline in zip(STATES, ERRORS, strict=False):
-        ((asked, x0, *_),) = discipline.runs
-        assert asked is state.p
-        assert abs(x0[2] / state.solution.x[2] - 1) > 0.01
-
-
 def test_errors_are_those_of_the_run() -> None:
     """A run of the slipping state, with known errors put in."""
     run, exact = analytic.simulate(SLIPPING.p, SLIPPING.solution.x, 0.1), APPROACH.exact
@@ -196,7 +168,3 @@ def test_figures_are_drawn_where_an_error_is_zero_or_missing() -> None:
     entries = [Entry(n, 1e-3, {"RR at 12": e, COST: 0.1}) for n, e in {"a": 0.0, "b": math.nan, "c": 1e-3}.items()]
     assert drawn(settings.draw_ladder(entries))
     assert drawn(settings.draw_frontier(entries))
-
-
-def test_numbers_of_tables() -> None:
-    assert [states.number(value) for value in (1.23e-5, 1e-16, math.nan)] == ["1.2e-05", "< 1e-14", "diverged"]

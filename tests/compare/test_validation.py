@@ -20,7 +20,7 @@ from compare.kit.levels import Level
 from compare.kit.programme import UNDAMPED, Measure, Protocol
 from compare.kit.record import Measurement, Missing, Records
 from compare.report import results
-from model import InputError, Parameters, StorageError
+from model import Parameters, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 SETS = {"mine": Parameters.named("reference"), "undamped": Parameters.named("reference").replace(c=0.0)}
@@ -188,21 +188,6 @@ def test_a_file_that_was_touched_is_named(tmp_path: Path, counted: list[str]) ->
     path.unlink()
     with pytest.raises(StorageError, match=r"round\.h5"):
         validation.judge_stored(tmp_path)
-
-
-def test_results_of_another_version_are_refused(tmp_path: Path, counted: list[str]) -> None:
-    run(tmp_path)
-    summary = json.loads((tmp_path / results.SUMMARY).read_text())
-    summary["provenance"]["versions"]["dualball"] = "0.0.1"
-    (tmp_path / results.SUMMARY).write_text(json.dumps(summary))
-    with pytest.raises(StorageError, match=r"holds results of dualball 0\.0\.1"):
-        run(tmp_path)
-
-
-def test_an_unknown_claim_leaves_nothing_behind(tmp_path: Path, counted: list[str]) -> None:
-    with pytest.raises(InputError, match="no claim is called 'of-rund'"):
-        run(tmp_path / "new", claims=["of-rund"])
-    assert not (tmp_path / "new").exists()
 
 
 def test_a_run_that_breaks_down_loses_its_set_and_no_other(

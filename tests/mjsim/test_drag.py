@@ -64,20 +64,6 @@ def test_slipping_converges_with_the_square_of_the_step(law):
     assert np.all(np.abs(fine[2:6]) < np.abs(coarse[2:6]) / 3.8)
 
 
-@pytest.mark.parametrize("law", OTHERS)
-def test_stationary_slipping_is_that_of_theory_for_all_simulators(law):
-    p = BY_LAW[law].replace(mu=0.15, eta=0.15, omega_0=20.0)
-    runs = [
-        analytic.simulate(p, SLIPPING, 40.0, sample_interval=40.0),
-        analytic.simulate(p, SLIPPING, 40.0, method="time-stepping", sample_interval=40.0),
-        mjsim.simulate(p, SLIPPING, 40.0, settings=ContactSettings.for_problem(p, 5e-4), sample_interval=40.0),
-    ]
-    omega_c = [analytic.solution(p, Case.SS).x[2], *(run.omega_c[-1] for run in runs)]
-    assert {run.cases[-1] for run in runs} == {Case.SS}
-    assert np.ptp(omega_c) <= 1e-9 * omega_c[0]
-    assert omega_c[0] < 0.9 * p.omega_0
-
-
 def test_a_step_too_long_for_the_drag_is_refused():
     p = BY_LAW["quadratic"].replace(omega_0=1.0, c=5.0)
     stiff = 2 * float(drag_laws.resistance(p.R * p.omega_0, p))

@@ -131,14 +131,6 @@ def test_a_run_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_failed_run_keeps_its_samples_and_says_why(tmp_path: Path) -> None:
-    storage.save(make(failure="diverged at t = 0.3 s"), tmp_path / "run.h5")
-    back = storage.load(tmp_path / "run.h5")
-    assert not back.complete
-    assert back.header.failure == "diverged at t = 0.3 s"
-    assert len(back.time) == 50
-
-
 def test_no_directory_to_write_to(tmp_path: Path) -> None:
     with pytest.raises(StorageError, match=r"^cannot write .*: No such file or directory$"):
         storage.save(make(), tmp_path / "absent" / "run.h5")
@@ -186,13 +178,6 @@ def test_a_file_from_before_the_flow_was_a_column_is_read(path: Path) -> None:
     assert_same(storage.load(path), make())
 
 
-def test_a_file_that_was_changed_is_refused(path: Path) -> None:
-    with h5py.File(path, "r+") as file:
-        file["y"][0] = 1.0
-    with pytest.raises(StorageError, match=r"run\.h5: it is cut short, changed, or not of this program"):
-        storage.load(path)
-
-
 @pytest.mark.parametrize(("content", "says"), [(b"", "not an HDF5 file"), (b"m = 1\n" * 40, "not an HDF5 file")])
 def test_another_format_is_named(tmp_path: Path, content: bytes, says: str) -> None:
     (tmp_path / "run.h5").write_bytes(content)
@@ -210,13 +195,6 @@ def test_a_run_is_read_in_parts(tmp_path: Path, size: int) -> None:
     for name in columns(Trajectory):
         joined = np.concatenate([getattr(part, name) for part in parts])
         np.testing.assert_array_equal(joined, getattr(trajectory, name))
-
-
-def test_a_run_without_samples_is_one_part(tmp_path: Path) -> None:
-    trajectory = make(0)
-    storage.save(trajectory, tmp_path / "run.h5")
-    (part,) = storage.parts(tmp_path / "run.h5", 10)
-    assert_same(part, trajectory)
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyError, OSError, TypeError, OverflowError, MemoryError])
