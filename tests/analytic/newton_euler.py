@@ -4,6 +4,8 @@ The ball's centre stands at (-rho, r + y, 0) in the co-rotating frame (1), with 
 split by (4), with rho for R. Everything else is differentiation of vectors in a rotating frame.
 """
 
+from collections.abc import Callable
+from functools import cache
 from types import SimpleNamespace
 
 import sympy as sp
@@ -92,3 +94,12 @@ def held(case: Case) -> dict[sp.Symbol, sp.Expr]:
     names = dict(zip(NAMES, STATE, strict=True))
     values = {names[name]: sp.Integer(0) for name in TRAITS[case].constraints if name in names}
     return values | ({names["slip_z"]: -names["v_h"] / r} if case is Case.RN else {})
+
+
+@cache
+def solved(case: Case) -> Callable[..., list]:
+    """Rates (8) and forces (6) of a case but RR as f(m, r, R, j, mu, eta, g, c, omega_0, alpha, beta, *state)."""
+    unknowns = [*RATE, *FORCE_A, *FORCE_B]
+    (solution,) = sp.solve([e.subs(held(case)) for e in balance() + closure(case)], unknowns, dict=True)
+    given = [m, r, R, j, mu, eta, g, c, omega_0, alpha, beta, *STATE]
+    return sp.lambdify(given, [solution[unknown] for unknown in unknowns])

@@ -4,11 +4,8 @@ The law, the branch of SS and the equations of motion are written out here again
 `slipping_branch` or `dynamics` is used for what is expected.
 """
 
-from functools import cache
-
 import numpy as np
 import pytest
-import sympy as sp
 from scipy.optimize import brentq
 
 from analytic import (
@@ -209,15 +206,6 @@ def test_where_the_fold_is_born() -> None:
 # --- stationary solutions and their eigenvalues ----------------------------------------------------------------
 
 
-@cache
-def equations_of_motion(case: Case):
-    """Rates (8,) of a case from Newton and Euler by algebra, at a given c: f(x, c, omega_0, alpha, beta, p)."""
-    unknowns = [*ne.RATE, *ne.FORCE_A, *ne.FORCE_B]
-    (solved,) = sp.solve([e.subs(ne.held(case)) for e in ne.balance() + ne.closure(case)], unknowns, dict=True)
-    symbols = [ne.m, ne.r, ne.R, ne.j, ne.mu, ne.eta, ne.g, ne.c, ne.omega_0, ne.alpha, ne.beta, *ne.STATE]
-    return sp.lambdify(symbols, [solved[rate] for rate in ne.RATE])
-
-
 def field(case: Case, x: np.ndarray, p: Parameters) -> np.ndarray:
     """Rates of a state on the wall under the drag of the law."""
     _, v_y, omega_c, w_x, w_y, w_z, *_ = x
@@ -225,8 +213,8 @@ def field(case: Case, x: np.ndarray, p: Parameters) -> np.ndarray:
     c = resistance(speed, p) / speed if speed else LIGHT[p.drag] * p.c
     alpha = np.arctan2(p.r * w_x, v_y + p.r * w_z) if case.A is Contact.S else 0.0
     beta = np.arctan2(w_y, w_z) if case.B is Contact.S else 0.0
-    rates = equations_of_motion(case)(p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, c, p.omega_0, alpha, beta, *x)
-    return np.array(rates, dtype=float)
+    solved = ne.solved(case)(p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, c, p.omega_0, alpha, beta, *x)
+    return np.array(solved[:8], dtype=float)
 
 
 def by_differences(s: StationarySolution, p: Parameters) -> np.ndarray:

@@ -160,17 +160,6 @@ def test_costs_at_most_twice_a_bare_integrator(monkeypatch):
     assert 0 < len(calls) <= 2 * bare.nfev
 
 
-def test_sticking_on_the_way_to_two_point_slipping():
-    """Where slip vanishes on the way, plain integration fails; the ball sticks for a while and goes on."""
-    p = P.replace(omega_0=14.5)
-    settled = solution(p, Case.SS).x[:6]
-    run = simulate(p, settled + OFFSET, 70.0, sample_interval=1.0)
-    assert (Case.RR, Case.SS) in states_of(run)
-    # What is left decays as exp(-t c/(2 (1+2j))).
-    left = math.exp(-70.0 * p.c / (2 * (1 + 2 * p.j)))
-    np.testing.assert_allclose(run.x[-1, 2:6], settled[2:], atol=1e-8 + 10 * left)
-
-
 @pytest.mark.parametrize(
     ("name", "omega_0", "case"),
     [

@@ -12,7 +12,7 @@ from compare.kit.record import Records
 from compare.kit.sets import sets
 from compare.subjects.flowmeter import measure
 from compare.subjects.flowmeter.claims import CLAIMS
-from tests.measured import thresholds, unnoticed
+from tests.measured import thresholds
 
 NAME = "thick-fluid"
 P = sets(Level.QUICK)[NAME]
@@ -44,8 +44,11 @@ def test_predictions_are_as_sure_as_they_say(records, monkeypatch):
         assert abs(one.value - finer.value) <= one.uncertainty
 
 
-def test_other_friction_and_inertia_are_noticed(records):
-    assert not unnoticed(UNLOADING, records, "simulate")
+@pytest.mark.parametrize(("claim", "other"), [("fig-13-right", {"eta": 1.01}), ("push", {"j": 1.02})])
+def test_claims_notice_other_friction_and_inertia(records, monkeypatch, claim, other):
+    right, changed = analytic.simulate, {name: factor * getattr(P, name) for name, factor in other.items()}
+    monkeypatch.setattr(analytic, "simulate", lambda p, *args, **more: right(p.replace(**changed), *args, **more))
+    assert {v.claim.id: v.outcome for v in judge(UNLOADING, records)}[claim] is Outcome.REFUTED
 
 
 def test_first_top_lies_between_samples():
