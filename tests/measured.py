@@ -42,10 +42,14 @@ def thresholds(set: str, p: Parameters, *names: str) -> Records:
 
 
 def unnoticed(claims: Sequence[Claim], records: Records, *functions: str) -> list[str]:
-    """What is wrong with theories that no claim refutes, of those with a fault in one of these functions."""
+    """What is wrong with theories that no claim refutes, of those with a fault in one of these functions.
+
+    A function is named as far as is needed to tell it from others, as in "dynamics._rs".
+    """
     missed = []
     for function in functions:
-        wrong_theories = [each for each in THEORIES if each.function == function and each.level is Level.QUICK]
+        named = [each for each in THEORIES if f"{each.module}.{each.function}".endswith(f".{function}")]
+        wrong_theories = [each for each in named if each.level is Level.QUICK]
         assert wrong_theories, function
         for wrong in wrong_theories:
             with believed(wrong):

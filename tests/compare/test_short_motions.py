@@ -89,9 +89,9 @@ def test_the_right_theory_is_confirmed(measured: Measured, protocol: str, ids: s
 @pytest.mark.parametrize(
     ("protocol", "functions"),
     [
-        ("field", ("newton_euler", "rolling_family", "_sr")),
+        ("field", tuple(f"dynamics.{case}" for case in ("_rs", "_sr", "_nr", "_ns", "_rn", "_sn"))),
         ("growth", ("gamma", "slip_rates")),
-        ("bounds", ("rr_to_rs", "rr_to_rs_stationary", "rr_to_ss", "nr_to_ns")),
+        ("bounds", ("rr_to_rs_stationary", "nr_to_ns")),
         ("lift", ("lift_acceleration",)),
         ("impacts", ("collide",)),
     ],
