@@ -38,8 +38,8 @@ from model.kinematics import slip_speeds
 GOOD_SPEED = 1e-4
 """Creep up to which a number is shown as good, m/s."""
 CAPTION = (
-    "dualball: the study's settings. MuJoCo: its defaults, the ball in the vessel in the study's scene. newcomer: its "
-    "defaults, a free ball in a wall of flat facets."
+    "dualball: the study's settings. MuJoCo: its defaults, the ball in the vessel in the study's scene. "
+    "mujoco-defaults: as it comes, a free ball in a wall of flat facets."
 )
 Cell = tuple[str, bool | None]
 """A text, and whether what it says is good; None: neither."""
@@ -98,7 +98,7 @@ class Column:
 OTHERS: dict[str, tuple[Any, float]] = {
     "dualball": (simulators.mujoco, ContactSettings.timestep),
     "MuJoCo": (Graded(Native()), Native.timestep),
-    "newcomer": (mujoco_free, Native.timestep),
+    "mujoco-defaults": (mujoco_free, Native.timestep),
 }
 """Engines beside a person's settings, each with its time step."""
 
