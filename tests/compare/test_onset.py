@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import analytic
+from compare.catalogue import CLAIMS
 from compare.claim import Outcome
-from compare.judge import judge
+from compare.judge import judge, select
 from compare.kit.brackets import FINER, LONGER, Bracket, Search, narrow
 from compare.kit.fits import turning, vanishing
 from compare.kit.lab import coarse_step, time_unit
@@ -76,6 +77,14 @@ def test_a_floor_that_carries_little_is_not_lost_where_the_wall_slips():
     run = analytic.simulate(p, [0, 0, p.omega_0, 0, 0, 0, 0, 0], 2.0)
     sliding = dataclasses.replace(run, slip_speed_B=run.slip_speed_B + 1e-3)
     assert [thresholds.lifts(Bracket(0.0, 1.0, (None, each))) for each in (run, sliding)] == [True, False]
+
+
+def test_the_drag_at_which_a_fold_is_born_is_judged_where_that_of_the_set_is_too_strong_for_one():
+    p = REFERENCE.replace(c=20 * REFERENCE.c)
+    born = analytic.bifurcation.diagram.critical_drag(p)
+    for value, outcome in (born, Outcome.CONFIRMED), (1.01 * born, Outcome.REFUTED):
+        row = measured("birth", "critical_drag", value, 1e-4 * born, p, "mine")
+        assert judge(select(CLAIMS, ["double-points"]), Records((row,)))[0].outcome is outcome
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6])
