@@ -61,9 +61,8 @@ def tables(about: dict[str, Any]) -> list[Any]:
         made = f"{each['name']}{each['engine'] and ', ' + each['engine']}: {each['samples']} samples"
         rows[letter] = f"{made} from {each['from']:g} to {each['to']:g} s"
         listed = [f"{case} {start:.4g}…{end:.4g} s" for case, start, end in each["cases"]]
-        rows[f"cases of {letter}"] = ", ".join(listed[:LISTED]) + f", and {len(listed) - LISTED} more" * (
-            len(listed) > LISTED
-        )
+        more = f", and {len(listed) - LISTED} more" if len(listed) > LISTED else ""
+        rows[f"cases of {letter}"] = ", ".join(listed[:LISTED]) + more
         rows[f"failure of {letter}"] = each["failure"]
     differ = about["parameters that differ"].items()
     rows["made with other parameters"] = ", ".join(f"{name} = {a} in a, {b} in b" for name, (a, b) in differ)
