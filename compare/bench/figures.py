@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-import statistics
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from compare.bench.case import TOLERANCE
@@ -30,27 +29,15 @@ def draw_league(league: Mapping[str, Sequence[Result]]) -> Figure:
     families = list(dict.fromkeys(name.removesuffix("-defaults") for name, own in tried.items() if own))
     for axes, each in zip(panels.ravel(), KINDS, strict=True):
         for name, results in tried.items():
-            own = [r for r in results if kinds[r.case] == each]
-            if not own:
+            own = np.array([[r.costs, r.errors] for r in results if kinds[r.case] == each])
+            if not len(own):
                 continue
+            known = np.isfinite(own[:, 1]).mean(0) > 0.5  # where the median is
+            cost, error = np.nanmedian(np.where(np.isfinite(own[:, 1:]), own, np.nan)[..., known], axis=0)
             number = families.index(name.removesuffix("-defaults"))
-            points = []
-            for k in range(len(own[0].steps)):
-                known = [(r.costs[k], r.errors[k]) for r in own if math.isfinite(r.errors[k])]
-                if len(known) > len(own) / 2:  # the median is known
-                    points.append([statistics.median(column) for column in zip(*known, strict=True)])
-            x, y = zip(*points, strict=True) if points else ((), ())
-            axes.plot(
-                x,
-                [max(error, LEAST) for error in y],
-                marker=MARKS[number % len(MARKS)],
-                color=COLOURS[number % len(COLOURS)],
-                mfc="white" if name.endswith("-defaults") else None,
-                ls=":" if name.endswith("-defaults") else "-",
-                ms=6,
-                lw=1,
-                label=name,
-            )
+            look = {"marker": MARKS[number % len(MARKS)], "color": COLOURS[number % len(COLOURS)], "ms": 6, "lw": 1}
+            look |= {"mfc": "white", "ls": ":"} if name.endswith("-defaults") else {}
+            axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
         axes.axhline(TOLERANCE, color="0.5", lw=0.8)
         axes.set(xscale="log", yscale="log", title=each)
         axes.grid(alpha=0.3)

@@ -17,8 +17,8 @@ from compare.bench.case import Case
 warp.config.quiet = True
 
 
-class Warp:
-    """As `mujoco_free.Bodies`, without its memory."""
+class Warp(mujoco_free.Bodies):
+    """The same scenes, stepped by Warp."""
 
     PRECISION = "f32"
     KNOWN = "mujoco-warp 4.0.0"
@@ -29,24 +29,19 @@ class Warp:
     )
 
     def __init__(self, name: str, declared: str, tune: Any = None) -> None:
-        self.NAME, self.DECLARED, self._tune = name, declared, tune
+        super().__init__(tune)
+        self.NAME, self.DECLARED = name, declared
 
     def build(self, case: Case, timestep: float) -> None:
-        """The scene at its start."""
-        spec = mujoco.MjSpec.from_string(case.mjcf(timestep))
-        if self._tune:
-            self._tune(spec, case, timestep)
-        self._case, self._now, self._timestep, model = case, 0.0, timestep, spec.compile()
-        data = mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, data, 0)
+        super().build(case, timestep)
+        model, data = self._model, self._data
         mujoco.mj_forward(model, data)
-        self._body = model.body("body").id
+        self._now, self._timestep, self._body = 0.0, timestep, model.body("body").id
         with warp.ScopedDevice("cpu"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that the friction of one geom is less than MuJoCo likes: a pair's counts
             self._model, self._data = engine.put_model(model), engine.put_data(model, data, nconmax=32, njmax=128)
 
     def step(self, n: int) -> None:
-        """Take n steps."""
         for _ in range(n):
             if self._case.forced:
                 position, velocity, _ = self.state()
@@ -57,7 +52,6 @@ class Warp:
             self._now += self._timestep
 
     def state(self) -> State:
-        """Position, velocity and spin; MuJoCo counts the spin in the body's axes."""
         q, v = (np.asarray(each.numpy()[0], float) for each in (self._data.qpos, self._data.qvel))
         return q[-7:-4], v[-6:-3], turned(q[-4:], v[-3:])
 

@@ -43,6 +43,9 @@ def main() -> None:
 class Scene:
     """The problem, and the simulation that `start` begins."""
 
+    directions = "C"
+    """What a relation calls its matrix: normal and tangents (rows) by velocities, first those of the centre."""
+
     def __init__(self, given: dict[str, Any]) -> None:
         self.given, self.R, self.r, self.mass = given, given["R"], given["r"], given["m"]
         self.inertia = given["j"] * self.mass * self.r**2
@@ -75,10 +78,6 @@ class Scene:
         self.simulation.setNewtonTolerance(given["newton"])
         self.simulation.initialize()
 
-    def directions(self, contact: Any) -> Any:
-        """Normal and tangents (rows) by velocities, first those of the centre."""
-        raise NotImplementedError
-
     def take_step(self, force: list[float]) -> None:
         """A step under a force that is constant over it."""
         self.ball.setFExtPtr(np.array(force))
@@ -93,7 +92,7 @@ class Scene:
         for number, contact in enumerate(self.contacts):
             impulse = contact.lambda_(1)
             if impulse[0] > 0:
-                force = self.directions(contact)[:, :3].T @ impulse / self.given["timestep"]
+                force = getattr(contact.relation(), self.directions)()[:, :3].T @ impulse / self.given["timestep"]
                 shown.append((number, force.tolist(), contact.y(0)[0]))
         return shown
 
@@ -153,10 +152,6 @@ class Turning(Scene):
         place = 2 * (q[1] - way) / (before + rho), -q[0], q[2]
         return place, (along / rho, -outward, v_y, *spin, s_z - along / rho)
 
-    def directions(self, contact: Any) -> Any:
-        """As in `Scene`."""
-        return contact.relation().C()
-
 
 class Contact(kernel.NewtonEuler3DR):  # type: ignore[misc]
     """A ball's contact with a surface that says how far it is from a centre, and its normal there."""
@@ -176,6 +171,8 @@ class Contact(kernel.NewtonEuler3DR):  # type: ignore[misc]
 class Free(Scene):
     """A free ball in a true cylinder."""
 
+    directions = "jachqT"
+
     def start(self, place: list[float], velocity: list[float]) -> None:
         """Place, velocity and spin in world axes."""
 
@@ -194,10 +191,6 @@ class Free(Scene):
         spin = velocity[3:]  # in the axes of the ball
         turn = 2 * np.cross(axis, spin)
         return (x, y, z), (*velocity[:3], *(spin + w * turn + np.cross(axis, turn)))
-
-    def directions(self, contact: Any) -> Any:
-        """As in `Scene`."""
-        return contact.relation().jachqT()
 
 
 if __name__ == "__main__":

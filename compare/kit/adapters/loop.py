@@ -75,13 +75,8 @@ def simulate(
     x, joints = State.one(x0), settings.coordinates == "joints"
     limits.check_place(x, p, p.r / 10)
     ball = Ball.of(p, ContactSettings())  # for its drag, which has nothing to do with MuJoCo's settings
-    total, done, told, failure, theta = (
-        (count - 1) * every + 1,
-        0,
-        0,
-        "",
-        0.0,
-    )  # of the last sample only forces are needed
+    total = (count - 1) * every + 1  # of the last sample only forces are needed
+    done, told, failure, theta = 0, 0, "", 0.0
     rows, kept, classifier = np.empty((NOTED, _WIDTH)), list[npt.NDArray[np.void]](), Classifier([p], settings)
 
     def keep(first: int, last: bool) -> None:
