@@ -200,20 +200,16 @@ class _Server:
         )
 
 
-def load(engine: Any) -> Any:
-    """The module or object of a name; `InputError` if it isn't there or isn't whole."""
-    if not isinstance(engine, str):
-        return engine
-    module, _, name = engine.partition(":")
-    try:
-        found = importlib.import_module(module)
-        return getattr(found, name) if name else found
-    except (ImportError, AttributeError) as error:
-        raise InputError(f"{engine} can't be imported: {error}") from error
-
-
-def _about(engine: Any) -> About:
-    """What an engine says of itself; `InputError` if it lacks a function."""
+def _load(given: Any) -> tuple[Any, About]:
+    """An engine by name or as it is, and what it says of itself; `InputError` if it isn't there or lacks a function."""
+    engine = given
+    if isinstance(given, str):
+        module, _, member = given.partition(":")
+        try:
+            engine = importlib.import_module(module)
+            engine = getattr(engine, member) if member else engine
+        except (ImportError, AttributeError) as error:
+            raise InputError(f"{given} can't be imported: {error}") from error
     name = getattr(engine, "NAME", getattr(engine, "__name__", type(engine).__name__))
     lacking = [function for function in FUNCTIONS if not callable(getattr(engine, function, None))]
     if lacking:
@@ -221,7 +217,7 @@ def _about(engine: Any) -> About:
     package, _, known = getattr(engine, "KNOWN", "").partition(" ")
     here = version(package) if package else ""
     shown = f"{package} {here}" + (f", known to work: {known}" if known and here != known else "")
-    return About(
+    about = About(
         name=name,
         precision=getattr(engine, "PRECISION", "f64"),
         declared=getattr(engine, "DECLARED", ""),
@@ -229,14 +225,15 @@ def _about(engine: Any) -> About:
         version=shown.strip(),
         steps=tuple(getattr(engine, "TIMESTEPS", STEPS)),
     )
+    return engine, about
 
 
 def serve(handle: int) -> None:
     """The process: an engine and then cases come in, what the engine makes of them goes out."""
     pipe = Connection(handle)
     try:
-        adapter = load(pipe.recv())
-        pipe.send(_about(adapter))
+        adapter, about = _load(pipe.recv())
+        pipe.send(about)
     except InputError as error:
         pipe.send(f"can't be used: {error}")
         return

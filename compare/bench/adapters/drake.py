@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import logging
 import math
 from typing import Any
 
@@ -13,9 +12,9 @@ import pydrake.all as engine
 from compare.bench.adapters.free import CHORD, Free, State
 from compare.bench.adapters.simulators import Simulated
 from compare.bench.case import Vector
+from compare.kit.adapters.drake import Plant
 from model.arrays import Array
 
-logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
 HEAVY = 1e6
 """Moment of inertia of a table divided by its mass, m2, so that nothing slows it."""
 
@@ -31,49 +30,34 @@ class Drake(Free):
 
     def make(self) -> None:
         case, body = self.case, self.case.body
-        builder = engine.DiagramBuilder()
-        plant, _ = engine.AddMultibodyPlantSceneGraph(builder, engine.MultibodyPlant(self.timestep))
-        plant.set_contact_model(engine.ContactModel.kPoint)
-        if self.best:
-            plant.set_discrete_contact_approximation(engine.DiscreteContactApproximation.kTamsi)
-        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -case.g])
-        plant.SetUseSampledOutputPorts(False)
         most = max(surface.friction for surface in case.surfaces)
+        springs = {"dissipation": 100.0, "point_stiffness": 1e10} if self.best else {}
+        self.own = Plant(engine, self.timestep, case.g, most, "tamsi" if self.best else "", **springs)
+        plant = self.own.plant
         moments = engine.UnitInertia(*(np.array(body.inertia) / body.mass))
         ball = plant.AddRigidBody("body", engine.SpatialInertia(body.mass, np.zeros(3), moments))
         for k, (place, shape) in enumerate(self.shapes()):
-            self.add(plant, ball, place, shape, f"body{k}", most)
+            self.own.add(ball, place, shape, f"body{k}")
         self.wall, hinges = None, []
         facets = max((surface.radius or 0.0) for surface in case.surfaces) if not self.best else 0.0
         for k, (surface, point, normal) in enumerate(self.planes()):
-            of, pose, shape = plant.world_body(), engine.HalfSpace.MakePose(normal, point), engine.HalfSpace()
-            if facets:  # a half space among a dozen of shapes crashes the engine
-                size = 100.0 * facets
-                turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
-                pose, shape = engine.RigidTransform(turn, point - size / 2 * normal), engine.Box(size, size, size)
-            elif surface.radius or surface.turning:
+            of = plant.world_body()
+            if not facets and (surface.radius or surface.turning):
                 heavy = engine.UnitInertia(HEAVY, HEAVY, HEAVY)
                 of = plant.AddRigidBody(surface.name, engine.SpatialInertia(body.mass, np.zeros(3), heavy))
                 frames = plant.world_body().body_frame(), of.body_frame()
                 hinges.append((surface, plant.AddJoint(engine.RevoluteJoint(surface.name, *frames, [0.0, 0.0, 1.0]))))
-            own = most * surface.friction / (2 * most - surface.friction)  # their harmonic mean is the pair's
-            self.add(plant, of, pose, shape, f"{surface.name}{k}", own)
-        plant.Finalize()
-        if self.best:
-            plant.set_stiction_tolerance(1e-8)
-        self.diagram, self.plant = builder.Build(), plant
-        self.root = self.diagram.CreateDefaultContext()
-        self.context = plant.GetMyMutableContextFromRoot(self.root)
-        self.input, self.force = plant.get_applied_generalized_force_input_port(), np.zeros(plant.num_velocities())
-        self.input.FixValue(self.context, self.force)
+            self.own.plane(of, point, normal, f"{surface.name}{k}", surface.friction, 100.0 * facets)
+        self.own.build(1e-8 if self.best else None)
+        self.force = np.zeros(plant.num_velocities())
         self.q, self.v = ball.floating_positions_start(), plant.num_positions() + ball.floating_velocities_start_in_v()
-        self.x = plant.GetPositionsAndVelocities(self.context)
+        self.x = plant.GetPositionsAndVelocities(self.own.context)
         self.x[self.q : self.q + 7] = [*body.orientation, *body.position]
         self.x[self.v : self.v + 6] = [*body.spin, *body.velocity]
         for surface, joint in hinges:
             self.x[plant.num_positions() + joint.velocity_start()] = surface.turning
             if surface.radius:
-                joint.Lock(self.context)
+                joint.Lock(self.own.context)
                 self.wall = joint.position_start()
 
     def shapes(self) -> list[tuple[Any, Any]]:
@@ -85,23 +69,14 @@ class Drake(Free):
         corners = itertools.product(*((-half, half) for half in body.size))
         return [(engine.RigidTransform(np.array(corner)), engine.Sphere(1e-9)) for corner in corners]
 
-    def add(self, plant: Any, of: Any, place: Any, shape: Any, name: str, mu: float) -> None:
-        """A shape that touches others."""
-        springs = {"dissipation": 100.0, "point_stiffness": 1e10} if self.best else {}
-        material = engine.ProximityProperties()
-        engine.AddContactMaterial(**springs, friction=engine.CoulombFriction(mu, mu), properties=material)
-        plant.RegisterCollisionGeometry(of, place, shape, name, material)
-
     def advance(self) -> None:
-        self.plant.SetPositionsAndVelocities(self.context, self.x)
-        self.x = self.plant.EvalUniquePeriodicDiscreteUpdate(self.context).get_vector(0).CopyToVector()
+        self.x = self.own.after(self.x, self.force)
 
     def state(self) -> State:
         return self.x[self.q + 4 :][:3], self.x[self.v + 3 :][:3], self.x[self.v :][:3]
 
     def push(self, force: Vector) -> None:
-        self.force[self.v - self.plant.num_positions() + 3 :][:3] = force
-        self.input.FixValue(self.context, self.force)
+        self.force[self.v - self.own.plant.num_positions() + 3 :][:3] = force
 
     def turn(self, point: Array, normal: Array) -> None:
         self.x[self.wall] = math.atan2(-normal[1], -normal[0])

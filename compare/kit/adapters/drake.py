@@ -61,58 +61,79 @@ DEFAULTS = {
 """The engine's own settings: a free ball in a prism of 64 boxes."""
 
 
+class Plant:
+    """A discrete plant with point contact: it is given bodies and shapes, built, and stepped."""
+
+    def __init__(
+        self, engine: Any, timestep: float, g: float, most: float, approximation: str, **springs: float
+    ) -> None:
+        """`most` is the largest friction of a pair; the engine's own approximation has no name."""
+        logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
+        self.engine, self.most, self.springs = engine, most, springs
+        self.builder = engine.DiagramBuilder()
+        self.plant, _ = engine.AddMultibodyPlantSceneGraph(self.builder, engine.MultibodyPlant(timestep))
+        self.plant.set_contact_model(engine.ContactModel.kPoint)
+        if approximation:
+            chosen = getattr(engine.DiscreteContactApproximation, f"k{approximation.capitalize()}")
+            self.plant.set_discrete_contact_approximation(chosen)
+        self.plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -g])
+        self.plant.SetUseSampledOutputPorts(False)
+
+    def add(self, of: Any, pose: Any, shape: Any, name: str, friction: float | None = None) -> Any:
+        """A shape of what moves, or of what it touches, with the friction of the pair."""
+        material, mu = self.engine.ProximityProperties(), self.most
+        if friction is not None:  # the harmonic mean of both is the pair's
+            mu = mu * friction / (2 * mu - friction) if friction else 0.0
+        coefficient = self.engine.CoulombFriction(mu, mu)
+        self.engine.AddContactMaterial(**self.springs, friction=coefficient, properties=material)
+        return self.plant.RegisterCollisionGeometry(of, pose, shape, name, material)
+
+    def plane(self, of: Any, point: Array, normal: Array, name: str, friction: float, size: float = 0.0) -> Any:
+        """A half space, or one side of a cube: a half space among a dozen of shapes crashes the engine."""
+        pose, shape = self.engine.HalfSpace.MakePose(normal, point), self.engine.HalfSpace()
+        if size:
+            turn = self.engine.RotationMatrix.MakeFromOneVector(normal, 2)
+            pose = self.engine.RigidTransform(turn, point - size / 2 * normal)
+            shape = self.engine.Box(size, size, size)
+        return self.add(of, pose, shape, name, friction)
+
+    def build(self, stiction: float | None) -> None:
+        """Nothing can be added after this; without a stiction tolerance the engine's own counts."""
+        self.plant.Finalize()
+        if stiction is not None:
+            self.plant.set_stiction_tolerance(stiction)
+        self.diagram = self.builder.Build()
+        self.root = self.diagram.CreateDefaultContext()
+        self.context = self.plant.GetMyMutableContextFromRoot(self.root)
+
+    def after(self, x: Array, force: Floats | Array) -> Array:
+        """Positions and velocities a step after x, under generalised forces."""
+        self.plant.get_applied_generalized_force_input_port().FixValue(self.context, force)
+        self.plant.SetPositionsAndVelocities(self.context, x)
+        x = self.plant.EvalUniquePeriodicDiscreteUpdate(self.context).get_vector(0).CopyToVector()
+        return x
+
+
 class Scene(adapter.Scene):
     """The ball in a plant of its own."""
 
     def __init__(self, engine: Any, p: Parameters, settings: Settings) -> None:
-        logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
         self._joints = settings.coordinates == "joints"
-        builder = engine.DiagramBuilder()
-        plant, _ = engine.AddMultibodyPlantSceneGraph(builder, engine.MultibodyPlant(settings.timestep))
-        plant.set_contact_model(engine.ContactModel.kPoint)
-        approximation = f"k{settings.approximation.capitalize()}"
-        plant.set_discrete_contact_approximation(getattr(engine.DiscreteContactApproximation, approximation))
-        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -p.g])
-        plant.SetUseSampledOutputPorts(False)
-        turning = engine.UnitInertia(*[p.j * p.r**2] * 3)
-        ball = plant.AddRigidBody("ball", engine.SpatialInertia(p.m, [0.0, 0.0, 0.0], turning))
-        if self._joints:
-            _hang(engine, plant, ball, p)
         springs = {"dissipation": settings.dissipation, "point_stiffness": settings.stiffness}
-        springs = {name: value for name, value in springs.items() if value is not None}
-        world, most = plant.world_body(), max(p.mu, p.eta)
-
-        def surface(body: Any, place: Any, shape: Any, name: str, friction: float) -> Any:
-            material, coefficient = engine.ProximityProperties(), engine.CoulombFriction(friction, friction)
-            engine.AddContactMaterial(**springs, friction=coefficient, properties=material)
-            return plant.RegisterCollisionGeometry(body, place, shape, name, material)
-
-        def of_pair(friction: float) -> float:
-            """The coefficient of a surface whose harmonic mean with that of the ball is the pair's."""
-            return most * friction / (2 * most - friction) if friction else 0.0
-
-        def plane(name: str, place: Array, normal: Array, friction: float) -> Any:
-            if settings.facets == 1:
-                pose, shape = engine.HalfSpace.MakePose(normal, place), engine.HalfSpace()
-            else:  # a half space among a dozen of shapes crashes the engine
-                turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
-                pose, shape = engine.RigidTransform(turn, place - size / 2 * normal), engine.Box(size, size, size)
-            return surface(world, pose, shape, name, of_pair(friction))
-
-        size = _SIZE * (p.R + p.r)
-        surface(ball, engine.RigidTransform(), engine.Sphere(p.r), "ball", most)
-        self._floor = plane("floor", np.zeros(3), np.array([0.0, 0.0, 1.0]), p.mu)
+        known = {name: value for name, value in springs.items() if value is not None}
+        own = Plant(engine, settings.timestep, p.g, max(p.mu, p.eta), settings.approximation, **known)
+        turning = engine.UnitInertia(*[p.j * p.r**2] * 3)
+        ball = own.plant.AddRigidBody("ball", engine.SpatialInertia(p.m, [0.0, 0.0, 0.0], turning))
+        if self._joints:
+            _hang(engine, own.plant, ball, p)
+        size = _SIZE * (p.R + p.r) if settings.facets > 1 else 0.0
+        own.add(ball, engine.RigidTransform(), engine.Sphere(p.r), "ball")
+        world = own.plant.world_body()
+        self._floor = own.plane(world, np.zeros(3), np.array([0.0, 0.0, 1.0]), "floor", p.mu, size)
         for k, (place, normal) in enumerate(tangents(p, settings.facets)):
-            plane(f"wall{k}", place, normal, p.eta)
-        plant.Finalize()
-        plant.set_stiction_tolerance(settings.stiction)
-        self._diagram = builder.Build()
-        self._root = self._diagram.CreateDefaultContext()
-        self._plant, self._context = plant, plant.GetMyMutableContextFromRoot(self._root)
-        self._force = plant.get_applied_generalized_force_input_port()
-        self._results = plant.get_contact_results_output_port()
-        self._ball = ball.index()
-        self._state: Array = np.empty(0)
+            own.plane(world, place, normal, f"wall{k}", p.eta, size)
+        own.build(settings.stiction)
+        self._plant, self._ball, self._state = own, ball.index(), np.empty(0)
 
     def start(self, place: Floats, velocity: Floats) -> None:
         if self._joints:
@@ -125,20 +146,17 @@ class Scene(adapter.Scene):
             self._state[0], self._state[3:6], forces = 0.0, 0.0, [*force, 0.0, 0.0, 0.0]
         else:
             forces = [0.0, 0.0, 0.0, *force]
-        self._force.FixValue(self._context, forces)
-        self._plant.SetPositionsAndVelocities(self._context, self._state)
         try:
-            update = self._plant.EvalUniquePeriodicDiscreteUpdate(self._context)
+            self._state = self._plant.after(self._state, forces)
         except RuntimeError as error:
             raise BreakdownError(f"could not go on ({' '.join(str(error).split())[:80]})") from error
-        self._state = update.get_vector(0).CopyToVector()
         numbers = self._state.tolist()
         if self._joints:
             return numbers[:3], numbers[6:]
         return numbers[4:7], [*numbers[10:], *numbers[7:10]]
 
     def touches(self) -> list[Touch]:
-        results = self._results.Eval(self._context)
+        results = self._plant.plant.get_contact_results_output_port().Eval(self._plant.context)
         shown = []
         for info in (results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())):
             pair, sign = info.point_pair(), 1 if info.bodyB_index() == self._ball else -1  # it acts on the second body
@@ -147,7 +165,7 @@ class Scene(adapter.Scene):
         return shown
 
     def close(self) -> None:
-        del self._diagram, self._root, self._plant, self._context, self._force, self._results
+        del self._plant
 
 
 def _hang(engine: Any, plant: Any, ball: Any, p: Parameters) -> None:
