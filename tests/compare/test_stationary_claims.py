@@ -84,7 +84,8 @@ def test_the_right_theory_is_confirmed(records: Records) -> None:
 
 def test_wrong_theories_are_noticed(records: Records) -> None:
     solutions = ("stationary_solutions", "stable_solutions", "_rr", "_lifting_spin", "_wall_carries")
-    assert not unnoticed(CLAIMS, records, *solutions, "operating_range", "reading_range")
+    assert not unnoticed(stationary.CLAIMS, records, *solutions)
+    assert not unnoticed(flowmeter.CLAIMS, records, "operating_range", "reading_range")
 
 
 def test_coarse_measurements_tell_nothing() -> None:
