@@ -36,7 +36,7 @@ def test_uncertainty_covers_the_rest_of_an_exponential_approach(rate) -> None:
 
 
 def test_bad_input() -> None:
-    with pytest.raises(InputError, match="at least 6 samples"):
+    with pytest.raises(InputError, match="6 samples or more"):
         window_mean([0, 1], [1, 2])
     with pytest.raises(InputError, match="finite"):
         window_mean(np.arange(6), [1, 2, 3, 4, 5, np.nan])
