@@ -55,6 +55,16 @@ highlight_language = "text"
 autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike", "Array": "Array"}
 suppress_warnings = ["ref.python"]  # two classes of one name in an annotation: neither is linked
 autodoc_member_order = "bysource"
+autodoc_mock_imports = [
+    "dartpy",
+    "mujoco_warp",
+    "newton",
+    "pybullet",
+    "pydrake",
+    "rapier3d",
+    "sapien",
+    "warp",
+]  # extras
 autodoc_default_options = {"members": True, "show-inheritance": True}
 
 
