@@ -43,19 +43,28 @@ LEAST = 3
 
 def hear(claim: Claim, testimony: Testimony) -> Verdict:
     """The verdict on a claim by the engine on trial, and what each engine says, that one first."""
-    named = {name: engine(name) for name in testimony}
-    heard = tuple(_heard(claim, named[name], steps) for name, steps in testimony.items())
-    (name, steps), *_ = testimony.items()
-    if len(steps) == 1 and not named[name].allowance:
-        return replace(verdict(claim, next(iter(steps.values()))), witnesses=heard)
-    said = Verdict(claim=claim, outcome=heard[0].outcome, checks=heard[0].checks, error=heard[0].reason)
-    return replace(said, witnesses=heard)
+    (name, steps), *others = testimony.items()
+    beside = [_heard(claim, engine(other), own) for other, own in others]
+    if len(steps) == 1 and not engine(name).allowance:
+        said = verdict(claim, next(iter(steps.values())))
+        return replace(said, witnesses=(_heard(claim, engine(name), steps, said), *beside))
+    first = _heard(claim, engine(name), steps)
+    said = Verdict(claim=claim, outcome=first.outcome, checks=first.checks, error=first.reason)
+    return replace(said, witnesses=(first, *beside))
 
 
-def _heard(claim: Claim, by: Engine, steps: Mapping[int, Records]) -> Witness:
+def _heard(claim: Claim, by: Engine, steps: Mapping[int, Records], said: Verdict | None = None) -> Witness:
+    """What an engine says, from its verdict where it has one of its own."""
     finest = steps[max(steps)]
+    if said and said.error:
+        return Witness(engine=by.name, outcome=Outcome.ERROR, reason=said.error)
     try:
-        found = {refine: checks_of(claim, records) for refine, records in steps.items()} if not claim.algebra else {}
+        if claim.algebra:
+            found = {}
+        elif said:
+            found = {max(steps): [(0, check) for check in said.checks]}
+        else:
+            found = {refine: checks_of(claim, records) for refine, records in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
         return Witness(engine=by.name, outcome=Outcome.ERROR, reason=f"{type(error).__name__}: {error}")
     missing = [each for each in finest.missing if each.protocol in claim.protocols]

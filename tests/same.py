@@ -5,16 +5,24 @@ A pure refactoring of what measures must leave them so. Which runs a number came
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
+
+import h5py
 
 from compare.kit import record
 from compare.kit.record import Records
 
 
 def protocols(directory: Path) -> dict[str, Records]:
-    """The measurements of each protocol in a results directory."""
-    return {path.stem: record.load(path) for path in sorted(directory.glob("measurements/*/*.h5"))}
+    """The measurements of each protocol in a results directory, by each engine with each step."""
+    found = {}
+    for path in sorted(directory.glob("measurements/*/*.h5")):
+        with h5py.File(path) as file:
+            about = json.loads(file.attrs["about"])
+        found[f"{path.stem} by {about['engine']}, step/{about.get('step', 1)}"] = record.load(path)
+    return found
 
 
 def differences(one: Records, other: Records) -> list[str]:
@@ -33,7 +41,9 @@ def main(first: str, second: str, *names: str) -> int:
     """Print what differs; 1 if anything does."""
     one, other = protocols(Path(first)), protocols(Path(second))
     worst = 0
-    for name in names or sorted(one.keys() | other.keys()):
+    for name in sorted(one.keys() | other.keys()):
+        if names and name.partition(" by ")[0] not in names:
+            continue
         found = differences(one[name], other[name]) if name in one and name in other else ["in one of them only"]
         print(f"{name}: {f'{len(found)} differences, such as {found[0]}' if found else 'the same'}")
         worst = max(worst, bool(found))

@@ -205,7 +205,7 @@ def carry_out(
         else:
             rows = [*_measured(protocol, lab, strong, before), *rows]
         make_directory(path.parent)
-        about = {"protocol": protocol.name, "engine": lab.engine.name, "level": lab.level.name}
+        about = {"protocol": protocol.name, "engine": lab.engine.name, "step": lab.refine, "level": lab.level.name}
         place = f"{campaign.directory.name}/{label}.h5"
         for k, row in enumerate(rows):
             if isinstance(row, Measurement) and protocol.drawn(row) and not lab.beside:
