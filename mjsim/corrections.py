@@ -146,11 +146,16 @@ def corrections(
 
     # Inertial forces at mid step. In the co-rotating frame they are 2 m omega_c v_h along the orbit and
     # -m rho omega_c^2 inwards, and I omega_c (-o_z, 0, o_x) on the spin. The engine has them with the velocities of the
-    # beginning of the step; their change up to its middle, extrapolated from the last step, is added.
+    # beginning of the step; their change up to its middle, extrapolated from the last step, is added. The axes'
+    # turning under the spin is not extrapolated, which would let a ball that slips on the wall swing more and more:
+    # only what else changed the spin is, and the middle solved for, by which turning leaves its size alone.
     omega_c = v.omega_c + ahead * change.omega_c
     v_h = v.v_h + ahead * change.v_h
-    o_x = v.o_x + ahead * change.o_x
-    o_z = v.o_z + ahead * change.o_z
+    turn = ahead * ball.step * omega_c
+    turned = ahead * ball.step * (v.omega_c + last.omega_c) / 4
+    x = v.o_x + ahead * change.o_x + turned * (v.o_z + last.o_z)
+    z = v.o_z + ahead * change.o_z - turned * (v.o_x + last.o_x)
+    o_x, o_z = (x - turn * z) / (1 + turn * turn), (z + turn * x) / (1 + turn * turn)
     inertial_z = 2 * ball.mass * (omega_c * v_h - v.omega_c * v.v_h)
     inertial_h = -ball.mass * rho * (omega_c * omega_c - v.omega_c * v.omega_c)
     moment_x = -ball.inertia * (omega_c * o_z - v.omega_c * v.o_z)

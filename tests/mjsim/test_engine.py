@@ -43,6 +43,15 @@ def test_falls_freely_through_the_fluid(order) -> None:
     np.testing.assert_allclose(ratio, 2**order, rtol=10 * p.c * 2e-3)
 
 
+def test_a_spin_under_which_the_axes_turn_stays_as_large_as_it_is() -> None:
+    """On a smooth wall no moment turns the ball in space; a turn of the fluid takes 31 steps."""
+    p = P.replace(eta=0.0, omega_0=100.0)
+    x0 = [1e3, -p.g / p.c, 100.0, 30.0, 0, 0]
+    run = mjsim.simulate(p, x0, 4.0, settings=ContactSettings.for_problem(p, 2e-3))
+    spin = np.hypot(run.slip_x + p.R / p.r * run.omega_c, run.slip_z + run.v_y / p.r)
+    np.testing.assert_allclose(spin[10:], spin[10], rtol=1e-9)
+
+
 def test_batch_is_the_single_run() -> None:
     """To the bit however many share the batch; slipping along a ramp, and through landings of both kinds."""
     rough = Parameters.named("high-wall-friction").replace(omega_0=20.0)
