@@ -68,7 +68,6 @@ class Engine:
     """Engines that are heard beside it when it is on trial."""
     mark: str
     """Marker of matplotlib."""
-    colour: str
 
     @property
     def missing(self) -> str:
@@ -141,7 +140,7 @@ def _theory(method: str, *task: Any) -> Trajectory:
         return error.trajectory
 
 
-def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, colour: str) -> tuple[Engine, Engine]:
+def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str) -> tuple[Engine, Engine]:
     """Records of an engine with the best settings of its adapter and with a newcomer's, each with a mark."""
     name, other = library.name, f"{library.name}-defaults"
     best = Engine(
@@ -155,7 +154,6 @@ def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str, c
         needs=library,
         as_it_comes=other,
         mark=marks[0],
-        colour=colour,
     )
     return best, replace(
         best,
@@ -180,7 +178,6 @@ MUJOCO = Engine(
     "states exact by construction; at the studies' steps",
     beside=("mujoco-plain", "mujoco-defaults"),
     mark="o",
-    colour="#0072B2",
 )
 PLAIN = replace(
     MUJOCO,
@@ -193,7 +190,6 @@ PLAIN = replace(
     beside=(),
     refine=(1, 2, 3, 4),
     mark="P",
-    colour="#56B4E9",
 )
 NEWCOMER = replace(
     MUJOCO,
@@ -207,7 +203,6 @@ NEWCOMER = replace(
     study=None,
     stream=_unwarned,
     mark="x",
-    colour="#CC79A7",
 )
 EVENT = Engine(
     name="event",
@@ -218,7 +213,6 @@ EVENT = Engine(
     sources=("model", "analytic"),
     stands_on=("numpy", "scipy"),
     mark="s",
-    colour="#D55E00",
 )
 MOREAU = replace(
     EVENT,
@@ -227,12 +221,11 @@ MOREAU = replace(
     configure=lambda given, p: analytic.Settings(method="time-stepping", **given),  # type: ignore[arg-type]
     simulate=partial(_theory, "time-stepping"),
     mark="^",
-    colour="#009E73",
 )
 _OTHERS = (
-    *_adapted(pybullet, Library("pybullet", "pybullet"), 1 / 240, "v1", "#E69F00"),
-    *_adapted(drake, Library("drake", "pydrake.all"), 1e-3, "D+", "#56B4E9"),
-    *_adapted(siconos, siconos.LIBRARY, 1e-3, "p2", "#000000"),
+    *_adapted(pybullet, Library("pybullet", "pybullet"), 1 / 240, "v1"),
+    *_adapted(drake, Library("drake", "pydrake.all"), 1e-3, "D+"),
+    *_adapted(siconos, siconos.LIBRARY, 1e-3, "p2"),
 )
 ENGINES: dict[str, Engine] = {each.name: each for each in (MUJOCO, PLAIN, NEWCOMER, EVENT, MOREAU, *_OTHERS)}
 """Every engine by name."""

@@ -71,9 +71,9 @@ def symbol(name: str) -> str:
 
     def typeset(match: re.Match[str]) -> str:
         letter, tilde, index, zero = match.groups()
-        return "$" + (rf"\tilde{{{letter}}}" if tilde else letter) + f"_{index}" + ("^0$" if zero else "$")
+        return "$" + (rf"\tilde{{{letter}}}" if tilde else letter) + f"_{{{index}}}" + ("^0$" if zero else "$")
 
-    return re.sub(r"(\w)(\u0303?)_(\w)(⁰?)", typeset, QUANTITIES[name].symbol)
+    return re.sub(r"(\w)(\u0303?)_(\w+?)(⁰?)(?!\w)", typeset, QUANTITIES[name].symbol)
 
 
 def label(name: str, unit: str = "") -> str:
@@ -102,7 +102,7 @@ def marks(states: Sequence[Measurement]) -> str:
     """What a caption says of measured points; nothing where there are none."""
     if not states:
         return ""
-    said = f" Marks: {len(states)} measured values; three standard uncertainties are smaller than most marks."
+    said = f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where the mark is larger."
     if alone := dict.fromkeys(m.engine for m in states if ENGINES[m.engine].refine != (1,)):
         steps = sorted({500 * coarse_step(m.parameters) for m in states if m.engine in alone})
         at = " or ".join(f"{step:g}" for step in steps)
@@ -177,9 +177,9 @@ def guides(axes: Axes, values: dict[str, float]) -> None:
 
 
 def mark_of(engine: str) -> dict[str, Any]:
-    """The mark of what an engine gave."""
+    """The mark of what an engine gave, black: colours are those of cases."""
     given = ENGINES.get(engine)  # theory against theory has none
-    return {"marker": given.mark if given else "D", "color": given.colour if given else "0.3", "mfc": "white"}
+    return {"marker": given.mark if given else "D", "color": "0.1", "mfc": "white"}
 
 
 def by_engine(rows: Iterable[T], engine: Callable[[T], str]) -> dict[str, list[T]]:
@@ -226,8 +226,8 @@ def ground(
     axes: Axes, run: Trajectory, span: tuple[float, float], unit: float = 1.0, origin: float = 0.0, named: bool = True
 ) -> None:
     """Shade each stretch of a span of time in the colour of its case, and name it above where there is room."""
-    stretches = run.phases()
-    for (case, first, _), (_, last, _) in zip(stretches, [*stretches[1:], (None, run.time[-1], 0.0)], strict=True):
+    begins = [(run.cases[0], run.time[0]), *zip(map(Case, run.events.to_case), run.events.time, strict=True)]
+    for (case, first), (_, last) in zip(begins, [*begins[1:], (None, run.time[-1])], strict=True):
         low, high = max(first, span[0]), min(last, span[1])
         if low < high:
             x = unit * (np.array([low, high]) - origin)

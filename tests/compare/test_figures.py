@@ -177,7 +177,7 @@ def test_the_bistable_region_is_named_and_points_not_as_predicted_are_crossed(ma
         assert any("bistable" in text.get_text() for text in axes.texts)
         crosses = [line for line in axes.lines if line.get_label() == "not as predicted"]
         assert [float(x) for line in crosses for x in line.get_ydata()] == [10.0] * (name == "fig-7")
-        assert ("1 crossed" in FIGURES[name].caption(data)) == (name == "fig-7")
+        assert ("not as predicted in 1 (crossed)" in FIGURES[name].caption(data)) == (name == "fig-7")
 
 
 def test_measured_states_have_their_engines_marks(material: Material) -> None:
@@ -185,9 +185,8 @@ def test_measured_states_have_their_engines_marks(material: Material) -> None:
     data = FIGURES["characteristic"].select(material)
     assert "mujoco-plain and mujoco-defaults: as measured with a time step of 2 ms" in flowmeter.caption_curves(data)
     axes = FIGURES["characteristic"].draw(data).axes[0]
-    shown = {line.get_marker(): line.get_color() for line in axes.lines}
-    for engine in ("mujoco", "mujoco-plain", "mujoco-defaults"):
-        assert shown[ENGINES[engine].mark] == ENGINES[engine].colour
+    shown = {line.get_marker() for line in axes.lines}
+    assert shown >= {ENGINES[engine].mark for engine in ("mujoco", "mujoco-plain", "mujoco-defaults")}
 
 
 def test_deviations_are_drawn_over_tolerance() -> None:
@@ -207,7 +206,7 @@ def test_deviations_are_drawn_over_tolerance() -> None:
 def test_the_fall_shows_cases_and_impact() -> None:
     figure = FIGURES["unloading"].draw(FIGURES["unloading"].select(Material()))
     assert {"NR", "NS", "SR", "RR"} <= {text.get_text() for text in figure.axes[0].texts}
-    assert {"$v_y$ (µm/s)", "gap (µm)"} <= {axes.get_ylabel() for axes in figure.axes}
+    assert {"$v_y$ (mm/s)", "gap (µm)"} <= {axes.get_ylabel() for axes in figure.axes}
 
 
 def test_a_fall_that_did_not_happen_is_a_gap() -> None:
@@ -243,12 +242,12 @@ def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.
 def test_how_figures_look(material: Material) -> None:
     assert set(style.COLOURS) == set(Case)
     assert len(set(style.COLOURS.values())) == len(Case)
-    labels = {"omega_c": "$ω_c$ (rad/s)", "slip_x": r"$\tilde{ω}_x$ (rad/s)", "wall_spin": "$ω_x^0$ (rad/s)"}
-    labels |= {"force_Ax-By": "$A_x$ − $B_y$ (N)", "gamma": "γ (rad/s²)", "hops": "hops on"}
+    labels = {"omega_c": "$ω_{c}$ (rad/s)", "slip_x": r"$\tilde{ω}_{x}$ (rad/s)", "wall_spin": "$ω_{x}^0$ (rad/s)"}
+    labels |= {"force_Ax-By": "$A_{x}$ − $B_{y}$ (N)", "gamma": "γ (rad/s²)", "hops": "hops on"}
     assert {name: style.label(name) for name in labels} == labels
     states = list(material.select("omega_c", "case"))[:2]
     words = style.caption(Parameters.named("reference"), "What it is.", states=states, names=("mu",))
-    assert words.startswith("What it is. μ = 0.2. Marks: 2 measured values")
+    assert words.startswith("What it is. μ = 0.2. Marks: measured (2)")
 
 
 def test_what_a_figure_file_is_called_decides_its_format(tmp_path: Path) -> None:

@@ -105,11 +105,12 @@ def draw_branch(of: Diagram) -> Figure:
 def caption_orbit(of: Diagram) -> str:
     """Of the orbit."""
     orbit = _orbit()
+    named = style.named(of.p, "mu", "eta", "j", "kappa", "omega_0")
     return (
         f"The hopping ball over one period of {orbit.period:.5g} s: height, and the orbit in two planes of the state "
-        "space, coloured by case. It lands, slips at both points for some 0.5 ms, slips up the wall (NS), sticks "
-        f"to it (NR), rises to {1e3 * orbit.cycle.y.max():.3g} mm and falls. Largest |Floquet multiplier| "
-        f"{abs(orbit.multipliers[0]):.4g}; {style.named(of.p, 'mu', 'eta', 'j', 'kappa', 'omega_0')} rad/s."
+        "space, coloured by case, a gap at the impact. It lands, slips at both points for 0.5 ms, slips up the wall "
+        f"(NS), sticks to it (NR), rises to {1e3 * orbit.cycle.y.max():.3g} mm and falls. Largest |Floquet multiplier| "
+        f"{abs(orbit.multipliers[0]):.4g}; {named} rad/s."
     )
 
 
@@ -117,13 +118,13 @@ def draw_orbit(of: Diagram) -> Figure:
     """Height over time, height over its rate, and height over the slip."""
     cycle = _orbit().cycle
     figure, axes = style.panels(9.0, 3.2, 1, 3, sharey=True)
-    shown = {"t (ms)": 1e3 * cycle.time, "$v_y$ (m/s)": cycle.v_y, "$\\tilde\\omega_x$ (rad/s)": cycle.slip_x}
+    shown = {"$t$ (ms)": 1e3 * cycle.time, "$v_y$ (m/s)": cycle.v_y, "$\\tilde\\omega_x$ (rad/s)": cycle.slip_x}
     for ax, (label, x) in zip(axes, shown.items(), strict=True):
         for case in dict.fromkeys(cycle.cases):
             own, look = cycle.case == case, {"color": style.COLOURS[case], "label": case.name}
             ax.plot(x[own], 1e3 * cycle.y[own], ".", ms=2.5, rasterized=True, **look)
         ax.set_xlabel(label)
-    axes[0].set_ylabel("y (mm)")
+    axes[0].set_ylabel("$y$ (mm)")
     style.legend(axes[0], loc="lower right", markerscale=4)
     return figure
 
@@ -143,16 +144,35 @@ def walls() -> dict[str, Any]:
             end = {name: one[name] + share * (two[name] - one[name]) for name in ("eta", "height", "omega_c")}
             place["orbit"] = end | {"stable": one["stable"]}
             orbits.insert(at, place["orbit"])
+    for place in places[1:-1]:  # where the line is bent least by it
+        x = np.array([(r["eta"] / 0.1, r["height"] / 0.03) for r in (*orbits, place["orbit"])])
+        detour = np.hypot(*(x[:-1] - x[-1]).T)
+        k = 1 + int(np.argmin(detour[:-1] + detour[1:] - np.hypot(*np.diff(x[:-1], axis=0).T)))
+        orbits.insert(k, place["orbit"] | {"stable": orbits[k - 1]["stable"]})
     return branch
+
+
+_KINDS = {
+    "nonsmooth birth": ("birth", (-8, 5)),
+    "torus": ("torus", (-8, -5)),
+    "fold": ("fold", (8, 4)),
+    "persistence": ("", (0, 0)),
+}
+"""Names of special places, as the figure shows them, and where."""
 
 
 def caption_walls(of: Diagram) -> str:
     """What happens along the branch."""
-    places = "; ".join(f"{place['kind']} at η = {place['value']:.4g}" for place in walls()["places"])
-    mark = " Shaded: the wall from which hops don't last, as measured." if of.states else ""
+    at = {kind: " and ".join(f"{e['value']:.4g}" for e in walls()["places"] if e["kind"] == kind) for kind in _KINDS}
+    birth = at["nonsmooth birth"].split()[0]
+    mark = " Shaded: the least wall friction at which hops don't last, as measured." if of.states else ""
     groups = style.named(of.p, "mu", "j", "kappa", "omega_0")
-    what = f"Height and mean ω_c of the hopping ball over the friction of the wall: {places}"
-    return f"{what}. {groups} rad/s. Dashed: unstable.{mark}"
+    return (
+        "Height and mean ω_c of the hopping ball against the friction of the wall, η. From no height (birth, "
+        f"η = {birth}) hops grow; they lose stability in a torus bifurcation ({at['torus']}), "
+        f"turn back in a fold ({at['fold']}), and end in hops of no height. Dots without names: the sequence of cases "
+        f"changes ({at['persistence']}). {groups} rad/s. Dashed: unstable.{mark}"
+    )
 
 
 def draw_walls(of: Diagram) -> Figure:
@@ -161,11 +181,10 @@ def draw_walls(of: Diagram) -> Figure:
     orbits, places = branch["orbits"], branch["places"]
     figure, panels = style.panels(9.0, 3.8, 1, 2)
     shown = ("height", "height of the hops (mm)", 1e3), ("omega_c", "mean " + style.OMEGA_C, 1.0)
-    names = {"torus": ("torus", (8, 4)), "fold": ("fold", (8, 4)), "nonsmooth birth": ("birth", (-8, 5))}
     for axes, (quantity, label, unit) in zip(panels, shown, strict=True):
         for rows, line in ((orbits, style.UNSTABLE), ([row for row in orbits if row["stable"]], style.STABLE)):
             axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=COLOUR, ls=line, lw=2)
-        named = dict(names)
+        named = dict(_KINDS)
         for place in places:
             x, y = place["value"], unit * place["orbit"][quantity]
             axes.plot(x, y, **style.POINT)
@@ -173,8 +192,8 @@ def draw_walls(of: Diagram) -> Figure:
                 style.name(axes, x, y, *named.pop(place["kind"]))
         for m in of.states:
             low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
-            axes.axvspan(low, high, color=style.mark_of(m.engine)["color"], alpha=0.4, label=f"{m.engine}: hops end")
-        axes.set(xlabel="η", ylabel=label)
+            axes.axvspan(low, high, color="0.3", alpha=0.4, label=f"{m.engine}: hops end")
+        axes.set(xlabel="wall friction $\\eta$", ylabel=label)
         axes.margins(0.2, 0.1)
     style.legend(panels[0], loc="upper left")
     return figure

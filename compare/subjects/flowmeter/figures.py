@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -115,7 +116,7 @@ def draw_figure_13(of: Diagram) -> Figure:
     else:
         t = bifurcation.thresholds(p)
         for case, ends, width, line, at in (
-            (Case.NR, (t.omega_02, top), 9, style.STABLE, (0.75, (12, -12))),
+            (Case.NR, (t.omega_02, top), 9, style.STABLE, (0.75, (15, -15))),
             (Case.SR, (t.omega_03, top), 5, style.STABLE, (0.4, (-12, 12))),
             (Case.SR, (t.omega_02, t.omega_03), 5, (0, (1.5, 0.8)), (0.1, (-30, 20))),
             (Case.RR, (0.0, t.omega_03), 2, style.STABLE, (0.45, (-5, 5))),
@@ -167,8 +168,9 @@ def caption_fall(fall: Motion) -> str:
     return style.caption(
         fall.p,
         "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the wall (NS), sinks, "
-        "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the impact, magnified in "
-        "time and height: it stops the sinking at once; after it the gaps show how far the ball hops, if it does. "
+        "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the impact at t = 0, "
+        "magnified in time and height (dots: samples): it stops the sinking at once; a hop would show as a gap, "
+        "a depth as a negative one. "
         f"Background: the case, by name above; engine: {fall.engine}.",
     )
 
@@ -184,14 +186,16 @@ def draw_fall(fall: Motion) -> Figure:
     left = leaves[-1] if len(leaves) else run.time[0]
     figure, panels = style.panels(9, 6, 3, 2, sharex="col", width_ratios=[1.7, 1])
     whole, close = panels.T
-    around, landing = (left - 0.3, left + 1.7), (lands - 0.02, lands + 0.02)
+    near = max(0.02, 12 * float(np.median(np.diff(run.time))))
+    around, landing = (left - 0.3, left + 1.7), (lands - near, lands + near)
     # Axes, span of time, its origin, and the units of time and gaps, in parts of a second and of a metre.
     for column, span, origin, unit, size in (whole, around, left, 1.0, 1e3), (close, landing, lands, 1e3, 1e6):
         k = np.flatnonzero((run.time > span[0]) & (run.time < span[1]))
         k = k[:: max(1, len(k) // 1500)]
         t = unit * (run.time[k] - origin)
         gaps, speed, slip = column
-        gaps.plot(t, size * run.y[k], color="black", label="$y$ (floor)")
+        dots: dict[str, Any] = {"color": "black"} | ({} if column is whole else {"marker": ".", "ms": 3})
+        gaps.plot(t, size * run.y[k], label="$y$ (floor)", **dots)
         gaps.plot(t, size * run.h[k], color=style.FORCE, ls="--", label="$h$ (wall)")
         if column is whole:
             gaps.set_ylabel("gap (mm)")
@@ -203,13 +207,13 @@ def draw_fall(fall: Motion) -> Figure:
             hops = run.y[k][run.v_y[k] > 0].max(initial=0.0)
             highest = 1e6 * max(float(run.h[k].max()), float(hops), 1e-7)
             gaps.set(ylim=(-0.4 * highest, 1.4 * highest), ylabel="gap (µm)")
-            speed.plot(t, 1e6 * run.v_y[k], color="black")
-            speed.set_ylabel("$v_y$ (µm/s)")
+            speed.plot(t, 1e3 * run.v_y[k], **dots)
+            speed.set_ylabel("$v_y$ (mm/s)")
             slip.set_xlabel("$t$ after the landing (ms)")
         for point, value, line in (("A", run.slip_speed_A, "-"), ("B", run.slip_speed_B, "--")):
             touches = [case for case in Case if getattr(case, point) is not Contact.N]
             shown = np.where(np.isin(run.case[k], touches), value[k], np.nan)
-            slip.plot(t, shown, color="black", ls=line, label=f"$|v_{point}|$")
+            slip.plot(t, shown, ls=line, label=f"$|v_{point}|$", **dots)
         slip.set(ylabel="slip speed (m/s)", xlim=(unit * (span[0] - origin), unit * (span[1] - origin)))
         for axes in column:
             style.ground(axes, run, span, unit, origin, named=axes is gaps)

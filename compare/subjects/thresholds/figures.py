@@ -78,7 +78,8 @@ def plane_caption(plane: Plane) -> str:
     )
     if runs:
         failed = sum(not check.agrees for check in plane.checks)
-        text += f" Marks: the {runs} points at which runs were started; {failed or 'none'} crossed, not as predicted."
+        text += f" Marks: the {runs} points at which runs were started; they ended "
+        text += f"not as predicted in {failed} (crossed)." if failed else "as predicted in all."
     return text
 
 
@@ -107,7 +108,7 @@ def draw_plane(plane: Plane) -> Figure:
         axes.plot(*_places(failed), "x", color="#B3261E", ms=10, mew=2, label="not as predicted")
     friction = "friction $\\eta = \\mu$" if plane.equal else "wall friction $\\eta$"
     axes.set(xlabel=friction, ylabel=style.OMEGA_0, xlim=(0, _WIDEST), ylim=(0, fastest))
-    style.legend(figure, loc="outside lower center", ncols=6, handlelength=2.6)
+    style.legend(figure, loc="outside lower center", ncols=6, handlelength=3.2)
     style.dimensionless(axes, p, y=style.FREE_0)
     return figure
 
@@ -174,7 +175,7 @@ _SHOWN = {
     "fig-9": "off the floor, where y is free: sinking along the wall (NS) passes over to riding it (NR) at P2",
     "fig-10": "on the floor, for η < j: rolling (RR) passes over to slipping (SS) at P3, SS turns back at the fold "
     "F and ends in SR at NF2",
-    "fig-11": "on the floor, for η > j: SR appears at ω₀₂, and RR ends at ω₀₃ where it meets SR",
+    "fig-11": "on the floor, for η > j: SR appears at ω₀₂, and RR ends at ω₀₃ where it meets SR (dots)",
     "fig-12": "as Fig. 11, but with the floor allowed to pull (A_y < 0), which is formal: the branch of SS and its "
     "bifurcations P3, F and NF2 reappear, and RR and SR exchange stability at NT1",
 }
@@ -237,10 +238,10 @@ def draw_diagram(of: Diagram) -> Figure:
         _branch(axes, p, Case.RR, bottom, t.omega_03)
         _branch(axes, p, Case.RR, t.omega_03, omega_01, "RR, virtual", (0.6, (-4, 4)), UNSTABLE)
         slipping(axes, p, partial(spin, p), (0.5, (0, 7)), (0.35, (0, 7)))
-        _branch(axes, p, Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.5, (-20, 60)), UNSTABLE)
+        _branch(axes, p, Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.5, (-30, -14)), UNSTABLE)
         _branch(axes, p, Case.SR, t.omega_03, top, "SR", (0.35, (-5, -5)))
         style.mark(axes, omega_01, omega_01 * p.R / p.r, "P3", (-6, 0))
-        style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (0, -8))
+        style.mark(axes, t.omega_03, t.omega_03 * p.R / p.r, "NT1", (7, 0))
         style.mark(axes, t.omega_02, lifted(t.omega_02, p), "NF2", (-6, 4))
         style.mark(axes, omega_04, float(bifurcation.wall_spin(fold_state(p, released=True), p)), "F", (7, 0))
         for s in slipping_branch.hopf_places(p):

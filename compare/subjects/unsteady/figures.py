@@ -67,9 +67,9 @@ def caption_pulsation(of: Measurements) -> str:
     return style.caption(
         of.mean,
         f"A ball in a flow that pulsates about ω₀ = {of.mean.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, "
-        f"where it rolls at both points (RR) and, dashed, where it slips at both (SS, about {FLOWS[1]:g} rad/s). "
+        f"where it rolls at both points (RR) and where it slips at both (SS, ω₀ = {FLOWS[1]:g} rad/s). "
         "Right: the amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast "
-        "pulsations; and the error of its mean reading when the amplitude is half as much again.",
+        "pulsations; and the error of its mean reading when the amplitude is 1.5 times that (dots: computed).",
         states=of.rows,
     )
 
@@ -79,10 +79,10 @@ def draw_pulsation(of: Measurements) -> Figure:
     p = of.mean
     figure, ((gain, onset), (phase, error)) = style.panels(9.0, 5.6, 2, 2, sharex=True)
     f = np.geomspace(*DECADES, 400)
-    for q, case, line in ((p, Case.RR, "-"), (REFERENCE.replace(omega_0=FLOWS[1]), Case.SS, "--")):
+    for q, case in ((p, Case.RR), (REFERENCE.replace(omega_0=FLOWS[1]), Case.SS)):
         ratio = response.transfer(q, case, f)
-        style.curve(gain, case, f, np.abs(ratio), line=line)
-        style.curve(phase, case, f, -np.degrees(np.unwrap(np.angle(ratio))), line=line)
+        style.curve(gain, case, f, np.abs(ratio))
+        style.curve(phase, case, f, -np.degrees(np.unwrap(np.angle(ratio))))
         style.name(gain, f[60], abs(ratio[60]), case.name, (0, -8), style.COLOURS[case])
     frequencies, onsets, errors = _theory(p)
     style.curve(onset, Case.RR, frequencies, onsets)
@@ -95,7 +95,7 @@ def draw_pulsation(of: Measurements) -> Figure:
     for quantity, axes in panels.items():
         unit = 180 / math.pi if axes is phase else 1.0
         style.points(axes, of.of(quantity), lambda m: float(m.conditions["f"]), unit=unit)
-    gain.set(xscale="log", yscale="log", ylabel="gain $|\\omega_c/\\omega_0|$")
+    gain.set(xscale="log", yscale="log", ylabel="gain, amplitude of $\\omega_c$ / of $\\omega_0$")
     phase.set(ylabel="phase lag (°)", xlabel="frequency (Hz)")
     onset.set(yscale="log", ylabel="amplitude at which\nslip begins (rad/s)")
     onset.margins(y=0.12)
@@ -106,13 +106,13 @@ def draw_pulsation(of: Measurements) -> Figure:
 
 def caption_unsteady(of: Measurements) -> str:
     """Of jumps and ramps."""
-    measured = f" Dots: MuJoCo, half the difference of two jumps by {JUMP:.1%}, up and down." if of.runs else ""
+    measured = f" Dots: mujoco, half the difference of two jumps by {JUMP:.1%}, up and down." if of.runs else ""
     return style.caption(
         REFERENCE,
-        "Left: ω_c after a small jump of the flow, divided by its change in the end; a ball that rolls creeps to its "
-        f"new reading, one that slips at both points rings.{measured} Middle: ramps past the fold, faster ones catch "
-        "up with the flow later. Right: by how much a ramp passes ω₀₄ until the ball lags by half as much as at first, "
-        "dashed the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).",
+        "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls approaches its "
+        f"new reading slowly, one that slips at both points swings.{measured} Middle: ramps of the flow past the fold "
+        "ω₀₄; the faster the ramp, the later the ball catches up. Right: by how much the flow has passed ω₀₄ when the "
+        "ball's lag has halved; dashed: the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).",
         states=of.of("ramp_end"),
     )
 
@@ -130,8 +130,8 @@ def draw_unsteady(of: Measurements) -> Figure:
     if len(of.runs) == 2:
         up, down = (motion.load() for motion in of.runs)
         shown = np.flatnonzero(up.time <= t[-1])[::5]
-        jump.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="MuJoCo")
-    jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$, 1 in the end")
+        jump.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="mujoco")
+    jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$ / final change")
     style.legend(jump)
     ends, fold = of.of("ramp_end"), bifurcation.thresholds(REFERENCE).omega_04
     p = ends[0].parameters if ends else REFERENCE.replace(omega_0=34.9)
