@@ -1,86 +1,155 @@
-"""`mjsim.memory.recall` and `retain` as loops over contacts, compiled with numba, which the extra `fast` installs."""
+"""`mjsim.memory.recall` and `retain` as loops over contacts, compiled with numba, which the extra `fast` installs.
+
+A step at rest takes some 40 µs, and to hand over ten arrays of `MjData` some 5. So the loops read them in the engine's
+own memory, where `mujoco.introspect` says that they are.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import math
+from typing import Any
 
+import mujoco
 import numba
 import numpy as np
-import numpy.typing as npt
+from mujoco.introspect import ast_nodes, structs
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from mjsim import memory
 from model.arrays import Array
 
-_KEPT = memory.KEPT
+_KEPT, _WIDTH = memory.KEPT, memory.WIDTH
+_INSIDE = 0.999
+"""Share of the cone up to which a contact surely sticks."""
 compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
 
 
+def _layout(struct: str) -> type[ctypes.Structure]:
+    """A structure of MuJoCo as ctypes knows it."""
+    scalars = {"int": ctypes.c_int, "mjtNum": ctypes.c_double, "mjtBool": ctypes.c_bool} | dict.fromkeys(
+        ("mjtSize", "size_t", "uintptr_t", "uint64_t"), ctypes.c_uint64
+    )
+
+    def kind(declared: Any) -> Any:
+        if isinstance(declared, ast_nodes.PointerType):
+            return ctypes.c_void_p
+        if isinstance(declared, ast_nodes.ArrayType):
+            return kind(declared.inner_type) * math.prod(declared.extents)
+        return scalars.get(declared.name) or _layout(declared.name)
+
+    fields = [(field.name, kind(field.type)) for field in structs.STRUCTS[struct].fields]
+    return type(struct, (ctypes.Structure,), {"_fields_": fields})
+
+
+_data, _contact = _layout("mjData"), _layout("mjContact")
+_FIELDS = (
+    "ncon", "geom_xpos", "geom_xmat", "contact", "efc_KBIP", "efc_R", "efc_aref", "efc_force", "qacc", "efc_J",
+    "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind",
+)  # fmt: skip
+_NCON, _XPOS, _XMAT, _CONTACT, _KBIP, _R, _AREF, _FORCE, _QACC, _J, _ROWNNZ, _ROWADR, _COLIND = range(13)
+_SIZE, _POS, _FRAME, _FRICTION, _DIM, _GEOM, _ADDRESS = range(13, 20)
+_AT = np.array(
+    [getattr(_data, name).offset for name in _FIELDS]
+    + [ctypes.sizeof(_contact)]
+    + [getattr(_contact, name).offset for name in ("pos", "frame", "friction", "dim", "geom", "efc_address")]
+)
+"""Bytes from the beginning of `mjData`, the size of a contact, and bytes from its beginning."""
+_empty = mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>"))
+if _data.from_address(_empty._address).signature != _empty.signature:  # what `mjData` ends with
+    raise ImportError("MuJoCo's structures are not laid out as mujoco.introspect says: formulas on arrays must serve")
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _pointer(typing: Any, address: Any) -> Any:
+    """The address as a pointer."""
+    return types.voidptr(types.intp), lambda context, builder, call, args: builder.inttoptr(args[0], cgutils.voidptr_t)
+
+
 @compiled  # type: ignore[untyped-decorator]
-def recall(
-    kept: tuple[Array, Array, Array], geom: Array, pos: Array, frame: Array, dim: Array, address: Array,
-    friction: Array, xpos: Array, xmat: Array, damping: Array, softness: Array, reference: Array, elliptic: bool,
-) -> tuple[npt.NDArray[np.intp], Array]:  # fmt: skip
-    """As `mjsim.memory.recall`."""
-    used, count = np.empty(len(dim), np.intp), 0
-    for i in range(len(dim)):
-        if address[i] >= 0 and dim[i] > 1 and geom[i, 0] >= 0 and geom[i, 1] >= 0 and damping[address[i] + 1, 1] > 0:
-            used[count] = i
-            count += 1
-    used = used[:count]
-    place = np.empty((count, 8))
-    for k in range(count):
-        i = used[k]
+def _whole(address: int) -> Any:
+    return numba.carray(_pointer(address), 1 << 40, np.int32)
+
+
+@compiled  # type: ignore[untyped-decorator]
+def _real(address: int) -> Any:
+    return numba.carray(_pointer(address), 1 << 40, np.float64)
+
+
+@compiled  # type: ignore[untyped-decorator]
+def _array(data: int, offset: int) -> int:
+    """Address of an array of `mjData`."""
+    return int(numba.carray(_pointer(data + offset), 1, np.int64)[0])
+
+
+@compiled  # type: ignore[untyped-decorator]
+def _recall(data: int, at: Array, before: Array, elliptic: bool) -> Array:
+    xpos, xmat, contact = _real(_array(data, at[_XPOS])), _real(_array(data, at[_XMAT])), _array(data, at[_CONTACT])
+    damping, softness = _real(_array(data, at[_KBIP])), _real(_array(data, at[_R]))
+    reference, ncon = _real(_array(data, at[_AREF])), _whole(data + at[_NCON])[0]
+    kept, used, count = np.zeros((ncon, _WIDTH)), np.empty(ncon, np.intp), 0
+    for i in range(ncon):
+        c = contact + i * at[_SIZE]
+        geom, dim, address = _whole(c + at[_GEOM]), _whole(c + at[_DIM])[0], _whole(c + at[_ADDRESS])[0]
+        if address < 0 or dim == 1 or geom[0] < 0 or geom[1] < 0 or damping[4 * (address + 1) + 1] <= 0:
+            continue
+        used[count], pos = c, _real(c + at[_POS])
         for side in range(2):
-            g = geom[i, side]
-            place[k, side] = g
+            g = geom[side]
+            kept[count, side] = g
+            x, y, z = pos[0] - xpos[3 * g], pos[1] - xpos[3 * g + 1], pos[2] - xpos[3 * g + 2]
             for axis in range(3):
-                total = 0.0
-                for j in range(3):
-                    total += xmat[g, 3 * j + axis] * (pos[i, j] - xpos[g, j])
-                place[k, 2 + 3 * side + axis] = total
+                m = 9 * g + axis
+                kept[count, 2 + 3 * side + axis] = xmat[m] * x + xmat[m + 3] * y + xmat[m + 6] * z
+        count += 1
+    kept = kept[:count]
 
     force, load = np.zeros((count, 5)), np.zeros(count)
-    world, first, begin = np.empty((3, 2)), 0, 0
-    before, forces, loads = kept
+    world, first = np.empty((3, 2)), 0
     for m in range(len(before)):
         nearest, least, begin = -1, math.inf, first
         for turn in range(count):  # contacts of a pair are together, mostly where they were
-            k = (begin + turn) % count
-            if place[k, 0] == before[m, 0] and place[k, 1] == before[m, 1]:
+            k = begin + turn
+            if k >= count:
+                k -= count
+            if kept[k, 0] == before[m, 0] and kept[k, 1] == before[m, 1]:
                 if nearest < 0:
                     first = k
                 distance = 0.0
                 for j in range(2, 8):
-                    distance += (place[k, j] - before[m, j]) ** 2
+                    distance += (kept[k, j] - before[m, j]) ** 2
                 if distance < least:
                     nearest, least = k, distance
             elif nearest >= 0:
                 break
         if nearest < 0:
             continue
-        i = used[nearest]
-        kinds = 1 if dim[i] == 3 else 2
+        frame, kinds = _real(used[nearest] + at[_FRAME]), 1 if _whole(used[nearest] + at[_DIM])[0] == 3 else 2
+        world[:] = 0.0
+        for side in range(2):
+            g = int(kept[nearest, side])
+            for j in range(3):
+                for axis in range(3):
+                    turned = xmat[9 * g + 3 * j + axis] / 2
+                    for kind in range(kinds):
+                        world[j, kind] += turned * before[m, 8 + 6 * side + 2 * axis + kind]
         for j in range(3):
-            for kind in range(kinds):
-                world[j, kind] = 0.0
-                for side in range(2):
-                    for axis in range(3):
-                        world[j, kind] += xmat[geom[i, side], 3 * j + axis] * forces[m, side, axis, kind] / 2
-        for j in range(3):
-            force[nearest, 0] += frame[i, 3 + j] * world[j, 0]
-            force[nearest, 1] += frame[i, 6 + j] * world[j, 0]
+            force[nearest, 0] += frame[3 + j] * world[j, 0]
+            force[nearest, 1] += frame[6 + j] * world[j, 0]
             for row in range(3 * kinds - 3):
-                force[nearest, 2 + row] += frame[i, 3 * row + j] * world[j, 1]
-        load[nearest] += loads[m]
+                force[nearest, 2 + row] += frame[3 * row + j] * world[j, 1]
+        load[nearest] += before[m, 20]
 
     needed = np.empty(5)
     for k in range(count):
-        a, rows, mu = address[used[k]], dim[used[k]] - 1, friction[used[k]]
+        a, rows = _whole(used[k] + at[_ADDRESS])[0], _whole(used[k] + at[_DIM])[0] - 1
         if elliptic:
             for j in range(rows):
                 reference[a + 1 + j] += softness[a + 1 + j] * force[k, j]
             continue
-        total = 0.0
+        total, mu = 0.0, _real(used[k] + at[_FRICTION])
         for j in range(rows):
             needed[j] = abs(force[k, j]) / mu[j]
             total += needed[j]
@@ -97,45 +166,78 @@ def recall(
             pair = max(abs(lean), level)
             reference[a + 2 * j] += softness[a + 2 * j] * ((pair + lean) / 2 - mean)
             reference[a + 2 * j + 1] += softness[a + 2 * j + 1] * ((pair - lean) / 2 - mean)
-    return used, place
+    return kept
 
 
 @compiled  # type: ignore[untyped-decorator]
-def retain(
-    used: npt.NDArray[np.intp], geom: Array, frame: Array, dim: Array, address: Array, friction: Array, xmat: Array,
-    softness: Array, reference: Array, acceleration: Array, forces: Array, elliptic: bool,
-) -> tuple[Array, Array]:  # fmt: skip
-    """As `mjsim.memory.retain`."""
-    result, load, force, world = np.zeros((len(used), 2, 3, 2)), np.zeros(len(used)), np.empty(5), np.empty((3, 2))
-    for k in range(len(used)):
-        i = used[k]
-        a, mu, asked = address[i], friction[i], 0.0
+def _retain(data: int, at: Array, kept: Array, elliptic: bool, nv: int, sparse: bool) -> None:
+    xmat, contact = _real(_array(data, at[_XMAT])), _array(data, at[_CONTACT])
+    damping, softness = _real(_array(data, at[_KBIP])), _real(_array(data, at[_R]))
+    reference, forces = _real(_array(data, at[_AREF])), _real(_array(data, at[_FORCE]))
+    qacc, jacobian, column = (
+        _real(_array(data, at[_QACC])),
+        _real(_array(data, at[_J])),
+        _whole(_array(data, at[_COLIND])),
+    )
+    begin, length = _whole(_array(data, at[_ROWADR])), _whole(_array(data, at[_ROWNNZ]))
+    i, world, force, held = -1, np.empty((3, 2)), np.empty(5), np.empty(10)
+    for k in range(len(kept)):
+        while True:  # the next that has a memory
+            i += 1
+            c = contact + i * at[_SIZE]
+            a, dim, geom = _whole(c + at[_ADDRESS])[0], _whole(c + at[_DIM])[0], _whole(c + at[_GEOM])
+            if a >= 0 and dim > 1 and geom[0] >= 0 and geom[1] >= 0 and damping[4 * (a + 1) + 1] > 0:
+                break
+        mu, frame = _real(c + at[_FRICTION]), _real(c + at[_FRAME])
+        rows, first, load, used = 2 * (dim - 1), a, 0.0, 0.0
         force[:] = 0.0
-        for j in range(dim[i] - 1):
-            if elliptic:
-                r = a + 1 + j
-                force[j] = forces[r]
-                asked += ((reference[r] - acceleration[r]) / softness[r] / mu[j]) ** 2
-            else:
-                r = a + 2 * j
-                load[k] += forces[r] + forces[r + 1]
-                force[j] = mu[j] * (forces[r] - forces[r + 1])
-                asked += abs(
-                    (reference[r] - acceleration[r]) / softness[r]
-                    - (reference[r + 1] - acceleration[r + 1]) / softness[r + 1]
-                )
         if elliptic:
-            load[k], asked = forces[a], math.sqrt(asked)
-        kinds = 1 if dim[i] == 3 else 2
-        share = min(max(2 - asked / max(_KEPT * load[k], 1e-300), 0.0), 1.0)
+            rows, first, load = dim - 1, a + 1, forces[a]
+            for j in range(rows):
+                force[j] = forces[first + j]
+                used += (force[j] / mu[j]) ** 2
+        else:
+            for j in range(dim - 1):
+                plus, minus = forces[a + 2 * j], forces[a + 2 * j + 1]
+                load += plus + minus
+                force[j] = mu[j] * (plus - minus)
+        asked, sticks = 0.0, elliptic and used < (_INSIDE * load) ** 2  # a row that isn't limited has what it asks for
+        for j in range(rows if load > 0 and not sticks else 0):
+            r = first + j
+            held[j] = forces[r]
+            if elliptic or held[j] == 0:
+                total = 0.0
+                if sparse:
+                    for n in range(begin[r], begin[r] + length[r]):
+                        total += jacobian[n] * qacc[column[n]]
+                else:
+                    for n in range(nv):
+                        total += jacobian[r * nv + n] * qacc[n]
+                held[j] = (reference[r] - total) / softness[r]
+            if elliptic:
+                asked += (held[j] / mu[j]) ** 2
+            elif j % 2:
+                asked += abs(held[j - 1] - held[j])
+        asked = math.sqrt(asked) if elliptic else asked
+        share = min(max(2 - asked / max(_KEPT * load, 1e-300), 0.0), 1.0)
         for j in range(3):
-            world[j, 0] = share * (frame[i, 3 + j] * force[0] + frame[i, 6 + j] * force[1])
-            world[j, 1] = share * (frame[i, j] * force[2] + frame[i, 3 + j] * force[3] + frame[i, 6 + j] * force[4])
+            world[j, 0] = share * (frame[3 + j] * force[0] + frame[6 + j] * force[1])
+            world[j, 1] = share * (frame[j] * force[2] + frame[3 + j] * force[3] + frame[6 + j] * force[4])
         for side in range(2):
             for axis in range(3):
-                for kind in range(kinds):
-                    total = 0.0
-                    for j in range(3):
-                        total += xmat[geom[i, side], 3 * j + axis] * world[j, kind]
-                    result[k, side, axis, kind] = total
-    return result, load
+                for kind in range(1 if dim == 3 else 2):
+                    m = 9 * geom[side] + axis
+                    kept[k, 8 + 6 * side + 2 * axis + kind] = (
+                        xmat[m] * world[0, kind] + xmat[m + 3] * world[1, kind] + xmat[m + 6] * world[2, kind]
+                    )
+        kept[k, 20] = load
+
+
+def recall(model: Any, data: Any, kept: Array, elliptic: bool) -> Array:
+    """As `mjsim.memory.recall`."""
+    return _recall(data._address, _AT, kept, elliptic)  # type: ignore[no-any-return]
+
+
+def retain(model: Any, data: Any, kept: Array, elliptic: bool) -> None:
+    """As `mjsim.memory.retain`."""
+    _retain(data._address, _AT, kept, elliptic, model.nv, mujoco.mj_isSparse(model))

@@ -37,10 +37,9 @@ _APART = np.array([1e6, 1e6, 1, 1, 1, 1, 1, 1])
 _OPEN = 1e9
 """Approach that a contact allows which is open, m s-2."""
 _ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
-_STATE = "place", "force", "load", "joints", "lift", "time"
-Kept = tuple[Array, Array, Array]
-"""Of each contact the geoms and its place on both in their axes, (n, 8), friction force and moment on both in their
-axes, (n, 2, 3, 2), and the normal force, (n,); m, N, N m."""
+WIDTH = 21
+"""Numbers remembered of a contact: geoms (2), its place on both in their axes (6), friction on both in their axes (3 of
+force and moment each, 12), normal force; m, N, N m."""
 
 
 class FrictionMemory:
@@ -81,19 +80,20 @@ class FrictionMemory:
 
     def reset(self) -> None:
         """Forget all, as after `mj_resetData`."""
-        self._kept: Kept = np.empty((0, 8)), np.empty((0, 2, 3, 2)), np.empty(0)
+        self._kept = np.empty((0, WIDTH))
         self._joints, self._lift = np.empty(0), np.empty(0)
         self._time = math.nan
 
     def state(self) -> dict[str, Array]:
-        """A copy of what is remembered: `Kept`, friction of joints, distances held by the servo, m, and the time, s."""
-        values = (*self._kept, self._joints, self._lift, np.array(self._time))
-        return {name: value.copy() for name, value in zip(_STATE, values, strict=True)}
+        """A copy of what is remembered: contacts, (n, `WIDTH`), friction of joints, distances held by the servo, m, and
+        the time, s."""
+        values = {"contacts": self._kept, "joints": self._joints, "lift": self._lift, "time": np.array(self._time)}
+        return {name: value.copy() for name, value in values.items()}
 
     def restore(self, state: Mapping[str, npt.ArrayLike]) -> None:
         """Go on from a `state`."""
-        place, force, load, self._joints, self._lift, time = (np.array(state[name], dtype=float) for name in _STATE)
-        self._kept, self._time = (place, force, load), float(time)
+        self._kept, self._joints, self._lift = (np.array(state[name], float) for name in ("contacts", "joints", "lift"))
+        self._time = float(np.asarray(state["time"]))
 
     def step(self, data: Any, nstep: int = 1) -> None:
         """Advance by `nstep` steps.
@@ -107,91 +107,84 @@ class FrictionMemory:
         if data.model is not model:
             raise InputError("data belong to another MjModel than this friction memory")
         self._check_integrator()
+        elliptic, recall, retain = model.opt.cone == _ELLIPTIC, self._recall, self._retain
         for _ in range(nstep):
             mujoco.mj_step1(model, data)
-            if data.time != self._time:  # another state, or one that MuJoCo has reset as it diverged
+            begin, ncon, nefc = data.time, data.ncon, data.nefc
+            if begin != self._time:  # another state, or one that MuJoCo has reset as it diverged
                 self.reset()
-            if data.nefc:
-                self._step2(data)
-            else:
-                mujoco.mj_step2(model, data)
-                self.reset()
+            kept = recall(model, data, self._kept, elliptic)
+            if self._servo:
+                self._lift = self._lifted(data, kept, elliptic)
+            if dry := data.nf:
+                joints, softness, reference = slice(data.ne, data.ne + dry), data.efc_R, data.efc_aref
+                if len(self._joints) == dry:
+                    reference[joints] += softness[joints] * self._joints
+            mujoco.mj_step2(model, data)
             self._time = data.time
+            if self._time <= begin or (data.ncon, data.nefc) != (ncon, nefc):  # reset as it diverged
+                self.reset()
+                continue
+            retain(model, data, kept, elliptic)
+            self._kept = kept
+            if dry:
+                asked = np.abs(reference - acceleration(model, data))[joints]
+                share = np.clip(2 - asked / (KEPT * softness * data.efc_frictionloss)[joints], 0, 1)
+                self._joints = data.efc_force[joints] * share * (data.efc_KBIP[joints, 1] > 0)
 
-    def _step2(self, data: Any) -> None:
-        model, contact = self.model, data.contact
-        geom, frame, dim = contact.geom, contact.frame, contact.dim
-        address, friction, axes = contact.efc_address, contact.friction, data.geom_xmat
-        softness, reference, elliptic = data.efc_R, data.efc_aref, model.opt.cone == _ELLIPTIC
-        used, place = self._recall(
-            self._kept, geom, contact.pos, frame, dim, address, friction, data.geom_xpos, axes, data.efc_KBIP,
-            softness, reference, elliptic,
-        )  # fmt: skip
-        if self._servo:
-            self._lift = self._lifted(data, used, place)
-        joints = slice(data.ne, data.ne + data.nf)
-        if 0 < len(self._joints) == data.nf:
-            reference[joints] += softness[joints] * self._joints
-        begin = data.time
-        mujoco.mj_step2(model, data)
-        if data.time <= begin or (data.ncon, data.nefc) != (len(dim), len(reference)):  # reset as it diverged
-            self.reset()
-            return
-        acceleration = np.empty(data.nefc)
-        mujoco.mj_mulJacVec(model, data, acceleration, data.qacc)
-        if data.nf:
-            share = np.abs(reference - acceleration)[joints] / (softness * data.efc_frictionloss)[joints]
-            self._joints = data.efc_force[joints] * np.clip(2 - share / KEPT, 0, 1) * (data.efc_KBIP[joints, 1] > 0)
-        force, load = self._retain(
-            used, geom, frame, dim, address, friction, axes, softness, reference, acceleration, data.efc_force, elliptic
-        )
-        self._kept = place, force, load
-
-    def _lifted(self, data: Any, used: npt.NDArray[np.intp], place: Array) -> Array:
+    def _lifted(self, data: Any, kept: Array, elliptic: bool) -> Array:
         """Servo: move the distances that contacts hold, so that loaded ones come to have no depth; return them, m."""
-        contact = data.contact
-        lift: Array = np.zeros(len(place))
-        if len(self._lift) and len(place):
-            nearest, same = _nearest(place, self._kept[0])
+        contact, used = data.contact, remembering(data)
+        lift: Array = np.zeros(len(kept))
+        if len(self._lift) and len(kept):
+            nearest, same = _nearest(kept, self._kept)
             lift[same] = self._lift[nearest[same]]
         gap, margin, rows = contact.dist[used], contact.includemargin[used], contact.efc_address[used]
         lift = np.clip(lift - self.model.opt.timestep / self._servo * gap, 0, margin)
         spring = data.efc_KBIP[rows, 0] * data.efc_KBIP[rows, 2] * (margin - lift)
         spring[(lift == 0) & (gap > 0)] = _OPEN
-        shared = 1 if self.model.opt.cone == _ELLIPTIC else 2 * (contact.dim[used] - 1)
-        of = np.repeat(np.arange(len(used)), shared)
+        of = np.repeat(np.arange(len(used)), 1 if elliptic else 2 * (contact.dim[used] - 1))
         data.efc_aref[rows[of] + np.arange(len(of)) - np.searchsorted(of, of)] -= spring[of]
         return lift
 
 
-def recall(
-    kept: Kept, geom: Array, pos: Array, frame: Array, dim: Array, address: Array, friction: Array,
-    xpos: Array, xmat: Array, damping: Array, softness: Array, reference: Array, elliptic: bool,
-) -> tuple[npt.NDArray[np.intp], Array]:  # fmt: skip
-    """Add to the reference accelerations what contacts remember; return which have a memory, and their places.
+def remembering(data: Any) -> npt.NDArray[np.intp]:
+    """Which contacts have a memory: those of geoms, with friction that is damped."""
+    contact = data.contact
+    used = np.flatnonzero((contact.efc_address >= 0) & (contact.dim > 1) & (contact.geom >= 0).all(axis=1))
+    damped: npt.NDArray[np.bool_] = data.efc_KBIP[contact.efc_address[used] + 1, 1] > 0
+    return used[damped]
+
+
+def acceleration(model: Any, data: Any) -> Array:
+    """Of all rows."""
+    found = np.empty(data.nefc)
+    mujoco.mj_mulJacVec(model, data, found, data.qacc)
+    return found
+
+
+def recall(model: Any, data: Any, before: Array, elliptic: bool) -> Array:
+    """Add to the reference accelerations what contacts remember; return their geoms and places, and no forces yet.
 
     Parameters
     ----------
-    kept : what is remembered of the last step
-    geom, pos, frame, dim, address, friction : contacts, as `MjData.contact` has them
-    xpos, xmat, damping, softness, reference : `geom_xpos`, `geom_xmat`, `efc_KBIP`, `efc_R`, `efc_aref`
+    before : what is remembered of the last step, (n, `WIDTH`)
     elliptic : whether cones are elliptic
     """
-    used = np.flatnonzero((address >= 0) & (dim > 1) & (geom >= 0).all(axis=1))
-    used = used[damping[address[used] + 1, 1] > 0]
-    geom, frame, friction, address = geom[used], frame[used].reshape(-1, 3, 3), friction[used], address[used]
-    axes = xmat[geom].reshape(-1, 2, 3, 3)
-    arm = pos[used][:, None] - xpos[geom]
-    place = np.concatenate([geom, (arm[:, :, None] @ axes).reshape(-1, 6)], axis=1)
-    world, load = np.zeros((len(used), 3, 2)), np.zeros(len(used))
-    before, forces, loads = kept
+    contact, used, reference, softness = data.contact, remembering(data), data.efc_aref, data.efc_R
+    geom, frame, friction = contact.geom[used], contact.frame[used].reshape(-1, 3, 3), contact.friction[used]
+    address, axes = contact.efc_address[used], data.geom_xmat[geom].reshape(-1, 2, 3, 3)
+    arm = contact.pos[used][:, None] - data.geom_xpos[geom]
+    kept, world = np.zeros((len(used), WIDTH)), np.zeros((len(used), 3, 2))
+    kept[:, :2], kept[:, 2:8] = geom, (arm[:, :, None] @ axes).reshape(-1, 6)
+    load = np.zeros(len(used))
     if len(before) and len(used):
-        nearest, same = _nearest(before, place)
-        nearest = nearest[same]
-        np.add.at(world, nearest, (axes[nearest] @ forces[same]).sum(axis=1) / 2)
-        np.add.at(load, nearest, loads[same])
+        nearest, same = _nearest(before, kept)
+        nearest, forces = nearest[same], before[same, 8:20].reshape(-1, 2, 3, 2)
+        np.add.at(world, nearest, (axes[nearest] @ forces).sum(axis=1) / 2)
+        np.add.at(load, nearest, before[same, 20])
     force = (frame @ world).reshape(-1, 6)[:, _COLUMNS]
-    own = dim[used][:, None] - 1 > _ROWS
+    own = contact.dim[used][:, None] - 1 > _ROWS
     if elliptic:
         rows = (address[:, None] + 1 + _ROWS)[own]
         reference[rows] += softness[rows] * force[own]
@@ -199,39 +192,36 @@ def recall(
         rows = (address[:, None] + 2 * _ROWS)[own]
         for side, share in enumerate(edges(force, load, friction, own)):
             reference[rows + side] += softness[rows + side] * share[own]
-    return used, place
+    return kept
 
 
-def retain(
-    used: npt.NDArray[np.intp], geom: Array, frame: Array, dim: Array, address: Array, friction: Array, xmat: Array,
-    softness: Array, reference: Array, acceleration: Array, forces: Array, elliptic: bool,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Friction of contacts on both geoms in their axes, (n, 2, 3, 2), and normal forces, (n,), to remember.
-
-    Parameters as for `recall`, and the accelerations ``J qacc`` and `efc_force` that the step came to.
-    """
-    address, own = address[used], dim[used][:, None] - 1 > _ROWS
-    holding = (reference - acceleration) / softness
+def retain(model: Any, data: Any, kept: Array, elliptic: bool) -> None:
+    """Remember friction of contacts on both geoms in their axes, and normal forces, that the step came to."""
+    contact, forces, used = data.contact, data.efc_force, remembering(data)
+    address, friction, own = contact.efc_address[used], contact.friction[used], contact.dim[used][:, None] - 1 > _ROWS
+    holding = (data.efc_aref - acceleration(model, data)) / data.efc_R
     force, asked = np.zeros(own.shape), np.zeros(own.shape)
     if elliptic:
         rows = (address[:, None] + 1 + _ROWS)[own]
         force[own], asked[own], load = forces[rows], holding[rows], forces[address]
-        share = np.sqrt(((asked / friction[used]) ** 2).sum(axis=1))
+        share = np.sqrt(((asked / friction) ** 2).sum(axis=1))
     else:
         rows = (address[:, None] + 2 * _ROWS)[own]
         asked[own] = np.abs(holding[rows] - holding[rows + 1])
         share = asked.sum(axis=1)
         asked[own], force[own] = forces[rows] + forces[rows + 1], forces[rows] - forces[rows + 1]
         load = asked.sum(axis=1)
-        force *= friction[used]
+        force *= friction
     along = np.zeros((len(used), 6))
     along[:, _COLUMNS] = force * np.clip(2 - share / np.maximum(KEPT * load, 1e-300), 0, 1)[:, None]
-    world = frame[used].reshape(-1, 3, 3).transpose(0, 2, 1) @ along.reshape(-1, 3, 2)
-    return xmat[geom[used]].reshape(-1, 2, 3, 3).transpose(0, 1, 3, 2) @ world[:, None], load
+    world = contact.frame[used].reshape(-1, 3, 3).transpose(0, 2, 1) @ along.reshape(-1, 3, 2)
+    axes = data.geom_xmat[contact.geom[used]].reshape(-1, 2, 3, 3).transpose(0, 1, 3, 2)
+    kept[:, 8:20], kept[:, 20] = (axes @ world[:, None]).reshape(-1, 12), load
 
 
-def _nearest(place: Array, others: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
-    """Which of the others is nearest to each place, and whether it is of the same geoms."""
+def _nearest(kept: Array, others: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    """Which of the others is nearest to each contact, and whether it is of the same geoms."""
+    place, others = kept[:, :8], others[:, :8]
     nearest = cdist(place * _APART, others * _APART, "sqeuclidean").argmin(axis=1)
     return nearest, (place[:, :2] == others[nearest, :2]).all(axis=1)
 
