@@ -116,9 +116,9 @@ def summary(verdicts: Sequence[Verdict]) -> Text:
     said = "; ".join([wording.headline(ran), *map(" ".join, wording.totals(ran))])
     shown = Text(f"{said}. {wording.missing(ran)}".strip(), "bold")
     for each in wording.witnesses(ran):
-        counts = f"{each['confirmed']} of {each['asked']} claims confirmed, {each['refuted']} refuted"
+        counts = f"{each['confirmed']} of {each['asked']} claims confirmed, {len(each['refuted'])} refuted"
         off = f"typical deviation {each['typical']}, worst {each['worst']}"
-        shown.append(f"\n{each['engine']}: {counts}; {off} ({each['about']})", "not bold")
+        shown.append(f"\n{each['engine']} ({each['title']}): {counts}; {off}", "not bold")
     return shown
 
 

@@ -90,7 +90,8 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         )
     measured = {name for m in material.records.measurements for name in m.runs}
     sets = {m.set for m in material.records.measurements}
-    known, made = summary.provenance, [files for each in summary.measurements.values() for files in each.values()]
+    known = summary.provenance
+    files = sum(len(names) for steps in summary.measurements.values() for names in steps.values())
     return pages.render(
         "compare.report",
         "report.html",
@@ -104,6 +105,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         figures=[figure for figure in apart if not figure["gap"]],
         sections=sections,
         outcomes=sorted({verdict.outcome for verdict in ran}),
+        heard=sorted({f"{each.engine}: {each.outcome}" for verdict in ran for each in verdict.witnesses[1:]}),
         wording=wording,
         run_of=lambda m: next((name for name in m.runs if storage.exists(directory / name)), ""),
         numbers=packed(columns(material.records, {v.claim.id: v.checks for v in ran})),
@@ -117,7 +119,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
             "versions": ", ".join(f"{name} {version}" for name, version in known.get("versions", {}).items()),
             "commit": known.get("commit", "") or "not from a checkout",
             "machine": known.get("machine", ""),
-            "measurements": ", ".join(each for files in made for each in files) or "none",
+            "measurements": f"{files} files, listed in {results.SUMMARY}",
         },
     )
 

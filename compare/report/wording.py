@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from statistics import median
+from typing import Any
 
 from compare.claim import Outcome, Text, Verdict, Witness
 from compare.kit.check import Check
@@ -101,29 +102,35 @@ def heard(witness: Witness) -> str:
     if witness.outcome in (Outcome.NOT_ASKED, Outcome.ERROR):
         return f"{witness.outcome}: {witness.reason}"
     order = f", converging with order {witness.order:.1f}" if math.isfinite(witness.order) else ""
-    at = f"; at 2 ms typically off by {witness.typical:.1g}, at most {witness.worst:.1g}"
+    at = f"; at 2 ms typically off by {percent(witness.typical)}, at most {percent(witness.worst)}"
     left_out = f"; {witness.left_out} not measured" if witness.left_out else ""
     numbers = f" on {len(witness.checks)} numbers" if witness.checks else ""
     return f"{witness.outcome}{numbers}{order}{at if math.isfinite(witness.worst) else ''}{left_out}"
 
 
-def witnesses(ran: Sequence[Verdict]) -> list[dict[str, str]]:
-    """What each engine says of all claims: what it is, how many claims came out how, and its deviations."""
+def percent(share: float) -> str:
+    """A relative deviation with one digit."""
+    return f"{float(f'{100 * share:.1g}'):g} %" if share >= 1e-6 else f"{share:.0e}"
+
+
+def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """What each engine says of all claims: what it is, how many came out how, which it refutes, its deviations."""
     rows = []
     for name in dict.fromkeys(each.engine for verdict in ran for each in verdict.witnesses):
         own = [(verdict, each) for verdict in ran for each in verdict.witnesses if each.engine == name]
         counts = Counter(each.outcome for _, each in own)
-        expected = sum(each.outcome is v.claim.expected is not Outcome.CONFIRMED for v, each in own)
+        refuted = {v.claim.id: v.claim.expected is Outcome.REFUTED for v, w in own if w.outcome is Outcome.REFUTED}
         off = [each for _, each in own if math.isfinite(each.typical)]
         row = {
             "engine": name,
+            "title": ENGINES[name].title or name,
             "about": ENGINES[name].about,
             "asked": str(len(own) - counts[Outcome.NOT_ASKED]),
             "confirmed": f"{counts[Outcome.CONFIRMED]}",
-            "refuted": f"{counts[Outcome.REFUTED]}" + (f" ({expected} as expected)" if expected else ""),
+            "refuted": refuted,
             "open": str(counts[Outcome.INCONCLUSIVE] + counts[Outcome.ERROR] + counts[Outcome.NOT_RUN]),
-            "typical": f"{median(each.typical for each in off):.1g}" if off else "–",
-            "worst": f"{max(each.worst for each in off):.1g}" if off else "–",
+            "typical": percent(median(each.typical for each in off)) if off else "–",
+            "worst": percent(max(each.worst for each in off)) if off else "–",
         }
         rows.append(row)
     return rows
@@ -138,7 +145,9 @@ def headline(ran: Sequence[Verdict]) -> str:
     if not ran:
         return "Nothing has been checked yet"
     counts = Counter(f"{v.outcome} as expected" if v.outcome is not Outcome.CONFIRMED else "confirmed" for v in ran)
-    return "The paper and the engine agree: " + ", ".join(f"{n} {name}" for name, n in counts.most_common())
+    name = next((each.engine for verdict in ran for each in verdict.witnesses), "")
+    said = ", ".join(f"{n} claims {what}" if n > 1 else f"{n} {what}" for what, n in counts.most_common())
+    return f"{ENGINES[name].title or name if name else 'The engine'} agrees with the paper: {said}"
 
 
 def missing(ran: Sequence[Verdict]) -> str:
@@ -158,5 +167,5 @@ def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
         (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance"),
     ]
     if corrected := sum(v.passed and v.claim.text is Text.CORRECTED for v in ran):
-        counts.append((str(corrected), "claims confirmed in a corrected form, see the errata"))
+        counts.append((str(corrected), "claims hold in a corrected form, see the errata"))
     return counts
