@@ -225,7 +225,7 @@ def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Set
             failure = f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the last samples)"
         elif max(excess, solving) > loose:
             way = "drifts" if max(drifting, solving) > loose else "swings"
-            failure = f"in {case.name} it still {way} {max(excess, solving):.2g} times as much as it may"
+            failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
         states.append(Settled(start, case, values, means[len(series) :], task, excess, failure))
     return min(states, key=lambda state: state.excess)
 

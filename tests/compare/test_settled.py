@@ -78,7 +78,7 @@ class TestSettled:
         monkeypatch.setattr(settling, "SOLVED", 1e-3)
         measured = _measured(lab, monkeypatch, THICK, 0.6)
         assert not measured.measurements
-        starts = [each for each in measured.missing if "still drifts" in each.reason]
+        starts = [each for each in measured.missing if " still drifts" in each.reason]
         states = [each for each in measured.missing if "no values of it" in each.reason]
         assert len(starts) + len(states) == len(measured.missing)
         assert sum(each.rows for each in starts) == 4
@@ -103,7 +103,7 @@ class TestSettled:
         measured = _measured(lab, monkeypatch, sets(Level.QUICK)["blunt"], 0.6, 2.0)
         cases = {m.conditions["case"] for m in measured.measurements if m.quantity == "omega_c"}
         assert cases == {"SS", "NS"}
-        assert any("a slight lag is one for ever" in each.reason for each in measured.missing)
+        assert any("quadratic drag fades with the lag" in each.reason for each in measured.missing)
 
     def test_states_of_different_steps_share_what_separates_them(self, records: Records) -> None:
         # Half of the step is measured from the mean of the whole: the difference is part of the uncertainty.

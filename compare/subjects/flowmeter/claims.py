@@ -234,8 +234,8 @@ CLAIMS = (
     Claim(
         "design-limit",
         "extension",
-        "The operating range of a meter ends where a design says, and with friction known to 5 % not before its worst "
-        "limit, nor after its thresholds' spread.",
+        "The operating range of a meter ends where its design says; with friction off by up to 5 %, not below the "
+        "design's worst limit and within the spread of its thresholds.",
         tuple(
             Bearing(
                 "thresholds",

@@ -244,7 +244,7 @@ EQUATIONS = tuple(
     Claim(
         f"motion-{case.name}",
         _SOURCES.get(case, "(20)"),
-        f"In case {case.name} the ball moves, its contacts press and rub, as the equations say.",
+        f"In case {case.name} the accelerations and contact forces are those of the equations of motion.",
         (
             *(_rate(case, name) for name in TRAITS[case].active if name not in ("y", "h")),
             *(_force(case, name) for name in _FORCES),

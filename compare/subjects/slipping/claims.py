@@ -128,8 +128,8 @@ CLAIMS = (
         Claim(
             f"slip-{arrow[0].name}-{arrow[1].name}",
             "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
-            f"Out of any state of {arrow[0].name} a slip along any direction of {arrow[1].name} grows at the rate γ "
-            "while the forces admit it; else it passes into another case, as the equations of motion say.",
+            f"A slight slip out of {arrow[0].name} in any direction of {arrow[1].name} grows at the rate γ while the "
+            "forces admit it; else the ball passes into another case, as the equations of motion say.",
             (
                 _growth(_gamma, _along(arrow, "", "dragged")),
                 *(
@@ -160,8 +160,8 @@ CLAIMS = (
     Claim(
         "eq-13-gamma",
         "3.2, last paragraph",
-        "On the wall alone slip grows at a rate in proportion to the friction that rolling takes along it, less what "
-        "Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
+        "On the wall alone slip in a direction grows in proportion to the friction that rolling needs in it, less "
+        "what Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
         (_growth(_lacking, _along(_NR_NS, "", "dragged"), "analytic.contact_forces, (13)"),),
     ),
     Claim(
@@ -214,7 +214,7 @@ CLAIMS = (
     Claim(
         "fig-4-5",
         "Figs. 4 and 5",
-        "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below it remains slipping for good.",
+        "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below, the ball keeps slipping.",
         (
             *_bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
             Bearing("settled", "case", _on_the_wall, when=given(start="on the wall"), by="slip_stability.stability"),
@@ -268,8 +268,8 @@ CLAIMS = (
             "Fig. 6, dotted",
             f"Out of {inner.name} the ball never lifts off the floor, whatever its orbit."
             if inner is Case.RS
-            else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in {outer.name}, would drive "
-            "it up.",
+            else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in {outer.name}, would "
+            "accelerate it upwards.",
             tuple(
                 Bearing("lift", quantity, predict, when=given(inner=inner.name), by="slip_stability: lift")
                 for quantity, predict in (

@@ -125,7 +125,7 @@ CLAIMS = (
     Claim(
         "prop-3-rate",
         "Prop. 3, (25), (35)",
-        "Where the floor slips and the wall rolls, leaning on the floor dies out above ω₀₃ = √(g/jR) and grows "
+        "In SR a load on the floor dies out above ω₀₃ = √(g/jR) and grows "
         "below, at the rates of the eigenvalues of f_SR.",
         (
             *_bearings(Case.SR),

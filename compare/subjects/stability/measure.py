@@ -172,7 +172,7 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> Iterator[Pu
         places = {int((k + 0.5) * len(alike) / (more * most)) for k in range(more * most)} if alike else set()
         yield from (alike[k] for k in sorted(places))
         if (lacking := min(more * most, len(of)) - len(places)) > 0 or not of:
-            why = f"{len(alike)} of {len(of)} settled states of {case.name} slip as fast as a push needs"
+            why = f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a push"
             yield Missing(PROTOCOL, name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
 
 

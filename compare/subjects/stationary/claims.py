@@ -179,8 +179,8 @@ CLAIMS = (
     Claim(
         "eq-42",
         "(42), (43)",
-        "Slipping at both points, floor and wall press as the closed forms over α say, and friction holds the ball "
-        "back along its orbit.",
+        "Slipping at both points, the normal forces at floor and wall are the closed forms in α, and friction holds "
+        "the ball back along its orbit.",
         tuple(
             Bearing("settled", quantity, predict, when=_SLIPS, size=natural_size, by="slipping_branch.branch")
             for quantity, predict in (
@@ -211,7 +211,8 @@ DIAGRAMS = (
     Claim(
         "fig-10",
         "Fig. 10",
-        "For η < j the spins on the wall in rolling, slipping and in the lifted state join as drawn.",
+        "For η < j the spins on the wall of the ball that rolls, slips, or is carried by the wall lie on the curves "
+        "of Fig. 10.",
         (
             *bearings(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
             *bearings(("wall_spin",), every(slips_first, _LEANS), "(91)", Case.SR),
@@ -220,7 +221,7 @@ DIAGRAMS = (
     Claim(
         "fig-11",
         "Fig. 11",
-        "For η > j rolling ends at ω₀₃ upon the state whose spin on the wall falls like 1/ω₀.",
+        "For η > j rolling ends at ω₀₃, where it meets SR, whose spin on the wall falls like 1/ω₀.",
         (
             *bearings(("wall_spin",), every(lifts_first, _ROLLS), "(91)"),
             *bearings(("wall_spin",), every(lifts_first, _LEANS), "(91)", Case.SR),
@@ -248,8 +249,8 @@ DIAGRAMS = (
     Claim(
         "regions",
         "Figs. 7 and 8, (84)-(90)",
-        "In every region of Figs. 7 and 8 those stationary states exist that it is labelled with: the attracting ones "
-        "and NS take in balls, SS beyond the fold divides two basins, SR is there where a ball leans on the floor.",
+        "In every region of Figs. 7 and 8 the stationary states of its label exist: balls settle in the attracting "
+        "ones and in NS, SS beyond the fold divides two basins, and in SR a ball leans on the floor.",
         (
             Bearing("plane", "cases", _in_region, by="analytic.bifurcation.diagram.case_map"),
             Bearing(

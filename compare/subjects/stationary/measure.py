@@ -52,7 +52,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             Re = 2 * p.r / p.nu_f * math.hypot(v_y, p.R * (omega_c - p.omega_0))
             rate *= p.C_D / 24 * Re
         if rate * duration(p) < LIVELY:
-            why = f"{named}: a slight lag is one for ever under the quadratic law"
+            why = f"{named}: quadratic drag fades with the lag, so that a small lag hardly dies out"
             without[key] = Missing(PROTOCOL, state.start.set, why, len(state.values))
         else:
             groups.setdefault(key, []).append(state)
@@ -89,7 +89,7 @@ def _unsettled(each: Settled, rows: int) -> Missing:
     """That a start did not settle, and what it did last."""
     p = each.start.p
     at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
-    return Missing(PROTOCOL, each.start.set, f"not settled from {each.start.name} at {at}: {each.failure}", rows)
+    return Missing(PROTOCOL, each.start.set, f"not settled at {at} (start: {each.start.name}): {each.failure}", rows)
 
 
 def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> Measurement:

@@ -106,7 +106,8 @@ CLAIMS = (
     Claim(
         "table-5-NT1",
         "Table 5, NT1",
-        "With η > j two-point rolling ends at ω₀₃: below, it takes in a ball pressed to the floor; above, it is lost.",
+        "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in it; above, it "
+        "leaves it.",
         (
             _at("omega_03"),
             Bearing(
@@ -351,7 +352,7 @@ FORMAL_CLAIMS = (
     Claim(
         "eq-83-rough",
         "(82), (83), end of section 4.3",
-        "(83) is a bound for η > 1 only, and contradicts (12) there; (82) does so unless η < j.",
+        "(83) is a bound for η > 1 only, and contradicts (12) there; (82) contradicts (12) unless η < j.",
         algebra=_pulling,
         text=Text.FORMAL,
         reason="At (83) the wall would have to pull, and at (82) for η > j the floor.",

@@ -70,17 +70,17 @@ CLAIMS = (
     Claim(
         "pulsation-slip",
         "(23), (66), (67), (73), (82)",
-        "In a pulsating flow a rolling ball begins to slip where the friction that its acceleration takes, or the "
-        "load at its fastest, is more than floor and wall can hold: not before slip can last, and not after no "
-        "forces allow rolling, mostly the same amplitude. In between Coulomb's law allows both; slip that "
-        "lasts below the first or rolling beyond the second would refute it.",
+        "In a pulsating flow a rolling ball begins to slip once rolling needs more friction than floor and wall can "
+        "give: not below the amplitude at which slip first lasts, and not above the one up to which forces allow "
+        "rolling. Mostly the two are the same; in between Coulomb's law allows both.",
         (_slips("slip-stability", Relation.AT_LEAST), _slips("infeasible", Relation.AT_MOST)),
     ),
     Claim(
         "pulsation-limits",
         "(66), (67), (82)",
-        "A slow pulsation makes the ball slip where the flow comes to ω₀₁, or ω₀₃; in a fast one the ball stands still "
-        "and slips where the lag alone is too much for it; none takes more than that.",
+        "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃; in a fast one ω_c hardly changes, "
+        "and the ball slips when the drag of the fluid alone is too strong. No pulsation needs a larger amplitude "
+        "than a fast one.",
         (
             *(
                 Bearing(

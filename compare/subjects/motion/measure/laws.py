@@ -65,7 +65,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         for key, value in fine.items():
             quantity, law, contact = key
             if math.isnan(value) or math.isnan(coarse[key]):
-                yield Missing(PROTOCOL, name, f"no sample shows at {contact}: {law}", 0)
+                yield Missing(PROTOCOL, name, f"no sample at {contact} to test: {law}", 0)
                 continue
             # Halving the step may by chance not show what it does: of both contacts the larger change stands.
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == key[:2]]

@@ -86,7 +86,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         if coarse.case[-1] != fine.case[-1]:
             yield Missing("runs", name, f"{how}: with half the time step the ball ends in another case")
         elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
-            yield Missing("runs", name, f"{how}: it hardly presses, and may hover")
+            yield Missing("runs", name, f"{how}: the contact force is so small that the ball may hover")
         elif how in ("smooth wall", "rough floor"):
             yield measurement(lab, "runs", name, p, "case", float(fine.case[-1]), tasks, **at)
         else:

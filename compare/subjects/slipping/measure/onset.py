@@ -137,7 +137,9 @@ def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
         if abs(zero.value) <= BEYOND * np.abs(q).max():
             yield if_found(push.row(lab, "bounds", f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")
         else:
-            yield Missing("bounds", name, f"{growth} has its zero far beyond the flows at which the ball stays")
+            yield Missing(
+                "bounds", name, f"{growth} is zero only far beyond the flows at which the ball stays in this case"
+            )
         yield if_found(push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
 
 
@@ -245,9 +247,11 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
         elif lifted is None:
             yield arrow.row("lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
         elif (to := Case(int(lifted.case[-1]))) is not arrow.outer:
-            yield Missing("lift", arrow.set, f"out of {arrow.inner.name} the ball leaves the floor for {to.name}")
+            yield Missing(
+                "lift", arrow.set, f"a ball that leaves the floor out of {arrow.inner.name} ends in {to.name}"
+            )
         elif (value := _onset(runs)) is None:
-            why = f"where the ball leaves {arrow.inner.name} the floor's contact comes and goes"
+            why = f"where the ball leaves {arrow.inner.name} the contact at the floor opens and closes"
             yield Missing("lift", arrow.set, why)
         else:
             yield arrow.row("lift_onset", 1 / time_unit(arrow.p), value, tasks)

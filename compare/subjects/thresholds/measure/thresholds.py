@@ -299,7 +299,7 @@ def _rows(
 
     def row(quantity: str, at: Measured | None, tasks: Sequence[Task], side: str, by: str) -> Measurement | Missing:
         if at is None:
-            return missing(f"too few states settled for {quantity} by {by}, or they point nowhere")
+            return missing(f"too few states settled for {quantity} by {by}, or their extrapolation has no zero")
         return measurement(lab, PROTOCOL, name, p.replace(omega_0=at.value), quantity, at, tasks, side=side, by=by)
 
     def bisected(quantity: str, of: Bracket, side: str, by: str) -> Measurement | Missing:
