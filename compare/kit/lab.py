@@ -73,16 +73,15 @@ class Lab:
         """The trajectories of the tasks, in order; raises for one that failed."""
         return self.campaign.run(tasks)
 
-    def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory]]:
-        """The same group by group: all are carried out together, but not held in memory together."""
-        self.complete([task for group in groups for task in group])
-        for group in groups:
-            yield self.run(group)
-
     def attempt(self, tasks: Sequence[Task]) -> list[Trajectory] | str:
         """The trajectories of the tasks, or why one of them failed."""
         failures = self.complete(tasks)
         return failures[0].reason if failures else self.run(tasks)
+
+    def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory] | str]:
+        """The same group by group: all are carried out together, but not held in memory together."""
+        self.complete([task for group in groups for task in group])
+        yield from map(self.attempt, groups)
 
     def each(self, tasks: Sequence[Task]) -> Iterator[Trajectory | str]:
         """The trajectory of every task, one after the other, or why it failed."""

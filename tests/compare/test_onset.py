@@ -246,3 +246,9 @@ def test_claims_notice_a_wrong_critical_friction_and_a_missing_branch(monkeypatc
     monkeypatch.setattr(analytic, "solution", lambda p, case, stable: solution(p, case, stable=True))
     refuted = {v.claim.id for v in judge(bifurcations.CLAIMS, records) if v.outcome is Outcome.REFUTED}
     assert refuted == {"eta-critical", "sub-branches"}
+
+
+def test_a_range_that_another_threshold_may_end_is_not_held_against_the_spread_of_this_one():
+    p = REFERENCE.replace(eta=0.99 * REFERENCE.j)
+    row = measured("thresholds", "omega_01", analytic.thresholds(p).omega_01, 1e-9, p, "mine")
+    assert judge(select(CLAIMS, ["design-limit"]), Records((row,)))[0].outcome is Outcome.CONFIRMED

@@ -12,6 +12,7 @@ import analytic
 import mjsim
 from compare.claim import Outcome
 from compare.judge import judge
+from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.record import Records, sure_enough
 from compare.kit.sets import sets
@@ -62,6 +63,20 @@ def test_everything_is_measured_and_theory_and_engine_agree(records: Records, la
 def test_wrong_theories_are_noticed(records: Records, wrong) -> None:
     with believed(wrong):
         assert any(v.outcome is Outcome.REFUTED for claim in claims.CLAIMS for v in judge([claim], records))
+
+
+def test_a_run_that_breaks_down_leaves_out_its_own_pulsation(records: Records, lab, monkeypatch) -> None:
+    each, tried = Lab.each, []
+
+    def breaking(lab, tasks):
+        tried.append(tasks)
+        runs = list(each(lab, tasks))
+        return ["diverged", *runs[1:]] if len(tried) == 1 else runs
+
+    monkeypatch.setattr(Lab, "each", breaking)
+    left = Records.of(unsteady.pulsation(lab, {NAME: QUICK[NAME]}, known(NAME)))
+    assert [missing.reason.endswith("the run diverged") for missing in left.missing] == [True]
+    assert len(left.measurements) == len(list(records.select("pulsation", where=lambda m: m.set == NAME))) / 2
 
 
 @pytest.mark.slow

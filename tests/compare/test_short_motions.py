@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from types import SimpleNamespace
 
@@ -17,18 +17,19 @@ from compare.claim import Outcome, Verdict
 from compare.judge import judge
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
-from compare.kit.record import Missing, Records
+from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
 from compare.kit.settling import family
 from compare.kit.short import random_state
 from compare.kit.statistics import settled_case
+from compare.kit.tasks import Task
 from compare.subjects.motion import claims as motion
 from compare.subjects.motion.measure import motions
 from compare.subjects.slipping import claims as slipping
 from compare.subjects.slipping.measure import growth, onset
 from compare.subjects.thresholds import claims as bifurcations
 from compare.subjects.thresholds.measure.thresholds import birth
-from model import Case, Parameters, storage
+from model import Case, Parameters, Trajectory, storage
 from model.cases import TRAITS
 from tests.measured import thresholds, unnoticed
 
@@ -39,10 +40,10 @@ LIFTS = {f"lift-{inner.name}-{outer.name}" for inner, outer in slip_stability.LI
 
 
 @pytest.fixture(scope="module")
-def measured(lab: Lab) -> Measured:
-    """What each protocol measures, on one set or two."""
+def protocols(lab: Lab) -> dict[str, Callable[[], Iterator[Measurement | Missing]]]:
+    """The protocols by name, on one set or two."""
     known = thresholds("reference", SETS["reference"], "omega_01", "omega_02")
-    protocols = {
+    return {
         "field": lambda: motions.field(lab, SETS, Records()),
         "growth": lambda: growth.measure(lab, SETS, Records()),
         "bounds": lambda: onset.bounds(lab, SETS, known),
@@ -50,11 +51,30 @@ def measured(lab: Lab) -> Measured:
         "motions": lambda: motions.motions(lab, SETS, Records()),
         "impacts": lambda: motions.impacts(lab, SETS, Records()),
     }
+
+
+@pytest.fixture(scope="module")
+def measured(protocols: dict[str, Callable[[], Iterator[Measurement | Missing]]]) -> Measured:
+    """What each protocol measures."""
     return cache(lambda name: Records.of(protocols[name]()))
 
 
 def verdicts(records: Records) -> dict[str, Verdict]:
     return {each.claim.id: each for each in judge(motion.LAWS + motion.EQUATIONS + slipping.CLAIMS, records)}
+
+
+@pytest.mark.parametrize("name", ["field", "growth", "bounds", "lift", "impacts"])
+def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(protocols, measured, name, monkeypatch) -> None:
+    whole, attempt, tried = measured(name), Lab.attempt, []
+
+    def breaking(lab: Lab, tasks: list[Task]) -> list[Trajectory] | str:
+        tried.append(tasks)
+        return attempt(lab, tasks) if len(tried) > 1 else "diverged at once"
+
+    monkeypatch.setattr(Lab, "attempt", breaking)
+    left = Records.of(protocols[name]())
+    assert ["the run diverged at once" in missing.reason for missing in left.missing].count(True) == 1
+    assert 0.5 < len(left.measurements) / len(whole.measurements) <= 1
 
 
 @pytest.mark.parametrize("case", list(Case))

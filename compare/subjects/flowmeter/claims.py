@@ -143,6 +143,12 @@ def _limit(m: Measurement, relation: Relation) -> float:
     return design.threshold_spread(list(design.corners(make, values, TOLERANCES)))[m.quantity][1]
 
 
+def _one_end(m: Measurement) -> bool:
+    """Whether one and the same threshold ends the operating range at every corner of `TOLERANCES`."""
+    p, off = m.parameters, TOLERANCES["eta"]
+    return not p.eta * (1 - off) < p.j < p.eta * (1 + off)
+
+
 def _between(m: Measurement) -> float:
     """The reading of a rising or falling flow, from the design's characteristic curve."""
     low, high = design.readings(m.parameters, m.parameters.omega_0)
@@ -241,7 +247,7 @@ CLAIMS = (
                 "thresholds",
                 end,
                 partial(_limit, relation=relation),
-                when=every(first, lambda m: m.parameters.drag == STOKES),
+                when=every(first, lambda m: m.parameters.drag == STOKES, *[_one_end] * (relation is Relation.AT_MOST)),
                 relation=relation,
                 by="analytic.flowmeter.design",
             )

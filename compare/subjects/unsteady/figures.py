@@ -17,7 +17,7 @@ from compare.branches import slipping
 from compare.kit import style
 from compare.kit.drawing import Drawing, Material, Motion
 from compare.kit.record import Measurement
-from compare.subjects.unsteady.measure import JUMP, caught_up, odd_part
+from compare.subjects.unsteady.measure import caught_up, odd_part
 from model import Case, Flow, Parameters
 
 SET = "reference"
@@ -106,7 +106,7 @@ def draw_pulsation(of: Measurements) -> Figure:
 
 def caption_unsteady(of: Measurements) -> str:
     """Of jumps and ramps."""
-    measured = f" Dots: mujoco, half the difference of two jumps by {JUMP:.1%}, up and down." if of.runs else ""
+    measured = " Dots: mujoco, half the difference of two small jumps, up and down." if of.runs else ""
     return style.caption(
         REFERENCE,
         "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls approaches its "

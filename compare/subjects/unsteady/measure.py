@@ -40,10 +40,9 @@ SAMPLES, LASTS = 256, 5
 """Samples in a period, and how many of them slip must last to count: friction may be full for a moment before."""
 PHASES = 8
 """Phases of a period at which the motion is started anew from its state."""
-
-
 JUMP = 1e-3
-"""Relative size of a jump."""
+"""Size of a jump from rolling divided by the flow, and from slipping by a third of the range of flows in which it is:
+the response to a small jump is wanted, and near the ends of that range it is far from linear."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +65,8 @@ class Pulsation:
     """omega_c divided by omega_0, from the Fourier sums over two periods."""
     uncertainty: float = math.inf
     """Of the parts of `ratio`."""
-    rolls: bool = True
-    """Whether the ball rolls all the time."""
+    failure: str = ""
+    """Why it isn't known how the ball rolls; empty if it does all the time."""
     tasks: tuple[Task, ...] = ()
     """The last two runs."""
 
@@ -116,15 +115,14 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
         small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, 1.1 * room) for n in octaves]
     followed = _followed(lab, small)
     for each in followed:
-        if not each.rolls:
-            at = f"at {each.frequency:g} Hz a ball slips in a pulsation half as large as in a slow one"
-            yield Missing("pulsation", each.set, at)
+        if each.failure:
+            yield Missing("pulsation", each.set, f"at {each.frequency:g} Hz {each.failure}")
             continue
         gain, lag = abs(each.ratio), -cmath.phase(each.ratio)
         own = {"gain": Measured(gain, each.uncertainty), "phase_lag": Measured(lag, each.uncertainty / gain)}
         for quantity, value in own.items():
             yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
-    rolling, slipping = _raised(lab, [each for each in followed if each.rolls]), []
+    rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
     for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
         at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
         # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
@@ -149,38 +147,48 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
 
 def _rounds(
     lab: Lab, driven: Sequence[tuple[Pulsation, float]], refine: int, samples: int, slips: bool
-) -> list[list[tuple[Task, Trajectory, float]]]:
-    """Runs in pulsations of these amplitudes until they are settled, the last with half the step: the last two rounds.
+) -> list[list[tuple[Task, Trajectory, float]] | str]:
+    """Runs in pulsations of these amplitudes until they are settled: the last two of each, the last with half the step,
+    or why one broke down.
 
     Each run comes with its task and the limit of omega_c as its periods begin, from which the next one starts; a ball
     that slips goes on with the rest of its last state.
     """
-    states, rounds = [each.start(a) for each, a in driven], []
+    states, seen = (
+        [each.start(a) for each, a in driven],
+        list[list[tuple[Task, Trajectory, float]] | str]([[]] * len(driven)),
+    )
     for n in range(ROUNDS):
         times = refine * (2 if n == ROUNDS - 1 else 1)
-        tasks = [each.task(lab, a, x, PERIODS, times, samples) for (each, a), x in zip(driven, states, strict=True)]
-        runs = lab.run(tasks)
-        limits = [limit(run.omega_c[samples::samples]) for run in runs]
-        states = [
-            State.of(run.x[-1])._replace(omega_c=omega_c).stacked() if slips else each.begun(omega_c).start(a)
-            for (each, a), run, omega_c in zip(driven, runs, limits, strict=True)
-        ]
-        rounds.append(list(zip(tasks, runs, limits, strict=True)))
-    return rounds[-2:]
+        todo = [(k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)]
+        tasks = [each.task(lab, a, states[k], PERIODS, times, samples) for k, each, a, _ in todo]
+        for (k, each, a, before), task, run in zip(todo, tasks, lab.each(tasks), strict=True):
+            if isinstance(run, str):
+                seen[k] = f"the run {run}"
+                continue
+            omega_c = limit(run.omega_c[samples::samples])
+            slid = State.of(run.x[-1])._replace(omega_c=omega_c).stacked()
+            states[k] = slid if slips else each.begun(omega_c).start(a)
+            seen[k] = [*before[-1:], (task, run, omega_c)]
+    return seen
 
 
 def _followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """How balls follow pulsations of their own amplitudes."""
     followed, last = [], slice(-2 * SAMPLES, None)
     rounds = _rounds(lab, [(each, each.amplitude) for each in pulsations], 2, SAMPLES, slips=False)
-    for each, (earlier, before, _), (later, run, omega_c) in zip(pulsations, *rounds, strict=True):
+    for each, seen in zip(pulsations, rounds, strict=True):
+        if isinstance(seen, str):
+            followed.append(replace(each, failure=seen))
+            continue
+        (earlier, before, _), (later, run, omega_c) = seen
         first, ratio = (
             complex(2j * np.mean(x[last] * np.exp(-2j * math.pi * each.frequency * t[last])) / each.amplitude)
             for t, x in ((before.time, before.omega_c), (run.time, run.omega_c))
         )
-        change, rolls = abs(ratio - first), rolls_on(run)
-        new = replace(each.begun(omega_c), ratio=ratio, uncertainty=change, rolls=rolls, tasks=(earlier, later))
-        followed.append(new)
+        failure = "" if rolls_on(run) else "a ball slips in a pulsation half as large as in a slow one"
+        new, change, tasks = each.begun(omega_c), abs(ratio - first), (earlier, later)
+        followed.append(replace(new, ratio=ratio, uncertainty=change, failure=failure, tasks=tasks))
     return followed
 
 
@@ -192,7 +200,7 @@ def _raised(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
             replace(each, amplitude=RAISE * each.amplitude, begin=each.begin * RAISE**each.power)
             for each in (raised[k] for k in todo)
         ]
-        still = [(k, each) for k, each in zip(todo, _followed(lab, higher), strict=True) if each.rolls]
+        still = [(k, each) for k, each in zip(todo, _followed(lab, higher), strict=True) if not each.failure]
         for k, each in still:
             raised[k] = replace(each, power=math.log(each.begin / raised[k].begin, RAISE))
         todo = [k for k, _ in still]
@@ -229,15 +237,21 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
     """
 
     samples = 8 * PHASES
-    coarse, fine = _rounds(lab, slipping, 1, samples, slips=True)
+    rounds = _rounds(lab, slipping, 1, samples, slips=True)
     anew = [
         each.task(lab, a, x, 1, 1, samples, phase=2 * math.pi * k / PHASES)
-        for (each, a), (_, run, _) in zip(slipping, coarse, strict=True)
-        for k, x in enumerate(run.x[-1 - samples : -1 : samples // PHASES])
+        for (each, a), seen in zip(slipping, rounds, strict=True)
+        if not isinstance(seen, str)
+        for k, x in enumerate(seen[0][1].x[-1 - samples : -1 : samples // PHASES])
     ]
-    begun = np.reshape([run.theta[-1] - run.theta[0] for run in lab.run(anew)], (-1, PHASES))
-    pairs = zip(slipping, begun, coarse, fine, strict=True)
-    for (each, amplitude), turns, (_, run, _), (task, halved, _) in pairs:
+    begun = lab.groups([anew[k : k + PHASES] for k in range(0, len(anew), PHASES)])
+    for (each, amplitude), seen in zip(slipping, rounds, strict=True):
+        at = f"the mean reading at {each.frequency:g} Hz"
+        if isinstance(seen, str) or isinstance(again := next(begun), str):
+            yield Missing("pulsation", each.set, f"{at}: {seen if isinstance(seen, str) else f'the run {again}'}")
+            continue
+        (_, run, _), (task, halved, _) = seen
+        turns = np.array([period.theta[-1] - period.theta[0] for period in again])
         before, usual = (np.diff(run.theta[::samples]) * each.frequency)[-2:].tolist()
         first, mean = (np.diff(halved.theta[::samples]) * each.frequency)[-2:].tolist()
         value = mean - each.p.omega_0
@@ -246,7 +260,6 @@ def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterat
         # Slip begins and ends within a coarse step: the mean error is uncertain by half of that part.
         error = Measured(value, drift + abs(value) / round(task.steps / PERIODS))
         row = each.row(lab, "mean_error", error, [task], amplitude=amplitude)
-        at = f"the mean reading at {each.frequency:g} Hz"
         yield if_found(row, f"{at} is none")
 
 
@@ -259,11 +272,13 @@ def limit(values: Array) -> float:
 def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at which a ramp ends it."""
     trials: list[Trial] = []
-    starts: list[tuple[tuple[float, float] | None, Start]] = []
+    starts: list[tuple[float, float, Start]] = []  # with the size of a jump, or the range and the end of a ramp
 
-    def jump(set: str, p: Parameters, case: Case, x0: State) -> None:
-        sides, known = tuple(p.replace(omega_0=p.omega_0 * (1 + side * JUMP)) for side in (1, -1)), {"case": case.name}
-        motion = Trial(set, p, case.name, x0.stacked(), lasting(p, 48.0), (2, 4), 4000, _jumped, None, sides, known)
+    def jump(set: str, p: Parameters, case: Case, x0: State, size: float) -> None:
+        sides, known = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1)), {"case": case.name}
+        t_end = lasting(p, 48.0)
+        samples = max(4000, round(t_end / (4 * coarse_step(p))))  # drag may be weak, and peaks come soon
+        motion = Trial(set, p, case.name, x0.stacked(), t_end, (2, 4), samples, _jumped, None, sides, known)
         trials.append(motion)
 
     for name, p in sets.items():
@@ -273,24 +288,25 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             continue
         if p.drag == STOKES:  # with others there is no delay that all small jumps share
             q = p.replace(omega_0=0.85 * begins)
-            jump(name, q, Case.RR, State(omega_c=q.omega_0))
-        starts.append((None, Start(name, p.replace(omega_0=begins + 0.3 * (holds - begins)), "jump", np.zeros(8))))
+            jump(name, q, Case.RR, State(omega_c=q.omega_0), JUMP * q.omega_0)
+        begun = Start(name, p.replace(omega_0=begins + 0.3 * (holds - begins)), "jump", np.zeros(8))
+        starts.append((JUMP / 3 * (holds - begins), 0.0, begun))
         if ends is None:
             yield Missing("unsteady", name, "no flow was measured at which slipping at both points ends in a jump")
         else:
             span = ends - begins
             first = p.replace(omega_0=begins + 0.75 * span)
-            starts.append(((span, begins + 1.35 * span), Start(name, first, "ramp", np.zeros(8))))
-    for (ramp, start), state in zip(starts, settle(lab, [start for _, start in starts]), strict=True):
+            starts.append((span, begins + 1.35 * span, Start(name, first, "ramp", np.zeros(8))))
+    for (span, end, start), state in zip(starts, settle(lab, [start for *_, start in starts]), strict=True):
         if state.failure or state.case is not Case.SS:
             why = state.failure or state.case.name
             yield Missing("unsteady", start.set, f"no settled slipping to start from: {why}")
             continue
         x0 = State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0)  # at both walls to the last digit
-        if ramp is None:
-            jump(start.set, start.p, Case.SS, x0)
+        if not end:
+            jump(start.set, start.p, Case.SS, x0, span)
         else:
-            (span, end), p, x = ramp, start.p, x0.stacked()
+            p, x = start.p, x0.stacked()
             for rate in lab.effort("unsteady.rates"):
                 rise = rate * p.c * span
                 t_end, known = (end - p.omega_0) / rise, {"rate": rise, **state_of(x[:6])}

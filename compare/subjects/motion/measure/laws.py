@@ -51,17 +51,20 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
         half = Flow.steady(fast / 2)
         starts = (up, State()), (down, State(y=2 * p.R, omega_c=fast)), (half, State(omega_c=fast / 3, h=p.R / 2))
-        for parts in refined:
-            tasks.append([lab.task(p, x, t_end, step / parts, flow=flow, samples=LASTS) for flow, x in starts])
+        finer = [(step / parts, *start) for parts in refined for start in starts]
+        tasks.append([lab.task(p, x, t_end, h, flow=flow, samples=LASTS) for h, flow, x in finer])
     falls = []
     for p in balls.values():
         # In the middle of still fluid, off floor and wall, from rest and sinking already.
         step, middle = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
         falling = middle, middle._replace(v_y=-math.sqrt(p.g * p.R))
-        falls += [[lab.task(p, x, 64 * step, step / parts, samples=64) for x in falling] for parts in refined]
+        falls.append([lab.task(p, x, 64 * step, step / parts, samples=64) for parts in refined for x in falling])
     runs = lab.groups([*tasks, *falls])
-    for (name, p), fine_tasks in zip(sets.items(), tasks[1::2], strict=True):
-        coarse, fine = deviations(next(runs)), deviations(next(runs))
+    for (name, p), own in zip(sets.items(), tasks, strict=True):
+        if isinstance(got := next(runs), str):
+            yield Missing(PROTOCOL, name, f"the run {got}")
+            continue
+        coarse, fine = deviations(got[: len(got) // 2]), deviations(got[len(got) // 2 :])
         for key, value in fine.items():
             quantity, law, contact = key
             if math.isnan(value) or math.isnan(coarse[key]):
@@ -70,13 +73,16 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             # Halving the step may by chance not show what it does: of both contacts the larger change stands.
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == key[:2]]
             sure = Measured(value, math.hypot(np.nanmax(changes), ROUNDING))
-            row = measurement(lab, PROTOCOL, name, p, quantity, sure, fine_tasks, law=law, contact=contact)
+            row = measurement(lab, PROTOCOL, name, p, quantity, sure, own[len(own) // 2 :], law=law, contact=contact)
             yield row
-    for (name, p), fine_tasks in zip(balls.items(), falls[1::2], strict=True):
-        (before, _), (speed, lasts) = _sinking_speed(*next(runs)), _sinking_speed(*next(runs))
+    for (name, p), own, got in zip(balls.items(), falls, runs, strict=True):
+        if isinstance(got, str):
+            yield Missing(PROTOCOL, name, f"the run {got}")
+            continue
+        (before, _), (speed, lasts) = _sinking_speed(*got[:2]), _sinking_speed(*got[2:])
         # What is left of a fall that has only just begun is a difference of speeds, each of them rounded in every step.
         sinking = Measured(speed, math.hypot(speed - before, ROUNDING * abs(speed) / (p.c * lasts)))
-        yield measurement(lab, PROTOCOL, name, p, "v_y", sinking, fine_tasks, case="NN", by=name, **FLUIDS[name])
+        yield measurement(lab, PROTOCOL, name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name])
 
 
 def deviations(runs: Sequence[Trajectory]) -> dict[tuple[str, str, str], float]:

@@ -34,6 +34,7 @@ from compare.kit.short import (
     random_state,
 )
 from compare.kit.statistics import Measured
+from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
@@ -125,10 +126,15 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
                 starts.append(replace(starts[-1], p=q))
     steps = CENTRES[-1] + HALF_WINDOW + NEAR
     tasks = [lab.pair(start.p, start.x0, steps, coarse_step(start.p) / REFINED) for start in starts]
-    runs = list(lab.groups(tasks))
+    runs: list[tuple[Start, list[Task], list[Trajectory]]] = []
+    for start, pair, got in zip(starts, tasks, lab.groups(tasks), strict=True):
+        if isinstance(got, str):
+            yield Missing("field", start.set, f"from {start.name}: the run {got}", 0)
+        else:
+            runs.append((start, pair, got))
     kept = Counter[tuple[str, float, Case]]()
     for centre in CENTRES:
-        for start, pair, (coarse, fine) in zip(starts, tasks, runs, strict=True):
+        for start, pair, (coarse, fine) in runs:
             case = Case(int(coarse.case[centre]))
             if kept[start.set, start.p.nu_f, case] == lab.effort("field.kept"):
                 continue
@@ -287,7 +293,11 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         lab.pair(start.p, start.x0, round(LANDED * time_unit(start.p) / step), step)
         for start, step in zip(starts, steps, strict=True)
     ]
-    for start, step, pair, (coarse, fine) in zip(starts, steps, pairs, lab.groups(pairs), strict=True):
+    for start, step, pair, got in zip(starts, steps, pairs, lab.groups(pairs), strict=True):
+        if isinstance(got, str):
+            yield Missing("impacts", start.set, f"{start.name}: the run {got}", len(NAMES))
+            continue
+        coarse, fine = got
         contact = [case.A if start.name.startswith("floor") else case.B for case in coarse.cases]
         at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + AFTER
         if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:

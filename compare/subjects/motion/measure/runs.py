@@ -81,7 +81,11 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         step = coarse_step(p)
         count = round(lasts * time_unit(p) / step)
         pairs.append([lab.task(p, x, count * step, step / times, samples=count) for times in REFINED])
-    for (name, how, p, x, _), tasks, (coarse, fine) in zip(runs, pairs, lab.groups(pairs), strict=True):
+    for (name, how, p, x, _), tasks, got in zip(runs, pairs, lab.groups(pairs), strict=True):
+        if isinstance(got, str):
+            yield Missing("runs", name, f"{how}: the run {got}", 1 if how in ("smooth wall", "rough floor") else len(x))
+            continue
+        coarse, fine = got
         at: dict[str, Condition] = {"start": how, "time": float(fine.time[-1]), **state_of(x.stacked())}
         if coarse.case[-1] != fine.case[-1]:
             yield Missing("runs", name, f"{how}: with half the time step the ball ends in another case")

@@ -150,6 +150,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         grown = []
         for push in pushes:
             own, pairs = next(runs)
+            if isinstance(pairs, str):
+                yield Missing("growth", push.start.set, f"from {push.inner.name} to {push.outer.name}: the run {pairs}")
+                continue
             if value := growth(push, pairs):
                 grown.append(value)
                 yield push.row(lab, "growth", "gamma", value, own)
@@ -250,9 +253,13 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
             angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
             fans.append([Push(start, Case.NR, Case.NS, np.array([0.0, np.sin(b), np.cos(b)])) for b in angles])
     runs = lab.groups([push.tasks(lab) for fan in fans for push in fan])
-    why = "slip along some direction did not last, or no direction stands out"
     for fan in fans:
-        grown = [value for push in fan if (value := growth(push, next(runs)))]
+        why, grown = "slip along some direction did not last, or no direction stands out", []
+        for push in fan:
+            if isinstance(got := next(runs), str):
+                why = f"the run {got}"
+            elif value := growth(push, got):
+                grown.append(value)
         angle = math.nan
         if len(grown) == DIRECTIONS:
             harmonics = np.fft.rfft([g.value for g in grown]) * 2 / DIRECTIONS

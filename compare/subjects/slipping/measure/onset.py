@@ -143,11 +143,14 @@ def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
         yield if_found(push.row(lab, "bounds", f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
 
 
-def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, list[Task], list[Measurement]]]:
+def _points(
+    lab: Lab, rows: Sequence[Sequence[Push]]
+) -> Iterator[tuple[Array, list[Task], list[Measurement | Missing]]]:
     """Flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2, of every row of pushes, the runs, and the strays.
 
     gamma is for a vanishing step and size of slip, from two sizes with the shorter step, and one with the longer one;
-    it is uncertain by what the step and the degree of the polynomials change, and nan if the case was another.
+    it is uncertain by what the step and the degree of the polynomials change, and nan if the case was another or a run
+    broke down, which the strays say.
     """
     tasks = []
     for push in (push for pushes in rows for push in pushes):
@@ -155,18 +158,23 @@ def _points(lab: Lab, rows: Sequence[Sequence[Push]]) -> Iterator[tuple[Array, l
         tasks.append([*push.pair(lab, large_size), push.pair(lab, small_size)[1]])
     runs, todo = lab.groups(tasks), iter(tasks)
     for pushes in rows:
-        points, strays, own = [], [], [next(todo) for _ in pushes]
+        points, own = [], [next(todo) for _ in pushes]
+        strays: list[Measurement | Missing] = []
         for push, pair in zip(pushes, own, strict=True):
-            records = next(runs)
+            p, records = push.start.p, next(runs)
+            if isinstance(records, str):
+                strays.append(Missing("bounds", push.start.set, f"from {push.inner.name}: the run {records}", 2))
+                points.append((p.omega_0, math.nan, math.nan))
+                continue
             size = MEDIUM[0] if push.inner is Case.NR else push.sizes[0]
-            strays.append(push.stray(lab, "bounds", size, pair[:2], records[:2]))
+            if stray := push.stray(lab, "bounds", size, pair[:2], records[:2]):
+                strays.append(stray)
             coarse, large, small = (push.rates(run) for run in records)
             best, change = without_size(np.array([large, small])), (large - coarse)[0]
-            p = push.start.p
             noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p) * slip_unit(p))
             points.append((p.omega_0, best[0] + change * LIMIT, noise))
         tasks_of_row = [task for each in own for task in each]
-        yield np.reshape(points, (-1, 3)).T, tasks_of_row, [stray for stray in strays if stray]
+        yield np.reshape(points, (-1, 3)).T, tasks_of_row, strays
 
 
 def _rolling(name: str, p: Parameters) -> Iterator[Crossing]:
@@ -228,7 +236,10 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
     first = [[arrow.task(Omega / time_unit(arrow.p)) for Omega in ORBITS] for arrow in arrows]
     seen: list[list[Trajectory]] = []
     near: list[list[Task]] = []
-    for arrow, runs in zip(arrows, lab.groups(first), strict=True):
+    why_not: list[str] = []
+    for arrow, got in zip(arrows, lab.groups(first), strict=True):
+        runs = [] if isinstance(got, str) else got
+        why_not.append(f"the run {got}" if isinstance(got, str) else "the ball doesn't stay in it at any orbit")
         # The first runs in a row in which the ball passes into no case but the two ends of the arrow.
         strays = [not np.isin(run.case[SKIPPED:], [arrow.inner, arrow.outer]).all() for run in runs]
         begin = [*strays, False].index(False)
@@ -240,19 +251,19 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
             (a, high), (b, low) = pressed[-2:]
             where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
             near[-1] = [arrow.task(where * (1 - part), times) for part in NEAR for times in (1, 2) if where]
-    for arrow, orbits, begun, tasks, runs in zip(arrows, first, seen, near, lab.groups(near), strict=True):
+    rows = zip(arrows, first, seen, why_not, near, lab.groups(near), strict=True)
+    for arrow, orbits, begun, why, tasks, got in rows:
         lifted = next((run for run in begun if _force(run) is None), None)
         if not begun:
-            yield Missing("lift", arrow.set, f"the ball doesn't stay in {arrow.inner.name} at any orbit")
+            yield Missing("lift", arrow.set, f"out of {arrow.inner.name}: {why}")
         elif lifted is None:
             yield arrow.row("lifts", float(begun[-1].omega_c[0]), 0.0, orbits)
         elif (to := Case(int(lifted.case[-1]))) is not arrow.outer:
-            yield Missing(
-                "lift", arrow.set, f"a ball that leaves the floor out of {arrow.inner.name} ends in {to.name}"
-            )
-        elif (value := _onset(runs)) is None:
-            why = f"where the ball leaves {arrow.inner.name} the contact at the floor opens and closes"
+            why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {to.name}"
             yield Missing("lift", arrow.set, why)
+        elif isinstance(got, str) or (value := _onset(got)) is None:
+            why = f"the run {got}" if isinstance(got, str) else "the contact at the floor opens and closes"
+            yield Missing("lift", arrow.set, f"where the ball leaves {arrow.inner.name} {why}")
         else:
             yield arrow.row("lift_onset", 1 / time_unit(arrow.p), value, tasks)
 
