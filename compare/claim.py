@@ -59,7 +59,7 @@ def every(*whens: When) -> When:
 
 
 def one(m: Measurement) -> float:
-    """The size of what is a ratio, an angle, or a deviation divided by its own scale."""
+    """The natural size of a ratio, an angle, or a deviation that is divided by its scale already."""
     return 1.0
 
 
@@ -102,7 +102,7 @@ class Claim:
     level: Level = Level.QUICK
     """The least level at which it is measured."""
     section: str = ""
-    """Part of the `catalogue`, which says it."""
+    """Section of the report, set by the `catalogue`."""
 
     def __post_init__(self) -> None:
         if (self.algebra is not None) != (self.text is Text.FORMAL) or bool(self.bearings) == bool(self.algebra):
@@ -153,7 +153,7 @@ class Verdict:
     def passed(self) -> bool:
         """Whether the outcome is the one to be expected.
 
-        What is refuted by an example is so on the sets of the study: a set of one's own may show none.
+        What an example refutes is refuted on the sets of the study; a user's own set may hold no such example.
         """
         if self.outcome is Outcome.CONFIRMED and self.claim.expected is Outcome.REFUTED:
             return not {check.measurement.set for check in self.checks} & sets(Level.FULL).keys()
@@ -166,7 +166,7 @@ class Verdict:
 
     @property
     def resolving_power(self) -> Mapping[str, float]:
-        """By quantity, the relative error of theory that every check that can tell would notice: the largest of all."""
+        """By quantity, the smallest relative error of theory that every conclusive check would notice."""
         power: dict[str, float] = {}
         fine = {check.measurement.quantity for check in self.checks if check.conclusive}
         for check in self.checks:

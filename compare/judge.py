@@ -102,7 +102,7 @@ def checks_of(claim: Claim, records: Records) -> list[tuple[int, Check]]:
 
 
 def check(bearing: Bearing, m: Measurement) -> Check:
-    """One measurement beside its prediction; what must be equal to the last digit has no scale but 1."""
+    """One measurement beside its prediction; the scale of what must be exactly equal is 1."""
     try:
         prediction = bearing.predict(m)
         size = bearing.size(m) if bearing.size else None

@@ -1,9 +1,9 @@
 """What engines other than the one on trial say of a claim: in the limit of no time step, or as they come.
 
 An engine in the limit measures the same with several time steps. Of every check the deviation from theory, divided by
-its scale, is extrapolated to no step, by polynomials in h through the steps: from h on, or also from h^2 on where the
-order found is above 1.5. The standard uncertainty is what the last term changes, and what both kinds of polynomials
-differ by. A claim is then judged as always, with a ceiling on what a check may overlook.
+its scale, is extrapolated to no step, by polynomials in h through the steps that begin with h or, too, where the order
+found is above 1.5, with h^2. The standard uncertainty is made up of what the last term changes and of the difference of
+both kinds of polynomials. A claim is then judged as always, with a ceiling on what a check may overlook.
 
 An engine as it comes measures with its own step alone, and a claim holds if no number is off by more than a share of
 its scale, `Engine.allowance`.
@@ -194,7 +194,8 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
         return float(weights @ errors[-terms - 1 :]), float(np.linalg.norm(weights * own[-terms - 1 :]))
 
     def limit(q: int) -> Measured:
-        """By as many terms as give the surest: more leave less out, but make more of the noise."""
+        """With the number of terms that gives the least uncertainty: more terms leave less out, but amplify the
+        noise."""
         found, (before, _) = [], fit(q, 0)
         for terms in range(1, len(steps)):
             value, noise = fit(q, terms)

@@ -217,7 +217,7 @@ class Balls:
         self.damp(runs)
 
     def lay_down(self, runs: Runs) -> None:
-        """Let runs of which nothing more is wanted rest where the fluid does not move them."""
+        """Put runs that have ended to rest, where the fluid does not move them."""
         self.resize(runs, np.full(len(runs), TICKS))
         self.qpos[1:3, runs], self.qvel[:, runs], self.last[:, runs] = 0.0, 0.0, 0.0
         for table in (self.table, self._normal):

@@ -224,7 +224,7 @@ def hovering(v: Velocity, rho: Quantity, ball: Ball) -> tuple[Quantity, Quantity
 
 
 def unbearable(hover: Quantity, most: Quantity) -> Quantity:
-    """The share of a slip speed that is too much for a contact to be continuous."""
+    """The share of a slip speed beyond that up to which the contact is continuous."""
     excess = hover - most
     return excess * (excess > 0) / (hover + (hover == 0))
 

@@ -36,7 +36,7 @@ def begin(balls: Balls, fluid: Array) -> None:
 
 
 def touching(balls: Balls) -> Mask:
-    """Which contacts are closed or as good as that, (2, runs)."""
+    """Which contacts are closed or nearly so, (2, runs)."""
     slow = np.abs(balls.speeds) * balls.settings.timestep < balls.reach
     return (balls.loads > 0) | ((np.abs(balls.gaps) < balls.reach) & slow)
 

@@ -55,7 +55,7 @@ class Number:
 
 
 _LARGE = 2.0
-"""Lengths of a meter, m, beyond which it is asked whether they are in millimetres."""
+"""Lengths of a meter, m, above which the user is asked whether millimetres were meant."""
 number = Number()
 count = Number(allowed=Range(1, 1e6, whole=True))
 count_or_none = Number(allowed=Range(0, 1e6, whole=True))
@@ -66,7 +66,7 @@ moment = Number("s", NOT_NEGATIVE)
 
 
 def written(text: str) -> Path:
-    """A file to be written, for argparse: that it can't be is better known before a long run than after."""
+    """A file to be written, for argparse; one that can't be written is refused before a long run, not after."""
     from model.files import check_writable  # here, because what only shows needs no HDF5
 
     try:

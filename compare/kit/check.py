@@ -42,7 +42,8 @@ class Check:
 
     @property
     def share(self) -> float:
-        """Deviation over tolerance, without sign; inf where theory knows no such state, or no tolerance is left."""
+        """Size of the deviation divided by the tolerance; inf where theory knows no such state, or without
+        tolerance."""
         if self.deviation == 0:
             return 0.0
         share = abs(self.deviation / self.tolerance) if self.tolerance else math.inf

@@ -44,9 +44,9 @@ class Engine:
     options: tuple[str, ...]
     """Options of the command line that `configure` takes."""
     configure: Callable[[Mapping[str, float], Parameters], Settings]
-    """Settings of a person's run from such options; those not given have their defaults."""
+    """Settings of a user's run from such options; those not given have their defaults."""
     study: Callable[[float, Parameters], Settings] | None = None
-    """Settings of a study for a time step in s, where they are others than those of a person's run."""
+    """Settings of a study for a time step in s, where they differ from those of a user's run."""
     simulate: Simulate | None = None
     stream: Stream | None = None
     sources: tuple[str, ...]
@@ -54,7 +54,7 @@ class Engine:
     stands_on: tuple[str, ...]
     """Packages whose versions do."""
     needs: Library | None = None
-    """What it can't run without, and what not everybody has; its version counts, too."""
+    """An optional library that it needs; the version of that is one of `versions`."""
     as_it_comes: str = ""
     """Name of the same engine as a newcomer would use it."""
     title: str = ""
@@ -67,7 +67,7 @@ class Engine:
     """Share of its scale by which a number may be off, chosen before anything was measured so; 0 where each measurement
     has a tolerance of its own."""
     beside: tuple[str, ...] = ()
-    """Engines that are heard beside it when it is on trial."""
+    """Engines that measure beside it, as further witnesses, when it is on trial."""
     mark: str
     """Marker of matplotlib."""
 

@@ -15,8 +15,8 @@ from model.arrays import Array
 POINTS = 5
 """Least number of points that `vanishing`, `initial_slope` and `turning` extrapolate from."""
 LEAST_RATIO, LARGEST_RATIO = 0.2, 0.9
-"""Range of the ratio of the geometric series as which the changes of an estimate are continued, one point to the next:
-two changes may be small by chance, and those that hardly shrink add up to nothing finite."""
+"""Range of the ratio of the geometric series by which the changes of an estimate, point by point, are continued: two
+changes may be small by chance, and with a ratio near 1 the sum has no bound."""
 FAR = 10.0
 """Largest distance of a maximum from the nearest point, divided by the length of the row of points: farther away the
 maximum is one of round-off."""

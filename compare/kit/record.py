@@ -94,7 +94,7 @@ def sure_enough(name: str, value: Measured, scale: float) -> bool:
 
 
 def if_found(row: Measurement, why: str) -> Measurement | Missing:
-    """A measurement, however coarse: the judge says whether it can tell; or why no number came out."""
+    """The measurement, however coarse, since the judge says whether it can tell; or why there is no number."""
     return row if np.isfinite([row.value, row.uncertainty]).all() else Missing(row.protocol, row.set, why)
 
 

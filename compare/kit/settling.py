@@ -59,7 +59,7 @@ class Settled:
     """Its mean state, (8,), from which it goes on: without the oscillation that it still has."""
     task: Task = field(repr=False)
     excess: float = math.inf
-    """How many times as much as it may for a comparison with theory it drifts or swings."""
+    """Drift or swing divided by its limit for a comparison with theory."""
     failure: str = ""
 
 
@@ -133,8 +133,8 @@ def settle(
 
     Of an engine as it comes every state counts, for what it is when time is up.
 
-    A settled state may drift and swing `loose` times as much as values may that are held against theory; but as long as
-    there are rounds, one that exceeds `sharp` times that goes on.
+    A settled state may drift and swing up to `loose` times the limit for values that are compared with theory; as long
+    as there are rounds, one that exceeds `sharp` times that limit goes on.
 
     It goes on from its mean, but at the height from which it started: the motion of a ball on the wall alone does not
     depend on its height, and one that sinks must not land.
@@ -198,8 +198,8 @@ def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Set
     """What a run has come to; `loose` as in `settle`.
 
     A run is settled once its drift lets each check resolve twice as much as it should, with no quantity swinging by
-    more than a thousandth of its scale, in a window with 98 % of its samples in one case. Of two windows that counts
-    which drifts less: half of the run for what oscillates, an eighth for what only decays.
+    more than a thousandth of its scale, in a window with 98 % of its samples in one case. Of two windows the one that
+    drifts less counts: half of the run for what oscillates, an eighth for what only decays.
     """
     p = start.p
     series = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}

@@ -1,6 +1,6 @@
 """Where tasks run: processes of this machine, or the workers of a Dask scheduler.
 
-Both are executors of `concurrent.futures`, and `Workers` says what a campaign must know beside.
+Both are executors of `concurrent.futures`, and `Workers` says what else a campaign must know.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from model.parameters import Range, check_number
 
 T = TypeVar("T")
 Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
-"""What does as `map` does."""
+"""A function that is called like `map`."""
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
 

@@ -103,7 +103,7 @@ class Scene(Protocol):
         """The contact points of the last step."""
 
     def close(self) -> None:
-        """Give up what the engine holds."""
+        """Release what the engine holds."""
 
 
 class BreakdownError(RuntimeError):

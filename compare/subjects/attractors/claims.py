@@ -23,12 +23,12 @@ _PERIODIC = "Section 5.3, last paragraph"
 
 
 def _hops(m: Measurement) -> float:
-    """Whether the ball of theory still hops after as long a run from the same state."""
+    """Whether theory's ball still hops after a run of the same length from the same state."""
     return hops(simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
 
 
 def _hops_on(m: Measurement) -> float:
-    """Whether the hop of a ball that rebounds is stable, followed from that without a rebound."""
+    """Whether the hop of a ball that rebounds is stable, by continuation from the hop without a rebound."""
     p, end = m.parameters, float(m.conditions["restitution"])
     orbit = theory(orbits.refine, p, TOP, 0.22)  # s, about its period
     for restitution in [*np.arange(0.2, end, 0.1).tolist(), end] if end else []:

@@ -5,7 +5,7 @@
 * The hop is followed along rougher walls to where disturbances grow; on both sides of that wall balls are left alone.
 * Balls that rebound from floor and wall hop, too: they are followed from one coefficient of restitution to the next.
 * A ball swings beside a Hopf point: it slips at both points, and goes round now faster and now slower.
-* Balls in strong drag are followed until drag has had its time: do they go on hopping?
+* Balls in strong drag are run for 60/c, long enough for drag to act: do they go on hopping?
 * On floors so rough (mu > 1) that forces allow rolling and slipping both: what does the ball settle to?
 """
 
@@ -45,16 +45,16 @@ SAMPLE = 1e-3
 """Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
 WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
 """Friction of the walls along which the hop is followed, in units of that of the set. The first steps are short, as the
-start is extrapolated from one or two hops, and few balls beside a hop come to it."""
+start is extrapolated from one or two hops, and a hop attracts from a small neighbourhood only."""
 REBOUNDS = tuple(round(0.04 * k, 2) for k in range(18))
 """Coefficients of restitution along which it is followed."""
 LONG, LEFT, FINER = (0.0, 0.2, 0.4, 0.48), 20.0, 40
-"""Those at which a ball is left alone, as at the first at which it hops no more; for how long, s; and time steps in one
-of `coarse_step`. With steps so long the smallest hops, beyond 0.5, may end early."""
+"""Coefficients at which a ball is run without further change, as at the first at which it no longer hops; for how long,
+s; and the number of time steps in a `coarse_step`. With these steps the smallest hops, beyond 0.5, may end early."""
 NEAR = 4
-"""The last walls, among which disturbances come to grow."""
+"""The last walls; at one of them disturbances begin to grow."""
 FOLLOWED, ALONE = 10.0, 60.0
-"""How long the ball hops at each wall, and how long it is left alone, s."""
+"""How long the ball hops at each wall, and how long it is run at the last ones, s."""
 SWINGS, SWUNG = 24.0, 4.0
 """Duration of the swing, and the last part of it that is measured, s."""
 STRONG_DRAG = {"mu": (0.05, 1.0), "eta": (0.05, 1.0), "j": (0.2, 0.6), "kappa": (2.0, 8.0), "Omega_0": (0.5, 6.0)}
@@ -107,7 +107,8 @@ def hopping(
 ) -> Iterator[Measurement | Missing]:
     """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would begin.
 
-    With the protocol "stepped" at the flow of the set only, by time stepping, which lets slip begin and turn at steps.
+    With the protocol "stepped" at the flow of the set only, by time stepping, in which slip begins and turns at whole
+    steps only.
     """
     shares = lab.effort("recurrent.flows") if protocol == "recurrent" else (1.0,)
     p = Parameters.named(SET)
@@ -156,7 +157,7 @@ def tops(run: Trajectory, start: float, end: float) -> Hops:
 
 
 def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
-    """What states (n, 8) at tops say of the map from hop to hop, linear in height, omega_c and slip_x.
+    """The map from hop to hop, linear in height, omega_c and slip_x, fitted to states (n, 8) at tops.
 
     The modulus of its largest eigenvalue, the factor by which disturbances grow or shrink; and its fixed point.
     """
@@ -171,7 +172,7 @@ def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
 
 
 def birth(flows: Sequence[float], heights: Sequence[float]) -> Measured:
-    """Flow at which hops would have no height: a parabola through the last three, uncertain by what a line differs."""
+    """Flow at which hops would have no height: a parabola through the last three; a line shows the uncertainty."""
     parabola, line = (float(np.polyfit(heights[-n:], flows[-n:], n - 1)[-1]) for n in (3, 2))
     return Measured(parabola, abs(parabola - line))
 
@@ -252,7 +253,7 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Measured
 def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Period, mean and size of the swing of omega_c, from its turning points, on a very rough floor.
 
-    With other steps than these the contact of the floor, which carries a hundredth of the weight, comes and goes.
+    With other steps than these the contact of the floor, which carries a hundredth of the weight, opens and closes.
     """
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()

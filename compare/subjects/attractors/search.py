@@ -5,7 +5,7 @@ c sqrt(R/g) and Omega_0 = omega_0 sqrt(R/g), by time stepping; the event-driven 
 chunk of sets is a file, named by the hash of all that determines it; a longer search contains the shorter ones.
 
 A map of basins says where the ball ends from each start of a plane of states, on a fine grid by time stepping and on
-a coarse one by MuJoCo. The two should differ only at the boundaries of basins, where the least error decides.
+a coarse one by MuJoCo. The two should differ only at the boundaries of basins, where the smallest error decides.
 """
 
 from __future__ import annotations
@@ -246,7 +246,7 @@ class Basins:
     fates: npt.NDArray[np.int64]
     """Indices of `FATES`, by time stepping, shape (m, n)."""
     coarse: int
-    """MuJoCo has done every `coarse`-th point both ways; 0 for none."""
+    """MuJoCo has computed every `coarse`-th point along both axes; 0 for none."""
     mujoco: npt.NDArray[np.int64]
     """Its fates, shape (m / coarse, n / coarse) rounded up, and its time step in s."""
     timestep: float
@@ -256,7 +256,7 @@ class Basins:
         return int(np.sum(self.fates == FATES.index(fate))), self.fates.size
 
     def differences(self) -> Array:
-        """How far from a boundary each point is at which the two differ, in cells of the fine map; 1 is next to it."""
+        """Distances from a boundary of the points at which the two differ, in cells of the fine map (1: next to it)."""
         from scipy.ndimage import distance_transform_cdt  # slow to import
 
         distance = np.zeros(self.fates.shape)

@@ -43,7 +43,7 @@ def _only_rolling(m: Measurement) -> float:
     """Within the operating range RR, whatever the start on the floor or, as long as it lasts there, on the wall."""
     if m.parameters.omega_0 < analytic.operating_range(m.parameters):
         return float(Case.RR)
-    # The start from which it shows that the range has ended: the ball slips on the floor, or stays on the wall.
+    # The start that shows that the range has ended: the ball slips on the floor, or stays on the wall.
     ended = m.conditions["start"] == ("rest" if slips_first(m) else "on the wall")
     if detected(m) not in cases(m.parameters) - ({Case.RR} if ended else set()):
         raise LookupError("beyond the range, rolling is not the only motion that lasts")
@@ -121,9 +121,7 @@ def _at_event(m: Measurement) -> Measured:
         # A landing without restitution takes away all of the speed.
         values = {"time": float(time), "landing_impulse": impulse, "landing_speed": -impulse / m.parameters.m}
         value = values[m.quantity]
-    return Measured(
-        value, math.hypot(unsure, 100 * RTOL * value)
-    )  # errors of some 100 steps of the integrator may be of one sign
+    return Measured(value, math.hypot(unsure, 100 * RTOL * value))  # errors of 100 steps may have the same sign
 
 
 TOLERANCES = {"mu": 0.05, "eta": 0.05}

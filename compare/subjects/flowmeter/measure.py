@@ -41,7 +41,7 @@ from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
 
 STEP = 1e-3
-"""Relative distance of neighbouring flows; half of it shows what the curvature does."""
+"""Relative distance of neighbouring flows; half of it shows the effect of curvature."""
 ACROSS = (-1e-3, -5e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)
 """Distances from the flow at which slipping sets in, relative to it."""
 SHARP = {"neighbours": 0.3, "jump": 0.1, "mean": 1.0}
@@ -123,8 +123,8 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
 def _slope(curve: Curve, states: Sequence[Settled]) -> Measured | None:
     """The slope of a curve, from its settled states; None where these are not of the cases that belong.
 
-    Between neighbours: central differences over two distances, without the error that goes with the distance squared.
-    The jump: slope above less slope below, each at the threshold itself, above by a cubic through four secants. The
+    Between neighbours: central differences over two distances, so that the error of second order cancels.
+    The jump: slope above minus slope below, each at the threshold itself, above by a cubic through four secants. The
     mean: from where slipping sets in, on the line on which the ball comes there, to the last flow.
     """
     cases = [each.case for each in states]
@@ -262,7 +262,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
             numbers = _landed(run)
         elif name == UPWARDS:  # it falls on the floor soon after
             numbers = {("lift", "first top"): first_top(run)}
-        elif name == BY_SPIN:  # it leaves the floor at a step, up to one late or early, and rises so much less or more
+        elif name == BY_SPIN:  # it leaves the floor at a whole step, up to one late or early, which changes its height
             numbers = {("lift", "end"): Measured(float(run.y[-1]), step / 2 * float(run.v_y.max()))}
         return family(settled_case(run)), numbers
 
@@ -272,7 +272,7 @@ def _trial(lab: Lab, state: Settled, name: str) -> Trial:
 
 
 def _landed(run: Trajectory) -> Numbers:
-    """Onset of slip, and landing: time, speed and vertical impulse. Empty where it doesn't come to that."""
+    """Onset of slip, and landing: time, speed and vertical impulse. Empty if the ball doesn't land."""
     p, step = run.header.parameters, float(run.time[1] - run.time[0])
     slip = run.slip_speed_B / math.sqrt(p.g * p.R)
     touches = np.flatnonzero(run.force_A[:, 1] > 0)
@@ -296,7 +296,8 @@ def _landed(run: Trajectory) -> Numbers:
 def first_top(run: Trajectory) -> Measured:
     """Height in m at which v_y first falls to zero.
 
-    It lies between those that constant acceleration gives from the samples on either side: half of that is unsure.
+    It lies between those that constant acceleration gives from the samples on either side: its uncertainty is half of
+    that range.
     """
     k = int(np.argmax(run.v_y < 0))
     ends = [k - 1, k]

@@ -82,9 +82,8 @@ def _slip_lasts(m: Measurement) -> float:
 def _case(m: Measurement) -> float:
     """The case in which theory's motion ends.
 
-    Where forces admit rolling at both points and yet slip would last, a ball that has rolled until now may go on so: it
-    hangs on the internal force between floor and wall, which the state doesn't hold (docs/theory.md, 7). Either way of
-    leaving it is then the theory's.
+    Where forces admit rolling at both points and slip would last, too, the internal force between floor and wall
+    decides, which the state doesn't contain (docs/theory.md, 7): both outcomes then agree with theory.
     """
     leaves, stays = (
         theory(analytic.simulate, m.parameters, state(m), float(m.conditions["time"]), leave_rolling=how, rtol=RTOL)

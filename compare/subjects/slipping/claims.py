@@ -58,7 +58,7 @@ def _gamma(m: Measurement) -> float:
 
 
 def _strays(protocol: str, when: When) -> Bearing:
-    """The case into which a slip passes that doesn't last."""
+    """The case that follows where a slip doesn't last."""
 
     def case(m: Measurement) -> float:
         n = np.array([_at(m, name) for name in ("n_x", "n_y", "n_z")])
@@ -74,7 +74,7 @@ def _gamma_nr(m: Measurement) -> float:
 
 
 def _lacking(m: Measurement) -> float:
-    """gamma from the forces of NR: friction that rolling takes along the slip less eta times the normal force."""
+    """gamma from the forces of NR: friction that rolling needs along the slip, minus eta times the normal force."""
     p = m.parameters
     _, (B_x, B_y, B_z) = analytic.contact_forces(Case.NR, _x(m), p)
     lacks = B_y * _at(m, "n_z") - B_z * _at(m, "n_y") - p.eta * B_x

@@ -59,11 +59,11 @@ STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 STOPPED = 4.0
 """Coarse steps in which friction may stop the slip of a state at the soonest: a faster decay is not resolved."""
 HOVERS = 10.0
-"""How many times as fast as `STUDY_SLIP` allows for its load a contact may slip: at 20 times it hovers."""
+"""Largest slip speed divided by what `STUDY_SLIP` allows for the load: at 20 the contact hovers."""
 RESOLVED = 0.25
 """Largest exponent in units of the finer time step."""
 REST = 0.05
-"""Measured rates below this share of the drag coefficient c count as none."""
+"""Measured rates below this share of the drag coefficient c count as zero."""
 Exponents = npt.NDArray[np.complex128]
 
 
@@ -105,7 +105,7 @@ class Pushed:
         return tasks
 
     def missing(self, why: str, modes: int = 0) -> Missing:
-        """That rates, decay and frequency of each, were not measured: of some modes, or of all of them."""
+        """That the rates (decay and frequency) of some modes, or of all, were not measured."""
         at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
         return Missing(PROTOCOL, self.start.set, f"{at}: {why}", 2 * (modes or len(self.active)))
 
@@ -134,7 +134,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 def chosen(records: Records, name: str, p: Parameters, more: int) -> Iterator[Pushed | Missing]:
     """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
 
-    Where fewer than that can be pushed, as far as there are any, the rest is missing.
+    Where there are fewer that can be pushed, the rest is missing.
 
     One on the wall alone is pushed high up, and where it only just touches the floor. Contacts must slip neither so
     slowly that a push turns the slip, or friction stops it within a few steps, nor so fast that they hover.
@@ -151,7 +151,7 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> Iterator[Pu
         states.append((q, case, x._replace(y=high(q)) if case.A is Contact.N else x))
         if case is Case.NR:
             states.append((q, Case.SR, x))
-    if p.drag == QUADRATIC:  # it settles no ball that goes round with the fluid; but one that begins so goes on so
+    if p.drag == QUADRATIC:  # no ball settles to going round with the fluid, but one that starts so goes on so
         states.append((p.replace(omega_0=0.5 / unit), Case.RR, State(omega_c=0.5 / unit)))
     for case, most in STATES.items():
         alike, of = [], sorted((s for s in states if s[1] is case), key=lambda s: s[0].omega_0)
@@ -186,7 +186,7 @@ def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
         seen = [max(pair, key=lambda run: stays(run, state.case)) for pair in zip(ups, downs, strict=True)]
         columns = [(1 if run in ups else -1) * (run.x - state.start.x0) for run in seen]
     else:
-        # Where the wall carries nothing, as beside a ball that only spins, no contact with it shows.
+        # Where the wall carries nothing, as beside a ball that only spins, its contact is not detected.
         seen = list(runs[:2] if state.case is Case.RS else runs)
         columns = [(up.x - down.x) / 2 for up, down in zip(ups, downs, strict=True)]
     D = np.stack(columns, axis=-1)[:, state.active] / (size * state.units[:, None])

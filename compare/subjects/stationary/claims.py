@@ -115,9 +115,8 @@ def _leaning(m: Measurement) -> float:
 
 
 def _born(m: Measurement) -> float:
-    """The drag c at which the point where the fold is born, whose eta goes like c^2, is at the eta of the set.
-
-    From that point in the drag that was measured: with the set's own, no fold may be born for any eta below j.
+    """The drag c at which the fold is born at the eta of the set; the eta at which it is born is proportional to c^2.
+    Computed from that point at the measured drag, since at the set's own there may be no fold for any eta below j.
     """
     p = m.parameters.replace(c=m.value)
     born = bifurcation.double_points(p)[0]

@@ -21,7 +21,7 @@ from model.drag import QUADRATIC
 
 PROTOCOL = "settled"
 LIVELY = 10.0
-"""How many times within a round the fluid would stop a free ball in a state whose values count."""
+"""Least duration of a round, in units of the time in which the fluid would stop a free ball, for values to count."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -62,7 +62,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     for state, *_ in alike:
         x0 = State.of(state.mean)._replace(y=max(State.of(state.start.x0).y, 0.0))
         again.append(replace(state.start, x0=x0.stacked()))
-    # With several time steps, their limit is found from all of them, and no single one says how far it is.
+    # With several time steps the limit is extrapolated from all of them, and half the step isn't needed here.
     refined = settle(lab, again, refine=2, span=20.0, sharp=sharp) if not lab.beside else [same for same, *_ in alike]
     for same, fine in zip(alike, refined, strict=True):
         if fine.failure:

@@ -1,6 +1,6 @@
 """Claims about the bifurcations over omega_0: Table 5, Proposition 7, and the branch that divides two attractors.
 
-Fig. 12, and (83) for eta > 1, no ball shows, since a contact would have to pull: they are checked by algebra alone.
+No ball can show Fig. 12, or (83) for eta > 1, since a contact would have to pull: they are checked by algebra alone.
 """
 
 from __future__ import annotations
@@ -65,11 +65,11 @@ _HOLDS: dict[str, Callable[[float, Parameters], float]] = {
     "slip_margin": lambda omega, p: float(rolling_forces.slip_margin(omega, p, omega)),
     "least_utilisation": lambda omega, p: 1 - float(rolling_forces.least_utilisation(omega, p, omega).utilisation),
 }
-"""What changes sign where the contacts can't hold a ball any more that rolls with the fluid."""
+"""Functions that change sign where the contacts can no longer hold a ball that rolls with the fluid."""
 
 
 def _holds(name: str, quantity: str) -> Bearing:
-    """The flow up to which forces admit rolling: for mu < 1 that up to which it goes on."""
+    """The flow up to which forces admit rolling, which is where rolling ends for mu < 1."""
 
     def end(m: Measurement) -> float:
         p, unit = m.parameters.replace(omega_0=1.0), math.sqrt(m.parameters.g / m.parameters.R)

@@ -32,7 +32,7 @@ def _ratio(m: Measurement) -> complex:
 
 
 def _slips(rule: str, relation: Relation) -> Bearing:
-    """The amplitude at which slip begins, if rolling ends by a rule."""
+    """The amplitude at which slip begins, if rolling ends as a rule says."""
 
     def onset(m: Measurement) -> float:
         return theory(pulsation.slip_onset, m.parameters, _at(m), rule)
@@ -86,7 +86,7 @@ CLAIMS = (
                 Bearing(
                     "thresholds",
                     end,
-                    # The flow at which a very slow pulsation about four fifths of it is greatest as the ball slips.
+                    # The greatest flow at which the ball slips in a very slow pulsation about four fifths of it.
                     lambda m: (
                         0.8 * m.parameters.omega_0
                         + pulsation.slow_onset(m.parameters.replace(omega_0=0.8 * m.parameters.omega_0))

@@ -286,7 +286,7 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         if begins is None or holds is None:
             yield Missing("unsteady", name, "no flows were measured between which the ball slips at both points")
             continue
-        if p.drag == STOKES:  # with others there is no delay that all small jumps share
+        if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
             q = p.replace(omega_0=0.85 * begins)
             jump(name, q, Case.RR, State(omega_c=q.omega_0), JUMP * q.omega_0)
         begun = Start(name, p.replace(omega_0=begins + 0.3 * (holds - begins)), "jump", np.zeros(8))
@@ -337,7 +337,7 @@ def odd_part(up: Trajectory, down: Trajectory) -> Array:
 def _jumped(up: Trajectory, down: Trajectory) -> dict[str, Measured]:
     """The delay; time and height of the highest peak, nan where there is none in the first half of the runs."""
     t, y = up.time, odd_part(up, down)
-    # Forces act in the middle of a step: a moment is known to half of the finer one, either way.
+    # Forces act in the middle of a step: times are known to half a finer step.
     late = coarse_step(up.header.parameters) / 4 / math.sqrt(12)
     k, later = peaks(y)
     highest = (k == y.argmax()) & (k < len(t) // 2)

@@ -70,7 +70,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             if math.isnan(value) or math.isnan(coarse[key]):
                 yield Missing(PROTOCOL, name, f"no sample at {contact} to test: {law}", 0)
                 continue
-            # Halving the step may by chance not show what it does: of both contacts the larger change stands.
+            # Halving the step may by chance change little: the larger change of the two contacts counts.
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == key[:2]]
             sure = Measured(value, math.hypot(np.nanmax(changes), ROUNDING))
             row = measurement(lab, PROTOCOL, name, p, quantity, sure, own[len(own) // 2 :], law=law, contact=contact)
@@ -88,7 +88,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 def deviations(runs: Sequence[Trajectory]) -> dict[tuple[str, str, str], float]:
     """How far runs of one set are from every law, dimensionless: by quantity, law and contact.
 
-    nan where no sample shows it.
+    nan where no sample can show it.
     """
 
     def farthest(values: Array, off: float) -> float:
@@ -114,7 +114,7 @@ def deviations(runs: Sequence[Trajectory]) -> dict[tuple[str, str, str], float]:
 def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
     """Normal force, friction, and its difference from friction against the slip, divided by the weight.
 
-    The latter as far as it is more than what the slip turns from one sample to the next. Then slip speed divided by
+    Of the difference only what exceeds the turn of the slip from one sample to the next. Then slip speed divided by
     sqrt(g R), gap divided by R and the contact's letter, empty next to a change of case, each (n,).
     """
     p, k = run.header.parameters, "AB".index(contact)

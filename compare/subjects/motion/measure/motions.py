@@ -49,7 +49,7 @@ NEAR = 4
 """Steps before and after a window in which the case doesn't change, either, so that friction has built up."""
 TURN = 0.5
 """Largest change of a slip in a window, and of that which friction alone would make, divided by the slip: where slip is
-about to vanish, or is held at a trace, friction turns too fast."""
+about to vanish, or very small, friction turns too fast."""
 FASTEST = (3e3, 3e4)
 """Reynolds numbers of some starts under laws of drag other than Stokes', as balls in water have them."""
 MOVING = {
@@ -85,9 +85,9 @@ is taken to have changed, and a few by which a change comes too early or late.""
 NARROW = 1e-4
 """Least gap of an open contact divided by R at the ends of a piece: an unloaded contact may hover."""
 LATE = 2.0
-"""Steps by which two landings may be late; the least slip at the ends of a piece is what weight makes in that time."""
+"""Steps by which two landings may be late; slip at the ends of a piece must exceed what weight causes in that time."""
 LEFT = 0.01
-"""Least share of the friction limit that a rolling contact leaves at the ends of a piece: with less left it creeps."""
+"""Least reserve of friction, relative, of a rolling contact at the ends of a piece: with less it creeps."""
 
 LANDINGS: dict[str, tuple[float, ...]] = {
     "floor, with slip": (0.05, -0.5, 0.5, 0.6, 0.2, -0.9, 0.4, 0.0),
@@ -113,7 +113,7 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         rng = np.random.default_rng([SEED, *name.encode()])
         for case, k in product(Case, range(lab.effort("field.starts"))):
             x = random_state(case, p, rng)
-            # Two contacts that both roll hold the ball against no more than a slight lag.
+            # Friction at two rolling contacts can balance only a slight lag.
             rolls = case is Case.RR
             omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
             starts.append(Start(name, p.replace(omega_0=omega_0), case.name, x))
@@ -155,7 +155,7 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
 
 def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
     """What is read at the centre of a window (3, 22): extrapolated to a vanishing step, by the finer run, and by that
-    with the lower degree. None if another case is in or near the window, or a slip turns or hardly presses.
+    with the lower degree. None if another case is in or near the window, or `turns_or_hovers`.
     """
     read = []
     for run, times in ((coarse, 1), (fine, 2)):
@@ -175,7 +175,7 @@ def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Ar
 
 
 def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
-    """Whether a contact that slips hardly presses, or its velocity changes by more than `TURN` of it, or would by
+    """Whether a slipping contact carries almost no load, or its slip changes by more than `TURN` of itself, or would by
     friction alone.
     """
     p, time = run.header.parameters, float(np.ptp(run.time[window]))
@@ -191,7 +191,7 @@ def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
 def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
     """Quantities with uncertainties, from what the extrapolation and the degree of the polynomials change.
 
-    The largest relative change of the rates, or of the forces, stands for all of them: that of one may vanish by
+    The largest relative change of the rates, or of the forces, is used for all of them, since that of one may vanish by
     chance.
     """
     moving = MOVING[case]
@@ -307,7 +307,7 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         p, units = start.p, state_units(start.p)
         changed = [VARIABLES.index(name) for name in NAMES]
         change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
-        # The contact closes at a step, up to one late: for so long weight and friction act otherwise than they should.
+        # The contact closes at a whole step, up to one late; until then weight and friction differ.
         late = step / time_unit(p) / 2
         conditions: dict[str, Condition] = {"start": start.name, "time": float(coarse.time[at]), **state_of(start.x0)}
         for quantity, k in zip(NAMES, changed, strict=True):

@@ -2,9 +2,9 @@
 
 Each start is carried out with two time steps; what the step changes is the uncertainty of the finer run.
 
-* *Thrown*: the ball flies past the axis of the vessel without touching anything, spinning, for as long as drag tells.
+* *Thrown*: the ball flies past the axis of the vessel without touching anything, long enough for drag to show.
 * *Pulled off*: beside the wall, with a slip on the floor that drives it away from there; its wall contact carries
-  nothing, or as good as nothing, and opens.
+  nothing, or almost nothing, and opens.
 * *Slips*, *rolls*, *sinks*: at one contact, at both, or off the wall, for a while, through whatever cases follow.
 * *Smooth wall*: the ball goes round with the fluid, rolls on the floor and spins against a wall without friction, in
   faster and faster flows. Does the floor hold it?
@@ -94,7 +94,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         elif how in ("smooth wall", "rough floor"):
             yield measurement(lab, "runs", name, p, "case", float(fine.case[-1]), tasks, **at)
         else:
-            # The change of one variable may vanish by chance: the largest, in natural units, stands for all.
+            # The change of one variable may vanish by chance: the largest, in natural units, is used for all.
             units, ends = state_units(p), (coarse.x[-1], fine.x[-1])
             change = float(np.abs((ends[1] - ends[0]) / units).max())
             for variable, value, size in zip(VARIABLES, ends[1].tolist(), units.tolist(), strict=True):

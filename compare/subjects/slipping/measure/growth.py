@@ -6,7 +6,7 @@ else the case into which it passes is what is measured.
 States are at random in natural units, and away from stationary ones.
 
 Out of rolling on the wall alone, slip grows the most where the first harmonic of gamma over all directions is greatest.
-By what the other harmonics may turn that direction, it is uncertain.
+Its uncertainty is how far the other harmonics may turn that direction.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class Push:
     def rates(self, run: Trajectory) -> Array:
         """Initial rates of the slip along n by polynomials of either degree (2,), rad s-2; nan in another case."""
         record = slice(SKIPPED * (len(run.time) // STEPS), None)
-        # Beside a ball at rest the wall carries nothing: its contact doesn't show.
+        # The wall carries nothing beside a ball at rest: that contact is not detected.
         alike = [self.outer, Case.RN] if self.start.name == "rest" else [self.outer]
         if not np.isin(run.case[record], alike).all():
             return np.full(2, np.nan)
@@ -127,8 +127,8 @@ class Push:
     def stray(
         self, lab: Lab, protocol: str, size: float, tasks: Sequence[Task], runs: Sequence[Trajectory]
     ) -> Measurement | None:
-        """The case into which a slip passes that doesn't last, by both steps of a size; None if it lasts, or isn't
-        clear: a change is seen some steps late.
+        """The case that follows where a slip doesn't last, if runs with both steps agree; None if it lasts, or they
+        don't, since a change is detected some steps late.
         """
         coarse, fine = runs
         ended = int(fine.case[-1])
@@ -139,7 +139,7 @@ class Push:
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """gamma out of random states, along every arrow; where one contact slips to either side, how they share rolling."""
+    """gamma out of random states, along every arrow; where one contact may slip to either side, their shares (69)."""
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
     yield from (Missing("growth", name, SMOOTH) for name in sets if name not in rough)
     sides = [push for name, p in rough.items() for push in _pushes(name, p, lab.effort("growth.more"))]
@@ -163,7 +163,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 yield stray
             else:
                 left[push.start.set, push.inner, push.outer] += 1
-        if len(grown) == 2:  # the share of the side of negative slip in rolling, as which the two growths cancel
+        if len(grown) == 2:  # the share of the side of negative slip with which the two growth rates cancel
             plus, minus = grown if pushes[0].n.sum() > pushes[1].n.sum() else grown[::-1]
             both = plus.value + minus.value
             error = math.hypot(plus.uncertainty * minus.value, minus.uncertainty * plus.value) / both**2
@@ -176,7 +176,7 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
     """gamma for a vanishing size and step from `Push.tasks`, None if a record left the case.
 
     Its uncertainty is what the step and a degree of the polynomials change, and for three sizes a third of what the
-    third one does: the next would change less.
+    third one changes, since the next would change less.
     """
     coarse, fine = (np.array([push.rates(run) for run in some]) for some in (runs[::2], runs[1::2]))
     if np.isnan(coarse).any() or np.isnan(fine).any():

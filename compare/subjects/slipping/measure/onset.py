@@ -131,7 +131,7 @@ def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
         if line.bent:
             zero, slope = zero_and_slope(q, gamma, noise)
         else:
-            # The points share causes of errors: more of them make neither zero nor slope surer.
+            # The points share causes of error: more of them don't reduce the uncertainty.
             zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
         growth = f"growth of slip {slips}, {push.start.name},"
         if abs(zero.value) <= BEYOND * np.abs(q).max():
@@ -215,7 +215,7 @@ class Arrow:
         """The state at an orbit, and the flow."""
         unit = self.p.R / self.p.r * omega_c if self.inner is Case.SR else state_units(self.p)[3]
         slips = np.array(ARROWS[self.inner, self.outer]) * unit
-        leads = 1.0 if self.inner is Case.RR else LEADS  # what rolls at both points may lag by next to nothing
+        leads = 1.0 if self.inner is Case.RR else LEADS  # a ball that rolls at both points can hardly lag
         return self.p.replace(omega_0=leads * omega_c), np.array([0.0, 0.0, omega_c, *slips, 0.0, 0.0])
 
     def task(self, omega_c: float, times: int = 1) -> Task:
@@ -240,7 +240,7 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
     for arrow, got in zip(arrows, lab.groups(first), strict=True):
         runs = [] if isinstance(got, str) else got
         why_not.append(f"the run {got}" if isinstance(got, str) else "the ball doesn't stay in it at any orbit")
-        # The first runs in a row in which the ball passes into no case but the two ends of the arrow.
+        # The runs up to the first in which the ball passes into a case that is neither end of the arrow.
         strays = [not np.isin(run.case[SKIPPED:], [arrow.inner, arrow.outer]).all() for run in runs]
         begin = [*strays, False].index(False)
         seen.append(runs[begin : [*strays, True].index(True, begin)])

@@ -195,7 +195,7 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
 
 def _grounded(x: Array) -> Array:
-    """The state on the floor: a lifted ball knows nothing of its height."""
+    """The state put on the floor: the motion of a lifted ball doesn't depend on its height."""
     return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
 
 
@@ -212,7 +212,7 @@ def _search(lab: Lab, edge: Edge) -> Search:
 
 
 def ends_slipping(run: Trajectory, edge: Edge) -> bool:
-    """Whether a ball ends up slipping: by which way it still goes, or where it has come to rest."""
+    """Whether a ball ends up slipping, by the direction in which it still moves, or the state it settled to."""
     slipping, lifted = (float(State.of(x).omega_c) for x in (edge.slipping, edge.lifted))
     first, second = (float(half.mean()) for half in np.array_split(run.omega_c[tail(run, 0.2)], 2))
     if abs(second - first) > 1e-5 * (lifted - slipping):

@@ -67,9 +67,9 @@ AWAY = 0.03
 """Relative distance from there at which an engine beside the one on trial looks for the end of rolling."""
 
 Key = tuple[str, str]
-"""A set, and what is looked for: the end of "rolling", "slipping", "leaning" or the "fold", the begin of "riding"."""
+"""A set, and what is looked for: the end of "rolling", "slipping", "leaning", the "fold", or where "riding" begins."""
 From = str | Array | Callable[[Parameters], Array]
-"""How a ball starts, as `settling.begin` has it, or in which state: fixed, or of the parameters with the flow."""
+"""How a ball starts: a name that `settling.begin` knows, a state, or a function of the parameters for it."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -193,7 +193,7 @@ def _search(
 ) -> Search:
     """Narrow a bracket by runs at held flows, `time` times as long as a question of `ASKED` takes.
 
-    When it is where slipping ends, a run goes out from where the ball has come to at the largest flow so far.
+    For the end of slipping, a run starts from the state that the ball reached at the largest flow so far.
     """
     units, answer = ASKED[question]
 
@@ -207,7 +207,7 @@ def _search(
 
 
 def rider(states: Sequence[Settled], height: float, less: float = 0.0) -> Callable[[Parameters], Array]:
-    """Riding the wall at a height, as continued in omega_0 from settled states, with some part of its spin less."""
+    """A state that rides the wall at a height, continued in omega_0 from settled states, with less spin."""
     omegas = np.array([state.start.p.omega_0 for state in states])
     fit = np.polynomial.Polynomial.fit(omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1)
 
@@ -220,7 +220,7 @@ def rider(states: Sequence[Settled], height: float, less: float = 0.0) -> Callab
 
 
 def lifts(end: Bracket) -> bool:
-    """Whether two-point rolling ends by losing the floor: that carries no more than what hovers, and the wall holds.
+    """Whether two-point rolling ends by lifting off: the floor carries no more than what hovers, and the wall holds.
 
     Just below omega_03 the floor carries as little, but rolling may end there by slip at both contacts.
     """
@@ -241,7 +241,7 @@ def stays_rolling(run: Trajectory) -> bool | None:
     """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip still dies out.
 
     Slip dies out that has fallen below 0.6 of what it was in the second half (moved from 0.9 after results had been
-    seen); a hundredth of what counts is none.
+    seen); slip below a hundredth of what counts is none.
     """
     if not presses(run):
         return False
@@ -269,7 +269,7 @@ to the floor it rolls on both again; it settles on the floor."""
 def extrapolated(
     states: Sequence[Settled], quantity: str, to: Callable[[Array, Sequence[Measured]], Measured]
 ) -> Measured | None:
-    """The flow to which a quantity of settled states points; None if they are too few, or point nowhere."""
+    """The flow to which a quantity of settled states is extrapolated; None if they are too few, or there is none."""
     if len(states) < POINTS:
         return None
     flows = [state.start.p.omega_0 for state in states]
