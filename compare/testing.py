@@ -46,7 +46,9 @@ class Series:
     def __post_init__(self) -> None:
         for name, values in {"time": self.time, **self.values}.items():
             if values.shape != self.time.shape or values.ndim != 1 or not len(values):
-                raise InputError(f"{self.name}: {name} has shape {values.shape}, time {self.time.shape}, not (n,) both")
+                raise InputError(
+                    f"{self.name}: {name} has shape {values.shape}, time {self.time.shape}, not both (n > 0,)"
+                )
             for k in np.flatnonzero(~np.isfinite(values))[:1]:
                 raise InputError(f"{self.name}: {name} is {values[k]} in sample {k}, at t = {self.time[k]:g} s")
         for k in np.flatnonzero(np.diff(self.time) <= 0)[:1]:
@@ -83,9 +85,14 @@ def read(source: Source, name: str = "") -> Series:
         for column, (axes, _) in _COLUMNS.items():
             given |= {column + axis: row for axis, row in zip(axes, np.atleast_2d(getattr(run, column).T), strict=True)}
     else:
-        given = dict(source if isinstance(source, Mapping) else zip(("time", "omega_c"), source, strict=True))
-    known = {"time" if key == "t" else key: np.asarray(values, float) for key, values in given.items()}
+        given = dict(source) if isinstance(source, Mapping) else {}
     name = name or (run.header.engine if run else "the motion")
+    try:
+        if not isinstance(source, Mapping | Trajectory):
+            given = dict(zip(("time", "omega_c"), source, strict=True))
+        known = {"time" if key == "t" else key: np.asarray(values, float) for key, values in given.items()}
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be (time, omega_c), arrays by name, a file or a trajectory: {error}") from error
     if "time" not in known or not known.keys() & UNITS.keys() - {"time"}:
         raise InputError(f"{name} needs time and, say, omega_c; it has {', '.join(given) or 'nothing of the kind'}")
     return Series(name, known.pop("time"), {key: row for key, row in known.items() if key in UNITS}, run)
@@ -96,7 +103,7 @@ def _csv(path: Path) -> dict[str, Array]:
         lines = [line.partition("#")[0] for line in path.read_text("utf-8-sig").splitlines()]
         rows = [row for line in lines if (row := line.replace(";", " ").replace(",", " ").replace('"', "").split())]
         head = rows.pop(0) if rows and {"time", "t"} & set(rows[0]) else ["time", "omega_c"]
-        return dict(zip(head, np.array(rows, float).reshape(-1, len(head)).T, strict=True))
+        return dict(zip(head, np.array(rows, float).reshape(len(rows), len(head)).T, strict=True))
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except ValueError as error:
@@ -177,8 +184,8 @@ def assert_tracks(mine: Source, reference: Source, *, quantity: str = "omega_c",
     off, unit = difference(a, b, quantity), UNITS[quantity]
     slack = (a.time[-1] - a.time[0]) / 100
     if b.time[-1] < a.time[-1] - slack or b.time[0] > a.time[0] + slack:
-        spans = [f"{each.name} lasts from {each.time[0]:g} to {each.time[-1]:g} s" for each in (b, a)]
-        raise InputError(f"the reference {spans[0]}, but {spans[1]}")
+        spans = [f"from {each.time[0]:g} to {each.time[-1]:g} s" for each in (b, a)]
+        raise InputError(f"the reference lasts {spans[0]}, but {a.name} {spans[1]}")
     if off.scale == 0:
         raise InputError(f"{quantity} of the reference {b.name} is zero all the time: there is no scale for an error")
     if off.doubt > rms * off.scale / 2:

@@ -35,10 +35,10 @@ ENGINES: dict[str, str] = {
     },
     "mujoco-warp": f"{_OWN}.mujoco_warp:best",
     "mujoco-warp-defaults": f"{_OWN}.mujoco_warp:defaults",
-    "newton-xpbd": f"{_OWN}.newton:xpbd",
-    "newton-xpbd-defaults": f"{_OWN}.newton:xpbd_defaults",
-    "newton-semiimplicit-defaults": f"{_OWN}.newton:semi_implicit_defaults",
-    "newton-vbd-defaults": f"{_OWN}.newton:vbd_defaults",
+    **{
+        f"newton-{name.replace('_', '-')}": f"{_OWN}.newton:{name}"
+        for name in ("kamino", "xpbd", "xpbd_defaults", "semiimplicit_defaults", "vbd_defaults")
+    },
 }
 """Where each engine is; NAME is in its best known settings, NAME-defaults as it comes."""
 KINDS = ("sticking", "rolling", "sliding", "landing")

@@ -30,9 +30,11 @@ from typing import Any
 
 import numpy as np
 
+from compare.bench import adapters
 from compare.bench.case import STEPS, TOLERANCE, Case
 from model import InputError
 from model.arrays import Array
+from model.parameters import POSITIVE, check_choice, check_number
 from model.trajectory import version
 
 LIMIT = 300.0
@@ -108,8 +110,11 @@ class Result:
 def run(case: Case, engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT) -> Result:
     """One engine on one case: ``engine`` is the name of a module, ``module:object``, a module or a picklable object.
 
-    ``limit`` is the longest time for one step's run, s. Raises `InputError` if the engine can't be imported.
+    ``limit`` is the longest time for one step's run, s. Raises `InputError` if the engine can't be used, or for a step
+    that is none.
     """
+    for step in steps or ():
+        check_number("step", step, "s", POSITIVE)
     (result,) = run_all([case], engine, steps, limit)
     if result.engine.missing:
         raise InputError(result.engine.missing)
@@ -201,31 +206,43 @@ class _Server:
 
 
 def _load(given: Any) -> tuple[Any, About]:
-    """An engine by name or as it is, and what it says of itself; `InputError` if it isn't there or lacks a function."""
+    """An engine by name or as it is, and what it says of itself; `InputError` if it can't be had or lacks something."""
     engine = given
     if isinstance(given, str):
         module, _, member = given.partition(":")
         try:
             engine = importlib.import_module(module)
             engine = getattr(engine, member) if member else engine
-        except (ImportError, AttributeError) as error:
-            raise InputError(f"{given} can't be imported: {error}") from error
+        except Exception as error:  # whatever a module or a broken package does when it is imported
+            works = f" ({text})" if (text := _version(given, None)) else ""
+            raise InputError(f"{type(error).__name__}: {_line(error)}{works}") from error
     name = getattr(engine, "NAME", getattr(engine, "__name__", type(engine).__name__))
     lacking = [function for function in FUNCTIONS if not callable(getattr(engine, function, None))]
     if lacking:
         raise InputError(f"{name} has no function {' nor '.join(lacking)}; an engine has {', '.join(FUNCTIONS)}")
-    package, _, known = getattr(engine, "KNOWN", "").partition(" ")
-    here = version(package) if package else ""
-    shown = f"{package} {here}" + (f", known to work: {known}" if known and here != known else "")
+    check_choice("PRECISION", precision := getattr(engine, "PRECISION", "f64"), list(FLOORS))
     about = About(
         name=name,
-        precision=getattr(engine, "PRECISION", "f64"),
+        precision=precision,
         declared=getattr(engine, "DECLARED", ""),
         note=getattr(engine, "NOTE", ""),
-        version=shown.strip(),
-        steps=tuple(getattr(engine, "TIMESTEPS", STEPS)),
+        version=_version(given, engine),
+        steps=tuple(check_number("TIMESTEPS", step, "s", POSITIVE) for step in getattr(engine, "TIMESTEPS", STEPS)),
     )
     return engine, about
+
+
+def _version(given: Any, engine: Any) -> str:
+    """Of an engine's package, and the one with which it is known to work if that is another."""
+    _, ours, own = str(given).rpartition(f"{adapters.__name__}.")
+    listed = (adapters.KNOWN.get(own) or adapters.KNOWN.get(own.partition(":")[0], "")) if ours else ""
+    package, _, known = getattr(engine, "KNOWN", listed).partition(" ")
+    here = version(package) if package else ""
+    return f"{package} {here}".strip() + (f", known to work: {known}" if known and here != known else "")
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]
 
 
 def serve(handle: int) -> None:
@@ -234,7 +251,7 @@ def serve(handle: int) -> None:
     try:
         adapter, about = _load(pipe.recv())
         pipe.send(about)
-    except InputError as error:
+    except (InputError, TypeError) as error:
         pipe.send(f"can't be used: {error}")
         return
     while True:
@@ -256,7 +273,8 @@ def _attempt(engine: Any, case: Case, step: float) -> Any:
                 begin = time.process_time()
                 if at > done:
                     engine.step(at - done)
-                parts = [np.array(part, dtype=float) for part in engine.state()]
+                found = engine.state()
+                parts = [] if found is None else [np.array(part, dtype=float) for part in found]
                 spent, done = spent + time.process_time() - begin, at
                 shapes = [part.shape for part in parts]
                 if shapes != [(3,)] * 3:
@@ -268,5 +286,5 @@ def _attempt(engine: Any, case: Case, step: float) -> Any:
     except NotImplementedError as error:
         return NotImplementedError(str(error))
     except Exception as error:  # whatever an engine throws loses the case alone
-        return None, math.nan, f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        return None, math.nan, f"{type(error).__name__}: {_line(error)}"
     return states, spent / float(case.times[-1]), ""

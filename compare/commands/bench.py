@@ -87,22 +87,36 @@ def listed(args: argparse.Namespace) -> int:
         about = {
             "case": chosen.name,
             "about": chosen.about,
-            "body": str(chosen.body),
-            "surfaces": "\n".join(map(str, chosen.surfaces)),
-            "force": f"pull {chosen.pull} N, growth {chosen.growth} N/s, drag {chosen.drag} 1/s, "
-            f"flow {chosen.flow} rad/s",
-            "scales": f"{chosen.scales} of position (m), velocity (m/s), spin (rad/s)",
+            "body": _fields(chosen.body),
+            "surfaces": "\n".join(map(_fields, chosen.surfaces)),
+            "force": f"m g = {chosen.body.mass * chosen.g:.6g} N down, pull {_numbers(chosen.pull)} N, growth "
+            f"{_numbers(chosen.growth)} N/s, drag {chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s",
+            "scales": f"{_numbers(chosen.scales)} of position (m), velocity (m/s), spin (rad/s); inf: not compared",
             "source": f"{chosen.source}; error below {chosen.bound:g}",
             "notices": "; ".join(f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()),
-            "ends at": f"t = {chosen.times[-1]:g} s: {np.array2string(chosen.exact[-1], precision=6)}",
+            "ends at": f"t = {chosen.times[-1]:g} s: position {_numbers(chosen.exact[-1, :3])} m, velocity "
+            f"{_numbers(chosen.exact[-1, 3:6])} m/s, spin {_numbers(chosen.exact[-1, 6:])} rad/s",
+            "more": "all states, JSON, HDF5 and MJCF: dualball cases -o DIR",
         }
-        shown: list[Any] = [pages.pairs(about), chosen.mjcf()]
+        shown: list[Any] = [pages.pairs(about)]
     else:
         rows = [["case", "contacts", "kind", "what happens"]]
         rows += [[c.name, str(len(c.surfaces)), league.kind(c), c.about] for c in own.values()]
         shown = [pages.table(f"Exact contact cases, version {VERSION}", rows, justify="left")]
     options.show(data, args.json, *shown, *([f"written to {args.output}"] if args.output else []))
     return 0
+
+
+def _fields(item: Any) -> str:
+    """The fields of a dataclass in a line, SI units."""
+    values = ((field.name, value) for field in dataclasses.fields(item) if (value := getattr(item, field.name)))
+    return ", ".join(f"{name} {value if isinstance(value, str) else _numbers(value)}" for name, value in values)
+
+
+def _numbers(values: Any) -> str:
+    """A number, or several in brackets."""
+    several = ", ".join(f"{value + 0.0:.6g}" for value in np.atleast_1d(values))
+    return f"({several})" if np.ndim(values) else several
 
 
 def graded(args: argparse.Namespace) -> int:
@@ -162,8 +176,8 @@ def ranked(args: argparse.Namespace) -> int:
     from compare.report.pictures import address, svg
 
     chosen = {name: league.ENGINES.get(name, name) for name in args.engine or league.ENGINES}
-    if unknown := [name for name in chosen if name not in league.ENGINES and not re.search(r"[.:]", name)]:
-        check_names(unknown, list(league.ENGINES), "engine")
+    modules = {name for name in chosen if re.search(r"[.:]", name) or Path(f"{name}.py").exists()}
+    check_names(chosen.keys() - modules, list(league.ENGINES), "engine")
     make_directory(args.output)
     with progress.shown(quiet=args.json or args.quiet) as show:
         found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import importlib
 
+import numpy as np
 import pytest
 
 from compare.bench import cases, run
-from compare.bench.adapters.free import turned, upright
+from compare.bench.adapters.free import upright
 from model import InputError
+from model.kinematics import rotated
 
 CASES = {case.name: case for case in cases()}
 OWN = "compare.bench.adapters"
@@ -45,4 +47,4 @@ def test_engines_that_are_not_installed() -> None:
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0, 0, -1), (-1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)])
 def test_turns(normal: tuple[float, float, float]) -> None:
-    assert turned(upright(normal), [0, 0, 1]) == pytest.approx(normal)
+    assert rotated(np.array(upright(normal)), np.array([0, 0, 1])) == pytest.approx(normal)

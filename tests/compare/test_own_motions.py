@@ -69,7 +69,7 @@ def test_tracking(theory: Trajectory) -> None:
     for part, message in ((slice(20, -20, 40), "too far apart"), (slice(5), "5 samples while both last")):
         with pytest.raises(InputError, match=message):
             assert_tracks((theory.time[part], theory.omega_c[part]), coarse if part.step else theory, rms=1e-4)
-    with pytest.raises(InputError, match="the reference event lasts from 0 to 12 s, but the motion lasts from 0 to 24"):
+    with pytest.raises(InputError, match="the reference lasts from 0 to 12 s, but the motion from 0 to 24"):
         assert_tracks((theory.time * 2, theory.omega_c), theory, rms=1.0)
     with pytest.raises(InputError, match=r"no omega_x.*did you mean 'omega_"):
         assert_tracks(theory, theory, quantity="omega_x", rms=1.0)

@@ -44,7 +44,7 @@ def test_an_engine_on_the_exact_cases(pytester: pytest.Pytester) -> None:
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (["--dualball-engine", "nosuch"], "*nosuch can't be used: nosuch can't be imported: No module named 'nosuch'*"),
+        (["--dualball-engine", "nosuch"], "*nosuch can't be used: ModuleNotFoundError: No module named 'nosuch'*"),
         (["--dualball-engine", "half"], "*half has no function state*"),
         (["--dualball-engine", "half", "--dualball-known", "half.py"], "*no case is called 'build'*"),
         (["--dualball-engine", "half", "--dualball-known", "none"], "*cannot read none*"),

@@ -26,6 +26,10 @@ class Exact:
 
     breaks: str = ""
 
+    @property
+    def PRECISION(self):
+        return "f128" if self.breaks == "precision" else "f64"
+
     def build(self, case, timestep):
         self.case, self.timestep, self.done = case, timestep, 0
         if case.name == "growing-pull":
@@ -46,6 +50,8 @@ class Exact:
         position, velocity, spin = self.case.exact[k].reshape(3, 3)
         if self.case.name == "box-stops" and self.breaks == "shapes":
             return position, velocity[:2], spin
+        if self.case.name == "box-stops" and self.breaks == "none":
+            return None
         if self.case.name == "box-stops" and self.breaks == "nan":
             return position, velocity * np.nan, spin
         return position + self.timestep * self.case.times[k] * np.eye(3)[0], velocity, spin
@@ -70,6 +76,7 @@ def test_errors_order_creep_and_cost():
         ("dies", "crashed (exit code 3) at a step of 4 ms"),
         ("raises", "ValueError: singular matrix"),
         ("shapes", "state() must return position, velocity and spin, not shapes [(3,), (2,), (3,)]"),
+        ("none", "state() must return position, velocity and spin, not shapes []"),
         ("nan", "diverged by t = 0.04 s at a step of 4 ms"),
     ],
 )
@@ -86,9 +93,11 @@ def test_what_breaks_loses_the_case_and_not_the_run(breaks, says):
 @pytest.mark.parametrize(
     ("engine", "says"),
     [
-        ("no.such.module", "no.such.module can't be imported: No module named 'no'"),
+        ("no.such.module", "no.such.module can't be used: ModuleNotFoundError: No module named 'no'"),
         ("compare.bench.runner", "compare.bench.runner has no function build nor step nor state"),
         (SimpleNamespace(build=print, step=print), "SimpleNamespace has no function state; an engine has build, step"),
+        ("compare.bench.adapters.dart:gone", " (dartpy "),
+        (Exact("precision"), "PRECISION = 'f128' must be one of f64, f32"),
     ],
 )
 def test_engines_that_are_none(engine, says):
@@ -126,7 +135,7 @@ def test_mistakes_with_the_league(tmp_path, capsys):
     assert cli.main(["league", "--engine", "mujco", "-o", str(tmp_path)]) == 2
     assert "did you mean 'mujoco'?" in capsys.readouterr().err
     assert cli.main(["league", "--engine", "no.such", "-o", str(tmp_path), "--quiet"]) == 2
-    assert "nothing to compare: no.such can't be used: no.such can't be imported" in capsys.readouterr().err
+    assert "nothing to compare: no.such can't be used: ModuleNotFoundError: No module" in capsys.readouterr().err
 
 
 def test_the_set_as_files(tmp_path, capsys):

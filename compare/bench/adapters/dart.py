@@ -11,15 +11,15 @@ from typing import Any
 import dartpy as engine
 import numpy as np
 
-from compare.bench.adapters.free import CHORD, Free, State, turned
+from compare.bench.adapters.free import CHORD, Free, State
 from compare.bench.case import Vector
 from model.arrays import Array
+from model.kinematics import rotated
 
 
 class Dart(Free):
     """As in `Free`."""
 
-    KNOWN = "dartpy 6.20.0"
     NOTE = (
         "as it comes worst with boxes, whose contacts FCL places anew in every step, so that they rock and creep; set "
         f"well of first order in everything, and worst where a ball goes round: {CHORD}"
@@ -50,7 +50,7 @@ class Dart(Free):
         skeleton = bodies.Skeleton("body")
         joint, self.node = skeleton.createFreeJointAndBodyNodePair()
         pose = np.eye(4)
-        pose[:3, :3] = np.stack([turned(body.orientation, axis) for axis in np.eye(3)], axis=1)
+        pose[:3, :3] = rotated(np.array(body.orientation), np.eye(3)).T
         pose[:3, 3] = body.position
         joint.setTransform(engine.math.Isometry3(pose))
         joint.setLinearVelocity(body.velocity)

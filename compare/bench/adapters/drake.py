@@ -22,7 +22,6 @@ HEAVY = 1e6
 class Drake(Free):
     """As in `Free`."""
 
-    KNOWN = "drake 1.51.1"
     NOTE = (
         "as it comes worst with boxes, which touch a plane at one point at a time and tumble from corner to corner; "
         f"spheres at the corners cure it; set well of first order, and worst round the cylinder: {CHORD}"

@@ -25,8 +25,6 @@ class Free(ABC):
     """A free body in an engine: in the best settings, with a wall that moves along, or as it comes, with facets."""
 
     PRECISION = "f64"
-    KNOWN = ""
-    """Package and version with which it is known to work."""
     NOTE = ""
     """What is worst, and why."""
 
@@ -96,13 +94,6 @@ def tangent(surface: Surface, azimuth: float) -> tuple[Array, Array]:
     """Point and inward normal of the plane that touches a cylinder there."""
     inwards = -np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     return surface.point - (surface.radius or 0.0) * inwards, inwards
-
-
-def turned(orientation: Any, vector: Any) -> Array:
-    """A vector (3,) turned by a unit quaternion, the scalar first."""
-    w, axis = orientation[0], np.asarray(orientation[1:], float)
-    across = 2 * np.cross(axis, vector)
-    return np.asarray(vector + w * across + np.cross(axis, across))
 
 
 def upright(normal: Any) -> tuple[float, float, float, float]:

@@ -13,7 +13,6 @@ from compare.bench.case import FACETS, Case
 from model.arrays import Array
 
 NAME = "mujoco-defaults"
-KNOWN = "mujoco 4.0.0"
 NOTE = "every corner of the facets takes away some of the speed, until the wall no longer carries the ball"
 DECLARED = f"{FACETS} planes for a cylinder; a table that turns hangs on a hinge"
 

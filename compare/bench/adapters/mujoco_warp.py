@@ -11,8 +11,9 @@ import numpy as np
 import warp
 
 from compare.bench.adapters import mujoco_free
-from compare.bench.adapters.free import State, turned
+from compare.bench.adapters.free import State
 from compare.bench.case import Case
+from model.kinematics import rotated
 
 warp.config.quiet = True
 
@@ -21,7 +22,6 @@ class Warp(mujoco_free.Bodies):
     """The same scenes, stepped by Warp."""
 
     PRECISION = "f32"
-    KNOWN = "mujoco-warp 4.0.0"
     TIMESTEPS = (4e-3, 2e-3)  # a step takes 5 ms, a thousand times MuJoCo's
     NOTE = (
         "worst where MuJoCo is, and as much: in facets, and with what must not move, since its soft friction creeps; "
@@ -53,7 +53,7 @@ class Warp(mujoco_free.Bodies):
 
     def state(self) -> State:
         q, v = (np.asarray(each.numpy()[0], float) for each in (self._data.qpos, self._data.qvel))
-        return q[-7:-4], v[-6:-3], turned(q[-4:], v[-3:])
+        return q[-7:-4], v[-6:-3], rotated(q[-4:], v[-3:])
 
 
 defaults = Warp("mujoco-warp-defaults", mujoco_free.DECLARED)

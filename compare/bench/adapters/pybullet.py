@@ -18,7 +18,6 @@ from model.arrays import Array
 class PyBullet(Free):
     """As in `Free`."""
 
-    KNOWN = "pybullet 3.2.7"
     NOTE = (
         "as it comes worst with a ball in facets, whose every corner takes away some of its speed; set well of first "
         f"order, and worst round the cylinder: {CHORD}"

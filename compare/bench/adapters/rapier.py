@@ -20,7 +20,6 @@ class Rapier(Free):
     """As in `Free`."""
 
     PRECISION = "f32"
-    KNOWN = "rapier3d 0.36.1"
     NOTE = f"worst round the cylinder and where the wall carries the ball: {CHORD}"
 
     def make(self) -> None:

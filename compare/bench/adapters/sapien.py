@@ -24,7 +24,6 @@ class Sapien(Free):
     """As in `Free`."""
 
     PRECISION = "f32"
-    KNOWN = "sapien 3.0.3"
     NOTE = (
         "as it comes worst where the wall carries the ball, as spin is limited to 100 rad/s, and with what is pinched, "
         "which creeps, since ten iterations of TGS don't solve it; PGS with more of them holds it, but has friction in "

@@ -29,7 +29,7 @@ class Simulated:
         self.NAME, self._free = name, free
         own = getattr(free, "DECLARED", "")
         self.DECLARED = "; ".join(filter(None, (JOINTS if free else "", declared or own)))
-        self.NOTE, self.KNOWN = note or getattr(free, "NOTE", ""), getattr(free, "KNOWN", "")
+        self.NOTE = note or getattr(free, "NOTE", "")
         if "timestep" not in ENGINES[name].options:
             self.TIMESTEPS = STEPS[-1:]
         self._states: Array | None = None
