@@ -17,12 +17,15 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
+import scipy.optimize
 import scipy.sparse
 
 Array = npt.NDArray[Any]
 """Of floats, or of marks and numbers that choose contacts."""
-LARGEST, CONE = 1.0, 0.999
-"""Steps are tried up to this, s; from this share of the cone on a contact slides."""
+LARGEST, CONE, MEETING = 1.0, 0.999, 1.0
+"""Steps are tried up to this, s; from this share of the cone on a contact slides; longest that bodies meet, s."""
+UNEVEN = 0.1
+"""Share of an approach that may be left after a blow of normal forces that should end it."""
 SOLREF = (0.02, 1.0)
 """What the engine takes for a solref of which one number is positive and the other is not."""
 
@@ -72,6 +75,19 @@ class Contacts:
     def _frictional(self) -> Array:
         return np.arange(1, 6) < self.dim[:, None]
 
+    @property
+    def softness(self) -> Array:
+        """R d/(1 - d): the inverse mass that scales the softness of normal rows, or of the edges of a pyramid, 1/kg."""
+        mu2 = self.friction[:, 0] ** 2
+        edges = np.where(self.dim > 1, 2 * mu2 * (1 + mu2) / self.impratio, 1) if self.pyramidal else 1
+        found: Array = self.inverse_mass * edges
+        return found
+
+    @property
+    def normals(self) -> Array:
+        """How many rows bear the normal force: one, or all edges of a pyramid."""
+        return np.where((self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1)
+
     def reference(self, solref: Array) -> tuple[Array, Array]:
         """`reference` of rows of these contacts."""
         return reference(solref, self.solimp, self.timestep, self.discrete, self.refsafe)
@@ -84,16 +100,13 @@ class Contacts:
         own = self.solreffriction.any(1) & (not self.pyramidal)
         b_f = np.where(own, self.reference(self.solreffriction)[1], b)
         mu, frictional = self.friction, self._frictional
-        estimate = self.inverse_mass
-        if self.pyramidal:  # an edge is the normal and mu times a direction of friction
-            estimate = estimate * np.where(self.dim > 1, 2 * mu[:, 0] ** 2 * (1 + mu[:, 0] ** 2) / self.impratio, 1)
         slides = self.cone >= CONE
         wanted = np.where(frictional, np.abs(self.force[:, 1:]) / mu, 0)  # friction divided by its coefficient
 
         def rows(depth: Array) -> tuple[Array, Array, Array]:
             """Softness of a row, its stiffness, and the damping of friction as a steady state sees it."""
             d = impedance(self.solimp, depth)
-            softness, k = (1 - d) / d * estimate, spring * d
+            softness, k = (1 - d) / d * self.softness, spring * d
             if not self.discrete:
                 return softness, k, b_f
             return softness, k, b + k * h if self.pyramidal else b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
@@ -123,13 +136,15 @@ class Contacts:
             x = (k * depth / softness)[:, None]
             creep = softness[:, None] * np.where(wanted <= 2 * x, wanted / 2, wanted - x) / (mu * damping[:, None])
             hover = first * load / (first_damping * np.hypot(mu[:, 0], mu[:, 1]))
-            inertia = np.where(self.dim > 1, 2 * self.dim - 2, 1) / softness
             sideways = 2 * mu**2 / softness[:, None]
         else:
             soft = softness[:, None] / self.impratio * (mu[:, :1] / mu) ** 2
             creep = soft * np.abs(self.force[:, 1:]) / damping[:, None]
             hover = (1 + mu[:, 0] ** 2 / self.impratio) * first * load / (mu[:, :2].max(1) * first_damping)
-            inertia, sideways = 1 / softness, 1 / soft
+            sideways = 1 / soft
+        shift = 1e-6 * depth
+        (softer, k_less, _), (harder, k_more, _) = rows(depth - shift), rows(depth + shift)
+        slope = softness * (k_more * (depth + shift) / harder - k_less * (depth - shift) / softer) / (2 * shift)
         if self.noslip:  # it corrects friction alone, after normal forces were found beside friction at no creep
             creep, sticks = np.zeros_like(creep), frictional & ~slides[:, None]
             along, soft = self.rows[:, 1:][sticks], 1 / sideways[sticks]
@@ -143,8 +158,8 @@ class Contacts:
             turning=np.where(slides, np.nan, np.hypot.reduce(creep[:, 2:], 1)),
             hover=np.where(self.dim > 1, hover, np.inf),
             slides=slides,
-            weight=np.column_stack([inertia, sideways]),
-            stiffness=k,
+            weight=np.column_stack([self.normals / softness, sideways]),
+            stiffness=slope,
             damping=np.column_stack([b, *[b_f] * 5]),
         )
 
@@ -189,6 +204,35 @@ class Contacts:
             low, high = (middle, high) if self.stable(math.exp(middle)) else (low, middle)
         return math.exp(low)
 
+    def approach(self) -> Array:
+        """The motion, in the coordinates of `rows`, that opens all contacts at 1 m/s without slip; its square, a mass.
+
+        It is nan if normal forces alone cannot end it: then a body lands on other contacts, too, or begins to turn.
+        """
+        wanted = np.tile(np.eye(1, 6), len(self.dim))[0]
+        found: Array = np.linalg.lstsq(self.rows.reshape(len(wanted), -1), wanted)[0]
+        found /= np.mean(self.rows[:, 0] @ found)
+        _, missing = scipy.optimize.nnls(self.rows[:, 0].T, found)
+        return found if missing < UNEVEN * np.hypot.reduce(found) else np.full_like(found, np.nan)
+
+    @np.errstate(all="ignore")  # without stiffness it never leaves
+    def rebound(self, speed: float) -> float:
+        """Share of its speed (m/s) with which a pair parts that meets with all contacts at once and is free else."""
+        h = self.timestep / (16 if self.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1)  # nearly continuous
+        spring, b = self.reference(self.solref)
+        mass, v, depth = float((self.approach() ** 2).sum()), -speed, self.timestep * speed / 2
+        for _ in range(round(MEETING / h)):
+            d = impedance(self.solimp, np.full(len(spring), depth))
+            k, weight = spring * d, self.normals * d / ((1 - d) * self.softness)
+            rate = b + k * h if self.discrete else b
+            end = 1 + rate * h if self.discrete else np.ones_like(b)
+            a = float((weight * (k * depth - rate * v)).sum() / (mass + (weight * end).sum()))
+            if not a > 0:
+                break
+            v += h * a
+            depth -= h * v
+        return v / speed if mass > 0 else math.nan
+
     def decay(self) -> float:
         """Rate, s-1, at which the slowest small motion dies out; 0 if it doesn't, inf if it is gone after a step."""
         mass, damping, stiffness = self.matrices()
@@ -214,6 +258,7 @@ class Law:
     weight: Array
     """Force per acceleration of each row, kg."""
     stiffness: Array
+    """Of small motions: impedance grows with depth."""
     damping: Array
 
 

@@ -18,7 +18,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench.contact_law import LARGEST, Array, Contacts, contacts, parameters, replaced
+from compare.bench.contact_law import LARGEST, MEETING, Array, Contacts, contacts, parameters, replaced
 from compare.kit import pages
 from model import InputError, StorageError
 
@@ -32,6 +32,8 @@ WINDOW, WINDOW_STEPS = 0.1, 50
 """A window is so long, s, and of so many steps."""
 BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
 """What the engine warns of when a model diverges."""
+G = 9.81
+"""m s-2."""
 CHECKED, CHECKS = 3.0, 3
 """A changed model must settle within so many s to be advised; so many are tried, after which there is no advice."""
 SHOWN, OFF = 12, 0.05
@@ -70,6 +72,9 @@ class Pair:
     slides: bool
     hover: float
     """Slip speed from which contact is lost again and again, m/s."""
+    rebound: float
+    """Share of its speed with which the pair alone parts again, at that of a fall as far as the smaller radius."""
+    rebound_measured: float
     decay: float
     """Rate at which the slowest disturbance dies out, s-1."""
     largest_step: float
@@ -175,7 +180,7 @@ def forecast(
         rate = those.decay()
         hint = f"; disturbances of its contacts die out at {rate:.2g} 1/s only" if rate < 1 else ""
         raise UnsettledError(f"after {data.time:.3g} s what touches still moves: {_few([*moving.values()])}{hint}")
-    those, number, bodies = those.only(kept), number[kept], bodies[kept]
+    rows, those, number, bodies = those.rows[kept], those.only(kept), number[kept], bodies[kept]
     start, radius = copy.copy(data), _radius(model)[bodies].min(1)
     good = np.full(len(number), depth) if depth else DEPTH * radius
     found = _measured(model, data, those, number, bodies)
@@ -186,7 +191,7 @@ def forecast(
     for k, (first, second) in enumerate(geoms):
         part = belongs.ravel() == k
         own = those.only(part)
-        step = own.largest_step()
+        step, speed = own.largest_step(), math.sqrt(2 * G * min(radius[part].min(), 1))
         pairs.append(
             Pair(
                 name=f"{names[first]} / {names[second]}",
@@ -195,6 +200,8 @@ def forecast(
                 cone=float(own.cone.max()),
                 slides=bool(law.slides[part].any()),
                 hover=float(law.hover[part].min()),
+                rebound=own.rebound(speed),
+                rebound_measured=_rebound(model, start, dataclasses.replace(own, rows=rows[part]), number[part], speed),
                 decay=own.decay(),
                 largest_step=step,
                 replaced=tuple(replaced(model, own, names)),
@@ -226,6 +233,35 @@ def _measured(model: Any, data: Any, c: Contacts, number: Array, bodies: Array) 
         "creep_measured": np.where(c.dim > 1, np.hypot(*slip.T), np.nan),
         "turning_measured": np.where(c.dim > 3, np.hypot.reduce(turning, 1), 0),
     }
+
+
+def _rebound(model: Any, data: Any, c: Contacts, number: Array, speed: float) -> float:
+    """Share of its speed with which a pair parts; it meets anew, without other contacts, weight or forces of joints."""
+    twin, state = copy.copy(model), mujoco.MjData(model)
+    mujoco.mj_copyData(state, model, data)
+    mujoco.mj_forward(model, state)
+    mass, bit = np.zeros((model.nv, model.nv)), mujoco.mjtDisableBit
+    mujoco.mj_fullM(model, state, mass)
+    approach = c.approach()
+    if np.isnan(approach).any():
+        return math.nan
+    way = np.linalg.solve(np.linalg.cholesky(mass).T, approach)
+    for name in ("GRAVITY", "SPRING", "DAMPER", "ACTUATION", "FRICTIONLOSS", "LIMIT", "EQUALITY"):
+        twin.opt.disableflags |= getattr(bit, f"mjDSBL_{name}")
+    others = ~np.isin(np.arange(model.ngeom), c.geoms[0])
+    for kind, which in (("geom", others), ("flex", slice(None))):
+        for mask in ("contype", "conaffinity"):
+            getattr(twin, f"{kind}_{mask}")[which] = 0
+    explicit = np.column_stack([twin.pair_geom1, twin.pair_geom2])
+    twin.pair_margin[~np.isin(explicit, c.geoms[0]).all(1)] = -1e3
+    gap = float(np.mean(state.contact.dist[number] - c.margin))
+    mujoco.mj_integratePos(model, state.qpos, way, -gap - model.opt.timestep * speed / 2)
+    state.qvel[:], state.qfrc_applied[:], state.xfrc_applied[:] = -speed * way, 0, 0
+    for _ in range(round(MEETING / model.opt.timestep)):
+        mujoco.mj_step(twin, state)
+        if not (state.nefc and state.efc_force.any()):
+            break
+    return float(way @ mass @ state.qvel) / float(approach @ approach) / speed
 
 
 def _harm(c: Contacts, radius: Array, good: Array, creep: float) -> dict[str, Array]:
@@ -398,23 +434,20 @@ def _few(names: Sequence[str]) -> str:
     return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
-def rows(f: Forecast) -> list[list[str]]:
-    """The pairs as a table, its head first, the worst next; what was measured is called found."""
-    head = ["pair", "load\nN", "depth\nµm", "found\nµm", "creep\nµm/s", "found\nµm/s", "mm/\nmin", "cone\n%"]
-    table = [[*head, "hover\nmm/s", "decay\n1/s", "step\nms"]]
+def tables(f: Forecast) -> list[tuple[str, list[list[str]]]]:
+    """Titles and tables, a head first, of the worst pairs: at rest and in motion; what was measured is called found."""
+    rest = [["pair", "load\nN", "depth\nµm", "found\nµm", "creep\nµm/s", "found\nµm/s", "mm/\nmin", "cone\n%"]]
+    motion = [["pair", "hover\nmm/s", "bounce\n%", "found\n%", "decay\n1/s", "step\nms"]]
     for p in f.pairs[:SHOWN]:
         micro = [_number(v, 1e6) for v in (p.depth, p.depth_measured, p.creep, p.creep_measured)]
-        rest = _number(p.creep_measured, 6e4), _number(p.cone, 100), _number(p.hover, 1e3), _number(p.decay)
-        table.append([p.name, _number(p.load), *micro, *rest, _number(p.largest_step, 1e3)])
-    return table
-
-
-def title(f: Forecast) -> str:
-    """What the table holds."""
-    return f"Pairs in contact: {len(f.pairs)}" + (f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else "")
+        rest.append([p.name, _number(p.load), *micro, _number(p.creep_measured, 6e4), _number(p.cone, 100)])
+        bounce = [_number(v, 100) for v in (p.rebound, p.rebound_measured)]
+        motion.append([p.name, _number(p.hover, 1e3), *bounce, _number(p.decay), _number(p.largest_step, 1e3)])
+    title = f"Pairs in contact: {len(f.pairs)}" + (f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else "")
+    return [(title, rest), ("In motion", motion)]
 
 
 def html(f: Forecast, after: Forecast | None, file: str) -> str:
     """The forecast, and that after the change, as one self-contained page."""
-    tables = [(title(each), rows(each)) for each in (f, after) if each]
-    return pages.render("compare.bench", "forecast.html", file=file, tables=tables, sentences=list(sentences(f)))
+    shown = tables(f) + ([("After the change", tables(after)[0][1])] if after else [])
+    return pages.render("compare.bench", "forecast.html", file=file, tables=shown, sentences=list(sentences(f)))

@@ -54,10 +54,10 @@ def foretold(args: argparse.Namespace) -> int:
         mujoco.set_mju_user_warning(heard)
     if args.output:
         write_text(args.output, forecast.html(found, after, str(args.file)))
-    shown: list[Any] = [pages.table(forecast.title(found), forecast.rows(found), **LOOK)]
+    shown: list[Any] = [pages.table(title, rows, **LOOK) for title, rows in forecast.tables(found)]
     shown += [Text(f"• {line}") for line in forecast.sentences(found)]
     if after:
-        shown += [Text(""), pages.table("After the change", forecast.rows(after), **LOOK)]
+        shown += [Text(""), pages.table("After the change", forecast.tables(after)[0][1], **LOOK)]
     options.show({"before": dataclasses.asdict(found), "after": after and dataclasses.asdict(after)}, args.json, *shown)
     limits = ("creep", "m/s", args.max_creep), ("depth", "m", args.max_depth)
     code = 0

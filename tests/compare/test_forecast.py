@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from compare.bench import forecast
+from compare.bench import contact_law, forecast
 from compare.bench.forecast import Forecast
 from compare.commands import cli
 from mjsim import FrictionMemory
@@ -100,8 +100,8 @@ def settled(text: str, keyframe: str | None = None, limit: float = 10.0) -> tupl
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_depth_and_creep_are_as_predicted(scene: str) -> None:
-    _, _, found = settled(SCENES[scene])
+def test_depth_creep_rebound_and_decay_are_as_predicted(scene: str) -> None:
+    model, data, found = settled(SCENES[scene])
     assert not found.moving
     for pair in found.pairs:
         assert not pair.slides
@@ -109,6 +109,17 @@ def test_depth_and_creep_are_as_predicted(scene: str) -> None:
         # Round-off of a place, over the window.
         assert pair.creep == pytest.approx(pair.creep_measured, rel=1e-2, abs=1e-11)
         assert pair.turning == pytest.approx(pair.turning_measured, rel=1e-2, abs=forecast.STILL)
+        # A wheel cannot land without the others.
+        assert pair.rebound == pytest.approx(pair.rebound_measured, rel=1.5e-2, nan_ok="wheel" in pair.name)
+    if scene in ("slope, RK4", "stack, pyramidal"):  # RK4 has no linear step in MuJoCo; CG stops too early for one
+        return
+    step = np.zeros((2 * model.nv, 2 * model.nv))
+    mujoco.mjd_transitionFD(model, data, 1e-6, True, step, None, None, None)
+    left = np.abs(np.linalg.eigvals(step))
+    slowest = -math.log(left[left < 1 - 1e-4].max()) / model.opt.timestep  # where bodies slip to, they stay
+    # An edge of a pyramid is idle where the rod hangs, which decay leaves out.
+    allowed = 0.2 if scene == "gripper, pyramidal" else 2e-2
+    assert contact_law.contacts(model, data)[0].decay() == pytest.approx(slowest, rel=allowed)
 
 
 # A body that a moving floor drags under a guide; how far its place is from where it was put, and its pair.
@@ -212,18 +223,6 @@ def test_advice_does_what_it_says(scene: str) -> None:
         assert np.abs(data.qpos - held).max() < 1e-3 * forecast.CREEP
 
 
-def test_a_disturbance_dies_out_at_the_predicted_rate() -> None:
-    model, data, found = settled(mjcf(LEVEL, 'cone="elliptic"', 'solref="-2000 -40"'))
-    data.qvel[2] += 1e-5
-    speeds = []
-    for _ in range(60):
-        mujoco.mj_step(model, data)
-        speeds.append(abs(data.qvel[2]))
-    # An oscillation that dies out: the largest speeds of two halves, at a whole number of half periods.
-    slow = found.pairs[0].decay
-    assert -math.log(max(speeds[40:]) / max(speeds[:20])) / (40 * model.opt.timestep) == pytest.approx(slow, rel=0.3)
-
-
 CLOTH = (
     '<flexcomp name="c" type="grid" count="4 4 1" spacing=".05 .05 .05" pos="1 1 .1" radius=".01" mass=".1" dim="2">'
 )
@@ -237,7 +236,7 @@ REFUSED = {
     mjcf(FLOOR.format("") + CLOTH): (2, "nothing touches.*16 contacts of flexible bodies are left out"),
     mjcf(LEVEL, geom='solref="-5000 0"'): (
         1,
-        "still moves: body 'box' at .*disturbances of its contacts die out at 0 1/s only",
+        "still moves: body 'box' at .*disturbances of its contacts die out at .* 1/s only",
     ),
     mjcf(SLOPE + ROUND): (1, "still moves: body 'ball' at"),
     mjcf(LEVEL.replace('"/></body>', '" /><joint/></body>')): (2, "MuJoCo refuses it"),
@@ -286,5 +285,5 @@ def test_two_hundred_contacts_stay_readable() -> None:
     )
     assert len(found.pairs) == 50
     assert sum(len(pair.members) for pair in found.pairs) == 200
-    assert len(forecast.rows(found)) == forecast.SHOWN + 1
+    assert [len(rows) for _, rows in forecast.tables(found)] == [forecast.SHOWN + 1] * 2
     assert list(forecast.sentences(found)) == ["Nothing needs to change."]
