@@ -53,8 +53,15 @@ def validate(
 
     Parameters
     ----------
+    output : directory of the results
+    level : how much is measured
     claims : ids; all that the level measures for None
     sets : parameter sets by name; those of the level for None
+    engine : the engine on trial; the witnesses beside it are `Engine.beside`
+    workers : number of processes, or `Workers` of another kind
+    limit : longest real time a run may take, s
+    progress, announce : called with how far it is, and with every verdict
+    report : whether to write the page with its figures
 
     Raises
     ------

@@ -33,7 +33,10 @@ class Thresholds:
 
 
 def thresholds(p: Parameters) -> Thresholds:
-    """Thresholds of a set of parameters; p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only."""
+    """The flows in rad s-1 at which stationary solutions change, by name; nan for what doesn't exist. (84)-(88)
+
+    p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only.
+    """
     Omega = threshold_curves(p, p.mu, p.eta)
     unit = np.sqrt(p.g / p.R)
     omega = {name: float(Omega[name] * unit) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}

@@ -36,7 +36,7 @@ relative to the flow, and the integrator's rtol. The mean is then known to some 
 
 
 def swing(p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike) -> tuple[Array, Array]:
-    """omega_c and omega_0 in rad s-1 of RR that has pulsated for long, at phases of the flow in rad, same shape."""
+    """omega_c and omega_0 in rad s-1 of RR in a periodic pulsation, at phases of the flow in rad, same shape."""
     return _swing(p, amplitude, lag_harmonics(p, amplitude, frequency), np.asarray(phase, dtype=float))
 
 
@@ -54,7 +54,8 @@ def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex
 def lag_harmonics(
     p: Parameters, amplitude: float, frequency: float, harmonics: int = HARMONICS
 ) -> npt.NDArray[np.complex128]:
-    """Complex amplitudes at the first odd harmonics of D = omega_c - omega_0 in rad s-1, where (23) repeats itself.
+    """Complex amplitudes at the first odd harmonics of D = omega_c - omega_0 in rad s-1, in the periodic solution of
+    (23).
 
     D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With Stokes' law there is
     one, and the first step of Newton's method has nothing left to do. Raises ArithmeticError if it doesn't converge.

@@ -22,7 +22,7 @@ from model import Parameters
 from model.arrays import Array, Real
 
 LIMIT = 0.01
-"""Relative shift of omega_c from which the model doesn't hold: what a flowmeter is bought for."""
+"""Relative shift of omega_c above which the model is said not to hold: the accuracy of a usual flowmeter."""
 AT_A_WALL = 1.7009
 """Stokes' drag on a sphere that touches a plane wall, relative to that far from it (M. E. O'Neill, Chem. Eng. Sci. 23
 (1968) 1293: at rest in a slow shear flow). A ball that touches two walls feels more."""

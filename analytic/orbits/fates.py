@@ -282,7 +282,8 @@ def lyapunov(
 
 
 def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Array, int]:
-    """Which of the starts (n, 8) still hop after 60/c, by time stepping; the states then (n, 8); how many runs failed.
+    """Which of the starts (n, 8) still hop after 60/c, by time stepping; their states then (n, 8); how many runs
+    failed.
 
     One thread; p.c must be positive.
     """

@@ -33,8 +33,8 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "compare", compare, "mine.csv theory.h5 -o difference.png")
     what = "a run, or time and some of its quantities from CSV or any HDF5 file"
-    for name in ("a", "b"):
-        command.add_argument(name, metavar="FILE", help=what)
+    command.add_argument("a", metavar="FILE", help=what)
+    command.add_argument("b", metavar="OTHER", help="what it is compared with, the same")
     command.add_argument("-o", "--output", type=Path, help="draw both (png, svg or pdf)")
     options.outputs(command)
 

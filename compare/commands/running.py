@@ -73,7 +73,10 @@ def add_engine_name(parser: argparse._ActionsContainer) -> None:
         except InputError as error:
             raise argparse.ArgumentTypeError(str(error)) from error
 
-    known = f"engine: {', '.join(engines.ENGINES)}; analytic is event"
+    known = (
+        "mujoco has corrections between its steps, mujoco-plain none, mujoco-defaults is MuJoCo as it comes; others: "
+        f"{', '.join(list(engines.ENGINES)[3:])} (analytic is event; default mujoco)"
+    )
     parser.add_argument("--engine", type=engine, default=engines.MUJOCO, metavar="NAME", help=known)
 
 

@@ -26,8 +26,8 @@ def add(commands: options.Commands) -> None:
     """Declare the commands."""
     command = options.command(commands, "validate", run, "--quick")
     level = command.add_mutually_exclusive_group()
-    for each, takes in ((Level.QUICK, "a minute or two"), (Level.FULL, "an hour or more (default: in between)")):
-        option, usual = f"--{each.name.lower()}", Level.DEFAULT
+    for each, takes in ((Level.QUICK, "a minute or two"), (Level.FULL, "an hour or more")):
+        option, usual, takes = f"--{each.name.lower()}", Level.DEFAULT, f"{takes} (default: in between)"
         level.add_argument(option, dest="level", action="store_const", const=each, default=usual, help=takes)
     own = command.add_mutually_exclusive_group()
     own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
@@ -100,7 +100,7 @@ def line(verdict: Verdict) -> Text:
         found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
         count = len(verdict.checks)
         shown.append("; ".join([f"{count:>5} number{'s' if count > 1 else ''}", *found]))
-    for each in verdict.witnesses[1:]:
+    for each in (witness for witness in verdict.witnesses[1:] if witness.outcome is not Outcome.NOT_ASKED):
         kind, mark = wording.MARKS[each.outcome]
         shown.append(f"; {each.engine} ").append(f"{mark} {each.outcome}", _STYLES[kind])
     if verdict.error:

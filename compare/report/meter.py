@@ -41,7 +41,7 @@ def torque(p: Parameters) -> str:
     laws = stokes, layer = [real_fluid.rolling(p, each) for each in (False, True)]
     stokes_told, layer_told = (
         f"{law.rate:.3g} 1/s: ω_c of the rolling ball would be {law.omega_c:.3g} rad/s ({law.shift:+.0%}), and "
-        f"the friction it takes {law.friction:.2g} of what there is"
+        f"it would need {law.friction:.2g} times the friction that there is"
         for law in laws
     )
     how = "at the given rate fluid_torque" if p.fluid_torque else "by Stokes at the rate 8πρ_fνr/(jm)"
@@ -49,9 +49,9 @@ def torque(p: Parameters) -> str:
     if layer.Re > 8 and not p.fluid_torque:
         said += f"; with a boundary layer, as for the spin's Re = {layer.Re:.2g}, at {layer_told}"
     if max(stokes.friction, layer.friction) > 1:
-        said += ". More than 1 means that the ball can't roll at both points"
+        said += ". With more than 1 it can't roll at both points"
     known = p.nu_f or p.fluid_torque
-    return f"{said}." if known else f"{said}. (If a fluid made c by Stokes' drag: which fluid isn't known.)"
+    return f"{said}." if known else f"{said}. (This takes c for Stokes' drag: the fluid isn't known.)"
 
 
 AT_WALLS = (
@@ -65,7 +65,9 @@ def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
     if not math.isfinite(value):
         return _NONE
     left = most
-    if value and off:
+    if abs(value) < 1e-15:  # round-off
+        return "0"
+    if off:
         size = abs(value)
         left = min(most, max(1, math.floor(math.log10(size)) - math.floor(math.log10(size * off)) + 1))
     return f"{float(f'{value:.{left}g}'):.{most}g}"
