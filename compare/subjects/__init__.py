@@ -18,6 +18,7 @@ NAMES = (
     "slipping",
     "attractors",
     "unsteady",
+    "formal",
 )
 """In the order of the report; each measures only after those before it."""
 

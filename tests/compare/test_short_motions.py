@@ -23,11 +23,11 @@ from compare.kit.settling import family
 from compare.kit.short import random_state
 from compare.kit.statistics import settled_case
 from compare.kit.tasks import Task
+from compare.subjects.formal import claims as formal
 from compare.subjects.motion import claims as motion
 from compare.subjects.motion.measure import motions
 from compare.subjects.slipping import claims as slipping
 from compare.subjects.slipping.measure import growth, onset
-from compare.subjects.thresholds import claims as bifurcations
 from compare.subjects.thresholds.measure.thresholds import birth
 from model import Case, Parameters, Trajectory, storage
 from model.cases import TRAITS
@@ -175,7 +175,7 @@ def test_pieces_keep_away_from_changes_of_case(lab: Lab, measured: Measured) -> 
 
 
 def test_formal_claims_are_algebra() -> None:
-    for verdict in judge(bifurcations.FORMAL_CLAIMS, Records()):
+    for verdict in judge(formal.CLAIMS, Records()):
         assert verdict.outcome is Outcome.CONFIRMED
         assert {check.measurement.engine for check in verdict.checks} == {"theory"}
 
