@@ -36,6 +36,9 @@ def counted(results: Path) -> Rows:
     """How many claims each witness was asked, and how they came out, with its deviations at a step of 2 ms."""
     told = wording.witnesses(verdicts(results))
     head = ["witness", "asked", "confirmed", "refuted", "undecided", "typical deviation", "worst"]
+    for row in told:
+        expected = sum(row["refuted"].values())
+        row["refuted"] = f"{len(row['refuted'])}" + (f" ({expected} as expected)" if expected else "")
     return [head, *([row[name] for name in ("engine", *head[1:4], "open", "typical", "worst")] for row in told)]
 
 

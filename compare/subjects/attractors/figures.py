@@ -154,7 +154,7 @@ def walls() -> dict[str, Any]:
 
 _KINDS = {
     "nonsmooth birth": ("birth", (-8, 5)),
-    "torus": ("torus", (-8, -5)),
+    "torus": ("torus", (0, -20)),
     "fold": ("fold", (8, 4)),
     "persistence": ("", (0, 0)),
 }
