@@ -95,25 +95,21 @@ def named(p: Parameters, *names: str) -> str:
 
 def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = (), names: Sequence[str] = ()) -> str:
     """Sentences, the parameters (those of `names`, see `named`), and what the marks of measured states are."""
-    return " ".join(filter(None, (*sentences, f"{named(p, *names)}."))) + edge(states) + marks(states)
+    return " ".join(filter(None, (*sentences, f"{named(p, *names)}."))) + marks(states)
 
 
 def marks(states: Sequence[Measurement]) -> str:
     """What a caption says of measured points; nothing where there are none."""
     if not states:
         return ""
-    said = f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where the mark is larger."
+    between = any(m.protocol == "edge" for m in states)
+    said = " On the unstable SS: the edge between two motions, which the engine was made to follow." if between else ""
+    said += f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where the mark is larger."
     if alone := dict.fromkeys(m.engine for m in states if ENGINES[m.engine].refine != (1,)):
         steps = sorted({500 * coarse_step(m.parameters) for m in states if m.engine in alone})
         at = " or ".join(f"{step:g}" for step in steps)
         said += f" {' and '.join(alone)}: as measured with a time step of {at} ms, not in the limit of no step."
     return said
-
-
-def edge(states: Sequence[Measurement]) -> str:
-    """What a caption says of points on the unstable branch; nothing where there are none."""
-    between = any(m.protocol == "edge" for m in states)
-    return " On the unstable SS: the edge between two motions, which the engine was made to follow." if between else ""
 
 
 def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:

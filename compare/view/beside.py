@@ -66,7 +66,7 @@ def tables(about: dict[str, Any]) -> list[Any]:
         rows[f"failure of {letter}"] = each["failure"]
     differ = about["parameters that differ"].items()
     rows["made with other parameters"] = ", ".join(f"{name} = {a} in a, {b} in b" for name, (a, b) in differ)
-    table = [["a - b", "unit", "rms", "of b's largest", "largest", "at (s)"]]
+    table = [["a - b", "unit", "rms", "rms/max |b|", "largest", "at (s)"]]
     for each in about["differences"]:
         part = f"{each['rms'] / each['scale']:.1e}" if each["scale"] else ""
         star = "*" if 0 < each["rms"] <= 2 * each["doubt"] else ""
@@ -98,6 +98,6 @@ def draw(a: Series, b: Series) -> Figure:
             style.ground(axes, a.run, (t[0], t[-1]), named=axes is panels[0])
     style.legend(panels[0])
     style.legend(panels[-1], ncols=6)
-    panels[-1].set(xlabel="time (s)", ylabel="difference,\nof b's largest")
+    panels[-1].set(xlabel="time (s)", ylabel="|a − b|/max |b|")
     panels[-1].grid(alpha=0.3)
     return figure

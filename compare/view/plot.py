@@ -15,13 +15,13 @@ def draw(run: Trajectory) -> Figure:
     blue, green, orange, red, pink = "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7"
     scale, unit = (1e3, "mm") if max(np.abs(run.y).max(), np.abs(run.h).max()) > 1e-5 else (1e6, "µm")
     friction_A, friction_B = np.hypot(*run.force_A[:, [0, 2]].T), np.hypot(*run.force_B[:, [1, 2]].T)
-    slips = zip("xyz", (red, green, pink), strict=True)
+    slips = zip("xyz", (red, green, pink), ("-", "--", ":"), strict=True)
     curves = {
         "angular velocity (rad/s)": (
             ("fluid, $ω_0$", run.header.flow(t), "0.6", "--"),
             ("orbit, $ω_c$", run.omega_c, blue, "-"),
         ),
-        "slip (rad/s)": tuple((style.symbol(f"slip_{k}"), getattr(run, f"slip_{k}"), c, "-") for k, c in slips),
+        "slip (rad/s)": tuple((style.symbol(f"slip_{k}"), getattr(run, f"slip_{k}"), *look) for k, *look in slips),
         f"gap ({unit})": (("floor, $y$", scale * run.y, blue, "-"), ("wall, $h$", scale * run.h, orange, "--")),
         "force (N)": (
             (style.symbol("force_Ay"), run.force_A[:, 1], blue, "-"),
@@ -39,6 +39,5 @@ def draw(run: Trajectory) -> Figure:
         axes.grid(alpha=0.3)
         style.legend(axes, ncols=4)
     panels[-1].set_xlabel("time (s)")
-    set_ = f"μ = {p.mu:g}, η = {p.eta:g}, j = {p.j:g}, c = {p.c:g} 1/s"
-    figure.suptitle(f"{run.header.engine}: {set_}", fontsize=11)
+    figure.suptitle(f"{run.header.engine}: {style.named(p)}", fontsize=11)
     return figure

@@ -1,4 +1,4 @@
-"""Drake with a free body: a discrete plant with point contact; its traps are told in `compare.kit.adapters.drake`."""
+"""Drake with a free body: a discrete plant with point contact; its traps: see `compare.kit.adapters.drake`."""
 
 from __future__ import annotations
 

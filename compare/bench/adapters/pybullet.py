@@ -1,4 +1,4 @@
-"""PyBullet with a free body, in double precision; its traps are told in `compare.kit.adapters.pybullet`.
+"""PyBullet with a free body, in double precision; its traps: see `compare.kit.adapters.pybullet`.
 
 One more: where a length unit is so small that things move by 0.4 of it in a step, friction is gone.
 """

@@ -199,7 +199,7 @@ def diagram_caption(of: Diagram) -> str:
         text += " H: a Hopf point of SS, beyond which an oscillation grows, too."
     if of.states and of.figure in ("fig-10", "fig-11"):
         text += " A ball on the wall (NR) has the spin of SR, also where SR is unstable."
-    return text + style.edge(of.states) + style.marks(of.states)
+    return text + style.marks(of.states)
 
 
 def draw_diagram(of: Diagram) -> Figure:

@@ -159,16 +159,11 @@ def draw_unsteady(of: Measurements) -> Figure:
     return figure
 
 
+_PULSATION = ("pulsation-lag", "pulsation-slip", "pulsation-mean")
 FIGURES = {
     name: Drawing(f"Unsteady flow: {title}", partial(select, figure=name), draw, caption, claims)
     for name, title, draw, caption, claims in (
-        (
-            "pulsation",
-            "pulsation",
-            draw_pulsation,
-            caption_pulsation,
-            ("pulsation-lag", "pulsation-slip", "pulsation-mean"),
-        ),
+        ("pulsation", "pulsation", draw_pulsation, caption_pulsation, _PULSATION),
         ("unsteady", "jumps and ramps", draw_unsteady, caption_unsteady, ("jump-slipping", "ramp-fold")),
     )
 }
