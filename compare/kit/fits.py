@@ -85,14 +85,18 @@ def initial_slope(where: Array, values: Sequence[Measured]) -> Measured:
     return _extrapolated(lambda y, n: float(Polynomial.fit(y[:n] / size, where[:n], n - 1).deriv()(0.0)) / size, values)
 
 
-def turning(where: Array, values: Sequence[Measured]) -> Measured:
-    """The maximum of the place as a function of a quantity, the value nearest to it first; nan if there is none."""
+def turning(where: Array, values: Sequence[Measured], others: Array | None = None) -> Measured:
+    """The maximum of the place as a function of a quantity, the value nearest to it first; nan if there is none.
+
+    Or what another quantity is there, with its values `others` at the places.
+    """
 
     def maximum(y: Array, n: int) -> float:
         y = y[:n] / np.abs(y).max()
         fit = Polynomial.fit(y, where[:n], n - 1)
         beyond = [root for root in _real_roots(fit.deriv()) if 0 < (root - y[0]) / (y[0] - y[-1]) < FAR]
-        return float(fit(min(beyond, key=lambda root: abs(root - y[0])))) if beyond else math.nan
+        nearest = min(beyond, key=lambda root: abs(root - y[0]), default=math.nan)
+        return float((fit if others is None else Polynomial.fit(y, others[:n], n - 1))(nearest))
 
     return _extrapolated(maximum, values)
 

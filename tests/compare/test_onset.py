@@ -107,8 +107,10 @@ def test_extrapolated_zero_of_what_is_no_power_series_is_as_sure_as_it_says(powe
 def test_extrapolated_maximum_is_as_sure_as_it_says():
     slip = 1 + np.sqrt(TURNS)  # its maximum is at slip = 1, with a cubic part
     where = 3 - (slip - 1) ** 2 * (1 + 0.5 * (slip - 1) + 0.2 * (slip - 1) ** 2)
-    top = turning(where, [Measured(-float(s), 1e-9) for s in slip])
+    slips = [Measured(-float(s), 1e-9) for s in slip]
+    top, pull = turning(where, slips), turning(where, slips, 0.9 * slip - np.sin(slip))
     assert abs(top.value - 3) < 3 * top.uncertainty < 3e-3
+    assert abs(pull.value - 0.9 + math.sin(1)) < 3 * pull.uncertainty < 3e-3
 
 
 @pytest.mark.parametrize("bend", [0.0, 1e-15, -1e-15, 1e-4])

@@ -125,16 +125,19 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     brackets |= _narrowed(lab, searches)
 
     # The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
-    # the branch. There is no fold where the floor's force on it vanishes just where the wall begins to carry it, and
-    # the slip ends no sooner.
+    # the branch. There is no fold where the floor would have to pull at that maximum, or there is none and the floor's
+    # force vanishes just where the wall begins to carry the ball.
     folds, smooth, searches = {}, set(), {}
     for name, p in sets.items():
         turned, held = states.get((name, "turning"), []), brackets.get((name, "riding"))
         top, unloaded = extrapolated(turned, "slip_x", turning), extrapolated(turned, "force_Ay", vanishing)
         off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty) if held and unloaded else math.inf
-        if held and off < narrowest * held.high:
+        forces = partial(turning, others=np.array([state.values["force_Ay"].value for state in turned]))
+        pressing = extrapolated(turned, "slip_x", forces)
+        sure = COVERAGE * pressing.uncertainty if pressing else math.inf
+        if pressing.value < -sure if pressing else held and off < narrowest * held.high:
             smooth.add(name)
-        elif top:
+        elif top and pressing and pressing.value > sure:
             folds[name], half = top, max(narrowest, 5.0 * top.uncertainty / top.value)
             change = Bracket(top.value * (1 - half), top.value * (1 + half))
             # At a fold all slows down, like the root of the distance.
