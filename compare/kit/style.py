@@ -165,7 +165,7 @@ def guides(axes: Axes, values: dict[str, float]) -> None:
     look: dict[str, Any] = {"xytext": (2, 0), "textcoords": "offset points", "fontsize": 9, "bbox": HALO}
     for key, value in sorted(values.items(), key=lambda item: item[1]):
         if low <= value <= high:
-            step = 1 - step if value - last < 0.08 * (high - low) else 0
+            step = step + 1 if value - last < 0.08 * (high - low) else 0
             last = value
             axes.axvline(value, **GUIDE)
             foot: dict[str, Any] = {"xy": (value, 0.02 + 0.07 * step), "xycoords": ("data", "axes fraction")}
