@@ -26,11 +26,12 @@ class Measured:
 
 
 def plain(value: Any) -> Any:
-    """Nested data as JSON holds it: lists for tuples, None for a number that is not finite."""
+    """Nested data as JSON holds it: lists for tuples, Python's numbers for numpy's, None for one that is not finite."""
     if isinstance(value, Mapping):
         return {name: plain(part) for name, part in value.items()}
     if isinstance(value, list | tuple):
         return [plain(part) for part in value]
+    value = value.item() if isinstance(value, np.generic) else value
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -1,10 +1,12 @@
 """Uncertainties that hold what they promise, on series whose truth is known."""
 
+import json
+
 import numpy as np
 import pytest
 
 from compare.kit.fits import value_and_slope, zero_and_slope
-from compare.kit.statistics import correlation_length, window_mean
+from compare.kit.statistics import correlation_length, plain, window_mean
 from model import InputError
 
 T = np.linspace(0, 10, 1001)
@@ -56,3 +58,8 @@ def test_a_bent_line_has_its_zero_and_slope(power: float) -> None:
     assert abs(zero.value - 1.7 ** (1 / power)) < 3 * zero.uncertainty < 0.03
     assert abs(slope.value - power * zero.value ** (power - 1)) < 3 * slope.uncertainty < 0.06
     assert np.isnan([m.value for m in zero_and_slope(x, x + 1, noise)]).all()
+
+
+def test_numbers_of_numpy_are_written_as_json() -> None:
+    data = {"a": (np.int64(3), np.float64(np.nan), np.True_), "b": [np.float64(0.5), "text", None]}
+    assert json.loads(json.dumps(plain(data))) == {"a": [3, None, True], "b": [0.5, "text", None]}
