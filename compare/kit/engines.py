@@ -142,7 +142,7 @@ def _theory(method: str, *task: Any) -> Trajectory:
         return error.trajectory
 
 
-def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str) -> tuple[Engine, Engine]:
+def _adapted(adapter: Any, library: Library, marks: str) -> tuple[Engine, Engine]:
     """Records of an engine with the best settings of its adapter and with a newcomer's, each with a mark."""
     name, other = library.name, f"{library.name}-defaults"
     best = Engine(
@@ -160,7 +160,7 @@ def _adapted(adapter: Any, library: Library, newcomer_step: float, marks: str) -
     return best, replace(
         best,
         name=other,
-        configure=lambda given, p: adapter.Settings(**{"timestep": newcomer_step, **adapter.DEFAULTS, **given}),
+        configure=lambda given, p: replace(adapter.DEFAULTS, **given),
         simulate=partial(loop.simulate, other, library, adapter.Scene),
         mark=marks[1],
     )
@@ -225,9 +225,9 @@ MOREAU = replace(
     mark="^",
 )
 _OTHERS = (
-    *_adapted(pybullet, Library("pybullet", "pybullet"), 1 / 240, "v1"),
-    *_adapted(drake, Library("drake", "pydrake.all"), 1e-3, "D+"),
-    *_adapted(siconos, siconos.LIBRARY, 1e-3, "p2"),
+    *_adapted(pybullet, Library("pybullet", "pybullet"), "v1"),
+    *_adapted(drake, Library("drake", "pydrake.all"), "D+"),
+    *_adapted(siconos, siconos.LIBRARY, "p2"),
 )
 ENGINES: dict[str, Engine] = {each.name: each for each in (MUJOCO, PLAIN, NEWCOMER, EVENT, MOREAU, *_OTHERS)}
 """Every engine by name."""

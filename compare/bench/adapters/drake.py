@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import pydrake.all as engine
 from compare.bench.adapters.free import CHORD, Free, State
 from compare.bench.adapters.simulators import Simulated
 from compare.bench.case import Vector
-from compare.kit.adapters.drake import Plant
+from compare.kit.adapters.drake import DEFAULTS, Plant, Settings
 from model.arrays import Array
 
 HEAVY = 1e6
@@ -30,8 +31,8 @@ class Drake(Free):
     def make(self) -> None:
         case, body = self.case, self.case.body
         most = max(surface.friction for surface in case.surfaces)
-        springs = {"dissipation": 100.0, "point_stiffness": 1e10} if self.best else {}
-        self.own = Plant(engine, self.timestep, case.g, most, "tamsi" if self.best else "", **springs)
+        settings = replace(Settings() if self.best else DEFAULTS, timestep=self.timestep)
+        self.own = Plant(engine, settings, case.g, most)
         plant = self.own.plant
         moments = engine.UnitInertia(*(np.array(body.inertia) / body.mass))
         ball = plant.AddRigidBody("body", engine.SpatialInertia(body.mass, np.zeros(3), moments))
@@ -47,7 +48,7 @@ class Drake(Free):
                 frames = plant.world_body().body_frame(), of.body_frame()
                 hinges.append((surface, plant.AddJoint(engine.RevoluteJoint(surface.name, *frames, [0.0, 0.0, 1.0]))))
             self.own.plane(of, point, normal, f"{surface.name}{k}", surface.friction, 100.0 * facets)
-        self.own.build(1e-8 if self.best else None)
+        self.own.build()
         self.force = np.zeros(plant.num_velocities())
         self.q, self.v = ball.floating_positions_start(), plant.num_positions() + ball.floating_velocities_start_in_v()
         self.x = plant.GetPositionsAndVelocities(self.own.context)

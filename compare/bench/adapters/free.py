@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from compare.bench.case import FACETS, Case, Surface, Vector
+from compare.kit.adapters.adapter import tangent
 from model.arrays import Array
 
 CHORD = (
@@ -56,7 +57,7 @@ class Free(ABC):
                         x, y = (
                             at + self.timestep / 2 * rate for at, rate in zip(position[:2], velocity[:2], strict=True)
                         )
-                        self.turn(*tangent(surface, math.atan2(y - surface.point[1], x - surface.point[0])))
+                        self.turn(*tangent(surface.radius, math.atan2(y, x)))
             self.advance()
             self.now += self.timestep
 
@@ -67,7 +68,7 @@ class Free(ABC):
                 yield surface, np.array(surface.point), np.array(surface.normal)
             else:
                 for k in range(1 if self.best else FACETS):
-                    yield surface, *tangent(surface, math.tau * k / FACETS)
+                    yield surface, *tangent(surface.radius, math.tau * k / FACETS)
 
     @abstractmethod
     def make(self) -> None:
@@ -88,12 +89,6 @@ class Free(ABC):
     def turn(self, point: Array, normal: Array) -> None:
         """Move the plane that stands for the cylinder."""
         raise NotImplementedError("its planes can't be moved")
-
-
-def tangent(surface: Surface, azimuth: float) -> tuple[Array, Array]:
-    """Point and inward normal of the plane that touches a cylinder there."""
-    inwards = -np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-    return surface.point - (surface.radius or 0.0) * inwards, inwards
 
 
 def upright(normal: Any) -> tuple[float, float, float, float]:

@@ -5,13 +5,15 @@ One more: where a length unit is so small that things move by 0.4 of it in a ste
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
+import numpy as np
 import pybullet as engine
 
 from compare.bench.adapters.free import CHORD, Free, State, upright
 from compare.bench.adapters.simulators import Simulated
 from compare.bench.case import Vector
+from compare.kit.adapters.pybullet import DEFAULTS, Server, Settings
 from model.arrays import Array
 
 
@@ -24,60 +26,33 @@ class PyBullet(Free):
     )
 
     def make(self) -> None:
+        if hasattr(self, "own"):
+            self.own.close()
         case, body = self.case, self.case.body
-        if engine.isConnected():
-            engine.disconnect()
-        engine.connect(engine.DIRECT)
-        self.scale = 10.0 if self.best else 1.0
-        engine.setPhysicsEngineParameter(fixedTimeStep=self.timestep)
-        if self.best:
-            engine.setPhysicsEngineParameter(
-                numSolverIterations=200,
-                solverResidualThreshold=1e-24,
-                enableConeFriction=1,
-                contactSlop=0.0,
-                contactBreakingThreshold=0.2,
-            )
-        engine.setGravity(0, 0, -case.g * self.scale)
+        settings = Settings(scale=10.0) if self.best else DEFAULTS
+        self.own = own = Server(engine, replace(settings, timestep=self.timestep), case.g)
         for surface, point, normal in self.planes():
             if surface.turning:
                 raise NotImplementedError("its planes don't turn")
-            shape = engine.createCollisionShape(engine.GEOM_PLANE, planeNormal=[0, 0, 1])
-            self.wall = engine.createMultiBody(0, shape)
-            self.place(self.wall, point, upright(normal))
-            engine.changeDynamics(self.wall, -1, lateralFriction=surface.friction, restitution=0)
-        size = [each * self.scale for each in body.size]
-        if body.shape == "sphere":
-            shape = engine.createCollisionShape(engine.GEOM_SPHERE, radius=size[0])
-        else:
-            shape = engine.createCollisionShape(engine.GEOM_BOX, halfExtents=size)
-        self.body = engine.createMultiBody(body.mass, shape)
-        free = {"linearDamping": 0, "angularDamping": 0}
-        inertia = [each * self.scale**2 for each in body.inertia]
-        engine.changeDynamics(self.body, -1, localInertiaDiagonal=inertia, **free)
-        engine.changeDynamics(self.body, -1, lateralFriction=1, restitution=0, **free)
-        self.place(self.body, body.position, body.orientation)
-        engine.resetBaseVelocity(self.body, [each * self.scale for each in body.velocity], body.spin)
-
-    def place(self, body: int, position: Any, orientation: Any) -> None:
-        """Put a body somewhere."""
-        w, *axis = orientation
-        engine.resetBasePositionAndOrientation(body, [each * self.scale for each in position], [*axis, w])
+            self.wall = own.plane(point, np.array([0.0, 0.0, 1.0]), surface.friction)
+            self.turn(point, normal)  # boxes rock on a plane that isn't turned, but has another normal than z
+        self.body = engine.createMultiBody(body.mass, own.shape(body.size), **own.here)
+        own.loosen(self.body, -1, [each * own.scale**2 for each in body.inertia])
+        w, *axis = body.orientation
+        own.put(self.body, body.position, [*axis, w], body.velocity, body.spin)
 
     def advance(self) -> None:
-        engine.stepSimulation()
+        engine.stepSimulation(**self.own.here)
 
     def state(self) -> State:
-        position, _ = engine.getBasePositionAndOrientation(self.body)
-        velocity, spin = engine.getBaseVelocity(self.body)
-        return [each / self.scale for each in position], [each / self.scale for each in velocity], spin
+        return self.own.state(self.body)
 
     def push(self, force: Vector) -> None:
-        where, _ = engine.getBasePositionAndOrientation(self.body)
-        engine.applyExternalForce(self.body, -1, [each * self.scale for each in force], where, engine.WORLD_FRAME)
+        self.own.push(self.body, force)
 
     def turn(self, point: Array, normal: Array) -> None:
-        self.place(self.wall, point, upright(normal))
+        w, *axis = upright(normal)
+        self.own.put(self.wall, point, [*axis, w])
 
 
 defaults = PyBullet("pybullet-defaults")

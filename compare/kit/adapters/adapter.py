@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from model import InputError, Parameters
+from model import InputError
 from model.arrays import Array
 from model.parameters import POSITIVE, check_choice, check_number
 from model.trajectory import version
@@ -110,7 +110,7 @@ class BreakdownError(RuntimeError):
     """The engine can't take the next step."""
 
 
-def tangents(p: Parameters, facets: int) -> list[tuple[Array, Array]]:
-    """Places and inward normals, each (3,), of planes tangent to the vessel's wall, from azimuth 0 round."""
-    normals = [-np.array([math.cos(a), math.sin(a), 0.0]) for a in math.tau * np.arange(facets) / facets]
-    return [(-(p.R + p.r) * normal, normal) for normal in normals]
+def tangent(radius: float, azimuth: float) -> tuple[Array, Array]:
+    """Point and inward normal, each (3,), of the plane that touches a cylinder about the z axis there."""
+    normal = -np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    return -radius * normal, normal

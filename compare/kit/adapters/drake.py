@@ -13,13 +13,14 @@ boxes are less exact, but one among a dozen of other shapes crashes the engine.
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from compare.kit.adapters import adapter
-from compare.kit.adapters.adapter import BreakdownError, Floats, Touch, tangents
+from compare.kit.adapters.adapter import BreakdownError, Floats, Touch, tangent
 from model import Parameters
 from model.arrays import Array
 
@@ -50,32 +51,26 @@ class Settings(adapter.Settings):
         return self.stiction
 
 
-DEFAULTS = {
-    "coordinates": "free",
-    "facets": 64,
-    "approximation": "lagged",
-    "stiction": 1e-4,
-    "stiffness": None,
-    "dissipation": None,
-}
+DEFAULTS = Settings(
+    coordinates="free", facets=64, approximation="lagged", stiction=1e-4, stiffness=None, dissipation=None
+)
 """The engine's own settings: a free ball in a prism of 64 boxes."""
 
 
 class Plant:
     """A discrete plant with point contact: it is given bodies and shapes, built, and stepped."""
 
-    def __init__(
-        self, engine: Any, timestep: float, g: float, most: float, approximation: str, **springs: float
-    ) -> None:
-        """`most` is the largest friction of a pair; the engine's own approximation has no name."""
+    def __init__(self, engine: Any, settings: Settings, g: float, most: float) -> None:
+        """`most` is the largest friction of a pair."""
         logging.getLogger("drake").setLevel(logging.ERROR)  # it warns that half spaces don't meet deformable bodies
-        self.engine, self.most, self.springs = engine, most, springs
+        self.engine, self.most, self.stiction = engine, most, settings.stiction
+        springs = {"dissipation": settings.dissipation, "point_stiffness": settings.stiffness}
+        self.springs = {name: value for name, value in springs.items() if value is not None}
         self.builder = engine.DiagramBuilder()
-        self.plant, _ = engine.AddMultibodyPlantSceneGraph(self.builder, engine.MultibodyPlant(timestep))
+        self.plant, _ = engine.AddMultibodyPlantSceneGraph(self.builder, engine.MultibodyPlant(settings.timestep))
         self.plant.set_contact_model(engine.ContactModel.kPoint)
-        if approximation:
-            chosen = getattr(engine.DiscreteContactApproximation, f"k{approximation.capitalize()}")
-            self.plant.set_discrete_contact_approximation(chosen)
+        chosen = getattr(engine.DiscreteContactApproximation, f"k{settings.approximation.capitalize()}")
+        self.plant.set_discrete_contact_approximation(chosen)
         self.plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -g])
         self.plant.SetUseSampledOutputPorts(False)
 
@@ -97,11 +92,10 @@ class Plant:
             shape = self.engine.Box(size, size, size)
         return self.add(of, pose, shape, name, friction)
 
-    def build(self, stiction: float | None) -> None:
-        """Nothing can be added after this; without a stiction tolerance the engine's own counts."""
+    def build(self) -> None:
+        """Nothing can be added after this."""
         self.plant.Finalize()
-        if stiction is not None:
-            self.plant.set_stiction_tolerance(stiction)
+        self.plant.set_stiction_tolerance(self.stiction)
         self.diagram = self.builder.Build()
         self.root = self.diagram.CreateDefaultContext()
         self.context = self.plant.GetMyMutableContextFromRoot(self.root)
@@ -119,9 +113,7 @@ class Scene(adapter.Scene):
 
     def __init__(self, engine: Any, p: Parameters, settings: Settings) -> None:
         self._joints = settings.coordinates == "joints"
-        springs = {"dissipation": settings.dissipation, "point_stiffness": settings.stiffness}
-        known = {name: value for name, value in springs.items() if value is not None}
-        own = Plant(engine, settings.timestep, p.g, max(p.mu, p.eta), settings.approximation, **known)
+        own = Plant(engine, settings, p.g, max(p.mu, p.eta))
         turning = engine.UnitInertia(*[p.j * p.r**2] * 3)
         ball = own.plant.AddRigidBody("ball", engine.SpatialInertia(p.m, [0.0, 0.0, 0.0], turning))
         if self._joints:
@@ -130,9 +122,9 @@ class Scene(adapter.Scene):
         own.add(ball, engine.RigidTransform(), engine.Sphere(p.r), "ball")
         world = own.plant.world_body()
         self._floor = own.plane(world, np.zeros(3), np.array([0.0, 0.0, 1.0]), "floor", p.mu, size)
-        for k, (place, normal) in enumerate(tangents(p, settings.facets)):
-            own.plane(world, place, normal, f"wall{k}", p.eta, size)
-        own.build(settings.stiction)
+        for k in range(settings.facets):
+            own.plane(world, *tangent(p.R + p.r, math.tau * k / settings.facets), f"wall{k}", p.eta, size)
+        own.build()
         self._plant, self._ball, self._state = own, ball.index(), np.empty(0)
 
     def start(self, place: Floats, velocity: Floats) -> None:

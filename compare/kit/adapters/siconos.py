@@ -56,7 +56,7 @@ class Settings(adapter.Settings):
     """Most iterations of that solver."""
 
 
-DEFAULTS = {"coordinates": "free", "activation": 0.0, "projection": None, "newton": 1e-6, "tolerance": 1e-4}
+DEFAULTS = Settings(coordinates="free", activation=0.0, projection=None, newton=1e-6, tolerance=1e-4)
 """The engine's own settings: a free ball in a true cylinder, since the user of Siconos writes the contacts."""
 
 
