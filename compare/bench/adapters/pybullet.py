@@ -24,6 +24,7 @@ class PyBullet(Free):
         "as it comes worst with a ball in facets, whose every corner takes away some of its speed; set well of first "
         f"order, and worst round the cylinder: {CHORD}"
     )
+    own: Server
 
     def make(self) -> None:
         if hasattr(self, "own"):
