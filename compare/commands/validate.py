@@ -115,7 +115,7 @@ def summary(verdicts: Sequence[Verdict]) -> Text:
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     said = "; ".join([wording.headline(ran), *map(" ".join, wording.totals(ran))])
     shown = Text(f"{said}. {wording.missing(ran)}".strip(), "bold")
-    for each in wording.witnesses(ran):
+    for each in (each for each in wording.witnesses(ran) if each["asked"] != "0"):
         counts = f"{each['confirmed']} of {each['asked']} claims confirmed, {len(each['refuted'])} refuted"
         off = f"typical deviation {each['typical']}, worst {each['worst']}"
         shown.append(f"\n{each['engine']} ({each['title']}): {counts}; {off}", "not bold")

@@ -144,10 +144,12 @@ def headline(ran: Sequence[Verdict]) -> str:
         return f"{len(failed)} of {len(ran)} claims did not come out as expected: {', '.join(failed[:4])}{more}"
     if not ran:
         return "Nothing has been checked yet"
-    counts = Counter(f"{v.outcome} as expected" if v.outcome is not Outcome.CONFIRMED else "confirmed" for v in ran)
+    asked = [v for v in ran if not v.claim.algebra]
+    counts = Counter(f"{v.outcome} as expected" if v.outcome is not Outcome.CONFIRMED else "confirmed" for v in asked)
     name = next((each.engine for verdict in ran for each in verdict.witnesses), "")
-    said = ", ".join(f"{n} claims {what}" if n > 1 else f"{n} {what}" for what, n in counts.most_common())
-    return f"{ENGINES[name].title or name if name else 'The engine'} agrees with the paper: {said}"
+    said = [f"{n} claim{'s' * (n > 1)} {what}" for what, n in counts.most_common()]
+    said += [f"{len(ran) - len(asked)} hold formally"] * (len(asked) < len(ran))
+    return f"{ENGINES[name].title or name if name else 'The engine'} agrees with the paper: {', '.join(said)}"
 
 
 def missing(ran: Sequence[Verdict]) -> str:
@@ -167,5 +169,7 @@ def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
         (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance"),
     ]
     if corrected := sum(v.passed and v.claim.text is Text.CORRECTED for v in ran):
-        counts.append((str(corrected), "claims hold in a corrected form, see the errata"))
+        counts.append(
+            (str(corrected), f"claim{'s hold' if corrected > 1 else ' holds'} in a corrected form, see the errata")
+        )
     return counts
