@@ -89,6 +89,12 @@ def test_a_foreign_model_is_named(tmp_path: Path, package: str) -> None:
     assert last.startswith(f"ImportError: {tmp_path / 'model.py'} hides the package model of dualball: rename that")
 
 
+def test_the_program_runs_beside_a_foreign_model(tmp_path: Path) -> None:
+    (tmp_path / "model.py").touch()
+    command = [sys.executable, "-m", "compare", "predict", "--omega-0", "25"]
+    subprocess.run(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, cwd=tmp_path, capture_output=True, check=True)
+
+
 @pytest.mark.parametrize(("law", "covered"), [("stokes", False), ("schiller-naumann", True)])
 def test_predict_says_where_a_law_of_drag_ends(capsys: pytest.CaptureFixture[str], law: str, covered: bool) -> None:
     options = ["predict", "--set", "steel-in-water", "--omega-0", "20", "--drag", law]
