@@ -110,7 +110,7 @@ def heard(witness: Witness) -> str:
 
 def percent(share: float) -> str:
     """A relative deviation with one digit."""
-    return f"{float(f'{100 * share:.1g}'):g} %" if share >= 1e-6 else f"{share:.0e}"
+    return f"{float(f'{100 * share:.1g}'):g} %" if share >= 1e-6 else f"{share:.0e}" if share else "0"
 
 
 def witnesses(ran: Sequence[Verdict]) -> list[dict[str, Any]]:

@@ -152,26 +152,15 @@ def walls() -> dict[str, Any]:
     return branch
 
 
-_KINDS = {
-    "nonsmooth birth": ("birth", (-8, 5)),
-    "torus": ("torus", (0, -20)),
-    "fold": ("fold", (8, 4)),
-    "persistence": ("", (0, 0)),
-}
-"""Names of special places, as the figure shows them, and where."""
-
-
 def caption_walls(of: Diagram) -> str:
     """What happens along the branch."""
-    at = {kind: " and ".join(f"{e['value']:.4g}" for e in walls()["places"] if e["kind"] == kind) for kind in _KINDS}
-    birth = at["nonsmooth birth"].split()[0]
+    at = {place["kind"]: f"η = {place['value']:.4g}" for place in reversed(walls()["places"])}
     mark = " Shaded: the least wall friction at which hops don't last, as measured." if of.states else ""
-    groups = style.named(of.p, "mu", "j", "kappa", "omega_0")
     return (
-        "Height and mean ω_c of the hopping ball against the friction of the wall, η. From no height (birth, "
-        f"η = {birth}) hops grow; they lose stability in a torus bifurcation ({at['torus']}), "
-        f"turn back in a fold ({at['fold']}), and end in hops of no height. Dots without names: the sequence of cases "
-        f"changes ({at['persistence']}). {groups} rad/s. Dashed: unstable.{mark}"
+        "Height and mean ω_c of the hopping ball against the friction of the wall. From no height "
+        f"({at['nonsmooth birth']}) hops grow; they lose stability in a torus bifurcation ({at['torus']}), turn back "
+        f"in a fold ({at['fold']}), and end in hops of no height. Dots without names: the sequence of cases changes. "
+        f"Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} rad/s.{mark}"
     )
 
 
@@ -184,7 +173,7 @@ def draw_walls(of: Diagram) -> Figure:
     for axes, (quantity, label, unit) in zip(panels, shown, strict=True):
         for rows, line in ((orbits, style.UNSTABLE), ([row for row in orbits if row["stable"]], style.STABLE)):
             axes.plot([r["eta"] for r in rows], [unit * r[quantity] for r in rows], color=COLOUR, ls=line, lw=2)
-        named = dict(_KINDS)
+        named = {"torus": ("torus", (0, -20)), "fold": ("fold", (8, 4)), "nonsmooth birth": ("birth", (-8, 5))}
         for place in places:
             x, y = place["value"], unit * place["orbit"][quantity]
             axes.plot(x, y, **style.POINT)
