@@ -330,6 +330,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "the peak after a jump 3 % late": scaled(1.03, 0),
         "the peak 3 % high": scaled(1.03, 1),
     },
+    "flowmeter.real_fluid.rolling": {
+        "the fluid's torque takes 2 % more friction": answer(fields(friction=times(1.02))),
+    },
     "flowmeter.design.best": {
         "a design takes less friction at the wall than it may": lambda right: (
             lambda make, bounds, *wanted: right(make, {**bounds, "eta": (0.05, 0.2)}, *wanted)
