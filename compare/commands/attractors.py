@@ -42,7 +42,7 @@ def add(commands: options.Commands) -> None:
     running.add_start(command)
     unless, most = "random starts, unless one is given by --start", "how long to follow a run at most"
     command.add_argument("--starts", type=options.count, default=20, help=unless)
-    command.add_argument("--seed", type=options.seed, default=0, help="of the random starts")
+    command.add_argument("--seed", type=options.seed, default=0, help="seed of the random starts")
     command.add_argument("--time", type=options.seconds, help=f"{most} (default {LASTING:g}/c)")
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several: grid")
     follow = "follow each periodic motion in a parameter, to where it is born and ends"
@@ -53,7 +53,7 @@ def add(commands: options.Commands) -> None:
     command = options.command(commands, "search", searched, "--sets 200 --range mu=0.5:1")
     command.add_argument("--sets", type=options.count, default=500, help="parameter sets")
     command.add_argument("--starts", type=options.count, default=5, help="random starts of each")
-    command.add_argument("--seed", type=options.seed, default=0, help="of the random sets and starts")
+    command.add_argument("--seed", type=options.seed, default=0, help="seed of the random sets and starts")
     options.add_axes(command, "--range", f"part of the box; {', '.join(BOX)}", "NAME=FROM:TO")
     running.add_workers(command)
     command.add_argument("--kept", type=Path, nargs="+", help="show what --save wrote instead")
@@ -68,9 +68,9 @@ def add(commands: options.Commands) -> None:
     for name in ("across", "up"):
         text = f"a state variable {name} the plane, and its range"
         command.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=text)
-    points = "MuJoCo, too, on every N-th point both ways; 0: not at all"
+    points = "every N-th point along both axes by MuJoCo, too; 0: none"
     command.add_argument("--mujoco", type=options.count_or_none, default=0, help=points)
-    command.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="that of MuJoCo")
+    command.add_argument("--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo")
     running.add_workers(command)
     command.add_argument("--save", type=options.written, help="write the map as JSON")
     options.outputs(command, "basins", "print the shares as JSON")

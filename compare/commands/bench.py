@@ -30,7 +30,7 @@ _NUMBERS: dict[str, tuple[options.Number, str]] = {
     "timestep": (options.seconds, "time step"),
     "impratio": (options.Number(allowed=POSITIVE), "impedance of friction, divided by that of the normal force"),
     "iterations": (_FEW, "most iterations of the solver"),
-    "tolerance": (options.Number(allowed=NOT_NEGATIVE), "at which the solver stops"),
+    "tolerance": (options.Number(allowed=NOT_NEGATIVE), "tolerance at which the solver stops"),
     "noslip_iterations": (_FEW, "iterations that suppress slip"),
 }
 _PAIR: dict[str, tuple[Any, Any, str]] = {

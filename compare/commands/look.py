@@ -22,7 +22,9 @@ def add(commands: options.Commands) -> None:
     command.add_argument("directory", type=Path, nargs="?", default=Path("results"), metavar="DIR", help=stored)
 
     command = options.command(commands, "figures", figures, "--format pdf")
-    command.add_argument("-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help="to fill")
+    command.add_argument(
+        "-o", "--output", type=Path, default=Path("figures"), metavar="DIR", help="directory to write to"
+    )
     command.add_argument("--results", type=Path, metavar="DIR", help=f"{stored} (default results, if it is there)")
     command.add_argument("--format", action="append", metavar="NAME", help="svg (default), pdf or png; may be repeated")
 

@@ -133,7 +133,7 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
 
 def add_parameters(parser: argparse.ArgumentParser) -> None:
     """Options that choose a parameter set and change some of its values."""
-    group = parser.add_argument_group("parameters", "a set, and values that are given in place of its own")
+    group = parser.add_argument_group("parameters", "a set, and values that replace its own")
     source = group.add_mutually_exclusive_group()
     source.add_argument("--set", metavar="NAME", default="reference", help=f"one of {', '.join(Parameters.names())}")
     source.add_argument("--parameters", metavar="FILE", help="TOML file with all of them, or with a [fluid] table")

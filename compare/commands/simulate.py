@@ -37,8 +37,8 @@ def add(commands: options.Commands) -> None:
     running.add_start(command)
     options.add_axes(command, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
     command.add_argument("--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead")
-    command.add_argument("--seed", type=options.seed, default=0, help="of the points of --random")
-    ways, meaning = ("held", "up", "down", "both"), "held: a run a point; else omega_0 in steps within one run"
+    command.add_argument("--seed", type=options.seed, default=0, help="seed of the points of --random")
+    ways, meaning = ("held", "up", "down", "both"), "held: a run for each point; else one run, omega_0 in steps"
     command.add_argument("--direction", choices=ways, default="held", help=meaning)
     command.add_argument("--hold", type=options.seconds, default=20.0, help="time at each step")
     running.add_engine(command)
@@ -48,7 +48,7 @@ def add(commands: options.Commands) -> None:
     options.outputs(command, "sweep", "print a summary as JSON")
 
     command = options.command(commands, "collect", collect, "sweep -o sweep.h5")
-    command.add_argument("directory", type=Path, metavar="DIR", help="what sweep has filled")
+    command.add_argument("directory", type=Path, metavar="DIR", help="directory of a sweep")
     command.add_argument("-o", "--output", type=options.hdf5, default=Path("sweep.h5"), help="HDF5 file to write")
 
 

@@ -37,13 +37,15 @@ def add(commands: options.Commands) -> None:
     running.add_workers(command)
 
     again = options.command(commands, "judge", judge, "results --claim prop-1")
-    again.add_argument("output", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="of a validation")
+    again.add_argument(
+        "output", type=Path, nargs="?", default=Path("results"), metavar="DIR", help="directory of a validation"
+    )
     running.add_processes(again)
 
     for parser, directory in ((command, "results"), (again, "")):
         one = "only this claim; may be repeated (default: all)"
         parser.add_argument("--claim", action="append", metavar="ID", help=one)
-        parser.add_argument("--verbose", action="store_true", help="every number, not a line a claim")
+        parser.add_argument("--verbose", action="store_true", help="list every number of each claim")
         options.outputs(parser, directory, "print the verdicts as JSON")
 
 
