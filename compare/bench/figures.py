@@ -24,7 +24,7 @@ MARKS, COLOURS = (
 def draw_league(league: Mapping[str, Sequence[Result]]) -> Figure:
     """A panel for each kind of case: the median of an engine's errors over that of its costs, its steps joined."""
     kinds = {case.name: kind(case) for case in cases()}
-    figure, panels = style.panels(10, 8.4, 2, 2, sharex=True, sharey=True)
+    figure, panels = style.panels(7.6, 8.8, 2, 2, sharex=True, sharey=True)
     tried = {name: [r for r in results if r.errors] for name, results in league.items()}
     families = list(dict.fromkeys(name.removesuffix("-defaults") for name, own in tried.items() if own))
     for axes, each in zip(panels.ravel(), KINDS, strict=True):
@@ -45,5 +45,5 @@ def draw_league(league: Mapping[str, Sequence[Result]]) -> Figure:
         axes.set_ylabel("error, in units of the case's scales")
     for axes in panels[1]:
         axes.set_xlabel("processor time divided by simulated time")
-    style.legend(figure, loc="outside lower center", ncols=4)
+    style.legend(figure, loc="outside lower center", ncols=3)
     return figure

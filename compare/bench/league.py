@@ -46,8 +46,8 @@ QUICK = (2e-3,)
 CAPTION = (
     "Errors at the shortest step in units of each case's scales; up to "
     f"{TOLERANCE:g} an engine passes. Order: power of the step with which errors fall, the median over the cases. "
-    "Cost: processor time divided by simulated time at the shortest step, the median. A dash: the engine can't "
-    "express the case, and was not tried."
+    "Cost: processor time divided by simulated time at the shortest step, the median. The shortest step is 1 ms, of "
+    "MuJoCo on Warp and of Newton's Kamino and VBD 2 ms. A dash: the engine can't express the case, and was not tried."
 )
 """What the numbers are."""
 

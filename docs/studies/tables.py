@@ -95,7 +95,8 @@ def _league() -> dict[str, list[Result]]:
 
 def _errors(asked: bool) -> Rows:
     """Errors by case of the engines as they come, or of those in their best settings."""
-    return league.rows({name: own for name, own in _league().items() if name.endswith("-defaults") == asked})
+    chosen = {name: own for name, own in _league().items() if name.endswith("-defaults") == asked}
+    return league.rows({name.removesuffix("-defaults"): own for name, own in chosen.items()})
 
 
 LEAGUE: dict[str, Callable[[Campaign], Rows]] = {

@@ -48,7 +48,7 @@ def test_a_table_is_put_in_its_place(tmp_path: Path) -> None:
     for _ in range(2):
         tables.write(page, "x", ROWS)
         assert page.read_text() == (
-            "before\n<!-- begin: x -->\n| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 | 4 |\n<!-- end: x -->\n"
+            "before\n<!-- begin: x -->\n| a | b |\n| --- | --: |\n| 1 | 2 |\n| 3 | 4 |\n<!-- end: x -->\n"
             "after <!-- begin: y --><!-- end: y -->\n"
         )
     with pytest.raises(InputError, match="must have the lines '<!-- begin: z -->'"):

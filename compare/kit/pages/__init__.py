@@ -32,8 +32,9 @@ def render(package: str, template: str, **values: Any) -> str:
 
 
 def markdown(rows: Rows) -> str:
-    """A table in Markdown."""
-    cells = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
+    """A table in Markdown; columns of short cells, most of them numbers, are set to the right, and not broken."""
+    short = [all(len(cell) <= 9 for cell in column[1:]) for column in zip(*rows, strict=True)]
+    cells = [rows[0], ["--:" if k and short[k] else "---" for k in range(len(short))], *rows[1:]]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells)
 
 
