@@ -12,7 +12,7 @@ its scale, `Engine.allowance`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from statistics import median
 
@@ -39,6 +39,8 @@ NEAR = 0.1
 """Largest difference of the conditions of two measurements of the same thing with different steps, by their size."""
 LEAST = 3
 """Time steps with which a number must have been measured to have a limit."""
+Step = tuple[int, Check]
+"""A check, and the time steps in one that its protocol asks for."""
 
 
 def hear(claim: Claim, testimony: Testimony) -> Verdict:
@@ -55,7 +57,6 @@ def hear(claim: Claim, testimony: Testimony) -> Verdict:
 
 def _heard(claim: Claim, by: Engine, steps: Mapping[int, Records], said: Verdict | None = None) -> Witness:
     """What an engine says, from its verdict where it has one of its own."""
-    finest = steps[max(steps)]
     if said and said.error:
         return Witness(engine=by.name, outcome=Outcome.ERROR, reason=said.error)
     try:
@@ -67,7 +68,11 @@ def _heard(claim: Claim, by: Engine, steps: Mapping[int, Records], said: Verdict
             found = {refine: checks_of(claim, records) for refine, records in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
         return Witness(engine=by.name, outcome=Outcome.ERROR, reason=f"{type(error).__name__}: {error}")
-    missing = [each for each in finest.missing if each.protocol in claim.protocols]
+    asked = [
+        ({each.protocol for rows in (own.measurements, own.missing) for each in rows}, n) for n, own in steps.items()
+    ]
+    last = {name: max((n for names, n in asked if name in names), default=0) for name in claim.protocols}
+    missing = [each for n, own in steps.items() for each in own.missing if last.get(each.protocol) == n]
     if not found or not any(found.values()):
         reason = "formal: theory against theory" if claim.algebra else ""
         reason = reason or next(
@@ -89,10 +94,10 @@ def _heard(claim: Claim, by: Engine, steps: Mapping[int, Records], said: Verdict
     elif len(steps) == 1:
         checks = [check for _, check in found[max(found)]]
     else:
-        rows = [_limit(row, sorted(found)) for row in _aligned([found[refine] for refine in sorted(found)])]
-        limits = [row for row in rows if row]
+        every = [_limit(row) for row in _aligned(found, last)]
+        limits = [limit for limit in every if limit]
         checks, orders = [check for check, _ in limits], [p for _, p in limits if math.isfinite(p)]
-        order, left_out = median(orders) if orders else math.nan, left_out + len(rows) - len(limits)
+        order, left_out = median(orders) if orders else math.nan, left_out + len(every) - len(limits)
     return Witness(
         engine=by.name,
         outcome=outcome(checks) if checks else Outcome.INCONCLUSIVE,
@@ -111,49 +116,46 @@ def _allowed(check: Check, share: float) -> Check:
     return check if exact else replace(check, tolerance=share * check.scale, ceiling=2 * share)
 
 
-def _aligned(found: Sequence[Sequence[tuple[int, Check]]]) -> list[tuple[Check | None, ...]]:
-    """The checks with the finest step, each after those of the same with coarser ones, None where there is none."""
+def _aligned(found: Mapping[int, Sequence[tuple[int, Check]]], last: Mapping[str, int]) -> Iterator[list[Step]]:
+    """The checks with the finest step of their protocol, `last`, each after those of the same with coarser ones."""
 
     def kind(bearing: int, m: Measurement) -> tuple[object, ...]:
-        return bearing, m.set, m.quantity, *sorted((k, v) for k, v in m.conditions.items() if isinstance(v, str))
+        texts = sorted((k, v) for k, v in m.conditions.items() if isinstance(v, str))
+        return m.protocol, bearing, m.set, m.quantity, *texts
 
     def place(m: Measurement) -> dict[str, float]:
         numbers = {name: v for name, v in m.conditions.items() if not isinstance(v, str)}
         p = m.parameters
         return numbers | {"omega_0": p.omega_0, "c": p.c, "mu": p.mu, "eta": p.eta}
 
-    groups: list[dict[tuple[object, ...], list[Check]]] = []
-    for own in found:
-        groups.append({})
-        for bearing, check in own:
-            groups[-1].setdefault(kind(bearing, check.measurement), []).append(check)
-    rows: list[tuple[Check | None, ...]] = []
-    for key, finest in groups[-1].items():
+    groups: dict[int, dict[tuple[object, ...], list[Check]]] = {n: {} for n in sorted(found)}
+    for n, group in groups.items():
+        for bearing, check in found[n]:
+            group.setdefault(kind(bearing, check.measurement), []).append(check)
+    for n, key, finest in [(n, key, own) for n, group in groups.items() for key, own in group.items()]:
         p, names = finest[0].measurement.parameters, sorted(place(finest[0].measurement))
+        if n != last[finest[0].measurement.protocol]:
+            continue
         natural = dict(zip(VARIABLES, state_units(p), strict=True))
         natural |= dict.fromkeys(("frequency", "decay_rate"), 1 / time_unit(p))
         here = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in finest])
-        fellows: list[list[Check | None]] = []
-        for group in groups[:-1]:
-            fellows.append([None] * len(finest))
-            if others := group.get(key, []):
-                there = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in others])
-                largest = np.maximum(np.abs(here).max(axis=0), np.abs(there).max(axis=0))
-                size = np.maximum(largest, [natural.get(name, 1e-300) for name in names])
-                apart = np.abs((here[:, None] - there[None]) / size).max(axis=2)
-                for i, k in zip(*linear_sum_assignment(apart), strict=True):
-                    if apart[i, k] <= NEAR:
-                        fellows[-1][i] = others[k]
-        rows += [(*coarser, check) for *coarser, check in zip(*fellows, finest, strict=True)]
-    return rows
+        rows: list[list[Step]] = [[] for _ in finest]
+        for coarser, others in [(m, group[key]) for m, group in groups.items() if m < n and key in group]:
+            there = np.array([[place(c.measurement).get(name, 0.0) for name in names] for c in others])
+            largest = np.maximum(np.abs(here).max(axis=0), np.abs(there).max(axis=0))
+            size = np.maximum(largest, [natural.get(name, 1e-300) for name in names])
+            apart = np.abs((here[:, None] - there[None]) / size).max(axis=2)
+            for i, k in zip(*linear_sum_assignment(apart), strict=True):
+                if apart[i, k] <= NEAR:
+                    rows[i].append((coarser, others[k]))
+        yield from ([*row, (n, check)] for row, check in zip(rows, finest, strict=True))
 
 
-def _limit(row: Sequence[Check | None], refine: Sequence[int]) -> tuple[Check, float] | None:
+def _limit(there: Sequence[Step]) -> tuple[Check, float] | None:
     """A check in the limit of no step, and the order found, nan where the step shows nothing.
 
     None where it wasn't measured with three steps.
     """
-    there = [(n, each) for n, each in zip(refine, row, strict=True) if each]
     last = there[-1][1]
     m, scale = last.measurement, last.scale or 1.0
     wanted = quantity(m.quantity).resolves
@@ -208,6 +210,8 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
     low, high = 0.2, 6.0
     order = float(brentq(misfit, low, high)) if misfit(low) * misfit(high) < 0 else math.nan
     first = limit(1)
+    if math.isnan(order):  # the changes fall as no power of the step
+        return Measured(first.value, math.hypot(first.uncertainty, float(np.ptp(errors[-3:])))), order
     if order < 1.5:
         return first, order
     second = limit(2)

@@ -22,15 +22,17 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
     # quick, default, full
     # settling: lengths of successive rounds, in units of `settling.SPAN`. The later ones are longer, because a ball on
     # the wall that goes on from its mean swings again, if less, and that has to die out, too.
-    "settling.rounds": ((1.0, 2.0, 2.0), (1.0, 2.0, 2.0), (1.0, 2.0, 2.0)),
+    "settling.rounds": ((1.0, 2.0, 2.0),) * 3,
     # settled: flows omega_0 sqrt(R/g), and the share of the drift limit down to which a state goes on. The five flows
     # of quick were chosen with results in sight, so that on the sets of quick they bracket every threshold.
     "settled.flows": ((0.62, 1.4, 1.7, 2.5, 4.2), _FLOWS, _FLOWS),
+    "settled.starts": (("rest", "with the fluid", "on the wall"),) * 3,
     "settled.sharp": (1.0, 0.1, 0.1),
     # thresholds: relative widths of the last brackets, of those about a fold, and the factor on the settling tolerance
     "thresholds.width": (5e-5, 1e-6, 5e-7),
     "thresholds.fold": (1.2e-3, 3e-4, 1.5e-4),
     "thresholds.loose": (10.0, 1.0, 1.0),
+    "thresholds.rounds": ((1.0, 2.0, 2.0),) * 3,
     # edge: parts of the way from omega_02 to omega_04, lines for each edge, time of a run in units of 1/c
     "edge.flows": ((0.3,), (0.1, 0.17, 0.26, 0.38, 0.6), (0.1, 0.17, 0.26, 0.38, 0.45, 0.6, 0.8)),
     "edge.lines": (3, 4, 6),
@@ -74,8 +76,11 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
 BESIDE: dict[str, Any] = {
     # engines beside the one on trial measure as much as the quick level at every level, but for this
     "settled.flows": (0.62, 1.7, 4.2),
+    "settled.starts": ("with the fluid", "on the wall"),
     "settling.rounds": (0.5,),
     "thresholds.width": 5e-4,
+    "thresholds.loose": 1e3,
+    "thresholds.rounds": (0.4, 0.2),
 }
 
 

@@ -74,6 +74,8 @@ class Protocol:
     plain: tuple[str, ...] = ()
     """The sets that plain MuJoCo measures at the quick level, in the limit of no time step. At the others it measures
     twelve of these protocols, and `reference` of the rest."""
+    steps: int = 3
+    """With how many of its time steps plain MuJoCo measures, the coarsest first."""
     follows: bool = False
     """Whether an engine beside the one on trial looks where that one found something."""
     defaults: tuple[str, ...] = ()
@@ -85,6 +87,8 @@ class Protocol:
         """The sets that it measures at a level with an engine, by name."""
         asked = {PLAIN.name: self.plain, NEWCOMER.name: self.defaults}.get(lab.engine.name, self.quick)
         known = sets(lab.level)
+        if lab.engine is PLAIN and lab.refine not in PLAIN.refine[: self.steps]:
+            return {}
         if lab.level > Level.QUICK:
             asked = tuple(known)
             if lab.beside:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -128,6 +129,7 @@ def settle(
     span: float = SPAN,
     loose: float = 1.0,
     sharp: float = math.inf,
+    rounds: Sequence[float] = (),
 ) -> list[Settled]:
     """Run each start until it is settled, in the order given; the step is `coarse_step` divided by `refine`.
 
@@ -142,7 +144,7 @@ def settle(
     states: dict[int, Settled] = {}
     if lab.engine.allowance:
         loose = math.inf
-    rounds = lab.effort("settling.rounds")
+    rounds = rounds or lab.effort("settling.rounds")
     todo = dict(enumerate(starts))
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
     while todo:
@@ -168,7 +170,7 @@ def settle(
     return [states[n] for n in range(len(starts))]
 
 
-def settle_groups(lab: Lab, groups: Sequence[Sequence[Start]], **how: float) -> list[list[Settled]]:
+def settle_groups(lab: Lab, groups: Sequence[Sequence[Start]], **how: Any) -> list[list[Settled]]:
     """The same for groups of starts, all of them together."""
     states = iter(settle(lab, [start for group in groups for start in group], **how))
     return [[next(states) for _ in group] for group in groups]

@@ -27,12 +27,13 @@ LIVELY = 10.0
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The case that every start ends in, and once for every distinct state its values.
 
-    Starts are at rest, going round with the fluid, and so high up on the wall; and spinning in a fluid at rest.
+    Starts are at rest, going round with the fluid, and so high up on the wall; and spinning in a fluid at rest. Engines
+    beside the one on trial don't start at rest.
     """
     sharp, starts = lab.effort("settled.sharp"), []
     for name, p in sets.items():
         for q in _flows(lab, p):
-            starts += [begin(name, q, how) for how in ("rest", "with the fluid", "on the wall")]
+            starts += [begin(name, q, how) for how in lab.effort("settled.starts")]
         spinning = State(slip_y=SPIN / time_unit(p) * p.R / p.r)
         starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
     ended = settle(lab, starts, sharp=sharp)
@@ -97,4 +98,4 @@ def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> 
     return measurement(lab, PROTOCOL, start.set, start.p, quantity, value, [each.task], **at)
 
 
-PROTOCOLS = (Protocol("settled", measure, plain=FOUR, defaults=ONE, cost=11),)
+PROTOCOLS = (Protocol("settled", measure, plain=FOUR, steps=4, defaults=ONE, cost=11),)

@@ -79,7 +79,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     otherwise. Without such flows it is looked for from half the slowest, or up to twice the fastest.
     """
     fine, narrowest = lab.effort("thresholds.width"), lab.effort("thresholds.fold")
-    kinds = {"rolling": "with the fluid", "riding": "on the wall", "slipping": "rest"}
+    slowest = "with the fluid" if lab.beside else "rest"
+    kinds = {"rolling": "with the fluid", "riding": "on the wall", "slipping": slowest}
     seen = {(name, kind): settled_cases(records, name, how) for name in sets for kind, how in kinds.items()}
     around: dict[Key, Bracket] = {}
     for key, cases in seen.items():
@@ -105,7 +106,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         end = brackets.get((name, "rolling"))
         if kind == "slipping" and end and not lifts(end) and end.high < change.high:
             change = replace(change, low=max(change.low, end.high))
-            searches[name, kind] = _search(lab, sets[name], kind, change, kinds[kind], COARSE * change.low)
+            searches[name, kind] = _search(lab, sets[name], kind, change, "rest", COARSE * change.low)
     brackets |= _narrowed(lab, searches, careful=False)
     if not lab.beside:
         brackets = {key: bracket for key, bracket in brackets.items() if bracket.runs[1] or bracket.high in seen[key]}
@@ -140,9 +141,10 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         elif top and pressing and pressing.value > sure:
             folds[name], half = top, max(narrowest, 5.0 * top.uncertainty / top.value)
             change = Bracket(top.value * (1 - half), top.value * (1 + half))
-            # At a fold all slows down, like the root of the distance.
+            # At a fold all slows down, like the root of the distance: that costs more than an engine beside may.
             time, width = 1 / math.sqrt(narrowest), narrowest * top.value
-            searches[name, "fold"] = _search(lab, p, "fold", change, turned[0].mean, width, time)
+            if not lab.beside:
+                searches[name, "fold"] = _search(lab, p, "fold", change, turned[0].mean, width, time)
     brackets |= _narrowed(lab, searches, careful=False)
     for name, p in sets.items():
         shown = {kind: b for (one, kind), b in brackets.items() if one == name and None not in b.runs}
@@ -180,7 +182,8 @@ def _settled_beside(lab: Lab, sets: Mapping[str, Parameters], of: Mapping[Key, B
         for (name, _), (flows, how) in places.items()
     ]
     belongs = {"sinking": Case.NS, "slipping": Case.SS, "turning": Case.SS}
-    rows = settle_groups(lab, starts, loose=lab.effort("thresholds.loose"))
+    how = {name: lab.effort(f"thresholds.{name}") for name in ("loose", "rounds")}
+    rows = settle_groups(lab, starts, **how)
     return {
         key: [s for s in states if not s.failure and family(s.case) is belongs.get(key[1], Case.NR)]
         for key, states in zip(places, rows, strict=True)
@@ -353,7 +356,8 @@ def _rows(
         if fold:
             yield bisected("omega_04", fold, "from below", "last settled slipping")
         else:
-            yield missing("the end of slipping at both points could be extrapolated, but not be bracketed")
+            why = "costs more than an engine beside the one on trial may" if lab.beside else "could not be done"
+            yield missing(f"the end of slipping at both points is extrapolated; to bracket it {why}")
 
 
 def birth(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
