@@ -10,10 +10,13 @@ import argparse
 import functools
 import json
 import os
+import pickle
 import sys
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 from compare.bench import league
 from compare.bench.figures import draw_league
@@ -83,27 +86,36 @@ TABLES: dict[str, Callable[[Campaign], Rows]] = {
 
 
 @functools.cache
-def _league() -> dict[str, list[Result]]:
-    with progress.shown(counted=True) as show:
-        found = league.measure(league.ENGINES, None, os.cpu_count() or 1, show)
+def _league(kept: Path) -> dict[str, list[Result]]:
+    """Of all engines, each measured unless its file is there: delete that of an engine whose adapter has changed."""
+
+    def results(name: str) -> list[Result]:
+        file = kept / f"{name}.pickle"
+        if not file.exists():
+            (found,) = league.measure({name: league.ENGINES[name]}, None, 1, show).values()
+            file.write_bytes(pickle.dumps(found))
+        return cast(list[Result], pickle.loads(file.read_bytes()))
+
+    with progress.shown(counted=True) as show, ThreadPoolExecutor(os.cpu_count()) as pool:
+        found = dict(zip(league.ENGINES, pool.map(results, league.ENGINES), strict=True))
     if missing := [results[0].skipped for results in found.values() if all(result.skipped for result in results)]:
         raise InputError(f"the page is about all engines: {missing[0]}")
-    write_text(Path("results") / "league.json", json.dumps(league.to_mapping(found)))
+    write_text(kept / "league.json", json.dumps(league.to_mapping(found)))
     drawing.save(draw_league(found), Path(__file__).parents[1] / "league.svg")
     return found
 
 
-def _errors(asked: bool) -> Rows:
+def _errors(asked: bool, kept: Path) -> Rows:
     """Errors by case of the engines as they come, or of those in their best settings."""
-    chosen = {name: own for name, own in _league().items() if name.endswith("-defaults") == asked}
+    chosen = {name: own for name, own in _league(kept).items() if name.endswith("-defaults") == asked}
     return league.rows({name.removesuffix("-defaults"): own for name, own in chosen.items()})
 
 
 LEAGUE: dict[str, Callable[[Campaign], Rows]] = {
-    "league": lambda campaign: league.summary(_league()),
-    "league-best": lambda campaign: _errors(False),
-    "league-defaults": lambda campaign: _errors(True),
-    "league-about": lambda campaign: league.about(_league()),
+    "league": lambda campaign: league.summary(_league(campaign.directory)),
+    "league-best": lambda campaign: _errors(False, campaign.directory),
+    "league-defaults": lambda campaign: _errors(True, campaign.directory),
+    "league-about": lambda campaign: league.about(_league(campaign.directory)),
 }
 PAGES = {"mujoco-settings.md": ("settings", TABLES), "engines.md": ("league", LEAGUE)}
 """Directory of the runs, and tables of each page."""

@@ -20,11 +20,6 @@ from model.kinematics import rotated
 class Dart(Free):
     """As in `Free`."""
 
-    NOTE = (
-        "as it comes worst with boxes, whose contacts FCL places anew in every step, so that they rock and creep; set "
-        f"well of first order in everything, and worst where a ball goes round: {CHORD}"
-    )
-
     def make(self) -> None:
         case, body, bodies = self.case, self.case.body, engine.dynamics
         self.world = engine.simulation.World()
@@ -83,7 +78,9 @@ class Dart(Free):
         self.wall.setNormalAndPoint(normal, point)
 
 
-defaults = Dart("dart-defaults")
+defaults = Dart("dart-defaults", "boxes rock and creep, since FCL places their contacts anew in every step")
 best = Dart(
-    "dart", "contacts by ODE's collision detector, Coulomb's cone by NSGS, overlaps taken out by split impulses"
+    "dart",
+    f"of first order in everything, worst round the cylinder: {CHORD}",
+    "contacts by ODE's collision detector, Coulomb's cone by NSGS, overlaps taken out by split impulses",
 )

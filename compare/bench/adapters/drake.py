@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pydrake.all as engine
 
-from compare.bench.adapters.free import CHORD, Free, State
+from compare.bench.adapters.free import Free, State
 from compare.bench.adapters.simulators import Simulated
 from compare.bench.case import Vector
 from compare.kit.adapters.drake import DEFAULTS, Plant, Settings
@@ -22,11 +22,6 @@ HEAVY = 1e6
 
 class Drake(Free):
     """As in `Free`."""
-
-    NOTE = (
-        "as it comes worst with boxes, which touch a plane at one point at a time and tumble from corner to corner; "
-        f"spheres at the corners cure it; set well of first order, and worst round the cylinder: {CHORD}"
-    )
 
     def make(self) -> None:
         case, body = self.case, self.case.body
@@ -82,8 +77,8 @@ class Drake(Free):
         self.x[self.wall] = math.atan2(-normal[1], -normal[0])
 
 
-defaults = Drake("drake-defaults")
-free = Drake("drake", "TAMSI, 1e10 N/m, stiction tolerance 1e-8 m/s; a box touches by its corners")
+defaults = Drake("drake-defaults", "boxes touch a plane at one point at a time, and tumble from corner to corner")
+free = Drake("drake", "", "TAMSI, 1e10 N/m, stiction tolerance 1e-8 m/s; a box touches by its corners")
 best = Simulated(
     "drake",
     free,

@@ -18,6 +18,8 @@ CHORD = (
     "speed a second"
 )
 """Why every engine with velocities in world axes slows what goes round."""
+CORNERS = "every corner of the facets takes away some of the speed, until the wall no longer carries the ball"
+"""Why a ball in facets is slower still."""
 State = tuple[Any, Any, Any]
 """Position, velocity and spin in world axes."""
 
@@ -26,12 +28,10 @@ class Free(ABC):
     """A free body in an engine: in the best settings, with a wall that moves along, or as it comes, with facets."""
 
     PRECISION = "f64"
-    NOTE = ""
-    """What is worst, and why."""
 
-    def __init__(self, name: str, best: str = "") -> None:
-        """`best` declares the settings other than the engine's own; empty for those."""
-        self.NAME, self.best = name, bool(best)
+    def __init__(self, name: str, note: str, best: str = "") -> None:
+        """`note`: what is worst, and why; `best` declares settings other than the engine's own; empty for those."""
+        self.NAME, self.NOTE, self.best = name, note, bool(best)
         wall = "one plane, set tangent before each step, for a cylinder" if best else f"{FACETS} planes for a cylinder"
         self.DECLARED = "; ".join(filter(None, (wall, best)))
         self.case: Case

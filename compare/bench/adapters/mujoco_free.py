@@ -9,11 +9,12 @@ from typing import Any
 import mujoco
 
 import mjsim
+from compare.bench.adapters.free import CORNERS
 from compare.bench.case import FACETS, Case
 from model.arrays import Array
 
 NAME = "mujoco-defaults"
-NOTE = "every corner of the facets takes away some of the speed, until the wall no longer carries the ball"
+NOTE = CORNERS
 DECLARED = f"{FACETS} planes for a cylinder; a table that turns hangs on a hinge"
 
 

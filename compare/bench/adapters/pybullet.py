@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pybullet as engine
 
-from compare.bench.adapters.free import CHORD, Free, State, upright
+from compare.bench.adapters.free import CORNERS, Free, State, upright
 from compare.bench.adapters.simulators import Simulated
 from compare.bench.case import Vector
 from compare.kit.adapters.pybullet import DEFAULTS, Server, Settings
@@ -20,10 +20,6 @@ from model.arrays import Array
 class PyBullet(Free):
     """As in `Free`."""
 
-    NOTE = (
-        "as it comes worst with a ball in facets, whose every corner takes away some of its speed; set well of first "
-        f"order, and worst round the cylinder: {CHORD}"
-    )
     own: Server
 
     def make(self) -> None:
@@ -56,8 +52,8 @@ class PyBullet(Free):
         self.own.put(self.wall, point, [*axis, w])
 
 
-defaults = PyBullet("pybullet-defaults")
-free = PyBullet("pybullet", "lengths in dm, 200 iterations to round-off, Coulomb's cone")
+defaults = PyBullet("pybullet-defaults", CORNERS)
+free = PyBullet("pybullet", "", "lengths in dm, 200 iterations to round-off, Coulomb's cone")
 best = Simulated(
     "pybullet",
     free,

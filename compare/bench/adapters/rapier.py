@@ -11,7 +11,7 @@ import math
 
 import rapier3d as engine
 
-from compare.bench.adapters.free import CHORD, Free, State
+from compare.bench.adapters.free import CHORD, CORNERS, Free, State
 from compare.bench.case import Vector
 from model.arrays import Array
 
@@ -20,7 +20,6 @@ class Rapier(Free):
     """As in `Free`."""
 
     PRECISION = "f32"
-    NOTE = f"worst round the cylinder and where the wall carries the ball: {CHORD}"
 
     def make(self) -> None:
         case, body = self.case, self.case.body
@@ -64,5 +63,9 @@ class Rapier(Free):
         self.world.rigid_bodies[self.wall].position = engine.Isometry3(point.tolist(), turned)
 
 
-defaults = Rapier("rapier-defaults")
-best = Rapier("rapier", "16 iterations, springs of 200 Hz, a length unit of 1 cm, no limit to speed")
+defaults = Rapier("rapier-defaults", CORNERS)
+best = Rapier(
+    "rapier",
+    f"worst round the cylinder: {CHORD}",
+    "16 iterations, springs of 200 Hz, a length unit of 1 cm, no limit to speed",
+)

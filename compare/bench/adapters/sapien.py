@@ -10,7 +10,7 @@ import math
 import warnings
 from typing import Any
 
-from compare.bench.adapters.free import Free, State, upright
+from compare.bench.adapters.free import CHORD, CORNERS, Free, State, upright
 from compare.bench.case import Vector
 from model.arrays import Array
 
@@ -24,11 +24,6 @@ class Sapien(Free):
     """As in `Free`."""
 
     PRECISION = "f32"
-    NOTE = (
-        "as it comes worst where the wall carries the ball, as spin is limited to 100 rad/s, and with what is pinched, "
-        "which creeps, since ten iterations of TGS don't solve it; PGS with more of them holds it, but has friction in "
-        "two directions of their own: what slips obliquely is wrong by 4 % at every step"
-    )
 
     def make(self) -> None:
         case, body = self.case, self.case.body
@@ -83,5 +78,10 @@ def pose(point: Array, normal: Array) -> Any:
     return engine.Pose(point, [half * (w + y), half * (x + z), half * (y - w), half * (z - x)])
 
 
-defaults = Sapien("sapien-defaults")
-best = Sapien("sapien", "PGS with 50 and 20 iterations, no limit to spin")
+defaults = Sapien("sapien-defaults", f"spin is limited to 100 rad/s, and {CORNERS}")
+best = Sapien(
+    "sapien",
+    f"worst round the cylinder: {CHORD}; and PGS has friction in two directions of their own, by which what slips "
+    "obliquely is wrong by 4 % at every step",
+    "PGS with 50 and 20 iterations, no limit to spin",
+)
