@@ -173,6 +173,10 @@ for name, column in (("mine", graded), ("repaired", better)):
         print(f"{case:>20}: error {column.of(case).error:.1e}")
 
 # %% [markdown]
+# The repair is for the ball, which comes nearer to theory in every case. Blocks rest on
+# four points, and lose contact with springs so soft (`block-rests`, `pinched-block`):
+# for other scenes `dualball forecast` finds what to change.
+#
 # What is left is what settings alone can't do: the ball still rolls on a lever that is
 # shorter by what it sinks in, and rolling contacts still creep a little. [How MuJoCo is
 # set here](../mujoco-settings.md) says what `dualball` adds between the steps to remove
