@@ -155,6 +155,7 @@ def settle(model: Any, data: Any, limit: float) -> dict[int, str]:
         speed, change = np.hypot.reduce(velocity * scale, 1), np.hypot.reduce((velocity - last) * scale, 1)
         turned, last = np.hypot.reduce(velocity[:, 3:], 1) * (data.time - start), velocity
         restless = (change > np.minimum(RESTLESS * speed, JOLT) + 1e2 * STILL) | (turned > TURNING)
+        restless[0] = False  # the world
         calm = calm + 1 if (change <= STEADY * speed + STILL).all() else 0  # a speed may pass through a maximum
     return {int(b): f"{_body(model, int(b))} at {speed[b]:.2g} m/s" for b in np.flatnonzero(restless)}
 
@@ -215,7 +216,7 @@ def forecast(
     alone = min(pair.largest_step for pair in pairs)
     step = min(alone, those.largest_step(min(alone, LARGEST)))
     best, left = _change(model, start, those, number, lambda c: _harm(c, radius, good, creep), pairs[0], len(moving))
-    memory = max(pair.harm["creep"] for pair in pairs) > 1 and bool(left["creep"].max() > 1)
+    memory = max(pair.harm["creep"] for pair in pairs) > 1 and bool(1 < left["creep"].max() < math.inf)
     return Forecast(tuple(pairs), model.opt.timestep, step, tuple(moving.values()), flexible, best, memory)
 
 
@@ -264,6 +265,7 @@ def _rebound(model: Any, data: Any, c: Contacts, number: Array, speed: float) ->
     return float(way @ mass @ state.qvel) / float(approach @ approach) / speed
 
 
+@np.errstate(over="ignore")
 def _harm(c: Contacts, radius: Array, good: Array, creep: float) -> dict[str, Array]:
     """By what may be wrong with each contact: how many times what passes for good."""
     law = c.law()
@@ -281,6 +283,8 @@ def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:
     if c.pyramidal:
         yield "cone", (int(mujoco.mjtCone.mjCONE_ELLIPTIC),)
     time, ratio = c.solref[0]
+    if time < 0 and ratio == 0:
+        yield "solref", (time, -_rounded(2 * math.sqrt(-time)))  # critical
     for share in (0.7, 0.5, 0.35, 0.25, 0.2, 0.15, 0.1):
         if time > 0 and share * time >= 2 * c.timestep:
             yield "solref", (_rounded(share * time), ratio)
@@ -396,7 +400,8 @@ def sentences(f: Forecast) -> Iterator[str]:
     sliding = [p.name for p in f.pairs if p.slides]
     if f.change:
         name, factor, unit = QUANTITIES[f.change.quantity]
-        before, after, found = (_number(v, factor) for v in (f.change.before, f.change.after, f.change.found))
+        endless = "any" if f.change.quantity == "largest_step" else "∞"
+        before, after, found = (_number(v, factor, endless) for v in (f.change.before, f.change.after, f.change.found))
         done = "" if found == "–" else f" Tried: {found} {unit}."
         yield f"Set {f.change.written}: the {name} of {f.change.pair} goes from {before} to {after} {unit}.{done}"
     if f.memory:
@@ -422,11 +427,11 @@ def sentences(f: Forecast) -> Iterator[str]:
         yield f"{f.flexible} contacts of flexible bodies are left out."
 
 
-def _number(value: float, factor: float = 1) -> str:
+def _number(value: float, factor: float = 1, endless: str = "any") -> str:
     """Three digits, none for what is next to nothing."""
     value *= factor
     if not math.isfinite(value):
-        return "any" if math.isinf(value) else "–"
+        return endless if math.isinf(value) else "–"
     return f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.3g}" if abs(value) >= 1e-3 else "0"
 
 
@@ -439,7 +444,7 @@ def tables(f: Forecast) -> list[tuple[str, list[list[str]]]]:
     rest = [["pair", "load\nN", "depth\nµm", "found\nµm", "creep\nµm/s", "found\nµm/s", "mm/\nmin", "cone\n%"]]
     motion = [["pair", "hover\nmm/s", "bounce\n%", "found\n%", "decay\n1/s", "step\nms"]]
     for p in f.pairs[:SHOWN]:
-        micro = [_number(v, 1e6) for v in (p.depth, p.depth_measured, p.creep, p.creep_measured)]
+        micro = [_number(v, 1e6, "∞") for v in (p.depth, p.depth_measured, p.creep, p.creep_measured)]
         rest.append([p.name, _number(p.load), *micro, _number(p.creep_measured, 6e4), _number(p.cone, 100)])
         bounce = [_number(v, 100) for v in (p.rebound, p.rebound_measured)]
         motion.append([p.name, _number(p.hover, 1e3), *bounce, _number(p.decay), _number(p.largest_step, 1e3)])
