@@ -50,11 +50,11 @@ _FIELDS = (
     "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind",
 )  # fmt: skip
 _NCON, _XPOS, _XMAT, _CONTACT, _KBIP, _R, _AREF, _FORCE, _QACC, _J, _ROWNNZ, _ROWADR, _COLIND = range(13)
-_SIZE, _POS, _FRAME, _FRICTION, _DIM, _GEOM, _ADDRESS = range(13, 20)
+_SIZE, _DIST, _POS, _FRAME, _FRICTION, _DIM, _GEOM, _ADDRESS = range(13, 21)
 _AT = np.array(
     [getattr(_data, name).offset for name in _FIELDS]
     + [ctypes.sizeof(_contact)]
-    + [getattr(_contact, name).offset for name in ("pos", "frame", "friction", "dim", "geom", "efc_address")]
+    + [getattr(_contact, name).offset for name in ("dist", "pos", "frame", "friction", "dim", "geom", "efc_address")]
 )
 """Bytes from the beginning of `mjData`, the size of a contact, and bytes from its beginning."""
 _empty = mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>"))
@@ -85,7 +85,7 @@ def _array(data: int, offset: int) -> int:
 
 
 @compiled  # type: ignore[untyped-decorator]
-def _recall(data: int, at: Array, before: Array, elliptic: bool) -> Array:
+def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, float]:
     xpos, xmat, contact = _real(_array(data, at[_XPOS])), _real(_array(data, at[_XMAT])), _array(data, at[_CONTACT])
     damping, softness = _real(_array(data, at[_KBIP])), _real(_array(data, at[_R]))
     reference, ncon = _real(_array(data, at[_AREF])), _whole(data + at[_NCON])[0]
@@ -95,7 +95,12 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool) -> Array:
         geom, dim, address = _whole(c + at[_GEOM]), _whole(c + at[_DIM])[0], _whole(c + at[_ADDRESS])[0]
         if address < 0 or dim == 1 or geom[0] < 0 or geom[1] < 0 or damping[4 * (address + 1) + 1] <= 0:
             continue
-        used[count], pos = c, _real(c + at[_POS])
+        used[count], pos, frame, kept[count, 28] = (
+            c,
+            _real(c + at[_POS]),
+            _real(c + at[_FRAME]),
+            _real(c + at[_DIST])[0],
+        )
         for side in range(2):
             g = geom[side]
             kept[count, side] = g
@@ -103,11 +108,13 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool) -> Array:
             for axis in range(3):
                 m = 9 * g + axis
                 kept[count, 2 + 3 * side + axis] = xmat[m] * x + xmat[m + 3] * y + xmat[m + 6] * z
+                if side == 0:
+                    kept[count, 25 + axis] = xmat[m] * frame[0] + xmat[m + 3] * frame[1] + xmat[m + 6] * frame[2]
         count += 1
     kept = kept[:count]
 
-    force, load = np.zeros((count, 5)), np.zeros(count)
-    world, first = np.empty((3, 2)), 0
+    force, pairs = np.zeros((count, 5)), np.zeros((count, 5))
+    world, first, moved = np.empty((3, 2)), 0, 0.0
     for m in range(len(before)):
         nearest, least, begin = -1, math.inf, first
         for turn in range(count):  # contacts of a pair are together, mostly where they were
@@ -122,10 +129,11 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool) -> Array:
                     distance += (kept[k, j] - before[m, j]) ** 2
                 if distance < least:
                     nearest, least = k, distance
-            elif nearest >= 0:
+            elif nearest >= 0 and not scattered:
                 break
         if nearest < 0:
             continue
+        moved = max(moved, least)
         frame, kinds = _real(used[nearest] + at[_FRAME]), 1 if _whole(used[nearest] + at[_DIM])[0] == 3 else 2
         world[:] = 0.0
         for side in range(2):
@@ -140,33 +148,28 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool) -> Array:
             force[nearest, 1] += frame[6 + j] * world[j, 0]
             for row in range(3 * kinds - 3):
                 force[nearest, 2 + row] += frame[3 * row + j] * world[j, 1]
-        load[nearest] += before[m, 20]
+        for j in range(5):
+            pairs[nearest, j] += before[m, 20 + j]
 
-    needed = np.empty(5)
     for k in range(count):
-        a, rows = _whole(used[k] + at[_ADDRESS])[0], _whole(used[k] + at[_DIM])[0] - 1
-        if elliptic:
-            for j in range(rows):
+        a, rows, mu = (
+            _whole(used[k] + at[_ADDRESS])[0],
+            _whole(used[k] + at[_DIM])[0] - 1,
+            _real(used[k] + at[_FRICTION]),
+        )
+        mean = 0.0
+        for j in range(rows):
+            if elliptic:
                 reference[a + 1 + j] += softness[a + 1 + j] * force[k, j]
-            continue
-        total, mu = 0.0, _real(used[k] + at[_FRICTION])
-        for j in range(rows):
-            needed[j] = abs(force[k, j]) / mu[j]
-            total += needed[j]
-        scale = min(1.0, load[k] / max(total, 1e-300))
-        rest, level = load[k], load[k] / rows
-        for j in range(rows - 1):  # the largest first
-            for other in range(j + 1, rows):
-                if needed[other] > needed[j]:
-                    needed[j], needed[other] = needed[other], needed[j]
-            rest -= scale * needed[j]
-            level = min(level, rest / (rows - 1 - j))
-        for j in range(rows):
-            lean, mean = scale * force[k, j] / mu[j], load[k] / (2 * rows)
-            pair = max(abs(lean), level)
-            reference[a + 2 * j] += softness[a + 2 * j] * ((pair + lean) / 2 - mean)
-            reference[a + 2 * j + 1] += softness[a + 2 * j + 1] * ((pair - lean) / 2 - mean)
-    return kept
+            else:
+                force[k, j] /= mu[j]
+                pairs[k, j] = max(pairs[k, j], abs(force[k, j]))
+                mean += pairs[k, j] / rows
+        for j in range(0 if elliptic else rows):
+            level = pairs[k, j] - mean
+            reference[a + 2 * j] += softness[a + 2 * j] * (level + force[k, j]) / 2
+            reference[a + 2 * j + 1] += softness[a + 2 * j + 1] * (level - force[k, j]) / 2
+    return kept, math.sqrt(moved / 2)
 
 
 @compiled  # type: ignore[untyped-decorator]
@@ -230,12 +233,13 @@ def _retain(data: int, at: Array, kept: Array, elliptic: bool, nv: int, sparse: 
                     kept[k, 8 + 6 * side + 2 * axis + kind] = (
                         xmat[m] * world[0, kind] + xmat[m + 3] * world[1, kind] + xmat[m + 6] * world[2, kind]
                     )
-        kept[k, 20] = load
+        for j in range(0 if elliptic else dim - 1):
+            kept[k, 20 + j] = share * (forces[a + 2 * j] + forces[a + 2 * j + 1])
 
 
-def recall(model: Any, data: Any, kept: Array, elliptic: bool) -> Array:
+def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, float]:
     """As `mjsim.memory.recall`."""
-    return _recall(data._address, _AT, kept, elliptic)  # type: ignore[no-any-return]
+    return _recall(data._address, _AT, before, elliptic, scattered)  # type: ignore[no-any-return]
 
 
 def retain(model: Any, data: Any, kept: Array, elliptic: bool) -> None:

@@ -13,6 +13,7 @@ press on its normal row, so memory fades out where ten to twenty times the cone 
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 from collections.abc import Mapping
@@ -37,9 +38,12 @@ _APART = np.array([1e6, 1e6, 1, 1, 1, 1, 1, 1])
 _OPEN = 1e9
 """Approach that a contact allows which is open, m s-2."""
 _ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
-WIDTH = 21
+WIDTH = 29
 """Numbers remembered of a contact: geoms (2), its place on both in their axes (6), friction on both in their axes (3 of
-force and moment each, 12), normal force; m, N, N m."""
+force and moment each, 12), what each pair of a pyramid's edges bears (5), normal in the axes of the first geom (3), and
+gap; m, N, N m."""
+SAME = 0.01
+"""Share of the larger radius up to which two points of contact count as one."""
 
 
 class FrictionMemory:
@@ -108,18 +112,21 @@ class FrictionMemory:
             raise InputError("data belong to another MjModel than this friction memory")
         self._check_integrator()
         elliptic, recall, retain = model.opt.cone == _ELLIPTIC, self._recall, self._retain
+        near = SAME * model.geom_rbound.min(where=model.geom_rbound > 0, initial=1e9)
         for _ in range(nstep):
             mujoco.mj_step1(model, data)
-            begin, ncon, nefc = data.time, data.ncon, data.nefc
-            if begin != self._time:  # another state, or one that MuJoCo has reset as it diverged
+            if data.time != self._time:  # another state, or one that MuJoCo has reset as it diverged
                 self.reset()
-            kept = recall(model, data, self._kept, elliptic)
+            kept, moved = recall(model, data, self._kept, elliptic, False)
+            if moved > near and put_back(model, data, self._kept):
+                kept, _ = recall(model, data, self._kept, elliptic, True)
             if self._servo:
                 self._lift = self._lifted(data, kept, elliptic)
             if dry := data.nf:
                 joints, softness, reference = slice(data.ne, data.ne + dry), data.efc_R, data.efc_aref
                 if len(self._joints) == dry:
                     reference[joints] += softness[joints] * self._joints
+            begin, ncon, nefc = data.time, data.ncon, data.nefc
             mujoco.mj_step2(model, data)
             self._time = data.time
             if self._time <= begin or (data.ncon, data.nefc) != (ncon, nefc):  # reset as it diverged
@@ -163,26 +170,58 @@ def acceleration(model: Any, data: Any) -> Array:
     return found
 
 
-def recall(model: Any, data: Any, before: Array, elliptic: bool) -> Array:
+def put_back(model: Any, data: Any, before: Array) -> bool:
+    """Put back points that the collider has dropped, of pairs that keep others, where bodies overlap as they did."""
+    geom = before[:, :2].astype(int)
+    axes = data.geom_xmat[geom].reshape(-1, 2, 3, 3)
+    first, second = np.moveaxis(data.geom_xpos[geom] + (axes @ before[:, 2:8].reshape(-1, 2, 3, 1))[..., 0], 1, 0)
+    normal, apart = (axes[:, 0] @ before[:, 25:28, None])[..., 0], second - first
+    opened = (normal * apart).sum(axis=1)
+    gap, slip = before[:, 28] + opened, np.hypot.reduce(apart - opened[:, None] * normal, axis=1)
+    near, found, place = SAME * model.geom_rbound[geom].max(axis=1), data.contact.geom.copy(), data.contact.pos.copy()
+    for k in np.flatnonzero((gap < 0) & (slip < near / 10)):
+        others, middle = (found == geom[k]).all(axis=1), (first[k] + second[k]) / 2
+        if not 0 < others.sum() < (geom == geom[k]).all(axis=1).sum():
+            continue
+        if (np.hypot.reduce(place[others] - middle, axis=1) > near[k]).all():
+            point = copy.copy(data.contact[others.argmax()])
+            across = np.cross(normal[k], np.eye(3)[abs(normal[k]).argmin()])
+            across /= np.hypot.reduce(across)
+            point.pos, point.dist = middle, gap[k]
+            point.frame = np.concatenate([normal[k], across, np.cross(normal[k], across)])
+            mujoco.mj_addContact(model, data, point)
+    if data.ncon == len(found):
+        return False
+    for renew in (mujoco.mj_makeConstraint, mujoco.mj_island, mujoco.mj_projectConstraint, mujoco.mj_fwdVelocity):
+        renew(model, data)
+    return True
+
+
+def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, float]:
     """Add to the reference accelerations what contacts remember; return their geoms and places, and no forces yet.
+
+    Also how far they have moved on the bodies, at most, m.
 
     Parameters
     ----------
     before : what is remembered of the last step, (n, `WIDTH`)
     elliptic : whether cones are elliptic
+    scattered : whether contacts of a pair may stand apart
     """
     contact, used, reference, softness = data.contact, remembering(data), data.efc_aref, data.efc_R
     geom, frame, friction = contact.geom[used], contact.frame[used].reshape(-1, 3, 3), contact.friction[used]
     address, axes = contact.efc_address[used], data.geom_xmat[geom].reshape(-1, 2, 3, 3)
     arm = contact.pos[used][:, None] - data.geom_xpos[geom]
-    kept, world = np.zeros((len(used), WIDTH)), np.zeros((len(used), 3, 2))
+    kept, world, moved = np.zeros((len(used), WIDTH)), np.zeros((len(used), 3, 2)), 0.0
     kept[:, :2], kept[:, 2:8] = geom, (arm[:, :, None] @ axes).reshape(-1, 6)
-    load = np.zeros(len(used))
+    kept[:, 25:28], kept[:, 28] = (frame[:, :1] @ axes[:, 0])[:, 0], contact.dist[used]
+    pairs = np.zeros((len(used), 5))
     if len(before) and len(used):
         nearest, same = _nearest(before, kept)
+        moved = np.hypot.reduce(before[same, 2:8] - kept[nearest[same], 2:8], axis=1).max(initial=0.0) / math.sqrt(2)
         nearest, forces = nearest[same], before[same, 8:20].reshape(-1, 2, 3, 2)
         np.add.at(world, nearest, (axes[nearest] @ forces).sum(axis=1) / 2)
-        np.add.at(load, nearest, before[same, 20])
+        np.add.at(pairs, nearest, before[same, 20:25])
     force = (frame @ world).reshape(-1, 6)[:, _COLUMNS]
     own = contact.dim[used][:, None] - 1 > _ROWS
     if elliptic:
@@ -190,13 +229,16 @@ def recall(model: Any, data: Any, before: Array, elliptic: bool) -> Array:
         reference[rows] += softness[rows] * force[own]
     else:
         rows = (address[:, None] + 2 * _ROWS)[own]
-        for side, share in enumerate(edges(force, load, friction, own)):
-            reference[rows + side] += softness[rows + side] * share[own]
-    return kept
+        lean = np.where(own, force / friction, 0.0)
+        pairs = np.maximum(pairs, np.abs(lean))
+        pairs -= pairs.sum(axis=1, keepdims=True) / own.sum(axis=1, keepdims=True)
+        for side, sign in enumerate((1, -1)):
+            reference[rows + side] += softness[rows + side] * ((pairs + sign * lean) / 2)[own]
+    return kept, moved
 
 
 def retain(model: Any, data: Any, kept: Array, elliptic: bool) -> None:
-    """Remember friction of contacts on both geoms in their axes, and normal forces, that the step came to."""
+    """Remember the friction that the step came to, and what pairs of edges bear."""
     contact, forces, used = data.contact, data.efc_force, remembering(data)
     address, friction, own = contact.efc_address[used], contact.friction[used], contact.dim[used][:, None] - 1 > _ROWS
     holding = (data.efc_aref - acceleration(model, data)) / data.efc_R
@@ -212,11 +254,14 @@ def retain(model: Any, data: Any, kept: Array, elliptic: bool) -> None:
         asked[own], force[own] = forces[rows] + forces[rows + 1], forces[rows] - forces[rows + 1]
         load = asked.sum(axis=1)
         force *= friction
+    kept_share = np.clip(2 - share / np.maximum(KEPT * load, 1e-300), 0, 1)[:, None]
     along = np.zeros((len(used), 6))
-    along[:, _COLUMNS] = force * np.clip(2 - share / np.maximum(KEPT * load, 1e-300), 0, 1)[:, None]
+    along[:, _COLUMNS] = force * kept_share
     world = contact.frame[used].reshape(-1, 3, 3).transpose(0, 2, 1) @ along.reshape(-1, 3, 2)
     axes = data.geom_xmat[contact.geom[used]].reshape(-1, 2, 3, 3).transpose(0, 1, 3, 2)
-    kept[:, 8:20], kept[:, 20] = (axes @ world[:, None]).reshape(-1, 12), load
+    kept[:, 8:20] = (axes @ world[:, None]).reshape(-1, 12)
+    if not elliptic:
+        kept[:, 20:25] = asked * kept_share
 
 
 def _nearest(kept: Array, others: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
@@ -224,28 +269,6 @@ def _nearest(kept: Array, others: Array) -> tuple[npt.NDArray[np.intp], npt.NDAr
     place, others = kept[:, :8], others[:, :8]
     nearest = cdist(place * _APART, others * _APART, "sqeuclidean").argmin(axis=1)
     return nearest, (place[:, :2] == others[nearest, :2]).all(axis=1)
-
-
-def edges(force: Array, load: Array, friction: Array, own: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Forces of a pyramidal cone's edges, along +mu and -mu of each row, less their mean.
-
-    Of the edge forces that give the normal force and the row forces, those nearest to their mean: pairs of opposite
-    edges share the normal force evenly, but for pairs that need more to bear what is along them.
-
-    Parameters
-    ----------
-    force, friction, own : row forces, their coefficients, and which rows a contact has, shape (n, 5)
-    load : normal forces, (n,)
-    """
-    lean, count = np.where(own, force / friction, 0.0), own.sum(axis=1)[:, None]
-    needed = np.abs(lean)
-    lean *= np.minimum(1, load / np.maximum(needed.sum(axis=1), 1e-300))[:, None]
-    needed = np.abs(lean)
-    largest = -np.sort(-needed, axis=1)
-    rest = (load[:, None] - np.cumsum(largest, axis=1) + largest) / np.maximum(count - _ROWS, 1)
-    level = np.where(own, rest, np.inf).min(axis=1)[:, None]
-    pair, mean = np.maximum(needed, level) / 2, load[:, None] / (2 * count)
-    return pair + lean / 2 - mean, pair - lean / 2 - mean
 
 
 @functools.cache

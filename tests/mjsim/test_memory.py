@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from mjsim import FrictionMemory, memory
-from mjsim.memory import edges
 from model import InputError
 
 G = 9.81
@@ -168,15 +167,14 @@ def test_compiled_as_written(cone):
     data, stepper, apart = mujoco.MjData(model), FrictionMemory(model), []
 
     def check(compiled, written, changed):
-        def call(model, data, kept, elliptic):
+        def call(model, data, kept, *more):
             begin, given = changed(data, kept).copy(), kept.copy()
-            other = written(model, data, given, elliptic)
-            wanted = [changed(data, given).copy(), other]
+            other = written(model, data, given, *more)
+            wanted = [changed(data, given).copy(), *(other or ())]
             changed(data, kept)[:] = begin
-            found = compiled(model, data, kept, elliptic)
-            for one, same in zip([changed(data, kept), found], wanted, strict=True):
-                if one is not None:
-                    apart.append(np.abs(one - same).max(initial=0) / np.abs(same).max(initial=1e-3))
+            found = compiled(model, data, kept, *more)
+            for one, same in zip([changed(data, kept), *(found or ())], wanted, strict=True):
+                apart.append(np.abs(one - same).max(initial=0) / np.abs(same).max(initial=1e-3))
             return found
 
         return call
@@ -184,7 +182,7 @@ def test_compiled_as_written(cone):
     stepper._recall = check(stepper._recall, memory.recall, lambda data, kept: data.efc_aref)
     stepper._retain = check(stepper._retain, memory.retain, lambda data, kept: kept)
     stepper.step(data, 200)
-    assert data.ncon > 4
+    assert data.ncon >= 4
     assert max(apart) < 1e-9
 
 
@@ -219,20 +217,6 @@ def test_forces_turn_with_a_hand():
     assert data.qpos[0] - turned > 1
 
 
-def test_edges_bear_what_they_should():
-    """They are never negative, add up to the normal force, and give the row forces, as far as the cone goes."""
-    rng = np.random.default_rng(1)
-    friction, load = rng.uniform(0.1, 1, (50, 5)), rng.uniform(0.1, 9, 50)
-    own = np.arange(5) < rng.choice([2, 3, 5], 50)[:, None]
-    force = rng.normal(size=(50, 5)) * own * friction
-    force *= (load / (np.abs(force) / friction).sum(axis=1) * rng.uniform(0, 1, 50))[:, None]
-    mean = (load / (2 * own.sum(axis=1)))[:, None]
-    plus, minus = (np.where(own, side + mean, 0) for side in edges(force, load, friction, own))
-    assert min(plus.min(), minus.min()) > -1e-12
-    assert (plus + minus).sum(axis=1) == pytest.approx(load)
-    assert friction * (plus - minus) == pytest.approx(force)
-
-
 def rise(model, stepper, seconds, velocity=()):
     """Most that the energy of free bodies, kinetic and potential, rises above the least it has been so far, J."""
     data, least, most = mujoco.MjData(model), np.inf, 0.0
@@ -265,16 +249,12 @@ def test_never_more_energy(geom, velocity):
     assert np.mean(ours) <= np.mean(plain) + np.std(plain) + 1e-6
 
 
-@pytest.mark.slow
-def test_piles_come_to_rest():
+@pytest.mark.parametrize("seeds", [[47], pytest.param(range(20), marks=pytest.mark.slow)])
+def test_piles_come_to_rest(seeds):
+    """The collider of boxes drops points and finds them again: bodies would rock if they were not put back."""
     from docs.studies import friction
 
-    still, rises = [], []
-    for seed in range(20):
-        model = friction.pile(seed, mixed=False)
-        plain = friction.settle(model, friction.Plain(model))[1]
-        drift, most = friction.settle(model, FrictionMemory(model))
-        still.append(drift < friction.STILL)
-        rises.append((most, plain))
-    assert sum(still) >= 16  # some rock where the collider's points come and go
-    assert np.max(rises, axis=0)[0] <= np.max(rises, axis=0)[1]
+    models = [friction.pile(seed, mixed=False) for seed in seeds]
+    drift, rise = np.transpose([friction.settle(model, FrictionMemory(model)) for model in models])
+    assert (drift < friction.STILL).sum() >= 0.95 * len(models)
+    assert rise.max() <= max(friction.settle(model, friction.Plain(model))[1] for model in models)
