@@ -173,7 +173,7 @@ for name, column in (("mine", graded), ("repaired", better)):
         print(f"{case:>20}: error {column.of(case).error:.1e}")
 
 # %% [markdown]
-# The repair is for the ball, which comes nearer to theory in every case. Blocks rest on
+# The repair is for the ball, nearer to theory in all cases but one. Blocks rest on
 # four points, and lose contact with springs so soft (`block-rests`, `pinched-block`):
 # for other scenes `dualball forecast` finds what to change.
 #

@@ -119,25 +119,20 @@ def test_both_scales(name: str) -> None:
         assert any("sqrt{R/g}" in label for label in labels)
 
 
-@pytest.mark.parametrize("name", ["fig-9", "fig-10", "fig-11", "fig-12"])
+@pytest.mark.parametrize("name", ["fig-9", "fig-10", "fig-11", "fig-12", "hopping-walls"])
 def test_special_points_lie_on_curves(name: str) -> None:
     """Every black dot is the end of a curve, or on one, within a thousandth of the frame."""
-    (axes,) = FIGURES[name].draw(FIGURES[name].select(Material())).axes
-    lines = [line for line in axes.lines if line.get_linewidth() == 2]
-    dots = [line for line in axes.lines if line.get_marker() == "o"]
-    assert dots
-    frame = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())])
-    for dot in dots:
-        point = np.array([float(np.ravel(v)[0]) for v in (dot.get_xdata(), dot.get_ydata())]) / frame
-        nearest = np.inf
-        for line in lines:
-            xy = np.stack([np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float)], axis=-1) / frame
-            xy = xy[np.isfinite(xy).all(axis=1)]
-            begin, step = xy[:-1], np.diff(xy, axis=0)
-            along = np.clip(np.sum((point - begin) * step, 1) / np.maximum(np.sum(step**2, 1), 1e-300), 0, 1)
-            away = np.linalg.norm(begin + along[:, None] * step - point, axis=1)
-            nearest = min(nearest, np.min(away, initial=np.inf))
-        assert nearest < 1e-3
+    for axes in FIGURES[name].draw(FIGURES[name].select(Material())).axes:
+        frame = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())])
+        dots = [line.get_xydata()[0] / frame for line in axes.lines if line.get_marker() == "o"]
+        curves = [line.get_xydata() / frame for line in axes.lines if line.get_linewidth() == 2]
+        curves = [xy[np.isfinite(xy).all(axis=1)] for xy in curves]
+        assert dots
+        begin = np.concatenate([xy[:-1] for xy in curves])
+        step = np.concatenate([np.diff(xy, axis=0) for xy in curves])
+        for dot in dots:
+            along = np.clip(np.sum((dot - begin) * step, 1) / np.maximum(np.sum(step**2, 1), 1e-300), 0, 1)
+            assert np.linalg.norm(begin + along[:, None] * step - dot, axis=1).min() < 1e-3
 
 
 def test_stable_and_unstable_parts_of_figure_10() -> None:
