@@ -46,8 +46,8 @@ def sensitivities(made: Design) -> Figure:
     for k, key in enumerate(there):
         values = [made.sensitivities[key][name].value for name in names]
         places = np.arange(len(names)) + (k - (len(there) - 1) / 2) * width
-        label = f"{style.THRESHOLD_LABELS[key]} = {getattr(made.thresholds, key):.4g} rad/s"
-        axes.bar(places, values, width, color=style.COLOURS[_LINES[key]], label=label)
+        look: dict[str, Any] = {"color": style.COLOURS[_LINES[key]], "hatch": ("", "//", "..", "xx")[k], "ec": "white"}
+        axes.bar(places, values, width, label=style.THRESHOLD_LABELS[key], **look)
     axes.axhline(0, color="black", lw=0.8)
     axes.set_xticks(range(len(names)), [_LABELS.get(name, f"${name}$") for name in names])
     axes.set_ylabel("% of the threshold per %")
@@ -78,14 +78,14 @@ FIGURES: tuple[tuple[Callable[[Design], Figure], str], ...] = (
     (
         characteristic,
         "Angular velocity of the ball's orbit, against that of the fluid. Where the lines part, the reading depends on "
-        "whether the flow rose or fell. Grey: from the lowest to the highest reading at any corner of the tolerances.",
+        "whether the flow rose or fell. Grey: from the lowest to the highest reading within the tolerances.",
     ),
     (sensitivities, "Sensitivities: by how many per cent a threshold changes if a value does by one."),
     (
         friction,
         "How far the operating range reaches over both frictions, with ball, vessel and fluid as chosen. Dot: the "
-        "choice, with its tolerances; white line: the fastest flow to measure; dotted: η = j, where slip as the limit "
-        "(left) gives way to unloading (right).",
+        "choice, with its tolerances; white line: the fastest flow to measure; dotted: η = j, left of "
+        "which slip limits the range, and right of which unloading does.",
     ),
 )
 """What draws each figure of the page, and its caption."""
