@@ -31,9 +31,10 @@ _LANDINGS = 20
 _JUDGED = 8
 """Short steps after which their length is adapted."""
 _CHANGE = 0.25
-"""Most that accelerations may change in a divided step, in units of what gravity and the wall's friction do in a whole
-step as the ball goes round. Four times less brings motions through landings no more than a fifth closer to those of a
-tenth of the step: the engine against itself, on random sets (docs/mujoco-settings.md)."""
+"""Most that accelerations may change in a divided step, in units of what the largest, at least that of gravity and the
+wall's friction, does in a whole step as the ball goes round. Four times less brings motions through landings no more
+than a fifth closer to those of a tenth of the step: the engine against itself, on random sets
+(docs/mujoco-settings.md)."""
 _CARRIED = "given_up", "_more", "_passing"
 """What is carried from one step to the next beside the balls."""
 _SHARE, _MOST = 16, 30_000
@@ -99,6 +100,7 @@ class Polar(Stepper):
         balls = self._balls
         if row is not None:
             row[:, : recorder.NQ], row[:, recorder.NQ : recorder.SENSORS] = balls.qpos.T, balls.qvel.T
+            row[:, 3 : recorder.NQ] = 1, 0, 0, 0  # as every step begins; others of the batch may have begun one since
             row[:, -1] = balls.leads
         for k, fluid in enumerate(omega_0):
             if self._whole and balls.drive_all(fluid):
@@ -139,14 +141,16 @@ class Polar(Stepper):
             judged = runs[ends & (balls.ticks[runs] < TICKS) & ~passes]
             if len(judged):  # halve or double their short steps by how accelerations changed in those taken
                 ticks, g, radius = balls.ticks[judged], balls.g[judged], self._R[judged]
-                change = np.abs(self._rates(judged) - before[:, judged]).max(axis=0) / taken[judged]
+                rates = self._rates(judged)
+                change = np.abs(rates - before[:, judged]).max(axis=0) / taken[judged]
                 pace = np.maximum(np.abs(balls.qvel[0, judged]), np.sqrt(g / radius))
-                usual = balls.settings.timestep * pace * (g + balls.eta[judged] * radius * pace**2)
+                forces = np.maximum(g + balls.eta[judged] * radius * pace**2, np.abs(rates).max(axis=0))
+                usual = balls.settings.timestep * pace * forces
                 grows = (change < _CHANGE * usual / 4) & (left[judged] % (2 * ticks) == 0)
                 changes = grows | ((change > _CHANGE * usual) & (ticks > 1))
                 balls.damp(judged[~changes])
                 balls.resize(judged[changes], np.where(grows, 2 * ticks, ticks // 2)[changes])
-                before[:, judged], taken[judged] = self._rates(judged), 0
+                before[:, judged], taken[judged] = rates, 0
         lost = np.flatnonzero(self._more > _MOST)
         if len(lost):
             self.given_up[lost], self._more[lost] = self._steps * balls.settings.timestep, 0.0

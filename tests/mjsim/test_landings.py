@@ -13,6 +13,7 @@ from mjsim.balls import TICKS
 from mjsim.journal import Journal
 from mjsim.stepping import Polar
 from model import Flow, Parameters
+from tests.random_motions import random_start
 
 HOPS = Parameters(
     mu=0.455544891368194, eta=0.07254346340444341, j=0.23894921089415236, r=0.02210534827760574, R=0.05, m=0.03,
@@ -77,6 +78,12 @@ def test_a_ball_that_slips_fast_lands_at_any_step(step: float) -> None:
     run = mjsim.simulate(p, x0, lasts, settings=ContactSettings.for_problem(p, step), sample_interval=lasts)
     # What forces of the size of the weight do in a step, times the angle by which they turn.
     assert np.abs(run.v_y - exact.v_y).max() < p.g * step * p.omega_0 * step
+
+
+def test_steps_are_not_divided_for_ever_where_large_forces_turn() -> None:
+    """Against the flow, slipping on floor and wall: steps that change forces of 13 g by little are short enough."""
+    p, x0 = random_start(388, on_wall=True)
+    assert mjsim.simulate(p, x0, 0.05, settings=ContactSettings.for_problem(p, 1.25e-4)).complete
 
 
 @pytest.mark.parametrize("batched", [False, True])
