@@ -83,6 +83,7 @@ _ALL = (
     *(Quantity(f"rate_{name}", f"d{symbol}/dt", "rad s-2", 5e-3) for name, symbol in _TURNS.items()),
     *(Quantity(f"after_{name}", f"{symbol} after", "m s-1", 5e-2) for name, symbol in _SPEEDS.items()),
     *(Quantity(f"after_{name}", f"{symbol} after", "rad s-1", 5e-2) for name, symbol in _TURNS.items()),
+    Quantity("rebounds", "landings that rebound", "1", 0.0),
     *(Quantity(f"omega_0{k}", f"ω₀{'₁₂₃₄'[k - 1]}", "rad s-1", 1e-3 if k == 4 else 1e-4) for k in range(1, 5)),
     *(Quantity(f"edge_{n}", f"{s} on the edge", "rad s-1", 1e-3) for n, s in (_TURNS | {"wall_spin": "ω_x⁰"}).items()),
     Quantity("lifts", "leaves the floor", "1", 0.0),

@@ -34,6 +34,8 @@ from model.files import make_directory
 
 STEP = 1e-3
 """Time step of the ladder, s."""
+HIGHER = (1e-4, 2e-4, 3e-4, 4e-4)
+"""By how much higher a landing ball begins, m, to land elsewhere within a step of 1 ms."""
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 """Time steps of error against cost, s."""
 Ways = Mapping[str, ContactSettings]
@@ -97,15 +99,21 @@ def landings(step: float) -> Rows:
     """What a landing, and motions with one, come to as corrections are taken away: relative errors of omega_c.
 
     That of `states.LANDING` 5 ms after it has landed and its rms over the motion, how high the ball rebounds within
-    0.1 s, and the rms over the motion of `states.HITTING`.
+    0.1 s at most, as it begins at one of `HIGHER`, and the rms over the motion of `states.HITTING`.
     """
     lone, theirs = "MuJoCo's defaults", "coordinates free, wall prism, cone pyramidal"
+    bare = plain(step)
     ways: Ways = {
         "ours (mujoco)": ContactSettings.at(step),
         "ours, memory off": ContactSettings.at(step, memory=False),
         "ours, servo 0, landings left to the contacts": ContactSettings.at(step, servo=0.0),
         "ours, landings left to the contacts": _Unwatched(**vars(ContactSettings.at(step))),
-        "ours, memory off, servo 0, order 1, integrator implicit (mujoco-plain)": plain(step),
+        "ours, memory off, servo 0, order 1, integrator implicit (mujoco-plain)": bare,
+        "mujoco-plain, damping ratio 2": replace(bare, solref=(2 * step, 2.0)),
+        "mujoco-plain, damping ratio 2, step divided by 10": replace(plain(step / 10), solref=(step / 5, 2.0)),
+        "mujoco-plain, step divided by 10": plain(step / 10),
+        "mujoco-plain, solimp 0.9": replace(bare, solimp=0.9),
+        "mujoco-plain, integrator discrete": replace(bare, integrator="discrete"),
         lone: newcomer(step),
         f"{lone}, {theirs} (mujoco-defaults)": as_it_comes(step),
     }
@@ -113,15 +121,20 @@ def landings(step: float) -> Rows:
     for name, way in ways.items():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of contacts that hover
-            lands, hits = (
-                mjsim.simulate(each.p, each.x0, each.lasts, settings=way, sample_interval=step)
-                for each in (states.LANDING, states.HITTING)
+            land, hit = states.LANDING, states.HITTING
+            lands, hits, *others = (
+                mjsim.simulate(each.p, x0, lasts, settings=way, sample_interval=step)
+                for each, x0, lasts in (
+                    *((each, each.x0, each.lasts) for each in (land, hit)),
+                    *((land, land.x0._replace(y=land.x0.y + more), 0.25) for more in HIGHER),
+                )
             )
         exact = states.LANDING.exact
         landed = float(exact.time[np.flatnonzero(exact.y <= 0)[0]])
         after = float(np.interp(landed + 5e-3, lands.time, lands.omega_c))
         off = after / float(np.interp(landed + 5e-3, exact.time, exact.omega_c)) - 1
-        height = float(lands.y[(lands.time > landed + 2e-3) & (lands.time < landed + 0.1)].max())
+        high = [run.y[(run.time > landed + 2e-3) & (run.time < landed + 0.1)].max() for run in (lands, *others)]
+        height = float(max(high))
         motions = (each.errors(run.time, run.x)[0] for each, run in ((states.LANDING, lands), (states.HITTING, hits)))
         rebound = f"{1e3 * height:.2g} mm" if height > 1e-5 else "none"
         rows.append([name, states.number(abs(off)), rebound, *map(states.number, motions)])

@@ -196,7 +196,10 @@ LAWS = (
         "impacts",
         "extension",
         "A ball that lands does not rebound, and friction takes its share of the impulse.",
-        tuple(Bearing("impacts", f"after_{name}", _end, size=_speed, by="analytic.simulate") for name in NAMES),
+        (
+            Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
+            *(Bearing("impacts", f"after_{name}", _end, size=_speed, by="analytic.simulate") for name in NAMES),
+        ),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
     ),
 )

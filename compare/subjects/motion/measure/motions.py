@@ -102,6 +102,9 @@ FLOW, LANDED = 0.8, 0.4
 """omega_0 sqrt(R/g), and the duration in units of sqrt(R/g)."""
 AFTER = 6
 """Steps of the coarser run after contact at which the ball is looked at: then friction has built up."""
+REBOUND = 1e-2
+"""Least height of a rebound divided by R: the starts are 4 to 5 times that high, and of a plastic landing nothing is
+left but the fall within a step."""
 NAMES = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 """Variables that a landing changes."""
 
@@ -286,18 +289,26 @@ def _start(name: str, p: Parameters, Omega_0: float, state: tuple[float, ...], h
 
 
 def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The state shortly after every landing."""
+    """The state shortly after every landing; and in how many runs, with both time steps, the contact opens again.
+
+    It does so where its gap, once it has stopped to shrink, grows by more than `REBOUND`.
+    """
     starts = [_start(name, p, FLOW, x, how) for name, p in sets.items() for how, x in LANDINGS.items()]
     steps = [coarse_step(start.p) / REFINED for start in starts]
     pairs = [
         lab.pair(start.p, start.x0, round(LANDED * time_unit(start.p) / step), step)
         for start, step in zip(starts, steps, strict=True)
     ]
+    rebounds = dict.fromkeys(sets, 0)
     for start, step, pair, got in zip(starts, steps, pairs, lab.groups(pairs), strict=True):
         if isinstance(got, str):
             yield Missing("impacts", start.set, f"{start.name}: the run {got}", len(NAMES))
             continue
         coarse, fine = got
+        for run in got:
+            gap = run.y if start.name.startswith("floor") else run.h
+            low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
+            rebounds[start.set] += bool(gap[low:].max() > gap[low] + REBOUND * start.p.R)
         contact = [case.A if start.name.startswith("floor") else case.B for case in coarse.cases]
         at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + AFTER
         if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
@@ -313,3 +324,7 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         for quantity, k in zip(NAMES, changed, strict=True):
             value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
             yield measurement(lab, "impacts", start.set, p, f"after_{quantity}", value, pair, **conditions)
+    for name, count in rebounds.items():
+        own = [task for start, pair in zip(starts, pairs, strict=True) if start.set == name for task in pair]
+        p = next(start.p for start in starts if start.set == name)
+        yield measurement(lab, "impacts", name, p, "rebounds", count, own)
