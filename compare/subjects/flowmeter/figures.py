@@ -116,7 +116,7 @@ def draw_figure_13(of: Diagram) -> Figure:
     else:
         t = bifurcation.thresholds(p)
         for case, ends, width, line, at in (
-            (Case.NR, (t.omega_02, top), 9, style.STABLE, (0.75, (15, -15))),
+            (Case.NR, (t.omega_02, top), 9, style.STABLE, (0.75, (9, -9))),
             (Case.SR, (t.omega_03, top), 5, style.STABLE, (0.4, (-12, 12))),
             (Case.SR, (t.omega_02, t.omega_03), 5, (0, (1.5, 0.8)), (0.1, (-30, 20))),
             (Case.RR, (0.0, t.omega_03), 2, style.STABLE, (0.45, (-5, 5))),

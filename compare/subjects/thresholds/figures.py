@@ -226,7 +226,7 @@ def draw_diagram(of: Diagram) -> Figure:
         guides = {"omega_02": t.omega_02, "omega_03": t.omega_03}
         top = 1.6 * t.omega_03
         _branch(axes, p, Case.RR, 0.0, t.omega_03)
-        _branch(axes, p, Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.4, (6, 4)), UNSTABLE)
+        _branch(axes, p, Case.SR, t.omega_02, t.omega_03, "SR, unstable", (0.02, (9, 3)), UNSTABLE)
         _branch(axes, p, Case.SR, t.omega_03, top, "SR", (0.5, (4, 6)))
         for w in (t.omega_02, t.omega_03):
             axes.plot([w], [lifted(w, p)], **style.POINT)
