@@ -43,7 +43,7 @@ QUANTITIES = {
     "depth": ("depth", 1e6, "µm"),
     "largest_step": ("largest step", 1e3, "ms"),
 }
-"""What may be wrong with a pair, in words, its unit and how many of it are one of SI."""
+"""What may be wrong with a pair, in words, its unit, and the factor from SI to it."""
 
 
 class UnsettledError(RuntimeError):

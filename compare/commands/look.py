@@ -1,4 +1,4 @@
-"""What is stored, shown: ``report``, ``figures``, ``inspect``, ``compare``, ``render``; and ``view``, a live ball."""
+"""Shows what is stored: ``report``, ``figures``, ``inspect``, ``compare``, ``render``; and ``view``, a live ball."""
 
 from __future__ import annotations
 

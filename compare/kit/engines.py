@@ -177,7 +177,7 @@ MUJOCO = Engine(
     stands_on=("numpy", "mujoco"),
     as_it_comes="mujoco-defaults",
     title="MuJoCo with corrections between its steps",
-    about="they make rigid stationary states exact by construction; measured at two time steps, 4 and 2 ms at most",
+    about="they make rigid stationary states exact by construction; measured at two time steps of at most 4 and 2 ms",
     beside=("mujoco-plain", "mujoco-defaults"),
     mark="o",
 )

@@ -26,7 +26,7 @@ _NONE = "–"
 
 
 def doubts(off: float) -> list[str]:
-    """The warning that a real fluid does what the model leaves out, if `real_fluid.model_error` is so large."""
+    """The warning that the model leaves out too much of a real fluid, if its error `off` exceeds the limit."""
     if off <= real_fluid.LIMIT:
         return []
     return [
@@ -61,7 +61,7 @@ AT_WALLS = (
 
 
 def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
-    """A number with so many digits at most, the last of them where the first digit of its relative error `off` is."""
+    """A number with at most `most` digits, and none beyond the first that its relative error `off` makes uncertain."""
     if not math.isfinite(value):
         return _NONE
     left = most
@@ -74,7 +74,7 @@ def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
 
 
 def sentences(made: Design) -> list[str]:
-    """What the design comes to."""
+    """What the design amounts to, in sentences."""
     chosen, request, curve, off, said = made.choice, made.request, made.curve, made.model_error, []
     if chosen.margin < 1:
         said.append(f"No meter within the bounds covers the flows up to {request.fastest:g} rad/s.")

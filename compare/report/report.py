@@ -98,7 +98,7 @@ def render(material: Material, verdicts: Sequence[Verdict], summary: Summary, sp
         title=f"{sum(verdict.passed for verdict in ran)} of {len(ran)} claims as expected",
         headline=wording.headline(ran),
         missing=wording.missing(ran),
-        lead=f"A ball rolls and slips round a cylinder. {lead}",
+        lead=f"A ball rolls and slips round inside a cylinder. {lead}",
         exceptions=[verdict for verdict in ran if verdict.outcome is not Outcome.CONFIRMED],
         witnesses=wording.witnesses(ran),
         tiles=[*wording.totals(ran), (str(len(measured)), f"simulations with {len(sets)} parameter sets")],

@@ -153,7 +153,7 @@ def headline(ran: Sequence[Verdict]) -> str:
 
 
 def missing(ran: Sequence[Verdict]) -> str:
-    """What the verdicts don't rest on, and what follows, in a sentence; empty if nothing is missing."""
+    """How many numbers are too coarse or missing, and what follows from that, in a sentence; empty if none is."""
     coarse = sum(not check.conclusive for verdict in ran for check in verdict.checks)
     left_out = sum(each.rows for each in {each for verdict in ran for each in verdict.missing})
     parts = [f"{coarse} of these numbers are too coarse to tell"] * (coarse > 0)

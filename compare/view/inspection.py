@@ -15,7 +15,7 @@ from model.kinematics import UNITS, VARIABLES
 LISTED = 20
 """Most phases, and most events, that are listed."""
 PART = 10_000
-"""Samples that are read at a time, so that a file may be larger than memory."""
+"""Samples read at a time, so that a file may be larger than memory."""
 
 
 def describe(path: Path) -> dict[str, Any]:

@@ -17,7 +17,7 @@ CHORD = (
     "each step ends along a chord, and the next one takes away what then points into the wall, omega^2 h/2 of the "
     "speed a second"
 )
-"""Why every engine with velocities in world axes slows what goes round."""
+"""Why every engine with velocities in world axes slows a body that goes round in a cylinder."""
 CORNERS = "every corner of the facets takes away some of the speed, until the wall no longer carries the ball"
 """Why a ball in facets is slower still."""
 State = tuple[Any, Any, Any]

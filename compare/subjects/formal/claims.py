@@ -310,7 +310,7 @@ CLAIMS = (
     Claim(
         "design-sensitivities",
         "(84)-(86)",
-        "By how many per cent a threshold changes if friction, inertia, the vessel or gravity does by one.",
+        "A design's sensitivities are the logarithmic derivatives of thresholds by friction, inertia, size, gravity.",
         algebra=_slopes,
         text=Text.FORMAL,
         reason="Derivatives of the closed forms, which thresholds themselves are measured against.",
