@@ -112,7 +112,9 @@ class Header:
 class Trajectory:
     """A motion of the ball, sampled: n samples and k events, in the axes and symbols of the paper.
 
-    Arrays have shape (n,) unless they say (n, axis); the axes are `AXES`.
+    Arrays have shape (n,), forces (n, 3) along `AXES`; `events` are changes of case, `header` says what was simulated.
+
+    COLUMNS
     """
 
     header: Header
@@ -223,6 +225,10 @@ def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]
     table = "event_" if of is Events else ""
     fields = [f for f in dataclasses.fields(of) if "units" in f.metadata]
     return {f.name: {"name": table + f.name.removesuffix("_case"), **f.metadata} for f in fields}
+
+
+_meanings = (f"* {name}: {meta['long_name']}, in {meta['units']}" for name, meta in columns(Trajectory).items())
+Trajectory.__doc__ = (Trajectory.__doc__ or "").replace("COLUMNS", "\n    ".join(_meanings).replace(", in 1", ""))
 
 
 def attributes(meta: Mapping[str, Any]) -> dict[str, Any]:
