@@ -105,7 +105,7 @@ def _slowest_decay(m: Measurement) -> float:
 def _slowest(m: Measurement) -> float:
     """The slowest decay of SR: that of leaning below omega_03, where it grows."""
     p, decay = m.parameters, -theory(analytic.leaning_modes, m.parameters)[0].real
-    return float(decay[0] if p.omega_0 < theory(analytic.thresholds, p).omega_03 else min(decay))
+    return float(decay[0] if p.omega_0 < theory(analytic.thresholds, p.replace(omega_0=1.0)).omega_03 else min(decay))
 
 
 CLAIMS = (

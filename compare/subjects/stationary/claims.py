@@ -42,7 +42,7 @@ def case(m: Measurement) -> float:
 
 def rolling(m: Measurement) -> float:
     """RR as long as it exists, (84) and (86); beyond, a case that lasts, which RR is not."""
-    t = theory(analytic.thresholds, m.parameters)
+    t = theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))
     limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
     if m.parameters.omega_0 < limit:
         return float(Case.RR)

@@ -63,11 +63,14 @@ _HOLDS: dict[str, Callable[[float, Parameters], float]] = {
 def _holds(name: str, quantity: str) -> Bearing:
     """The flow up to which forces admit rolling, which is where rolling ends for mu < 1."""
 
-    def end(m: Measurement) -> float:
-        p, unit = m.parameters.replace(omega_0=1.0), math.sqrt(m.parameters.g / m.parameters.R)
+    def end(p: Parameters) -> float:
+        unit = math.sqrt(p.g / p.R)
         return float(brentq(_HOLDS[name], 0.01 * unit, 100 * unit, args=(p,), rtol=1e-12))
 
-    return Bearing("thresholds", quantity, end, when=lambda m: m.parameters.mu < 1, by=f"rolling_forces.{name}")
+    def predict(m: Measurement) -> float:
+        return theory(end, m.parameters.replace(omega_0=1.0))
+
+    return Bearing("thresholds", quantity, predict, when=lambda m: m.parameters.mu < 1, by=f"rolling_forces.{name}")
 
 
 CLAIMS = (
