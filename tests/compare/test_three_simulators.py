@@ -22,8 +22,8 @@ DURATION, STEP = 2.0, 1.25e-4
 AGREE = 0.005
 """Difference of omega_c at the end, in units of omega_0, up to which simulators agree."""
 BY_CHANCE = 2
-"""Sets of 250 that may differ more: a start close to the border of two basins ends in either.
-Set 75 does so at any step: undisturbed, it rolls on where a slight slip would grow (docs/theory.md)."""
+"""Sets of 250 that may differ more, at any step: undisturbed, a ball may roll on where a slight slip would grow
+(docs/theory.md, section 7), and does so for as long as one of the simulators likes."""
 
 
 def ends(seed):
@@ -31,6 +31,7 @@ def ends(seed):
     p, x0 = random_start(seed, on_wall=True)
     simulators = {
         "event": partial(analytic.simulate, settings=analytic.Settings()),
+        "event, rolling on": partial(analytic.simulate, settings=analytic.Settings(leave_rolling="infeasible")),
         "time-stepping": partial(analytic.simulate, settings=analytic.Settings(method="time-stepping", timestep=STEP)),
         "mujoco": partial(mjsim.simulate, settings=ContactSettings.for_problem(p, STEP)),
     }
@@ -46,14 +47,17 @@ def ends(seed):
 
 @pytest.mark.slow
 def test_three_simulators_agree_on_random_sets(capsys):
-    differ, failed = [], []
+    differ, failed, unexplained = [], [], []
     with ProcessPoolExecutor() as pool:
         for seed, values, wrong in pool.map(ends, range(SETS)):
             failed += [f"seed {seed}: {line}" for line in wrong]
+            rolls_on = values.pop("event, rolling on", np.nan)
             if values and np.ptp(list(values.values())) > AGREE:
+                unexplained += [seed] if abs(rolls_on - values.get("event", np.nan)) < AGREE else []
                 shown = ", ".join(f"{name} {value:.4f}" for name, value in values.items())
                 differ.append(f"seed {seed}: omega_c/omega_0 by {shown}")
     with capsys.disabled():
         print(*["", *differ, *failed], sep="\n", flush=True)
     assert not failed
+    assert not unexplained
     assert len(differ) <= BY_CHANCE * max(1, SETS / 250)
