@@ -150,7 +150,8 @@ def run(
 ) -> Iterator[tuple[Job, Records | Exception]]:
     """Carry out protocols, some at once if they need nothing of each other; yield each as it ends, with its records.
 
-    A protocol that breaks down comes with its exception, and takes no other with it: those that need it go without.
+    A protocol that breaks down comes with its exception, and so do those that need it: what they measured without it
+    would be kept, and taken for whole the next time.
     The sets are those `chosen`, or each protocol's own. Raises `StorageError` where files can't be read or written.
     """
     known = {called(protocol.name, lab): (protocol, lab) for protocol, lab in jobs}
@@ -161,14 +162,20 @@ def run(
     order = TopologicalSorter({name: [each for each in those if each in known] for name, those in needs.items()})
     order.prepare()
     found: dict[str, Records] = {}
+    broken: dict[str, Exception] = {}
     running: dict[Future[Records], str] = {}
     campaign = jobs[0][1].campaign if jobs else None
     with ThreadPoolExecutor(campaign.at_once if campaign else 1) as threads:
         try:
             while order.is_active():
                 for name in sorted(order.get_ready(), key=lambda name: (not known[name][0].first, -cost(known[name]))):
-                    before = sum((found[other] for other in needs[name] if other in found), Records())
-                    running[threads.submit(carry_out, *known[name], chosen, before, results)] = name
+                    if lost := [broken[other] for other in needs[name] if other in broken]:
+                        future = Future[Records]()
+                        future.set_exception(lost[0])
+                    else:
+                        before = sum((found[other] for other in needs[name] if other in found), Records())
+                        future = threads.submit(carry_out, *known[name], chosen, before, results)
+                    running[future] = name
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     name, error = running.pop(future), future.exception()
                     order.done(name)
@@ -178,6 +185,7 @@ def run(
                     elif isinstance(error, StorageError) or not isinstance(error, Exception):
                         raise error  # a full disk, or a file that was touched, is for the user to mend
                     else:
+                        broken[name] = error
                         yield known[name], error
         except BaseException:
             assert campaign

@@ -85,6 +85,16 @@ def test_one_failure_takes_its_own_claim_only(tmp_path: Path, counted: list[str]
     assert (tmp_path / results.REPORT).exists()
 
 
+def test_what_needs_a_broken_protocol_is_not_measured_without_it(
+    tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else what it measured would be kept, and taken for whole once the other is mended."""
+    monkeypatch.setattr(validation, "PROTOCOLS", (*validation.PROTOCOLS, Protocol("next", going_round, ("broken",))))
+    monkeypatch.setattr(validation, "CLAIMS", (*validation.CLAIMS, claim("of-next", "next")))
+    assert run(tmp_path)["of-next"] == "error"
+    assert not [*tmp_path.glob("measurements/*/next.h5")]
+
+
 def test_what_was_measured_is_not_measured_again(tmp_path: Path, counted: list[str]) -> None:
     run(tmp_path)
     run(tmp_path)
