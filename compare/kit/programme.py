@@ -22,7 +22,7 @@ from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
 from compare.kit.tasks import sources
-from model import Parameters, SimulationError, StorageError
+from model import Parameters, StorageError
 from model.files import make_directory
 
 DIRECTORY = "measurements"
@@ -215,7 +215,7 @@ def carry_out(
         if protocol.alone and "reference" not in strong:
             rows.insert(0, Missing(protocol.name, next(iter(strong), ""), protocol.alone, 0))
         else:
-            rows = [*_measured(protocol, lab, strong, before), *rows]
+            rows = [*protocol.measure(lab, strong, before), *rows]
         make_directory(path.parent)
         about = {"protocol": protocol.name, "engine": lab.engine.name, "step": lab.refine, "level": lab.level.name}
         place = f"{campaign.directory.name}/{label}.h5"
@@ -226,18 +226,6 @@ def carry_out(
     records = record.load(path)
     campaign.reduce(label, {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run})
     return records
-
-
-def _measured(
-    protocol: Protocol, lab: Lab, sets: Mapping[str, Parameters], before: Records
-) -> list[Measurement | Missing]:
-    """What a protocol measures; a run that it can't go on without leaves out its set, and no other."""
-    try:
-        return list(protocol.measure(lab, sets, before))
-    except SimulationError as error:
-        if len(sets) > 1:  # what was run is not run again
-            return [row for name, p in sets.items() for row in _measured(protocol, lab, {name: p}, before)]
-        return [Missing(protocol.name, next(iter(sets)), str(error))]
 
 
 def _too_weak(p: Parameters, protocol: Protocol) -> str:

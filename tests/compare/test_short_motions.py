@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from types import SimpleNamespace
 
@@ -17,7 +17,7 @@ from compare.claim import Outcome, Verdict
 from compare.judge import judge
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
 from compare.kit.settling import family
 from compare.kit.short import random_state
@@ -40,10 +40,10 @@ LIFTS = {f"lift-{inner.name}-{outer.name}" for inner, outer in slip_stability.LI
 
 
 @pytest.fixture(scope="module")
-def protocols(lab: Lab) -> dict[str, Callable[[], Iterator[Measurement | Missing]]]:
-    """The protocols by name, on one set or two."""
+def measured(lab: Lab) -> Measured:
+    """What each protocol measures, on one set or two."""
     known = thresholds("reference", SETS["reference"], "omega_01", "omega_02")
-    return {
+    protocols = {
         "field": lambda: motions.field(lab, SETS, Records()),
         "growth": lambda: growth.measure(lab, SETS, Records()),
         "bounds": lambda: onset.bounds(lab, SETS, known),
@@ -51,11 +51,6 @@ def protocols(lab: Lab) -> dict[str, Callable[[], Iterator[Measurement | Missing
         "motions": lambda: motions.motions(lab, SETS, Records()),
         "impacts": lambda: motions.impacts(lab, SETS, Records()),
     }
-
-
-@pytest.fixture(scope="module")
-def measured(protocols: dict[str, Callable[[], Iterator[Measurement | Missing]]]) -> Measured:
-    """What each protocol measures."""
     return cache(lambda name: Records.of(protocols[name]()))
 
 
@@ -64,7 +59,7 @@ def verdicts(records: Records) -> dict[str, Verdict]:
 
 
 @pytest.mark.parametrize("name", ["field", "growth", "bounds", "lift", "impacts"])
-def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(protocols, measured, name, monkeypatch) -> None:
+def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(measured, name, monkeypatch) -> None:
     whole, attempt, tried = measured(name), Lab.attempt, []
 
     def breaking(lab: Lab, tasks: list[Task]) -> list[Trajectory] | str:
@@ -72,7 +67,7 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(protocols, me
         return attempt(lab, tasks) if len(tried) > 1 else "diverged at once"
 
     monkeypatch.setattr(Lab, "attempt", breaking)
-    left = Records.of(protocols[name]())
+    left = measured.__wrapped__(name)
     assert ["the run diverged at once" in missing.reason for missing in left.missing].count(True) == 1
     assert 0.5 < len(left.measurements) / len(whole.measurements) <= 1
 

@@ -200,23 +200,6 @@ def test_a_file_that_was_touched_is_named(tmp_path: Path, counted: list[str]) ->
         validation.judge_stored(tmp_path)
 
 
-def test_a_run_that_breaks_down_loses_its_set_and_no_other(
-    tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def diverging(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Rows:
-        for name, p in sets.items():
-            lab.run([lab.task(p, [0, 0, 1e9 if name == "mine" else 1.0, 0, 0, 0], 0.1, 4e-3)])
-            yield Missing("broken", name, "whole")
-
-    monkeypatch.setattr(validation, "PROTOCOLS", (Protocol("broken", diverging),))
-    both = {"yours": Parameters.named("reference"), **SETS}
-    verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=both, workers=0, claims=["of-broken"])
-    assert verdicts[0].outcome is Outcome.NOT_RUN
-    yours, mine, _ = verdicts[0].missing
-    assert (yours.reason, mine.set) == ("whole", "mine")
-    assert mine.reason.startswith("the run ")
-
-
 @pytest.mark.parametrize("command", ["validate", "judge"])
 def test_the_command_line(command: str, tmp_path: Path, counted: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     validate = ["validate", "--quick", "-o", str(tmp_path), "--workers", "0", "--set", "reference"]

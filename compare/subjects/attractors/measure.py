@@ -226,7 +226,11 @@ def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
     for k, e in enumerate(REBOUNDS):
         # The first of them are so close that the last hop of one begins the next.
         ahead = states[-1] if k < 2 else 2 * states[-1] - states[-2]
-        (run,) = lab.run([task(ahead, LAST, e)])
+        runs = lab.attempt([task(ahead, LAST, e)])
+        if isinstance(runs, str):
+            yield Missing("rebounding", SET, f"the run {runs}")
+            return
+        (run,) = runs
         if hops(run):
             last = tops(run, 0.0, LAST)
             states.append(last.x[-1])
@@ -234,7 +238,11 @@ def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
             yield Missing("rebounding", SET, "the ball does not hop")
             return
         if not hops(run) or e in LONG:
-            (run,) = lab.run([alone := task(states[-1], LEFT, e)])
+            runs = lab.attempt([alone := task(states[-1], LEFT, e)])
+            if isinstance(runs, str):
+                yield Missing("rebounding", SET, f"the run {runs}")
+                return
+            (run,) = runs
             at = last.conditions(p) | {"restitution": e, "duration": LEFT}
             yield measurement(lab, "rebounding", SET, p, "hops", hops(run), [alone], **at)
             if not hops(run):
