@@ -85,7 +85,7 @@ def _array(data: int, offset: int) -> int:
 
 
 @compiled  # type: ignore[untyped-decorator]
-def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, float]:
+def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, Array, float]:
     xpos, xmat, contact = _real(_array(data, at[_XPOS])), _real(_array(data, at[_XMAT])), _array(data, at[_CONTACT])
     damping, softness = _real(_array(data, at[_KBIP])), _real(_array(data, at[_R]))
     reference, ncon = _real(_array(data, at[_AREF])), _whole(data + at[_NCON])[0]
@@ -95,12 +95,8 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool
         geom, dim, address = _whole(c + at[_GEOM]), _whole(c + at[_DIM])[0], _whole(c + at[_ADDRESS])[0]
         if address < 0 or dim == 1 or geom[0] < 0 or geom[1] < 0 or damping[4 * (address + 1) + 1] <= 0:
             continue
-        used[count], pos, frame, kept[count, 28] = (
-            c,
-            _real(c + at[_POS]),
-            _real(c + at[_FRAME]),
-            _real(c + at[_DIST])[0],
-        )
+        used[count], kept[count, 28] = i, _real(c + at[_DIST])[0]
+        pos, frame = _real(c + at[_POS]), _real(c + at[_FRAME])
         for side in range(2):
             g = geom[side]
             kept[count, side] = g
@@ -111,7 +107,7 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool
                 if side == 0:
                     kept[count, 25 + axis] = xmat[m] * frame[0] + xmat[m + 3] * frame[1] + xmat[m + 6] * frame[2]
         count += 1
-    kept = kept[:count]
+    kept, used = kept[:count], used[:count]
 
     force, pairs = np.zeros((count, 5)), np.zeros((count, 5))
     world, first, moved = np.empty((3, 2)), 0, 0.0
@@ -134,7 +130,8 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool
         if nearest < 0:
             continue
         moved = max(moved, least)
-        frame, kinds = _real(used[nearest] + at[_FRAME]), 1 if _whole(used[nearest] + at[_DIM])[0] == 3 else 2
+        c = contact + used[nearest] * at[_SIZE]
+        frame, kinds = _real(c + at[_FRAME]), 1 if _whole(c + at[_DIM])[0] == 3 else 2
         world[:] = 0.0
         for side in range(2):
             g = int(kept[nearest, side])
@@ -152,12 +149,8 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool
             pairs[nearest, j] += before[m, 20 + j]
 
     for k in range(count):
-        a, rows, mu = (
-            _whole(used[k] + at[_ADDRESS])[0],
-            _whole(used[k] + at[_DIM])[0] - 1,
-            _real(used[k] + at[_FRICTION]),
-        )
-        mean = 0.0
+        c, mean = contact + used[k] * at[_SIZE], 0.0
+        a, rows, mu = _whole(c + at[_ADDRESS])[0], _whole(c + at[_DIM])[0] - 1, _real(c + at[_FRICTION])
         for j in range(rows):
             if elliptic:
                 reference[a + 1 + j] += softness[a + 1 + j] * force[k, j]
@@ -169,42 +162,38 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool
             level = pairs[k, j] - mean
             reference[a + 2 * j] += softness[a + 2 * j] * (level + force[k, j]) / 2
             reference[a + 2 * j + 1] += softness[a + 2 * j + 1] * (level - force[k, j]) / 2
-    return kept, math.sqrt(moved / 2)
+    return kept, used, math.sqrt(moved / 2)
 
 
 @compiled  # type: ignore[untyped-decorator]
-def _retain(data: int, at: Array, kept: Array, elliptic: bool, nv: int, sparse: bool) -> None:
+def _retain(data: int, at: Array, kept: Array, used: Array, elliptic: bool, nv: int, sparse: bool) -> None:
     xmat, contact = _real(_array(data, at[_XMAT])), _array(data, at[_CONTACT])
-    damping, softness = _real(_array(data, at[_KBIP])), _real(_array(data, at[_R]))
-    reference, forces = _real(_array(data, at[_AREF])), _real(_array(data, at[_FORCE]))
-    qacc, jacobian, column = (
+    softness, reference = _real(_array(data, at[_R])), _real(_array(data, at[_AREF]))
+    forces, qacc, jacobian = (
+        _real(_array(data, at[_FORCE])),
         _real(_array(data, at[_QACC])),
         _real(_array(data, at[_J])),
-        _whole(_array(data, at[_COLIND])),
     )
-    begin, length = _whole(_array(data, at[_ROWADR])), _whole(_array(data, at[_ROWNNZ]))
-    i, world, force, held = -1, np.empty((3, 2)), np.empty(5), np.empty(10)
+    column, begin = _whole(_array(data, at[_COLIND])), _whole(_array(data, at[_ROWADR]))
+    length = _whole(_array(data, at[_ROWNNZ]))
+    world, force, held = np.empty((3, 2)), np.empty(5), np.empty(10)
     for k in range(len(kept)):
-        while True:  # the next that has a memory
-            i += 1
-            c = contact + i * at[_SIZE]
-            a, dim, geom = _whole(c + at[_ADDRESS])[0], _whole(c + at[_DIM])[0], _whole(c + at[_GEOM])
-            if a >= 0 and dim > 1 and geom[0] >= 0 and geom[1] >= 0 and damping[4 * (a + 1) + 1] > 0:
-                break
+        c = contact + used[k] * at[_SIZE]
+        a, dim, geom = _whole(c + at[_ADDRESS])[0], _whole(c + at[_DIM])[0], _whole(c + at[_GEOM])
         mu, frame = _real(c + at[_FRICTION]), _real(c + at[_FRAME])
-        rows, first, load, used = 2 * (dim - 1), a, 0.0, 0.0
+        rows, first, load, lean = 2 * (dim - 1), a, 0.0, 0.0
         force[:] = 0.0
         if elliptic:
             rows, first, load = dim - 1, a + 1, forces[a]
             for j in range(rows):
                 force[j] = forces[first + j]
-                used += (force[j] / mu[j]) ** 2
+                lean += (force[j] / mu[j]) ** 2
         else:
             for j in range(dim - 1):
                 plus, minus = forces[a + 2 * j], forces[a + 2 * j + 1]
                 load += plus + minus
                 force[j] = mu[j] * (plus - minus)
-        asked, sticks = 0.0, elliptic and used < (_INSIDE * load) ** 2  # a row that isn't limited has what it asks for
+        asked, sticks = 0.0, elliptic and lean < (_INSIDE * load) ** 2  # a row that isn't limited has what it asks for
         for j in range(rows if load > 0 and not sticks else 0):
             r = first + j
             held[j] = forces[r]
@@ -237,11 +226,11 @@ def _retain(data: int, at: Array, kept: Array, elliptic: bool, nv: int, sparse: 
             kept[k, 20 + j] = share * (forces[a + 2 * j] + forces[a + 2 * j + 1])
 
 
-def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, float]:
+def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, Array, float]:
     """As `mjsim.memory.recall`."""
     return _recall(data._address, _AT, before, elliptic, scattered)  # type: ignore[no-any-return]
 
 
-def retain(model: Any, data: Any, kept: Array, elliptic: bool) -> None:
+def retain(model: Any, data: Any, kept: Array, used: Array, elliptic: bool) -> None:
     """As `mjsim.memory.retain`."""
-    _retain(data._address, _AT, kept, elliptic, model.nv, mujoco.mj_isSparse(model))
+    _retain(data._address, _AT, kept, used, elliptic, model.nv, mujoco.mj_isSparse(model))

@@ -117,11 +117,11 @@ class FrictionMemory:
             mujoco.mj_step1(model, data)
             if data.time != self._time:  # another state, or one that MuJoCo has reset as it diverged
                 self.reset()
-            kept, moved = recall(model, data, self._kept, elliptic, False)
+            kept, used, moved = recall(model, data, self._kept, elliptic, False)
             if moved > near and put_back(model, data, self._kept):
-                kept, _ = recall(model, data, self._kept, elliptic, True)
+                kept, used, _ = recall(model, data, self._kept, elliptic, True)
             if self._servo:
-                self._lift = self._lifted(data, kept, elliptic)
+                self._lift = self._lifted(data, kept, used, elliptic)
             if dry := data.nf:
                 joints, softness, reference = slice(data.ne, data.ne + dry), data.efc_R, data.efc_aref
                 if len(self._joints) == dry:
@@ -132,16 +132,16 @@ class FrictionMemory:
             if self._time <= begin or (data.ncon, data.nefc) != (ncon, nefc):  # reset as it diverged
                 self.reset()
                 continue
-            retain(model, data, kept, elliptic)
+            retain(model, data, kept, used, elliptic)
             self._kept = kept
             if dry:
                 asked = np.abs(reference - acceleration(model, data))[joints]
                 share = np.clip(2 - asked / (KEPT * softness * data.efc_frictionloss)[joints], 0, 1)
                 self._joints = data.efc_force[joints] * share * (data.efc_KBIP[joints, 1] > 0)
 
-    def _lifted(self, data: Any, kept: Array, elliptic: bool) -> Array:
+    def _lifted(self, data: Any, kept: Array, used: Array, elliptic: bool) -> Array:
         """Servo: move the distances that contacts hold, so that loaded ones come to have no depth; return them, m."""
-        contact, used = data.contact, remembering(data)
+        contact = data.contact
         lift: Array = np.zeros(len(kept))
         if len(self._lift) and len(kept):
             nearest, same = _nearest(kept, self._kept)
@@ -153,14 +153,6 @@ class FrictionMemory:
         of = np.repeat(np.arange(len(used)), 1 if elliptic else 2 * (contact.dim[used] - 1))
         data.efc_aref[rows[of] + np.arange(len(of)) - np.searchsorted(of, of)] -= spring[of]
         return lift
-
-
-def remembering(data: Any) -> npt.NDArray[np.intp]:
-    """Which contacts have a memory: those of geoms, with friction that is damped."""
-    contact = data.contact
-    used = np.flatnonzero((contact.efc_address >= 0) & (contact.dim > 1) & (contact.geom >= 0).all(axis=1))
-    damped: npt.NDArray[np.bool_] = data.efc_KBIP[contact.efc_address[used] + 1, 1] > 0
-    return used[damped]
 
 
 def acceleration(model: Any, data: Any) -> Array:
@@ -197,10 +189,10 @@ def put_back(model: Any, data: Any, before: Array) -> bool:
     return True
 
 
-def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, float]:
-    """Add to the reference accelerations what contacts remember; return their geoms and places, and no forces yet.
+def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, Array, float]:
+    """Add to the reference accelerations what contacts remember; return what is known of them, with no forces yet.
 
-    Also how far they have moved on the bodies, at most, m.
+    Also which contacts they are, and how far they have moved on the bodies, at most, m.
 
     Parameters
     ----------
@@ -208,7 +200,9 @@ def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool
     elliptic : whether cones are elliptic
     scattered : whether contacts of a pair may stand apart
     """
-    contact, used, reference, softness = data.contact, remembering(data), data.efc_aref, data.efc_R
+    contact, reference, softness = data.contact, data.efc_aref, data.efc_R
+    used = np.flatnonzero((contact.efc_address >= 0) & (contact.dim > 1) & (contact.geom >= 0).all(axis=1))
+    used = used[data.efc_KBIP[contact.efc_address[used] + 1, 1] > 0]
     geom, frame, friction = contact.geom[used], contact.frame[used].reshape(-1, 3, 3), contact.friction[used]
     address, axes = contact.efc_address[used], data.geom_xmat[geom].reshape(-1, 2, 3, 3)
     arm = contact.pos[used][:, None] - data.geom_xpos[geom]
@@ -234,12 +228,12 @@ def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool
         pairs -= pairs.sum(axis=1, keepdims=True) / own.sum(axis=1, keepdims=True)
         for side, sign in enumerate((1, -1)):
             reference[rows + side] += softness[rows + side] * ((pairs + sign * lean) / 2)[own]
-    return kept, moved
+    return kept, used, moved
 
 
-def retain(model: Any, data: Any, kept: Array, elliptic: bool) -> None:
+def retain(model: Any, data: Any, kept: Array, used: Array, elliptic: bool) -> None:
     """Remember the friction that the step came to, and what pairs of edges bear."""
-    contact, forces, used = data.contact, data.efc_force, remembering(data)
+    contact, forces = data.contact, data.efc_force
     address, friction, own = contact.efc_address[used], contact.friction[used], contact.dim[used][:, None] - 1 > _ROWS
     holding = (data.efc_aref - acceleration(model, data)) / data.efc_R
     force, asked = np.zeros(own.shape), np.zeros(own.shape)

@@ -174,7 +174,7 @@ def test_compiled_as_written(cone):
             changed(data, kept)[:] = begin
             found = compiled(model, data, kept, *more)
             for one, same in zip([changed(data, kept), *(found or ())], wanted, strict=True):
-                apart.append(np.abs(one - same).max(initial=0) / np.abs(same).max(initial=1e-3))
+                apart.append(np.abs(one - same).max(initial=0) / np.abs(1.0 * same).max(initial=1e-3))
             return found
 
         return call
