@@ -75,9 +75,9 @@ def _heard(claim: Claim, by: Engine, steps: Mapping[int, Records], said: Verdict
     missing = [each for n, own in steps.items() for each in own.missing if last.get(each.protocol) == n]
     if not found or not any(found.values()):
         reason = "formal: theory against theory" if claim.algebra else ""
-        reason = reason or next(
-            (f"nothing measured: {each}" for each in missing), "its protocols don't ask this engine"
-        )
+        dear = f"{', '.join(sorted(claim.protocols))} cost more than is spent on engines beside the one on trial"
+        dear = "only settled states are asked of an engine as it comes" if by.allowance else dear
+        reason = reason or next((f"nothing measured: {each}" for each in missing), dear)
         return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason)
     usual = [
         abs(check.deviation / check.scale)

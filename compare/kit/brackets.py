@@ -15,8 +15,6 @@ from model import Trajectory
 
 Answer = Callable[[Trajectory], bool | None]
 """Yes, no, or None where the run doesn't show it, and is done again for longer."""
-SECTIONS = 7
-"""Flows inside a bracket in each round, by which it shrinks to an eighth."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +75,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     uncertain as the bracket before it was wide, see `Bracket.shift`.
     """
     failures: dict[Search, str] = {}
+    sections = lab.effort("brackets.sections")
 
     def ask(questions: Sequence[Question], care: Care) -> tuple[list[Task], list[Trajectory | None], list[bool | None]]:
         tasks, runs = [search.task(value, bracket, care) for search, value, bracket in questions], []
@@ -94,14 +93,14 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     before = list(brackets)
     todo = list(range(len(searches)))
     while todo := [k for k in todo if brackets[k].high - brackets[k].low > searches[k].width]:
-        values = {k: np.linspace(brackets[k].low, brackets[k].high, SECTIONS + 2).tolist() for k in todo}
+        values = {k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist() for k in todo}
         asked = [(searches[k], value, brackets[k]) for k in todo for value in values[k][1:-1]]
         tasks, runs, answers = ask(asked, USUAL)
         unclear = [n for n, answer in enumerate(answers) if answer is None and runs[n] is not None]
         for n, task, run, answer in zip(unclear, *ask([asked[n] for n in unclear], LONGER), strict=True):
             tasks[n], runs[n], answers[n] = task, run, answer
         for n, k in enumerate(todo):
-            inside = slice(n * SECTIONS, (n + 1) * SECTIONS)
+            inside = slice(n * sections, (n + 1) * sections)
             ends = brackets[k].runs
             said, shown = [True, *answers[inside], False], [ends[0], *runs[inside], ends[1]]
             no = said.index(False)

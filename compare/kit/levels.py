@@ -28,6 +28,8 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
     "settled.flows": ((0.62, 1.4, 1.7, 2.5, 4.2), _FLOWS, _FLOWS),
     "settled.starts": (("rest", "with the fluid", "on the wall"),) * 3,
     "settled.sharp": (1.0, 0.1, 0.1),
+    # flows inside a bracket in each round, by which it shrinks to an eighth
+    "brackets.sections": (7, 7, 7),
     # thresholds: relative widths of the last brackets, of those about a fold, and the factor on the settling tolerance
     "thresholds.width": (5e-5, 1e-6, 5e-7),
     "thresholds.fold": (1.2e-3, 3e-4, 1.5e-4),
@@ -78,6 +80,7 @@ BESIDE: dict[str, Any] = {
     "settled.flows": (0.62, 1.7, 4.2),
     "settled.starts": ("with the fluid", "on the wall"),
     "settling.rounds": (0.5,),
+    "brackets.sections": 3,
     "thresholds.width": 5e-4,
     "thresholds.loose": 1e3,
     "thresholds.rounds": (0.4, 0.2),

@@ -97,4 +97,4 @@ def test_who_measured_nothing_was_not_asked_and_says_why():
     _, plain, defaults = said.witnesses
     assert {plain.outcome, defaults.outcome} == {Outcome.NOT_ASKED}
     assert plain.reason == "nothing measured: mine: nothing settles"
-    assert defaults.reason == "its protocols don't ask this engine"
+    assert defaults.reason == "only settled states are asked of an engine as it comes"
