@@ -29,7 +29,7 @@ from model import Case, Parameters
 from tests.measured import measured
 
 REFERENCE = Parameters.named("reference")
-NUMBERS = SimpleNamespace(each=list)
+NUMBERS = SimpleNamespace(each=list, effort=lambda name: 7)
 """Stands for a lab whose tasks are their own runs."""
 
 
