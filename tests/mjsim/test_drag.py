@@ -10,7 +10,7 @@ import mjsim
 from analytic.mechanics import drag
 from mjsim import ContactSettings, limits
 from mjsim.corrections import Ball, resistance
-from model import Case, Flow, InputError
+from model import Flow, InputError
 from model.drag import LAWS
 from tests import drag_laws
 from tests.drag_laws import BY_LAW
@@ -38,19 +38,7 @@ def test_a_law_without_a_formula_is_not_taken_for_another(monkeypatch):
         Ball.of(drag_laws.BALL.replace(drag="oseen"), ContactSettings())
 
 
-@pytest.mark.parametrize("law", OTHERS)
-@pytest.mark.parametrize("changes", [{}, {"coordinates": "free", "memory": False, "order": 1}])
-def test_a_fall_ends_at_the_terminal_speed(law, changes):
-    p = BY_LAW[law].replace(omega_0=0.0, c=1.0, nu_f=1e-4)
-    settings = ContactSettings.at(1e-3, **changes)
-    run = mjsim.simulate(p, [50.0, 0, 0, 0, 0, 0, p.R / 2, 0], 4.0, settings=settings, sample_interval=0.1)
-    assert set(run.cases) == {Case.NN}
-    speed = -run.v_y[-1]
-    # What is left decays at twice g/v or faster; the round-off of a height of 50 m over a step limits v_y.
-    assert float(drag_laws.resistance(speed, p)) * speed == pytest.approx(p.g, rel=1e-8)
-
-
-@pytest.mark.parametrize("law", OTHERS)
+@pytest.mark.parametrize("law", LAWS)
 def test_slipping_converges_with_the_square_of_the_step(law):
     """Each variable's error against the event-driven simulation is less than a quarter at half the step."""
     p = BY_LAW[law].replace(mu=0.15, eta=0.15, omega_0=20.0)

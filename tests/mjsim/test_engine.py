@@ -1,25 +1,17 @@
 """The engine against motions whose exact form is short enough to stand in the test, and itself compiled."""
 
 import math
-from itertools import pairwise
 
 import mujoco
 import numpy as np
 import pytest
 
 import mjsim
-from mjsim import ContactSettings, backend, recorder, scene, stepping
+from mjsim import ContactSettings, backend, scene, stepping
 from model import Case, Flow, InputError, Parameters, SimulationError
 from model.drag import LAWS
 
 P = Parameters.named("reference")
-
-
-def test_joint_coordinates_round_trip() -> None:
-    rng = np.random.default_rng(1)
-    x = rng.normal(size=(50, 8)) * [1e-3, 0.1, 10, 5, 5, 5, 1e-3, 0.1]
-    qpos, qvel = recorder.joint_state(x, 0.7, P)
-    np.testing.assert_allclose(recorder.state(qpos, qvel, P).stacked(), x, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -77,25 +69,6 @@ def test_batch_is_the_single_run() -> None:
         np.testing.assert_array_equal(run.force_B, first.force_B)
 
 
-def test_forces_of_a_single_contact() -> None:
-    """At rest in still fluid away from the wall, the floor carries m g and nothing else acts.
-
-    Carried by the wall alone at the fluid's speed: it turns the path, B_x = m R omega_0^2, and bears the weight.
-
-    The axial oscillation about that state decays with 2(1 + j)/c = 2.8 s, so that 1e-9 is left of it after 60 s.
-    """
-    run = mjsim.simulate(P.replace(omega_0=0.0), [0, 0, 0, 0, 0, 0, 0.01, 0], 1.0)
-    np.testing.assert_allclose(run.force_A[-1], [0, P.m * P.g, 0], atol=1e-9 * P.m * P.g)
-    assert abs(run.gap_A[-1]) < 1e-12
-    p = Parameters.named("high-wall-friction").replace(omega_0=25.0)
-    settings = ContactSettings.at(4e-3)
-    slip_x = (p.g / p.j - p.R * p.omega_0**2) / (p.r * p.omega_0)  # B_y = m g carries no moment about the centre's path
-    run = mjsim.simulate(p, [0, 0, p.omega_0, slip_x, 0, 0], 60.0, settings=settings)
-    np.testing.assert_allclose(run.force_B[-1], [p.m * p.R * p.omega_0**2, p.m * p.g, 0], atol=1e-8 * p.m * p.g)
-    assert run.cases[-1].name == "NR"
-    assert run.omega_c[-1] == pytest.approx(p.omega_0, rel=1e-12)
-
-
 def test_divergence_stops_a_run_and_keeps_what_there_is() -> None:
     wild = [0, 0, 1e9, 0, 0, 0]
     with pytest.raises(SimulationError, match=r"diverged by t = .* s") as caught:
@@ -121,20 +94,6 @@ def test_a_ball_that_crosses_the_axis_goes_on(miss) -> None:
         np.testing.assert_allclose(p.R - run.h, exact, rtol=0, atol=1 / 24 / 32**2 * p.R)
         assert run.theta[-1] == pytest.approx(math.pi, abs=2 * miss / exact[-1] + 3e-3)
     assert np.all(together[1].h == 0.2 * p.R)
-
-
-def test_a_ball_that_passes_by_the_axis_goes_on() -> None:
-    """Without friction a straight line at R/3 from the axis: rho^2 = b^2 + (a - v t)^2, to second order in the step."""
-    p = P.replace(omega_0=0.0, c=0.0, mu=0.0, eta=0.0)
-    a, b, v = 0.8 * p.R, p.R / 3, 0.2
-    rho = np.hypot(a, b)
-    x0 = [0, 0, v * b / rho**2, 0, 0, 0, p.R - rho, v * a / rho]
-    errors = []
-    for timestep in (1e-3, 5e-4):
-        run = mjsim.simulate(p, x0, 0.35, settings=ContactSettings.at(timestep), sample_interval=0.01)
-        errors.append(np.abs(p.R - run.h - np.hypot(b, a - v * run.time)).max())
-    # The azimuth turns by up to v/b h in a step: what third order adds to the ratio is of its size.
-    assert errors[0] / errors[1] == pytest.approx(4, rel=10 * v / b * 1e-3)
 
 
 def test_slip_too_fast_for_continuous_contact_is_said() -> None:
@@ -183,31 +142,6 @@ def test_a_run_whose_steps_are_divided_for_ever_is_given_up(monkeypatch: pytest.
 def test_bad_arguments(arguments, words) -> None:
     with pytest.raises(InputError, match=words):
         mjsim.simulate(**{"p": P, "x0": [0, 0, 1, 0, 0, 0]} | arguments)
-
-
-def test_slipping_converges_at_second_order() -> None:
-    """Each halving of the step divides what it changes by four, from the start of a transient on."""
-    p = P.replace(omega_0=25.0)
-    runs = [
-        mjsim.simulate(p, [0, 0, 14.3, -1, 2, 7], 0.4, settings=ContactSettings.at(h), sample_interval=8e-3)
-        for h in (1e-3, 5e-4, 2.5e-4)
-    ]
-    coarse, fine = (np.abs(a.x - b.x)[:, 2:6].max() for a, b in pairwise(runs))
-    assert 3.5 < coarse / fine < 8  # the third order shows, too, where margins lag behind the load
-
-
-def test_without_the_servo_sliding_states_are_of_second_order_in_the_step() -> None:
-    """A ball that sinks in rolls on a lever shorter by half its depth, and the depth goes with timestep^2."""
-    p = P.replace(omega_0=25.0)
-    steps = (2e-3, 1e-3, 5e-4)
-    coarse, middle, fine = (
-        float(mjsim.simulate(p, np.zeros(8), 40.0, settings=ContactSettings.at(h, servo=0.0)).omega_c[-1])
-        for h in steps
-    )
-    # The next term is of the fourth order: relative to this one it is of the size of the change of omega_c itself.
-    change = abs(coarse - fine) / abs(fine)
-    assert 1e-3 < change < 0.1
-    assert (coarse - middle) / (middle - fine) == pytest.approx(4, rel=2 * change)
 
 
 # --- the scene file ------------------------------------------------------------------------------------------
