@@ -45,12 +45,6 @@ def _vectors():
     return frame, v_C, spin, v_A, v_B, rho
 
 
-def velocities() -> tuple[sp.Matrix, sp.Matrix]:
-    """v_A and v_B in the state variables: what (6) ought to say."""
-    _, _, _, v_A, v_B, _ = _vectors()
-    return _symbols(v_A), _symbols(v_B)
-
-
 def balance() -> list[sp.Expr]:
     """The six equations (20), each zero, linear in rates and forces, and the two kinematic ones."""
     frame, v_C, spin, _, _, rho = _vectors()

@@ -1,7 +1,5 @@
 """Thresholds, the fold and the maps of Figs. 7 and 8, against arithmetic of 50 digits and against the solutions."""
 
-import math
-
 import numpy as np
 import pytest
 import sympy as sp
@@ -11,11 +9,9 @@ from analytic.bifurcation import diagram
 from analytic.bifurcation.diagram import (
     Exists,
     case_map,
-    critical_drag,
     double_points,
     number_of_folds,
     threshold_curves,
-    wall_spin,
 )
 from analytic.stationary import slipping_branch as sb
 from model import Case, InputError, Parameters
@@ -59,39 +55,6 @@ def test_fold_to_1e_12(mu: float, eta: float, kappa: float) -> None:
     assert abs(place / float(alpha) - 1) <= 1e-10
 
 
-# kappa = 30 needs a rough floor to have a fold for any eta < j.
-BIRTHS = [(mu, kappa) for mu in (0.2, 1.0, 100.0) for kappa in (1e-4, 0.07, 0.2)] + [(100.0, 30.0)]
-
-
-@pytest.mark.parametrize(("mu", "kappa"), BIRTHS)
-def test_fold_is_born_at_eta_cr_in_sr(mu: float, kappa: float) -> None:
-    """Just above eta_cr the fold is next to alpha = -pi/2, at omega_02; just below there is none."""
-    p = groups(mu, 0.1, kappa)
-    eta_cr = float(sb.eta_critical(mu, p))
-    assert np.isnan(sb.fold(p.replace(eta=eta_cr * (1 - 1e-9))))
-    last = np.inf
-    for excess in (1e-3, 1e-6, 1e-9):
-        p = p.replace(eta=eta_cr * (1 + excess))
-        s = float(sb.fold(p))
-        Omega_04 = float(sb.branch(s, p).Omega_0)
-        gap = Omega_04 * np.sqrt(eta_cr * (1 + excess)) - 1
-        assert -4 * EPS <= gap < last
-        last = gap
-        assert np.exp(-s) <= 100 * excess * (1 + mu), "cos alpha goes to 0 like the excess"
-
-
-@pytest.mark.parametrize("kappa", KAPPAS[:4])
-def test_all_curves_meet_at_eta_equal_j(kappa: float) -> None:
-    p = P.replace(eta=P.j * (1 - 1e-12), mu=2.0, c=kappa * np.sqrt(P.g / P.R))
-    limits = thresholds(p)
-    for name in ("omega_01", "omega_02", "omega_04"):
-        # Beyond it the fold is off by (j - eta) mu/kappa.
-        assert abs(getattr(limits, name) / limits.omega_03 - 1) <= 1e-11 * (1 + 1 / kappa), name
-    at_j = thresholds(p.replace(eta=p.j))
-    np.testing.assert_allclose([at_j.omega_01, at_j.omega_02], at_j.omega_03, rtol=4 * EPS)
-    assert np.isnan(at_j.omega_04)
-
-
 def test_order_and_existence_of_the_thresholds() -> None:
     for p in map(Parameters.named, Parameters.names()):
         t = thresholds(p)
@@ -115,13 +78,6 @@ def test_order_and_existence_of_the_thresholds() -> None:
     assert thresholds(P.replace(mu=0.0)).omega_01 == 0
     assert thresholds(P.replace(mu=0.0)).eta_cr == np.inf
     assert thresholds(P.replace(c=0.0)).eta_cr == 0
-
-
-def test_fold_moves_away_with_vanishing_drag() -> None:
-    """omega_04 ~ K/c: what is left of it goes to zero linearly with c (omega_c adds to the lag)."""
-    K = thresholds(P.replace(c=1e-9)).omega_04 * 1e-9
-    errors = [abs(thresholds(P.replace(c=c)).omega_04 * c / K - 1) for c in (1e-2, 1e-4)]
-    assert errors[0] / errors[1] == pytest.approx(100, rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -188,24 +144,6 @@ def test_map_against_the_solutions(mu: float | None) -> None:
     assert not wrong
 
 
-def test_wall_spin() -> None:
-    """(91) is the first coordinate of (4): g/(j omega_0 r) in SR, omega_0 R/r in RR."""
-    spins = {s.case: wall_spin(s.state, P) for s in stationary_solutions(P.replace(omega_0=35.0))}
-    assert spins[Case.SR] == pytest.approx(P.g / (P.j * 35.0 * P.r), rel=1e-12)
-    assert spins[Case.RR] == pytest.approx(35.0 * P.R / P.r, rel=1e-12)
-
-
-@pytest.mark.parametrize("c", [0.3, 1.0, 8.0])
-def test_critical_drag(c: float) -> None:
-    """With a little less drag than that there is a fold, with a little more none."""
-    p = P.replace(c=c)
-    critical = critical_drag(p)
-    assert thresholds(p.replace(c=critical)).eta_cr == pytest.approx(p.eta, rel=1e-14)
-    assert [number_of_folds(p.replace(c=factor * critical)) for factor in (0.999, 1.001)] == [1, 0]
-    with pytest.raises(InputError):
-        critical_drag(p.replace(eta=0.5))
-
-
 # --- the fluid's inertia against the balance of forces and moments of a ball in a swirl ----------------------
 
 
@@ -239,16 +177,3 @@ def test_rolling_ends_where_no_forces_hold_it_and_the_wall_carries_it(s):
     p = BALL.replace(density_ratio=s)
     centripetal = p.m * p.R * diagram.thresholds_with_inertia(p)["omega_02"] ** 2
     assert p.eta * ((1 + s / 2) * centripetal - 1.5 * s * centripetal) == pytest.approx(p.m * p.g, rel=1e-12)
-
-
-def test_shifts():
-    p = BALL.replace(density_ratio=0.4)
-    by = diagram.inertia_shifts(p)
-    assert by["omega_02"] == pytest.approx(1 / math.sqrt(0.6) - 1, rel=1e-12)
-    assert by["rolling_rate"] == pytest.approx(1.8 / 2.0 - 1, rel=1e-12)
-    assert all(shift == 0.0 for shift in diagram.inertia_shifts(p.replace(density_ratio=0.0)).values())
-    assert math.isnan(diagram.inertia_shifts(p.replace(eta=0.5))["omega_01"])  # there is none without it
-    assert math.isfinite(
-        diagram.thresholds_with_inertia(p.replace(eta=0.5))["omega_01"]
-    )  # but eta < j/(1 - s) is enough
-    assert "omega_01" not in diagram.inertia_shifts(p.replace(mu=0.0))

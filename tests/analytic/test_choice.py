@@ -177,18 +177,6 @@ def test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends():
     assert ends == {Case.RS, Case.SR, Case.SS}
 
 
-def test_beyond_the_onset_something_moves():
-    """Wherever the margin is negative the contact problem has a solution that slips or lifts, and it is reached."""
-    rng, count = np.random.default_rng(4), 0
-    for _ in range(1000):
-        p, omega_c = random_rolling(rng)
-        if rolling_forces.slip_margin(omega_c, p) < 0:
-            case, _ = transitions.choose(Moment(0.0, 0.0, State(omega_c=omega_c)), p, p.omega_0)
-            count += 1
-            assert case is not Case.RR
-    assert count > 300
-
-
 @pytest.mark.parametrize("rolls", "AB")
 def test_a_single_rolling_contact_holds_or_gives_way(rolls):
     """RS and SR: while friction can hold the contact no slip of it lasts, if the other's is below 2 sqrt(1+j)/j.

@@ -11,10 +11,8 @@ from scipy.optimize import brentq
 from analytic import (
     Stability,
     StationarySolution,
-    characteristic_slope,
     contact_forces,
     leaning_modes,
-    mean_slope,
     slope_jump,
     slowest_time_constant,
     solution,
@@ -22,7 +20,7 @@ from analytic import (
     thresholds,
     vector_field,
 )
-from analytic.bifurcation.diagram import case_map, critical_drag, double_points, number_of_folds, threshold_curves
+from analytic.bifurcation.diagram import number_of_folds
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary import slipping_branch as sb
 from analytic.stationary.slipping_branch import eigenvalues_at
@@ -113,25 +111,6 @@ def test_fold_where_the_drag_bends(nu_f: float) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_fold_is_unique_because_the_drag_grows_ever_faster(law: str) -> None:
-    """The proof in docs/theory.md: along the branch the stiffness of a fold rises, that of the law falls."""
-    for p in random_sets(law, 60):
-        s = np.linspace(-24, 24, 2401)
-        at = sb.branch(s, p)
-        den = (1 + p.j * at.cos**2) * p.mu * p.eta + (p.j - p.eta) * at.cos
-        beyond = p.mu * p.eta * (1 - p.j * at.cos**2) - den * (at.cos / at.sin) ** 2
-        falls = beyond > 0
-        needed = beyond / (1 + 2 * p.mu * p.eta * at.cos - p.eta * at.cos**2) * 2 * at.Omega_c * at.sin
-        assert np.all(np.diff(at.drag[falls]) < 0)
-        assert np.all(np.diff(at.stiffness[falls]) <= 1e-12 * at.stiffness[falls][1:])
-        assert np.all(np.diff(needed[falls]) > -1e-12)
-        assert needed[-1] == pytest.approx(2 * p.mu * np.sqrt(p.eta), rel=1e-6)
-        t = thresholds(p)
-        assert number_of_folds(p) == (p.eta > t.eta_cr) == np.isfinite(t.omega_04)
-        assert p.eta <= t.eta_cr or t.omega_04 > t.omega_02 > t.omega_01
-
-
-@pytest.mark.parametrize("law", LAWS)
 def test_points_and_slopes_of_the_branch(law: str) -> None:
     """d omega_c/d omega_0 and the sign of `slope` against differences; solutions SS by the formulas written out here.
 
@@ -167,40 +146,6 @@ def test_how_slip_sets_in_under_the_quadratic_law() -> None:
         rise = np.log2((places[1].state.omega_c - omega_01) / (places[0].state.omega_c - omega_01))
         assert rise == pytest.approx(2 * power, abs=0.05)
         assert slope_jump(p) == pytest.approx(-1.0, abs=1e-12)
-
-
-@pytest.mark.parametrize("law", NOT_STOKES)
-def test_flowmeter(law: str) -> None:
-    """The characteristic, and its mean slope up to omega_02, against differences."""
-    p = P.replace(drag=law)
-    t = thresholds(p)
-
-    def reading(omega_0: float) -> float:
-        return solution(p.replace(omega_0=omega_0), Case.SS).state.omega_c
-
-    expected = (reading(t.omega_02) - t.omega_01) / (t.omega_02 - t.omega_01)
-    assert mean_slope(p) == pytest.approx(expected, rel=1e-12)
-    omega_0, h = 20.0, 1e-4
-    expected = (reading(omega_0 + h) - reading(omega_0 - h)) / (2 * h)
-    assert characteristic_slope(p.replace(omega_0=omega_0)) == pytest.approx(expected, rel=1e-6)
-
-
-def test_where_the_fold_is_born() -> None:
-    """In SR, where the lag vanishes: with Schiller and Naumann as with Stokes, under the quadratic law at eta = 0."""
-    p = P.replace(drag=SCHILLER_NAUMANN)
-    assert (critical_drag(p), double_points(p)) == (critical_drag(P), double_points(P))
-    near = thresholds(p.replace(eta=thresholds(p).eta_cr * (1 + 1e-3)))
-    assert 1 < near.omega_04 / near.omega_02 < 1 + 1e-4
-    p = P.replace(drag=QUADRATIC)
-    assert critical_drag(p) == np.inf
-    assert [point.eta for point in double_points(p)] == [P.j]
-    assert np.all(np.isfinite(threshold_curves(p, 0.2, np.array([1e-6, 1e-3, 0.1]))["omega_04"]))
-    for law in NOT_STOKES:  # curves and map agree with single sets
-        p, eta = P.replace(drag=law), np.array([0.01, 0.05, 0.3, 0.6])
-        curve = threshold_curves(p, p.mu, eta)["omega_04"] * np.sqrt(p.g / p.R)
-        np.testing.assert_allclose(curve, [thresholds(p.replace(eta=e)).omega_04 for e in eta.tolist()], rtol=1e-14)
-        plane = case_map(p, p.mu, eta, np.array([0.999, 1.001]) * curve[2])
-        assert plane[2, 0] != plane[2, 1]
 
 
 # --- stationary solutions and their eigenvalues ----------------------------------------------------------------
@@ -293,17 +238,6 @@ def test_where_the_fluid_takes_the_ball_along_a_slight_lag_decides(law: str, ome
     if omega_0 == 40.0:  # the first mode of SR is that of leaning; the other dies out like a slight lag does
         expected, _ = leaning_modes(p.replace(drag=STOKES, c=LIGHT[law] * p.c + 1e-12))
         np.testing.assert_allclose(leaning_modes(p)[0], expected, atol=1e-10)
-
-
-@pytest.mark.parametrize("omega_0", [26.0, 40.0, 60.0])
-def test_a_slight_drag_attracts_where_the_quadratic_one_does(omega_0: float) -> None:
-    """SR: whether it attracts doesn't depend on how small c is, so that c(|w|) -> 0 may stand for it."""
-    for eta, expected in ((0.6, {True}), (1.8, {True, False})):
-        p = P.replace(omega_0=omega_0, eta=eta, drag=STOKES)
-        of_sr = [next(s for s in stationary_solutions(p.replace(c=c)) if s.case is Case.SR) for c in (1e-4, 1.0, 9.0)]
-        kinds = {s.stable for s in of_sr}
-        assert len(kinds) == 1
-        assert kinds <= expected
 
 
 @pytest.mark.parametrize(("mu", "eta", "c"), [(0.2, 0.2, 1.0), (0.2, 0.02, 1.0), (0.7, 0.35, 0.01), (1.5, 0.1, 5.0)])

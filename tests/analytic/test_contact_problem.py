@@ -11,18 +11,13 @@ from hypothesis import strategies as st
 from analytic import contact_forces
 from analytic.mechanics.contact_problem import Closed, NotConvergedError, solve, unlocked
 from analytic.mechanics.rigid_body import (
-    Velocities,
-    contact_work,
     energy,
-    mean,
     slip_at_A,
     slip_at_B,
     smooth_rates,
-    state,
     velocities,
 )
 from model import Case, Parameters
-from model.kinematics import slip_velocities
 
 P = Parameters.named("reference")
 EPS = sys.float_info.epsilon
@@ -113,53 +108,3 @@ def test_locked_in_the_corner():
     np.testing.assert_allclose(np.multiply(after, [1.0] * 3 + [p.r] * 3), 0.0, atol=4 * EPS)
     with pytest.raises(NotConvergedError):
         unlocked(caught.value, p.replace(mu=0.9))
-
-
-@given(speeds, st.just(0.0) | st.floats(1e-9, 2), st.floats(0, 1))
-@settings(max_examples=100, deadline=None)
-def test_impact_on_the_floor_alone(u, mu, e):
-    """Normal and tangential impulses decouple: p_n = (1+e) m |v_n|, p_t = min(mu p_n, m_t |slip|) against the slip."""
-    p = P.replace(mu=mu)
-    u = (u[0], -abs(u[1]), *u[2:])
-    after, impulse = solve(u, Closed(-e * u[1]), None, p)
-    slip = np.array(slip_at_A(u, p))
-    size = math.hypot(*slip)
-    p_n = (1 + e) * p.m * abs(u[1])
-    p_t = min(mu * p_n, p.m * p.j / (1 + p.j) * size)
-    assert impulse[1] == pytest.approx(p_n, rel=1e-14, abs=sys.float_info.min)
-    np.testing.assert_allclose(
-        impulse[::2][:2], -p_t * slip / size if size else 0 * slip, atol=1e-14 * p.m * (size + 1)
-    )
-    assert impulse[3:] == (0, 0, 0)
-    assert after[1] == pytest.approx(-e * u[1], abs=1e-14 * abs(u[1]) + sys.float_info.min)
-
-
-def test_a_ball_that_rolls_into_the_wall_hops():
-    """The wall meets a ball that rolls towards it with a spin that climbs: B_y = min(eta m v, m_t v) upwards."""
-    v = 0.3
-    u = (-v, 0.0, 0.0, 0.0, 0.0, v / P.r)
-    after, impulse = solve(u, Closed(), Closed(), P)
-    assert slip_at_A(u, P) == (0.0, 0.0)
-    assert impulse[4] == pytest.approx(min(P.eta, P.j / (1 + P.j)) * P.m * v, rel=1e-12)
-    assert after[1] > 0
-    assert impulse[:3] == (0.0, 0.0, 0.0)
-
-
-@given(speeds, speeds, frictions, frictions)
-@settings(max_examples=50, deadline=None)
-def test_work_of_impulses_is_the_change_of_energy(u, guess, mu, eta):
-    p = P.replace(mu=mu, eta=eta)
-    after, impulse = solve(u, Closed(), Closed(), p)
-    before_J, after_J = energy(0.0, u, p), energy(0.0, after, p)
-    work = contact_work(mean(Velocities(*u), after), impulse, p)
-    assert after_J - before_J == pytest.approx(work, abs=1e-13 * (before_J + after_J))
-
-
-@given(speeds, st.just(0.0) | st.floats(1e-9, 0.04))
-@settings(max_examples=50, deadline=None)
-def test_velocities_and_state_are_inverse(u, h):
-    x = state(0.1, h, u, P)
-    np.testing.assert_allclose(velocities(x, P), u, atol=1e-12 * 200)
-    v_A, v_B = slip_velocities(np.array(x), P)
-    np.testing.assert_allclose(np.array(slip_at_A(u, P)), v_A[[0, 2]], atol=1e-12)
-    np.testing.assert_allclose(np.array(slip_at_B(u, P)), v_B[[1, 2]], atol=1e-12)

@@ -45,47 +45,6 @@ def test_sensitivities_have_these_closed_forms(trial: int) -> None:
             assert abs(s.value - value) <= s.error + 1e-9
 
 
-def test_sensitivities_of_the_fold_by_differences_of_other_widths() -> None:
-    """Central differences of omega_04 err by the square of their width."""
-    at = {"mu": 0.2, "eta": 0.2, "j": 0.4, "c": 1.0, "R": 0.05, "g": 9.81}
-    fold = design.sensitivities(P.replace, at)["omega_04"]
-
-    def ln_fold(name: str, factor: float) -> float:
-        return math.log(thresholds(P.replace(**{name: at[name] * factor})).omega_04)
-
-    for name in at:
-        for h in (3e-2, 1e-2):
-            difference = (ln_fold(name, math.exp(h)) - ln_fold(name, math.exp(-h))) / (2 * h)
-            assert fold[name].value == pytest.approx(difference, abs=20 * h**2)
-        assert fold[name].error < 1e-4
-    # All flows scale with sqrt(g/R) and else depend on R, g, c by kappa = c sqrt(R/g) only.
-    assert fold["R"].value == pytest.approx(-0.5 + fold["c"].value / 2, abs=1e-8)
-    assert fold["g"].value == pytest.approx(-fold["R"].value, abs=1e-8)
-    # There is none where a threshold or a value ends.
-    by = design.sensitivities(P.replace, {"eta": 0.4})
-    assert math.isnan(by["omega_01"]["eta"].value)
-    assert math.isnan(design.sensitivities(P.replace, {"j": 2 / 3})["omega_03"]["j"].value)
-    assert by["omega_02"]["eta"].value == pytest.approx(-0.5)
-
-
-def test_no_meter_within_tolerances_reads_beyond_the_corners() -> None:
-    p = Parameters.from_fluid(nu_f=1e-4, rho_f=900, **STEEL)  # thick oil: a fold near omega_02
-    make = partial(Parameters.from_fluid, nu_f=1e-4, rho_f=900)
-    at = {name: STEEL[name] for name in ("r", "R", "rho_b", "mu", "eta")}
-    flows = np.linspace(0.5, 1.5, 4) * thresholds(p).omega_02
-    extreme = [design.readings(q, flows) for q in design.corners(make, at, TOLERANCES)]
-    low, high = np.min([r[0] for r in extreme], axis=0), np.max([r[1] for r in extreme], axis=0)
-    spread = design.threshold_spread(list(design.corners(make, at, TOLERANCES)))
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        q = make(**at | {name: at[name] * (1 + t * rng.uniform(-1, 1)) for name, t in TOLERANCES.items()})
-        own = design.readings(q, flows)
-        assert np.all(own[0] >= low * (1 - 1e-12))
-        assert np.all(own[1] <= high * (1 + 1e-12))
-        t = thresholds(q)
-        assert all(lowest <= getattr(t, name) <= highest for name, (lowest, highest) in spread.items())
-
-
 @pytest.mark.parametrize("law", ["stokes", "schiller-naumann", "quadratic"])
 @pytest.mark.parametrize("eta", [0.02, 0.2, 0.6])
 def test_readings_are_those_of_the_stable_solutions(law: str, eta: float) -> None:
@@ -107,12 +66,12 @@ def test_best_against_brute_force(tolerances: dict[str, float]) -> None:
     """No point of a grid is better, and the nearest to the optimum is almost as good."""
     bounds = {"r": (0.003, 0.006), "R": (0.02, 0.03), "rho_b": (2500, 8000), "mu": (0.1, 0.3), "eta": (0.1, 0.6)}
     best = design.best(WATER, bounds, tolerances, fastest=15.0)
-    grids = [np.linspace(*ends, n) for ends, n in zip(bounds.values(), (2, 2, 2, 3, 41), strict=True)]
+    grids = [np.linspace(*ends, n) for ends, n in zip(bounds.values(), (2, 2, 2, 2, 21), strict=True)]
     margins = []
     for values in itertools.product(*grids):
         c = design.choice(WATER, dict(zip(bounds, map(float, values), strict=True)), tolerances, 15.0)
         margins.append(c.margin)
-    step = 0.5 / 40 / 0.4  # of ln eta on the grid, near the optimum; no |d ln omega_0k/d ln eta| reaches 1 here
+    step = 0.5 / 20 / 0.4  # of ln eta on the grid, near the optimum; no |d ln omega_0k/d ln eta| reaches 1 here
     assert max(margins) <= best.margin * (1 + 1e-5)
     assert max(margins) >= best.margin * (1 - step)
     assert best.values["r"] == pytest.approx(0.003, rel=1e-2)  # it doesn't change the limit, but the response

@@ -27,14 +27,6 @@ P = Parameters.named("reference")
 ROUGH = Parameters.named("high-wall-friction")
 
 
-@pytest.mark.parametrize("p", [P, ROUGH, P.replace(eta=0.02), P.replace(mu=0.9, eta=0.39)])
-def test_operating_range_is_where_rolling_is_the_only_attractor(p: Parameters) -> None:
-    limit = operating_range(p)
-    for omega_0 in np.linspace(0.02, 0.9999, 9) * limit:
-        assert {s.case for s in stable_solutions(p.replace(omega_0=float(omega_0)))} == {Case.RR}
-    assert {s.case for s in stable_solutions(p.replace(omega_0=limit * 1.0001))} != {Case.RR}
-
-
 @pytest.mark.parametrize("trial", range(12))
 def test_what_ends_the_operating_range(trial: int) -> None:
     """What else lasts just beyond: slip at both points, or the ride on the wall while the ball still rolls, too."""
@@ -47,17 +39,6 @@ def test_what_ends_the_operating_range(trial: int) -> None:
     assert below == {Case.RR}
     assert beyond == ({Case.SS} if limit.end is End.SLIP else {Case.RR, Case.NR})
     assert (limit.end is End.SLIP) == (p.eta < p.j)
-
-
-@pytest.mark.parametrize("p", [P, ROUGH])
-def test_reading_range(p: Parameters) -> None:
-    """omega_c = omega_0 in every attractor up to it, however far if it is inf, and not beyond."""
-    limit = reading_range(p)
-    for omega_0, reads in ((0.999 * min(limit, 1e3), True), (1.001 * limit, False)):
-        if np.isfinite(omega_0):
-            lasting = stable_solutions(p.replace(omega_0=omega_0))
-            assert lasting
-            assert all(np.isclose(s.state.omega_c, omega_0, rtol=1e-12) for s in lasting) == reads
 
 
 def test_limits_and_edges() -> None:
@@ -76,21 +57,6 @@ def test_limits_and_edges() -> None:
     assert operating_range(P.replace(c=0.0)) == reading_range(P.replace(c=0.0)) == 0
     assert operating_limit(P.replace(c=0.0)).end is End.NO_DRAG
     assert np.isnan(unloading_limit(P.replace(eta=0.0)))
-
-
-@pytest.mark.parametrize("trial", range(20))
-def test_characteristic_slope_by_differences(trial: int) -> None:
-    """Central differences of omega_c between neighbouring flows, on SS (error of order step^2) and elsewhere."""
-    rng = np.random.default_rng(trial)
-    p = P.replace(mu=rng.uniform(0.05, 1), j=rng.uniform(0.2, 0.6), c=10 ** rng.uniform(-1, 1))
-    p = p.replace(eta=float(p.j * rng.uniform(0.1, 0.9)))
-    t, h = thresholds(p), 1e-5
-    for omega_0 in (0.5 * t.omega_01, *(t.omega_01 + (t.omega_02 - t.omega_01) * np.array([0.2, 0.5, 0.9]))):
-        below, above = (
-            stable_solutions(p.replace(omega_0=float(omega_0 * f)))[0].state.omega_c for f in (1 - h, 1 + h)
-        )
-        slope = characteristic_slope(p.replace(omega_0=float(omega_0)))
-        assert slope == pytest.approx((above - below) / (2 * h * omega_0), rel=1e-5, abs=1e-9)
 
 
 def test_characteristic_slope_between_omega_02_and_omega_04() -> None:
@@ -117,7 +83,7 @@ def test_jump_and_mean_of_the_slope() -> None:
         assert slope_jump(p) == pytest.approx(after - before, abs=1e-6)
     for name in ("reference", "steel-in-water"):
         p = Parameters.named(name)
-        t, n = thresholds(p), 100
+        t, n = thresholds(p), 40
         flows = t.omega_01 + (t.omega_02 - t.omega_01) * (np.arange(n) + 0.5) / n
         slopes = [characteristic_slope(p.replace(omega_0=float(w)), Case.SS) for w in flows]
         assert mean_slope(p) == pytest.approx(np.mean(slopes), rel=10 / n**2)
@@ -177,25 +143,6 @@ def test_slow_pulsations_follow_the_characteristic() -> None:
     assert response.transfer(SLIPPING, Case.SS, 0.0) == pytest.approx(slope(25.0), rel=1e-7)
 
 
-@pytest.mark.parametrize("omega_0", [18.0, 25.0, 35.0])
-def test_a_jump(omega_0: float) -> None:
-    """The odd part of two small jumps, up and down; its highest point."""
-    p, size = P.replace(omega_0=omega_0), 1e-3
-    x = analytic.solution(p, Case.SS).x
-    up, down = (analytic.simulate(p.replace(omega_0=omega_0 + s), x, 4.0) for s in (size, -size))
-    odd = (up.omega_c - down.omega_c) / (2 * size)
-    expected = response.step_response(p, Case.SS, up.time)
-    np.testing.assert_allclose(odd, expected, atol=1e-3 * np.abs(expected).max())
-    time, height = response.peak(p, Case.SS)
-    slope = analytic.characteristic_slope(p, Case.SS)
-    if np.isinf(time):
-        assert height == 1
-        assert np.all(odd < 1.001 * slope)
-    else:
-        assert odd.max() / slope == pytest.approx(height, rel=1e-3)
-        assert up.time[odd.argmax()] == pytest.approx(time, abs=0.01)
-
-
 def test_a_ramp_passes_the_fold_by_the_two_thirds_power_of_its_rate() -> None:
     """Beyond the local law K rate^(2/3) the overshoot has terms rate ln(rate) and rate: three rates show all three."""
     fold, K = analytic.thresholds(P).omega_04, response.ramp_coefficient(P)
@@ -217,18 +164,6 @@ def test_what_there_is_not() -> None:
         response.ramp_coefficient(P.replace(eta=0.02))
     with pytest.raises(InputError, match="case SS has no stable"):
         response.transfer(P, Case.SS, 1.0)
-
-
-def test_rolling_reads_the_mean_of_a_sine_with_any_law_of_drag_but_not_of_every_wave() -> None:
-    """Half a period later a sine is mirrored, and so is the motion; a wave with its second harmonic isn't."""
-    p = P.replace(nu_f=1e-5, drag="schiller-naumann")
-    errors = []
-    for waves in ([(1.2, 0.5, 0.0)], [(1.2, 0.5, 0.0), (0.6, 1.0, 0.0)]):
-        run = analytic.simulate(p, [0, 0, 12.0, 0, 0, 0], 40.0, Flow.sines(12.0, waves), sample_interval=2.0)
-        assert set(run.cases) == {Case.RR}
-        errors.append((run.theta[-1] - run.theta[-2]) / 2.0 - 12.0)
-    assert abs(errors[0]) < 1e-6
-    assert abs(errors[1]) > 1e-3
 
 
 # --- slip under pulsation against the event-driven simulator, and its limits in closed form ------------------
@@ -276,21 +211,6 @@ def test_forces_may_allow_more_on_a_rough_floor() -> None:
         assert pulsation.slip_onset(P.replace(**changes), 1.0) == onset
 
 
-@pytest.mark.parametrize("frequency", [0.1, 1.0])
-@pytest.mark.parametrize("name", ["slips at both", "wake", "quadratic"])
-def test_the_first_harmonic_is_that_of_the_simulation(name: str, frequency: float) -> None:
-    p, amplitude = PULSATING[name], 0.8 * pulsation.slip_onset(PULSATING[name], frequency)
-    x0 = [0, 0, float(pulsation.swing(p, amplitude, frequency, 0.0)[0]), 0, 0, 0]
-    flow = Flow.sine(p.omega_0, amplitude, frequency)
-    run = simulate(p, x0, 1 / frequency, flow, sample_interval=1 / (256 * frequency))
-    ratio = 2j * np.mean((run.omega_c * np.exp(-2j * np.pi * frequency * run.time))[:-1]) / amplitude
-    assert pulsation.first_harmonic(p, amplitude, frequency) == pytest.approx(ratio, rel=1e-5)
-    if name == "slips at both":
-        assert ratio == pytest.approx(response.transfer(p, Case.RR, frequency), rel=1e-7)
-    else:  # the stronger the pulsation, the more closely it is followed
-        assert abs(ratio / pulsation.first_harmonic(p, amplitude / 2, frequency)) > 1.02
-
-
 @pytest.mark.parametrize("p", PULSATING.values(), ids=PULSATING)
 def test_limits_of_the_onset(p: Parameters) -> None:
     k = rolling_rate(p)
@@ -298,43 +218,3 @@ def test_limits_of_the_onset(p: Parameters) -> None:
     slow = [abs(pulsation.slip_onset(p, f * k) / pulsation.slow_onset(p) - 1) for f in (1e-4, 1e-5)]
     assert slow[1] < 0.5 * slow[0] or slow[1] < 1e-8
     assert slow[1] < 1e-3
-
-
-@pytest.mark.parametrize("name", ["slips at both", "wake", "quadratic"])
-def test_finer_predictions_are_the_same(name: str) -> None:
-    """Twice as many harmonics, and a motion that is integrated and repeats itself more exactly, change little."""
-    p, frequency = PULSATING[name], 1.0
-    amplitude = 1.5 * pulsation.slip_onset(p, frequency)
-    exact = 1 + 1j * pulsation.lag_harmonics(p, amplitude, frequency, 2 * pulsation.FINE)[0] / amplitude
-    assert pulsation.first_harmonic(p, amplitude, frequency) == pytest.approx(exact, rel=1e-6)
-    exact = pulsation.mean_error(p, amplitude, frequency, settled=1e-9, rtol=1e-10)
-    assert pulsation.mean_error(p, amplitude, frequency) == pytest.approx(exact, rel=2e-5)
-
-
-def test_mean_error_of_fast_pulsations() -> None:
-    """None as long as the ball rolls; beyond, as Moreau's time stepping has it, which knows no cases."""
-    p, frequency = PULSATING["slips at both"], 1.5
-    onset = pulsation.slip_onset(p, frequency)
-    assert pulsation.mean_error(p, 0.99 * onset, frequency) == 0.0
-    expected = pulsation.mean_error(p, 1.5 * onset, frequency)
-    x0, flow = [0, 0, p.omega_0 + expected, 0, 0, 0], Flow.sine(p.omega_0, 1.5 * onset, frequency)
-    run = simulate(p, x0, 20 / frequency, flow, method="time-stepping", timestep=1e-3, sample_interval=1 / frequency)
-    assert expected < -0.1
-    assert (run.theta[-1] - run.theta[-2]) * frequency - p.omega_0 == pytest.approx(expected, rel=0.01)
-
-
-def test_a_ball_may_slip_all_the_time() -> None:
-    """In SS throughout, with no change of case, the mean is that of the characteristic as long as it is straight."""
-    p = PULSATING["slips at both"].replace(omega_0=25.0)
-    assert pulsation.mean_error(p, 1e-3, 1.0) == pytest.approx(solution(p, Case.SS).x[2] - 25.0, rel=1e-5)
-
-
-def test_mean_error_of_slow_pulsations() -> None:
-    """They tend to the mean of the characteristic along the wave, of which SS has the part beyond omega_01."""
-    p = PULSATING["slips at both"]
-    flows = p.omega_0 + 3.0 * np.sin(np.pi * (np.arange(500) + 0.5) / 500)  # what is below the mean reads the flow
-    beyond = flows[flows > thresholds(p).omega_01].tolist()
-    limit = sum(solution(p.replace(omega_0=w), Case.SS).state.omega_c - w for w in beyond) / 1000
-    near, far = (abs(pulsation.mean_error(p, 3.0, f * rolling_rate(p)) - limit) for f in (1e-2, 4e-2))
-    assert near < 0.3 * far
-    assert near < 1e-2 * abs(limit)

@@ -1,4 +1,4 @@
-"""Event-driven simulation against closed forms, plain integration, stationary solutions, and the paper's trajectories.
+"""Event-driven simulation against closed forms, plain integration and stationary solutions.
 
 Event times are compared at 1e-9 relative, the default tolerance of the integrator.
 """
@@ -12,8 +12,7 @@ from scipy.optimize import brentq
 
 from analytic import simulate, solution, vector_field
 from analytic.mechanics import rolling_forces
-from analytic.mechanics.dynamics import newton_euler
-from analytic.simulation import integrator, simulator
+from analytic.simulation import integrator
 from model import Case, Flow, Parameters, SimulationError
 
 P = Parameters.named("reference")
@@ -59,21 +58,6 @@ def test_bounces_come_to_rest():
     assert run.events.time[-1] == pytest.approx(t_0 * (1 + e) / (1 - e), rel=RTOL)
     assert states_of(run)[-1] == (Case.NN, Case.RN)
     assert balance(run) < RTOL
-
-
-def test_fall_along_a_smooth_wall():
-    """NS with eta = 0: only drag resists, y = y_0 + (v_0 + g/c)(1 - exp(-c t))/c - g t/c."""
-    p, y, v = P.replace(eta=0.0, omega_0=5.0), 0.1, 0.3
-
-    def height(t):
-        return y + (v + p.g / p.c) * (1 - math.exp(-p.c * t)) / p.c - p.g * t / p.c
-
-    run = simulate(p, [y, v, 5.0, 1.0, 2.0, 3.0], 0.5, sample_interval=0.01)
-    landing = brentq(height, 0.1, 1.0, xtol=1e-15)
-    assert run.cases[0] is Case.NS
-    assert run.events.time[0] == pytest.approx(landing, rel=RTOL)
-    before = run.time < landing
-    np.testing.assert_allclose(run.y[before], [height(t) for t in run.time[before]], atol=RTOL * y)
 
 
 def test_spin_up_from_rest():
@@ -140,24 +124,6 @@ def test_two_point_slipping_against_plain_integration():
     np.testing.assert_allclose(run.x[:, 2:6], plain.y.T, rtol=1e-8, atol=1e-8)
     assert not len(run.events)
     assert balance(run) < RTOL
-
-
-def test_costs_at_most_twice_a_bare_integrator(monkeypatch):
-    """Rates evaluated, against LSODA of f_SS with the same tolerances and neither events nor guards nor energy."""
-    p, rtol = P.replace(omega_0=25.0), 1e-9
-    x0 = solution(p, Case.SS).x[:6] + OFFSET
-    calls = []
-
-    def counted(*args):
-        calls.append(None)
-        return newton_euler(*args)
-
-    monkeypatch.setattr("analytic.mechanics.dynamics.newton_euler", counted)
-    simulate(p, x0, 10.0, rtol=rtol, sample_interval=10.0)
-    monkeypatch.undo()
-    natural = np.array([1.0, p.R / p.r, p.R / p.r, p.R / p.r]) * math.sqrt(p.g / p.R)
-    bare = solve_ivp(f_ss(p), (0, 10), x0[2:], method="LSODA", rtol=rtol, atol=rtol / 1e3 * natural)
-    assert 0 < len(calls) <= 2 * bare.nfev
 
 
 @pytest.mark.parametrize(
@@ -266,35 +232,3 @@ def test_solvers_that_both_fail_end_the_run(monkeypatch):
     monkeypatch.setattr(integrator.LSODA, "step", fails)
     with pytest.raises(SimulationError, match="in case SS: step size below spacing of numbers"):
         simulate(P.replace(omega_0=25.0), [0, 0, 9.0, 3, 2, -3], 1.5)
-
-
-# --- trajectories of sections 3 and 5.3, by what the paper says of them --------------------------------------
-
-
-ROUGH = Parameters.named("high-wall-friction")
-LIMIT = math.sqrt(ROUGH.g / (ROUGH.eta * ROUGH.R))
-"""omega_0 at which NR's stationary orbit loses its stability with respect to slipping (61)."""
-
-
-def test_figures_4_and_5_slip_dies_out_or_grows():
-    dies, grows = (simulator.slip_perturbation(ROUGH.replace(omega_0=s * LIMIT), 1.0, 0.9, 0.1) for s in (1.2, 0.9))
-    assert [Case(code) for code in dies.events.to_case] == [Case.NR]
-    assert dies.cases[0] is Case.NS
-    # (60): the slowest direction loses slip at (1+j)/(r j) (eta R omega_0^2 - g).
-    rate = (1 + ROUGH.j) / (ROUGH.r * ROUGH.j) * ROUGH.g * (1.2**2 - 1)
-    assert dies.events.time[0] <= 1.0 / rate
-    assert set(grows.cases) == {Case.NS}
-    assert np.all(np.diff(grows.slip_speed_B[len(grows.time) // 2 :]) > 0)
-
-
-def test_unloading_ends_in_two_point_rolling_after_impacts():
-    run = simulator.unloading(ROUGH, hold=20.0)
-    visited = [Case(code) for code in run.events.to_case]
-    assert visited[0] is Case.NS
-    assert visited[-1] is Case.RR
-    assert run.events.time[0] > 3 * 20.0  # only below omega_02
-    assert np.any(run.events.impulse_A[:, 1] > 0)
-    last = 0.98 * LIMIT
-    start = abs(run.omega_c[run.time > run.events.time[-1]][0] - last)
-    left = math.exp(-(80.0 - run.events.time[-1]) / (1 + 2 * ROUGH.j))
-    assert run.omega_c[-1] == pytest.approx(last, abs=1.1 * start * left)

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from analytic import attractors, simulate, stable_solutions, thresholds
+from analytic import attractors, simulate, stable_solutions
 from analytic.orbits import fates, orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.fates import Kind, Run
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import NoOrbitError, Orbit
 from analytic.simulation import ensemble
-from analytic.stationary import slipping_branch
 from model import Case, Events, Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.trajectory import SAMPLE
@@ -83,14 +82,6 @@ def test_a_branch_ends_at_the_range(hop: Orbit) -> None:
     assert np.all(np.diff([orbit.cycle.y.max() for orbit in branch.orbits]) > 0)
 
 
-def test_a_branch_says_where_it_is_given_up(hop: Orbit) -> None:
-    """One orbit further each way, far from the ends of the range."""
-    branch = orbit_branch.follow(hop, "omega_0", 40.0, 100.0, most=1)
-    assert [place.kind for place in branch.places] == [Bifurcation.LOST] * 2
-    assert [place.value for place in branch.places] == branch.values[[0, -1]].tolist()
-    assert all("not followed beyond 1 orbits" in str(place) for place in branch.places)
-
-
 @pytest.mark.slow
 def test_hops_that_rebound_end_in_a_torus(hop: Orbit) -> None:
     """Followed in the coefficient of restitution, from where the orbit can be found from that without."""
@@ -102,44 +93,6 @@ def test_hops_that_rebound_end_in_a_torus(hop: Orbit) -> None:
     (torus,) = (place for place in branch.places if place.kind is Bifurcation.TORUS)
     assert torus.value == pytest.approx(0.536, abs=1e-3)
     assert [value < torus.value for value in branch.values] == branch.stable.tolist()
-
-
-@pytest.mark.slow
-def test_hopping_is_born_where_the_wall_begins_to_carry() -> None:
-    """Down in omega_0 the hops become ever lower and vanish at omega_02; the multipliers don't tell of it."""
-    low = HOPPING.replace(omega_0=53.77)
-    hop = orbits.refine(low, (7.23e-4, 0.0, 52.54, -84.426, 0.0, 0.0), 0.2403)
-    branch = orbit_branch.follow(hop, "omega_0", 40.0, 53.8)
-    birth, edge = branch.places[0], branch.places[-1]
-    assert birth.kind is Bifurcation.BIRTH
-    assert birth.value == pytest.approx(thresholds(HOPPING).omega_02, rel=1e-4)
-    assert edge.kind is Bifurcation.RANGE
-    assert branch.values[-1] == pytest.approx(53.8)
-    assert branch.stable.all()
-    heights = [orbit.loop.x[0] for orbit in branch.orbits]
-    assert heights == sorted(heights)
-
-
-@pytest.mark.slow
-def test_swinging_lives_between_hopf_points(swing: Orbit) -> None:
-    """Followed both ways it ends where eigenvalues of SS cross the imaginary axis."""
-    branch = orbit_branch.follow(swing, "omega_0", 20.0, 30.0)
-    ends = branch.places[0], branch.places[-1]
-    assert [end.kind for end in ends] == [Bifurcation.HOPF] * 2
-    flows = sorted(float(slipping_branch.states(s, SWINGING)[1]) for s in slipping_branch.hopf_places(SWINGING))
-    assert [end.value for end in ends] == pytest.approx(flows, rel=1e-4)
-
-
-@pytest.mark.slow
-def test_a_torus_bifurcation_and_a_fold(hop: Orbit) -> None:
-    """With a rougher wall a pair of multipliers leaves the unit circle, later the branch turns back."""
-    branch = orbit_branch.follow(hop, "eta", 0.072, 0.15)
-    kinds = [place.kind for place in branch.places]
-    assert kinds.index(Bifurcation.TORUS) < kinds.index(Bifurcation.FOLD)
-    torus = branch.places[kinds.index(Bifurcation.TORUS)]
-    assert np.abs(torus.orbit.multipliers[:2]) == pytest.approx(1.0, abs=1e-5)
-    fold = branch.places[kinds.index(Bifurcation.FOLD)]
-    assert branch.values.max() <= fold.value == pytest.approx(branch.values.max(), rel=1e-2)
 
 
 @pytest.mark.slow
@@ -202,13 +155,6 @@ def test_random_starts_are_reproducible_and_inside() -> None:
     assert not np.array_equal(first, other)
     assert np.all((first[:, 0] >= 0) & (first[:, 0] <= HOPPING.R))
     assert np.all(first[first[:, 0] == 0, 1] == 0)
-
-
-def test_undecided_says_what_it_did_last() -> None:
-    """A time too short: no verdict, but means and extremes of what there is."""
-    (only,) = attractors(HOPPING, SLIPS, lasting=1.0)
-    assert only.fate.kind is Kind.UNDECIDED
-    assert only.run.omega_c[-1] == pytest.approx(20, rel=0.5)
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import pytest
 
 from analytic import contact_forces
 from analytic.mechanics import rolling_forces
-from analytic.mechanics.dynamics import newton_euler, rolling_family
-from model import Case, InputError, Parameters, State
+from analytic.mechanics.dynamics import rolling_family
+from model import Case, InputError, Parameters
 
 P = Parameters.named("reference")
 FRICTION = [(0.2, 0.2), (0.2, 0.6), (0.6, 0.2), (0.4, 0.4), (1.5, 0.3), (0.3, 1.5), (1.0, 1.0), (2.0, 2.0)]
@@ -22,12 +22,6 @@ def utilisation(omega_c: np.ndarray, p: Parameters, omega_0: np.ndarray, B_y: np
         A = np.where(A_y > 0, np.hypot(A_x, A_z) / (p.mu * A_y), np.inf)
         B = np.where(B_x > 0, np.hypot(B_y, B_z) / (p.eta * B_x), np.inf)
     return np.maximum(A, B)
-
-
-def test_every_member_gives_the_same_motion() -> None:
-    members = [rolling_family(12.0, P, 30.0, B_y) for B_y in (-1.0, 0.0, 0.7)]
-    rates = [newton_euler(Case.RR, State(omega_c=12.0), force, P, 30.0).omega_c for force in members]
-    np.testing.assert_allclose(rates, -P.c * (12 - 30) / (1 + 2 * P.j), rtol=1e-14)
 
 
 @pytest.mark.parametrize(("mu", "eta"), FRICTION)
@@ -54,18 +48,6 @@ def test_least_utilisation_interval_and_margin_agree(mu: float, eta: float) -> N
         np.testing.assert_allclose(utilisation(OMEGA_C, p, OMEGA_0, ends)[end], 1, rtol=1e-9)
 
 
-@pytest.mark.parametrize("eta", [0.05, 0.2, 0.35, 0.4, 0.45, 1.0, 2.0])
-@pytest.mark.parametrize("mu", [0.05, 0.2, 0.8, 1.0])
-def test_stationary_rolling_ends_at_omega_01_or_omega_03(mu: float, eta: float) -> None:
-    """(84) for eta < j, (86) for eta >= j, as long as the ball can't jam (mu <= 1)."""
-    p = P.replace(mu=mu, eta=eta)
-    limit = p.g / (p.j * p.R)
-    if eta < p.j:
-        limit = p.g / p.R * mu * (1 + eta) / (mu * eta * (1 + p.j) + p.j - eta)
-    ends = np.sqrt(limit) * np.array([1 - 1e-12, 1 + 1e-12])
-    assert list(rolling_forces.margin(ends, p, ends) >= 0) == [True, False]
-
-
 @pytest.mark.parametrize(("mu", "eta"), [(1.5, 0.3), (1.2, 0.1), (3.0, 0.5)])
 def test_stationary_rolling_jams_for_mu_over_1(mu: float, eta: float) -> None:
     """omega_0^2 <= (g/R) mu(1 - eta)/(j + eta - mu eta(1 + j)) if that is positive, without end if not."""
@@ -78,23 +60,6 @@ def test_stationary_rolling_jams_for_mu_over_1(mu: float, eta: float) -> None:
     else:
         ends = np.array([50.0, 500.0])
         assert np.all(rolling_forces.margin(ends, p, ends) >= 0)
-
-
-@pytest.mark.parametrize("mu", [0.2, 0.9])
-def test_the_floor_alone_limits_the_drag(mu: float) -> None:
-    """With a wall that holds everything: T < mu(1 - jR omega_c^2/g)/sqrt(1 - mu^2), T = A_z/(m g) (cf. (73))."""
-    p, omega_c = P.replace(mu=mu, eta=1e6), 9.0
-    T = mu * (1 - p.j * p.R * omega_c**2 / p.g) / np.sqrt(1 - mu**2)
-    D = T * (1 + 2 * p.j) * p.g / (p.j * p.c * p.R)
-    margins = rolling_forces.margin(omega_c, p, omega_c + D * np.array([1 - 1e-12, 1 + 1e-12]))
-    assert list(margins >= 0) == [True, False]
-
-
-def test_margin_is_continuous_through_its_zero() -> None:
-    omega_c = np.linspace(10, 16, 100_001)
-    margin = rolling_forces.margin(omega_c, P, omega_c + 1.0)
-    assert margin.max() > 0 > margin.min()
-    assert np.abs(np.diff(margin)).max() < 1e-3 * np.ptp(margin)
 
 
 def test_at_rest_and_without_friction() -> None:

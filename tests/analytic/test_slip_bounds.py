@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from analytic import contact_forces, thresholds, vector_field
 from analytic.mechanics import dynamics
-from analytic.mechanics.rigid_body import Forces
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
 from model import Case, InputError, Parameters, State
@@ -28,9 +26,6 @@ def random_sets(count: int, top: float = 1.0) -> list[Parameters]:
         omega_0 = rng.uniform(-3, 3) * np.sqrt(9.81 / R)
         sets.append(Parameters(m=m, r=r, R=R, j=j, mu=mu, eta=eta, g=g, c=c, omega_0=omega_0))
     return sets
-
-
-# --- as printed ------------------------------------------------------------------------------------------------
 
 
 def equal(left: Any, right: Any) -> bool:
@@ -75,56 +70,6 @@ def test_from_newton_and_euler(side: int) -> None:
         assert equal(gamma, side * rate), outer
 
 
-# --- at random sets --------------------------------------------------------------------------------------------
-
-
-def test_zeros_of_a_lag() -> None:
-    """(66) with eta, (73) as printed."""
-    for p in random_sets(50):
-        at_B = p.eta / (p.j * p.c) * (1 + p.j) * (1 + 2 * p.j) * p.omega_0**2
-        at_A = (1 + 2 * p.j) * p.mu / (p.j * p.R * p.c) * (p.g - p.j * p.R * p.omega_0**2)
-        for side in (1, -1):
-            for bound_of, lag in ((slip_bounds.rr_to_rs, at_B), (slip_bounds.rr_to_sr, -at_A)):
-                zero = bound_of(p, p.omega_0, side).zero
-                assert zero == pytest.approx(p.omega_0 + side * lag, rel=1e-14, abs=1e-14 * abs(lag))
-
-
-def forces_at_onset(p: Parameters, omega_0: np.ndarray, side: int) -> Forces:
-    """While slip sets in along (0, 0), side 1, or (pi, pi), side -1, in an orbit with the fluid."""
-    along = (0.0, float(side))
-    return dynamics.forces(Case.SS, State(omega_c=omega_0), p, omega_0, along, along)
-
-
-def test_bound_83_contradicts_the_normal_forces() -> None:
-    """For eta > 1 slip along (pi, pi) would grow below a real bound, but not before the wall would pull, (12)."""
-    real = 0
-    for p in random_sets(200, top=3.0):
-        square = slip_bounds.rr_to_ss(p, -1).zero
-        assert (square > 0) == (p.eta > 1)
-        if square > 0:
-            real += 1
-            assert np.all(forces_at_onset(p, np.linspace(0.0, 1.0, 11) * np.sqrt(square), -1).B_x < 0)
-    assert real > 50
-
-
-def test_bound_82_needs_eta_less_than_j() -> None:
-    """Where (82) has a bound the floor presses there exactly for eta < j."""
-    pressing = 0
-    for p in random_sets(300, top=1.5):
-        square = slip_bounds.rr_to_ss(p).zero
-        if square > 0:
-            force = forces_at_onset(p, np.sqrt(square), 1)
-            assert (force.A_y > 0) == (p.eta < p.j)
-            assert force.B_x > 0
-            pressing += p.eta < p.j
-            if p.eta < p.j:
-                assert np.sqrt(square) == pytest.approx(thresholds(p).omega_01, rel=1e-14)
-    assert pressing > 30
-
-
-# --- NR at any state -------------------------------------------------------------------------------------------
-
-
 def states_of_nr(p: Parameters, count: int) -> np.ndarray:
     rng = np.random.default_rng(7)
     unit = np.sqrt(p.g / p.R)
@@ -149,56 +94,3 @@ def test_56_at_any_state() -> None:
     assert values[3, 2] == slip_bounds.gamma_nr(beta[3], x[2], P)
     with pytest.raises(InputError, match="slip_z = 1"):
         slip_bounds.gamma_nr(0.0, [0.1, 0, 9.0, 0, 0, 1.0], P)
-
-
-def test_58_and_59() -> None:
-    """(57) vanishes at both, they are the extrema, and (59) is the friction cone, in all of X_NR."""
-    p, beta, stable = P.replace(omega_0=20.0, eta=0.5), np.linspace(0, 2 * np.pi, 721), []
-    for x in states_of_nr(p, 100):
-        _, v_y, omega_c, slip_x, *_ = x
-        pull = p.g / p.r + p.c * v_y / p.r + omega_c * slip_x + p.R / p.r * omega_c**2
-        first = np.arctan2(p.c * p.R / p.r * (p.omega_0 - omega_c), pull)  # (58)
-        second = first + np.pi
-        values = slip_bounds.gamma_nr(beta, x, p)
-        greatest, least = slip_bounds.gamma_nr(first, x, p), slip_bounds.gamma_nr(second, x, p)
-        # A grid of half a degree misses an extremum by (1/2) (0.25 degrees)^2 = 1e-5 of the swing at most.
-        swing = greatest - least
-        assert greatest >= values.max() - 1e-14 * swing
-        assert least <= values.min() + 1e-14 * swing
-        assert values.max() >= greatest - 1e-5 * swing
-        assert values.min() <= least + 1e-5 * swing
-        _, (B_x, B_y, B_z) = contact_forces(Case.NR, x, p)
-        assert (greatest < 0 and least < 0) == (np.hypot(B_y, B_z) < p.eta * B_x)
-        stable.append(greatest < 0)
-    assert 10 < sum(stable) < 90
-
-
-# --- Filippov --------------------------------------------------------------------------------------------------
-
-
-def test_69() -> None:
-    """f_RR = delta f^- + (1 - delta) f^+, and 0 < delta < 1 exactly where slip dies out on both sides."""
-    inside = []
-    for p in random_sets(200):
-        for outer, row in ((Case.RS, 4), (Case.SR, 3)):
-            for omega_c in (0.9 * p.omega_0, 0.2 * p.omega_0):
-                x = State(omega_c=omega_c)
-                delta = slip_bounds.filippov_share(outer, omega_c, p)
-                sides = []
-                for side in (-1.0, 1.0):
-                    near = np.array(x)
-                    near[row] = side * 1e-14 * abs(omega_c)  # (68): a slip that vanishes in round-off
-                    sides.append(vector_field(outer, near, p))
-                mixed = delta * sides[0] + (1 - delta) * sides[1]
-                scale = (abs(delta) + abs(1 - delta)) * np.abs(sides).max()
-                expected = vector_field(Case.RR, x, p)
-                np.testing.assert_allclose(mixed, expected, atol=1e-12 * scale)
-                growth = [float(slip_stability.gamma(Case.RR, outer, x, [side], p)) for side in (-1.0, 1.0)]
-                both_die, both_grow = max(growth) < 0, min(growth) > 0
-                assert (0 < delta < 1) == (both_die or both_grow)
-                assert not both_grow or (outer is Case.SR and p.j * p.R * omega_c**2 > p.g)
-                inside.append(0 < delta < 1)
-    assert min(sum(inside), len(inside) - sum(inside)) > 50
-    with pytest.raises(InputError, match="case SS: RR divides the states of RS and SR only"):
-        slip_bounds.filippov_share(Case.SS, 10.0, P)
-    assert slip_bounds.filippov_share(Case.RS, 10.0, P.replace(eta=0.0, omega_0=12.0)) == np.inf

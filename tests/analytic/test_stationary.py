@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,14 +18,12 @@ from analytic import (
     thresholds,
     vector_field,
 )
-from analytic.mechanics import dynamics
 from analytic.mechanics.dynamics import jacobian
 from analytic.stationary import slipping_branch as stability
 from analytic.stationary.slipping_branch import branch, fold, points_at
 from model import Case, InputError, Parameters, State
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
-from tests.analytic import newton_euler as ne
 
 P = Parameters.named("reference")
 EPS = np.finfo(float).eps
@@ -34,19 +31,6 @@ EPS = np.finfo(float).eps
 
 def of_case(p: Parameters, case: Case) -> list[StationarySolution]:
     return [s for s in stationary_solutions(p) if s.case is case]
-
-
-def test_propositions_1_and_2() -> None:
-    for omega_0 in (1.0, 8.0, 13.0):
-        p = P.replace(omega_0=omega_0)
-        (s,) = of_case(p, Case.RR)
-        assert (s.exists, s.stability, s.state.omega_c, s.force_A[2]) == (True, Stability.ASYMPTOTIC, omega_0, 0)
-        np.testing.assert_allclose(s.eigenvalues, [-p.c / (1 + 2 * p.j)], rtol=1e-14)
-    (s,) = of_case(P.replace(omega_0=0.0), Case.RS)
-    assert (s.family, s.stability) == (("slip_y",), Stability.NEUTRAL)
-    np.testing.assert_allclose(s.force_A, [0, P.m * P.g, 0], atol=1e-18)
-    np.testing.assert_array_equal(s.force_B, 0)
-    assert not of_case(P, Case.RS)
 
 
 @pytest.mark.parametrize("eta", [0.2, 0.6])
@@ -68,22 +52,6 @@ def test_propositions_3_and_5(eta: float) -> None:
     for factor, kind in ((0.999, Stability.UNSTABLE), (1.001, Stability.ASYMPTOTIC)):
         (s,) = of_case(P.replace(omega_0=factor * np.sqrt(P.g / (P.j * P.R))), Case.SR)
         assert s.stability is kind
-
-
-def test_proposition_6() -> None:
-    """(49) with its second row, omega_c = omega_0, restored; (50); eigenvalues +-i omega_0, also where omega_0 = 0."""
-    for omega_0 in (0.0, 12.0, 31.0):
-        p = P.replace(omega_0=omega_0)
-        (s,) = of_case(p, Case.NS)
-        sink = (p.g - p.eta * omega_0**2 * p.R) / p.c
-        expected = [0, -sink, omega_0, (p.eta - p.j) / p.j * omega_0 * p.R / p.r, 0, sink / p.r, 0, 0]
-        np.testing.assert_allclose(s.x, expected, rtol=1e-13, atol=1e-13)
-        np.testing.assert_allclose(s.force_B, p.m * p.R * omega_0**2 * np.array([1, p.eta, 0]), rtol=1e-13)
-        assert s.stability is Stability.NEUTRAL
-        pair = s.eigenvalues[np.abs(s.eigenvalues.real) <= 1e-12 * max(omega_0, 1)]
-        np.testing.assert_allclose(sorted(pair.imag)[0], -omega_0, rtol=1e-12)
-        np.testing.assert_allclose(sorted(pair.imag)[-1], omega_0, rtol=1e-12)
-    assert not of_case(P.replace(omega_0=32.0), Case.NS)
 
 
 # --- one solution, and those that attract -----------------------------------------------------------------------
@@ -308,34 +276,6 @@ def test_vanishing_parameters(change: dict[str, float], expected: dict[str, obje
 
 
 ROUGH = Parameters.named("high-wall-friction")
-
-
-def test_modes_in_closed_form() -> None:
-    """Trace and determinant of the Jacobian of f_SR, by computer algebra from Newton and Euler."""
-    p, w, sign, omega_c, slip = ne.PARAMETERS, *sp.symbols("w s omega_c slip")
-    x = State(omega_c=omega_c, slip_x=slip)
-    rates = dynamics.newton_euler(Case.SR, x, dynamics.FORCES[Case.SR](x, p, w, (sign, 0)), p, w)
-    at = {omega_c: w, slip: p.g / (p.j * w * p.r) - w * p.R / p.r}
-    J = sp.Matrix([rates.omega_c, rates.slip_x]).jacobian([omega_c, slip]).subs(at)
-    trace = -(p.c + p.mu * sign * (p.g / (p.R * w) - (1 + p.j) * w)) / (1 + p.j)
-    assert sp.simplify(J.trace() - trace) == 0
-    assert sp.simplify(J.det() + p.mu * sign * p.c * w / (1 + p.j)) == 0
-
-
-@pytest.mark.parametrize("omega_0", [20.0, 25.0, 40.0, -20.0, -30.0])
-def test_modes(omega_0: float) -> None:
-    """Sum and product as the docstring has them; leaning grows below omega_03; the vectors lead onto the floor."""
-    p = ROUGH.replace(omega_0=omega_0)
-    values, vectors = leaning_modes(p)
-    x = solution(p, Case.SR, stable=omega_0**2 > p.g / (p.j * p.R)).state
-    drive = p.mu * np.sign(x.slip_x * omega_0) * abs(omega_0)
-    total = -(p.c + drive * (p.g / (p.R * omega_0**2) - (1 + p.j))) / (1 + p.j)
-    np.testing.assert_allclose(values.sum(), total, rtol=1e-12)
-    np.testing.assert_allclose(values.prod(), -drive * p.c / (1 + p.j), rtol=1e-12)
-    assert (values[0].real > 0) == (omega_0**2 < p.g / (p.j * p.R))
-    for along_omega_c, along_slip_x in 1e-6 * vectors.real:
-        near = x._replace(omega_c=x.omega_c + along_omega_c, slip_x=x.slip_x + along_slip_x)
-        assert contact_forces(Case.SR, near, p)[0][1] > 0
 
 
 @pytest.mark.parametrize("omega_0", [20.0, 30.0])

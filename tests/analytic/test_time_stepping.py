@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from analytic import Settings, simulate, simulate_many, stationary_solutions
+from analytic import Settings, simulate, simulate_many
 from analytic.simulation.compiling import compiled, forget_stale
 from analytic.simulation.stepping import TOLERANCE, step
 from analytic.simulation.time_stepping import prepared
@@ -32,13 +32,6 @@ def deviations(p, x0, t_end, steps, flow=None, **given):
     return exact, [np.mean(np.abs(run.x[1:] - exact.x[1:]) / SCALE) for run in runs]
 
 
-def test_no_drift_at_the_wall():
-    """Held by the wall the ball stays at it exactly, whatever the step."""
-    run = simulate(P.replace(omega_0=14.0), [0, 0, 10.0, 20, 30, 10], 1.0, method="time-stepping", timestep=5e-3)
-    assert np.all(run.h == 0.0)
-    assert np.all(run.y >= 0.0)
-
-
 def test_flight_is_of_second_order():
     """Fall with drag, theta = 1/2: against y(t) in closed form."""
     p, y, t = P.replace(c=3.0), 0.3, 0.2
@@ -46,17 +39,6 @@ def test_flight_is_of_second_order():
     steps, x0 = np.array([2e-2, 1e-2, 5e-3]), [y, 0, 0, 0, 0, 0, 0.02, 0]
     runs = [simulate(p, x0, t, method="time-stepping", timestep=s, sample_interval=t) for s in steps]
     assert order(steps, [abs(run.y[-1] - exact) for run in runs]) == pytest.approx(2.0, abs=0.1)
-
-
-def test_restitution():
-    """Heights of bounces shrink by e^2, up to what a step moves the ball at impact."""
-    p, y, e, dt = P.replace(c=0.0, omega_0=0.0), 0.05, 0.8, 2e-5
-    run = simulate(
-        p, [y, 0, 0, 0, 0, 0, 0.02, 0], 0.7, method="time-stepping", timestep=dt, restitution=e, sample_interval=1e-3
-    )
-    t_0 = math.sqrt(2 * y / p.g)
-    top = run.y[(run.time > t_0) & (run.time < t_0 * (1 + 2 * e))].max()
-    assert top == pytest.approx(e**2 * y, abs=2 * dt * math.sqrt(2 * p.g * y) + p.g * 1e-6)
 
 
 @pytest.mark.parametrize(
@@ -164,21 +146,6 @@ def test_where_no_step_is_given_it_fits_the_problem():
         simulate(p, x0, 0.01, method="time-stepping", timestep=1e-3)
 
 
-def test_one_step_of_free_rolling_by_hand():
-    """RR at rest in the fluid's frame: one step leaves everything as it is, and the forces are those of (23)."""
-    p = P.replace(omega_0=10.0)
-    ball, _, _, given = prepared(State(omega_c=10.0), 0.0, p, Flow.steady(10.0), Settings(), np.array([0.0, 1.0]))
-    after = step(ball, 1e-3, 10.0, given)
-    u = p.m * p.R * 100.0
-    A_x, A_y, A_z, B_x, B_y, B_z = (impulse / 1e-3 for impulse in after.P)
-    assert after.case == Case.RR
-    assert A_y + B_y == pytest.approx(p.m * p.g, rel=1e-9)
-    assert A_x + B_x == pytest.approx(u, rel=1e-9)
-    assert B_y - A_x == pytest.approx(p.j * u, rel=1e-9)
-    assert A_z == pytest.approx(0, abs=1e-9)
-    assert B_z == pytest.approx(0, abs=1e-9)
-
-
 # --- many runs at once are the same runs one by one; the step settles and chooses where it once did not ------
 
 
@@ -226,28 +193,6 @@ def test_landings_and_quiet():
 def test_bad_input(sets, x0s, message):
     with pytest.raises(InputError, match=message):
         simulate_many(sets, x0s, 0.1)
-
-
-JAMMED = [
-    groups(1.23, 0.17, 0.61, 0.12, 2.1),
-    groups(1.2277, 0.1721, 0.611, 0.1198, 2.099),
-    groups(1.7222, 0.0388, 0.482, 0.1099, 2.635),
-]
-
-
-@pytest.mark.parametrize("p", JAMMED)
-def test_settles_where_rolling_can_jam(p):
-    """mu > 1, above omega_01, at the default step: forces could hold RR for longer, but the ball comes to SS."""
-    (slipping,) = [s for s in stationary_solutions(p) if s.case is Case.SS and s.exists and s.stable]
-    x0s = np.zeros((4, 8))
-    x0s[:, 2] = p.omega_0 * np.array([-0.5, 0.3, 0.9, 1.5])
-    x0s[::2, 3:6] = p.omega_0
-    x0s[2:, 0] = 0.01
-    many = simulate_many(p, x0s, 80 / p.c, sample_interval=80 / p.c)
-    assert many.failure == ("",) * 4
-    assert set(many.case[:, -1]) == {Case.SS}
-    # 80/c of settling at a rate of c/(2 (1 + 2j)) leave exp(-17).
-    np.testing.assert_allclose(many.x[:, -1, 2], slipping.x[2], rtol=1e-6)
 
 
 def test_settles_on_random_sets():

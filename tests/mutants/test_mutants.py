@@ -14,7 +14,6 @@ import analytic
 from analytic.mechanics import dynamics
 from analytic.stationary import solutions as stationary
 from compare.catalogue import CLAIMS
-from compare.claim import Outcome
 from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, MUJOCO
 from compare.kit.lab import Lab
@@ -68,24 +67,6 @@ def test_wrong_equations_of_motion_are_wrong_and_not_broken(wrong: WrongTheory) 
         assert numbers() != right
 
 
-@pytest.mark.parametrize("law", ["stokes", "schiller-naumann", "quadratic"])
-def test_faults_in_a_law_of_drag_show_under_that_law_alone(law: str) -> None:
-    p = P.replace(drag=law, nu_f=2e-4, omega_0=20.0)
-
-    def numbers(p: Parameters) -> tuple[object, ...]:
-        solved = [(*s.x.tolist(), *s.eigenvalues.tolist()) for s in analytic.stationary_solutions(p)]
-        return *solved, analytic.thresholds(p).omega_04
-
-    right, seen = numbers(p), set()
-    of_drag = ("SS lags as", "NS sinks as", "ω₀₄ as", "the drag's slope", "Schiller", "quadratic drag")
-    for wrong in (each for each in THEORIES if each.what.startswith(of_drag)):
-        with believed(wrong):
-            if numbers(p) != right:
-                seen.add(wrong.what.split()[0])
-    every = {"SS", "NS", "ω₀₄", "the"}
-    assert seen == {"stokes": set(), "schiller-naumann": every | {"Schiller"}, "quadratic": every | {"quadratic"}}[law]
-
-
 def test_a_fault_shows_wherever_the_function_is_known_by_name() -> None:
     doubled = WrongTheory("", "analytic.stationary.solutions", "stable_solutions", lambda right: lambda p: 2 * right(p))
     right = analytic.stable_solutions(P)
@@ -124,29 +105,6 @@ def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(
     right, other = runs[MUJOCO.name], runs[wrong.name]
     assert other.header.parameters == right.header.parameters == P
     assert np.abs(other.x - right.x).max() > 1e-6
-
-
-def test_the_page_names_what_nobody_noticed_and_what_hangs() -> None:
-    whats, refuted = ("ω₀₁ high", "ω₀₂ high"), {"table-5-P2": Outcome.REFUTED}
-    powers = [(3e-5, "rough-wall", "table-5-P3"), (4e-6, "reference", "table-5-P3"), (1e-6, "wake", "table-5-P3")]
-    levels = [
-        trial.Judged(name, [*map(trial.Trial, whats, *columns)], {"omega_01": powers}, ["orbits.refine", "orbits.seen"])
-        for name, columns in (
-            ("quick", ([{}, refuted], [("prop-1",), ()])),
-            ("default", ([{"table-5-P3": Outcome.REFUTED}, refuted], [(), ("prop-2",)])),
-        )
-    ]
-    page, numbers = trial.page(levels, [trial.Trial("no drag", refuted)]), "3e-05 | 4e-06 | 67%"
-    for text in (
-        "## Wrong theories, 2: noticed 1 at quick, 2 at default",
-        "Faults that hang a claim: 1 at quick, 1 at default.",
-        "| ω₀₁ high | **nobody**, prop-1 hangs | table-5-P3 |",
-        "| ω₀₂ high | table-5-P2 | table-5-P2, prop-2 hangs |",
-        "## Wrong engines, 1: noticed 1 at quick",
-        "* `orbits`: `refine`, `seen`",
-        f"| ω₀₁ | 0.0001 | {numbers} | {numbers} | rough-wall, table-5-P3 |",
-    ):
-        assert text in page
 
 
 def test_a_prediction_that_hangs_is_no_breakdown(monkeypatch: pytest.MonkeyPatch) -> None:
