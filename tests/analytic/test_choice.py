@@ -5,8 +5,6 @@ The steep contact has friction against the direction of v/sqrt(v^2 + eps^2) in t
 """
 
 import math
-import os
-from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -22,8 +20,6 @@ from analytic.simulation.motion import Moment
 from model import Case, Contact, SimulationError, State
 from tests.random_motions import UNIT, P, random_start
 
-RUNS = int(os.environ.get("DUALBALL_LONG_RUNS", "1500"))
-"""Number of runs of 60/c in the slow test."""
 JAMMING = {  # where Moreau's time stepping and MuJoCo settle, omega_c in rad s-1
     P.replace(mu=mu, eta=eta, j=j, r=r * P.R, c=kappa * UNIT, omega_0=Omega_0 * UNIT): settles
     for mu, eta, j, r, kappa, Omega_0, settles in (
@@ -224,10 +220,3 @@ def fault(seed):
 def test_long_random_runs_end(seed):
     """The last three come to rest: no solver crawls through round-off, and no ball hops by it."""
     assert not fault(seed)
-
-
-@pytest.mark.slow
-def test_many_long_random_runs_end():
-    with ProcessPoolExecutor() as pool:
-        faults = [line for line in pool.map(fault, range(RUNS), chunksize=10) if line]
-    assert not faults, "\n".join(faults)

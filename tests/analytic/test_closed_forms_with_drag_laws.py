@@ -13,7 +13,6 @@ from analytic import (
     StationarySolution,
     contact_forces,
     leaning_modes,
-    slope_jump,
     slowest_time_constant,
     solution,
     stationary_solutions,
@@ -134,20 +133,6 @@ def test_points_and_slopes_of_the_branch(law: str) -> None:
                 assert at_angle(abs(s.alpha), p) == pytest.approx((s.state.omega_c, omega_0), rel=1e-12)
 
 
-def test_how_slip_sets_in_under_the_quadratic_law() -> None:
-    """alpha grows like (omega_0 - omega_01)^2, the reading like its fourth power; under Stokes, 1 and 2."""
-    for law, power in ((STOKES, 1), (SCHILLER_NAUMANN, 1), (QUADRATIC, 2)):
-        p = P.replace(drag=law)
-        omega_01 = thresholds(p).omega_01
-        leads = np.array([1e-3, 2e-3]) * (10 if law == QUADRATIC else 1e-3)
-        places = [solution(p.replace(omega_0=omega_01 + lead), Case.SS) for lead in leads]
-        growth = np.log2(places[1].alpha / places[0].alpha)
-        assert growth == pytest.approx(power, abs=0.02)
-        rise = np.log2((places[1].state.omega_c - omega_01) / (places[0].state.omega_c - omega_01))
-        assert rise == pytest.approx(2 * power, abs=0.05)
-        assert slope_jump(p) == pytest.approx(-1.0, abs=1e-12)
-
-
 # --- stationary solutions and their eigenvalues ----------------------------------------------------------------
 
 
@@ -261,17 +246,6 @@ def test_ends_of_the_branch(mu: float, eta: float, c: float, law: str) -> None:
             values = eigenvalues_at(sign * distance, p)
             assert max(np.abs(values - value).min() for value in expected) <= allowed
     assert (at_sr[0].real > 0) == (eta > c**2 * p.R / (4 * p.g * mu**2))
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_without_drag_all_laws_are_one(law: str) -> None:
-    p = P.replace(drag=law, c=0.0, omega_0=35.0)
-    solutions, expected = stationary_solutions(p), stationary_solutions(p.replace(drag=STOKES))
-    assert [(s.case, s.stability, s.family) for s in solutions] == [(s.case, s.stability, s.family) for s in expected]
-    np.testing.assert_array_equal([s.eigenvalues for s in solutions[:1]], [s.eigenvalues for s in expected[:1]])
-    assert np.isnan(thresholds(p).omega_04)
-    bound = slip_bounds.rr_to_rs(p, 10.0, 1)
-    assert (bound.zero, bound.slope) == (np.inf, 0.0)
 
 
 # --- slip ------------------------------------------------------------------------------------------------------

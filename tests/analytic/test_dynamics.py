@@ -72,18 +72,6 @@ def test_rates_and_forces_at_random_states(case: Case, law: str, friction: tuple
     assert np.max(np.abs(mine - expected) / scale) <= 1e-12
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("case", list(Case))
-def test_floats_and_arrays_agree(case: Case, law: str) -> None:
-    """An integrator's eight floats and an array of states give the same rates to the last digits."""
-    x, p = random_states(case, 20), P.replace(drag=law, nu_f=1e-5)
-    many = vector_field(case, x, p)
-    scale = np.abs(many).max(axis=0)
-    for one, expected in zip(x, many, strict=True):
-        rate = dynamics.rates(case, one.tolist(), p, p.omega_0)
-        assert np.all(np.abs(rate - expected) <= 1e-13 * np.maximum(scale, np.abs(expected)))
-
-
 @pytest.mark.parametrize("case", list(Case))
 def test_shapes_and_a_flow_of_its_own(case: Case) -> None:
     """Six entries mean a closed wall."""

@@ -118,18 +118,6 @@ def test_laws_hold_for_any_parameters(mu, eta, omega_0, c, omega_c, slips, e):
     assert_lawful(run, 100 * RTOL)
 
 
-@given(seed=st.integers(0, 10_000))
-@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_time_stepping_obeys_coulomb_too(seed):
-    p, x = random_run(seed)
-    run = simulate(p, x, 0.05, method="time-stepping", timestep=2e-4, initial_impact=True, sample_interval=1e-3)
-    friction_A = np.hypot(run.force_A[:, 0], run.force_A[:, 2]) - p.mu * run.force_A[:, 1]
-    friction_B = np.hypot(run.force_B[:, 1], run.force_B[:, 2]) - p.eta * run.force_B[:, 0]
-    largest = max(np.abs(run.force_A).max(), np.abs(run.force_B).max(), p.m * p.g)
-    assert max(friction_A.max(), friction_B.max()) <= 1e-14 * largest
-    assert min(run.force_A[:, 1].min(), run.force_B[:, 0].min()) >= 0
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_trajectory_describes_itself(method):
     x0 = [0.02, 0.0, 8.0, 1.0, 2.0, 3.0, 0.01, -0.2]

@@ -13,7 +13,6 @@ from analytic import (
     simulate,
     slowest_time_constant,
     solution,
-    stable_solutions,
     stationary_solutions,
     thresholds,
     vector_field,
@@ -73,26 +72,6 @@ def test_solution_of_a_case() -> None:
     ):
         with pytest.raises(InputError, match=message):
             ask()
-
-
-@pytest.mark.parametrize(
-    ("eta", "omega_0", "expected"),
-    [
-        (0.2, 9.0, {Case.RR}),
-        (0.2, 20.0, {Case.SS}),
-        (0.2, 35.0, {Case.SS, Case.SR, Case.NR}),
-        (0.2, 50.0, {Case.SR, Case.NR}),
-        (0.6, 12.0, {Case.RR}),
-        (0.6, 20.0, {Case.RR, Case.NR}),
-        (0.6, 25.0, {Case.SR, Case.NR}),
-        (0.6, 0.0, {Case.RR, Case.RS}),
-    ],
-)
-def test_stable_solutions(eta: float, omega_0: float, expected: set[Case]) -> None:
-    """The regions of Figs. 7, 10 and 11; no sinking ball among them, nor the far part of SS."""
-    attracting = stable_solutions(P.replace(eta=eta, omega_0=omega_0))
-    assert {s.case for s in attracting} == expected
-    assert len(attracting) == len(expected)
 
 
 @pytest.mark.parametrize(("omega_0", "c"), [(3.0, 0.1), (9.0, 1.0), (20.0, 4.0), (30.0, 1.0)])

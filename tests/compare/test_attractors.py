@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import analytic
-from analytic.orbits import periodic as orbits
 from compare.commands.cli import main
 from compare.kit.statistics import hops
 from compare.kit.trials import finer
@@ -39,20 +37,6 @@ def test_undecided_with_what_it_did_last(capsys: pytest.CaptureFixture[str], tmp
     rows = [line for line in page.read_text("utf-8").splitlines() if line.startswith("|")]
     assert len(rows) == 2 + 2
     assert len({row.replace("\\|", "").count("|") for row in rows}) == 1
-
-
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
-        (["--start", "y=-1"], "y = -1 m is out of range"),
-        (["--follow", "omega_0=60"], "omega_0=from:to"),
-        (["--follow", "omega=60:70"], "unknown parameter 'omega'"),
-        (["--c", "0", "--starts", "1"], "say how long"),
-    ],
-)
-def test_bad_input(given: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["attractors", *given]) == 2
-    assert says in capsys.readouterr().err
 
 
 def test_tops_of_known_hops() -> None:
@@ -107,17 +91,3 @@ def _run(time: Array, y: Array, theta: Array) -> Trajectory:
     block = np.zeros(len(time), SAMPLE)
     block["time"], block["y"], block["theta"], block["omega_c"] = time, y, theta, np.gradient(theta, time)
     return Trajectory.from_blocks(Header("mujoco", HOPPING, Flow.steady(HOPPING.omega_0)), [block], Events())
-
-
-@pytest.mark.slow
-def test_time_stepping_comes_to_the_orbit_of_theory() -> None:
-    """Of second order in its step once that resolves the half millisecond on the floor: extrapolated, within 1e-6."""
-    pytest.importorskip("numba")
-    orbit = orbits.refine(HOPPING, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.223)
-    theory = np.array([orbit.period, orbit.turn / orbit.period, orbit.cycle.y.max()])
-    how = {"method": "time-stepping", "sample_interval": 1e-3}
-    runs = [analytic.simulate(HOPPING, orbit.loop.x, 16.0, timestep=step, **how) for step in (4e-6, 2e-6)]
-    tops = [attractors.tops(run, 12.0, 16.0).values.values() for run in runs]
-    coarse, fine = (np.array([each.value for each in values]) for values in tops)
-    assert np.abs(fine / theory - 1).max() < np.abs(coarse / theory - 1).max() / 3
-    assert (fine + (fine - coarse) / 3) / theory == pytest.approx(np.ones(3), abs=1e-6)

@@ -80,14 +80,6 @@ def test_theory_stands_beside_what_was_measured(tmp_path: Path) -> None:
         np.testing.assert_array_equal(np.isnan(data.y_theory), [False, True])
 
 
-def test_a_single_run_varies_nothing(runs: Path, tmp_path: Path) -> None:
-    for path in sorted(runs.glob("*.h5"))[1:]:
-        path.unlink()
-    assert sweep.collect(runs, tmp_path / "all.h5") == 1
-    with xarray.open_dataset(tmp_path / "all.h5", engine="h5netcdf") as data:
-        assert set(data.coords) == {"run"}
-
-
 def test_the_same_run_twice_is_refused_by_name(runs: Path, tmp_path: Path) -> None:
     first = min(runs.glob("*.h5"))
     (key,) = storage.load_runs(first)
@@ -135,9 +127,3 @@ def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(
     assert json.loads(capsys.readouterr().out)["parameters"]["omega_0"] == OMEGAS[1]
     assert sweep.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
     assert sweep.describe(tmp_path / "all.h5")["names"] == [str(Path(*path.parts[-2:])) for path in paths]
-
-
-def test_a_collection_is_not_drawn(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sweep.collect(runs, runs / "all.h5")
-    assert cli.main(["inspect", str(runs / "all.h5"), "--plot", str(runs / "plot.png")]) == 2
-    assert "only a run can be drawn" in capsys.readouterr().err

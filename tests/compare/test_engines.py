@@ -62,12 +62,12 @@ def test_a_step_too_long_for_the_problem_is_refused_by_all(tmp_path, name):
 
 
 @engines(*BEST)
-@pytest.mark.parametrize("state", STATES[:3], ids=lambda state: state.name)
-def test_stationary_states_are_those_of_theory(name, state):
+def test_a_stationary_state_is_that_of_theory(name):
     """PyBullet's to round-off; a ball of Drake sinks in by its load over the stiffness, and creeps at up to v_s.
 
     Sinking in shortens its lever. Friction works against creep, as drag does: m c R^2 omega_c d omega_c.
     """
+    state = STATES[2]
     settings, p, x = ENGINES[name].at(4e-3, state.p), state.p, state.solution.x
     tolerance = 1e-12
     if name == "drake":
@@ -168,20 +168,6 @@ def test_settings_out_of_range_are_refused(name):
         settings(timestep=-1.0)
     with pytest.raises(InputError, match="coordinates = 'polar'"):
         settings(coordinates="polar")
-
-
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        (["--engine", "event"], "event has no time step"),
-        (["--engine", "time-stepping", "--solimp", "0.9"], "of time-stepping only --timestep can be given"),
-        (["--engine", "pybullet"], "pybullet is not installed"),
-    ],
-)
-def test_only_settings_can_be_graded(options, says, monkeypatch, capsys):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert cli.main(["grade", *options]) == 2
-    assert says in capsys.readouterr().err
 
 
 def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):

@@ -189,22 +189,3 @@ def test_what_stands_for_what_is_missing(read: Callable[[str], Native], world: s
     assert re.search(lacks, of_scene.note)
     assert "\n" not in of_scene.note
     assert (of_scene.A == of_scene.B) is bool(of_scene.note)
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"timestep": 0.0}, r"timestep = 0 s is out of range: must be > 0"),
-        ({"impratio": -1.0}, "impratio = -1"),
-        ({"cone": "eliptic"}, "did you mean 'elliptic'"),
-        ({"iterations": -1}, "iterations = -1"),
-    ],
-)
-def test_settings_that_cannot_run(changes: dict, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        Native(**changes)
-
-
-def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["grade", "nowhere.xml"]) == 2
-    assert "there is no such file" in capsys.readouterr().err

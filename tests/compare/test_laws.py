@@ -12,12 +12,11 @@ from analytic.mechanics import drag
 from compare.claim import Outcome, Verdict
 from compare.judge import judge
 from compare.kit.lab import Lab
-from compare.kit.record import Measurement, Records
+from compare.kit.record import Records
 from compare.subjects.motion import claims
 from compare.subjects.motion.measure import laws
 from model import Case, Flow, Parameters, Trajectory
 from model.trajectory import SAMPLE, Events, Header
-from tests.measured import measured
 
 P = Parameters.named("high-wall-friction")
 SAMPLES = 50
@@ -70,24 +69,8 @@ def test_every_deviation_is_measured() -> None:
     assert values(slow)["where it rolls it doesn't slip", "A"] > 0
 
 
-def law(quantity: str, value: float, uncertainty: float, contact: str = "A") -> Measurement:
-    return measured("laws", quantity, value, uncertainty, P, law="a law", contact=contact)
-
-
 def verdict_of(name: str, records: Records) -> Verdict:
     return judge([claim for claim in claims.LAWS if claim.id == name], records)[0]
-
-
-def test_laws_are_judged() -> None:
-    good = (law("friction_ratio", P.mu, 1e-9), law("friction_ratio", P.eta, 1e-9, "B"))
-    assert verdict_of("table-3", Records(good)).outcome is Outcome.CONFIRMED
-    for bad in (
-        law("law_in_motion", 1e-3, 1e-5),
-        law("friction_ratio", 1.01 * P.mu, 1e-9),
-        law("friction_ratio", P.mu, 1e-9, "B"),
-    ):
-        assert verdict_of("table-3", Records((*good, bad))).outcome is Outcome.REFUTED
-    assert verdict_of("table-3", Records((*good, law("law_in_motion", 0.0, 1e-2)))).outcome is Outcome.INCONCLUSIVE
 
 
 def test_laws_and_drag_are_measured_with_mujoco(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,9 +82,3 @@ def test_laws_and_drag_are_measured_with_mujoco(lab: Lab, monkeypatch: pytest.Mo
     right = drag.sinking_speed
     monkeypatch.setattr(drag, "sinking_speed", lambda **fluid: 1.0001 * right(**fluid))
     assert verdict_of("eq-10", records).outcome is Outcome.REFUTED
-
-
-def test_a_drag_coefficient_that_disagrees_with_drag_is_noticed(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    of_fluid = Parameters.from_fluid
-    monkeypatch.setattr(Parameters, "from_fluid", lambda **values: (p := of_fluid(**values)).replace(c=1.01 * p.c))
-    assert verdict_of("eq-10", Records.of(laws.measure(lab, {}, Records()))).outcome is Outcome.REFUTED

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+import analytic  # noqa: F401  runs in this process leave it loaded
+from compare import bench
+
 pytest_plugins = ("pytester",)
 ADAPTER = """
 def build(case, timestep):
@@ -23,22 +26,21 @@ def state():
 """
 
 
-def run(pytester: pytest.Pytester, *args: str) -> pytest.RunResult:
-    """As where dualball is installed: there an entry point names the package `compare`."""
-    return pytester.runpytest_subprocess("-p", "compare", "-p", "no:cacheprovider", *args)
+INSTALLED = ("-p", "compare", "-p", "no:cacheprovider")
+"""Where dualball is installed an entry point names the package `compare`."""
 
 
 def test_an_engine_on_the_exact_cases(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(adapter=ADAPTER, test_mine="def test_mine(): assert True")
     known = pytester.makefile(".txt", known="# ours\ncylinder   it has no wall\nblock-rests\n")
-    found = run(pytester, "--dualball-engine", "adapter", "--dualball-known", str(known), "-rx")
+    given = "test_mine.py", "--dualball-engine", "adapter", "--dualball-known", str(known), "-rx", "-n", "1"
+    found = pytester.runpytest_subprocess(*INSTALLED, *given)
     found.stdout.fnmatch_lines(["*box that is pushed off*errors*allowed is 0.01*", "*exact cases:*"])
     found.stdout.re_match_lines([r"case +error +order", r"sphere-slides-rolls +0 .* passed", r"box-stops .* failed"])
     found.stdout.fnmatch_lines(["*XFAIL adapter::cylinder - it has no wall*"])
     outcomes = found.parseoutcomes()
     assert (outcomes["failed"], outcomes["xfailed"], outcomes["xpassed"], outcomes["skipped"]) == (1, 1, 1, 1)
-    both = run(pytester, "--dualball-engine", "adapter", "test_mine.py", "-k", "mine or drilling", "-n", "2")
-    both.assert_outcomes(passed=2)
+    assert outcomes["passed"] == len(bench.cases()) - 3  # and the test that is named
 
 
 @pytest.mark.parametrize(
@@ -51,8 +53,9 @@ def test_an_engine_on_the_exact_cases(pytester: pytest.Pytester) -> None:
     ],
 )
 def test_what_cannot_be_tested(pytester: pytest.Pytester, args: list[str], message: str) -> None:
-    pytester.makepyfile(half="build = step = print")
-    found = run(pytester, *args)
+    """Unless files are named nothing but the cases is collected."""
+    pytester.makepyfile(half="build = step = print", test_mine="def test_mine(): assert True")
+    found = pytester.runpytest_inprocess(*INSTALLED, *args)
     assert found.ret != 0
     (found.stdout if "known" not in args[-2] else found.stderr).fnmatch_lines([message])
     assert found.parseoutcomes().get("passed", 0) == 0
@@ -71,7 +74,7 @@ def test_fixtures(pytester: pytest.Pytester) -> None:
             assert dualball_case.error(dualball_case.exact) == 0
         """
     )
-    found = run(pytester, "-k", "theory or drilling")
+    found = pytester.runpytest_inprocess(*INSTALLED, "-k", "theory or drilling")
     found.assert_outcomes(passed=2, deselected=found.parseoutcomes()["deselected"])
 
 
@@ -83,4 +86,4 @@ def test_runs_that_do_not_use_it(pytester: pytest.Pytester, foreign: str) -> Non
     heavy = '{"numpy", "mujoco", "analytic", "compare.bench"}'
     pytester.makepyfile(f"import sys\ndef test_it(): assert not {heavy} & set(sys.modules)")
     pytester.syspathinsert()
-    run(pytester).assert_outcomes(passed=1)
+    pytester.runpytest_subprocess(*INSTALLED).assert_outcomes(passed=1)

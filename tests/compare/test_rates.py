@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
-from itertools import product
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm
 
-import analytic
-from analytic.mechanics import dynamics
 from compare.claim import Outcome
 from compare.judge import judge
 from compare.kit.fits import exponents, matched, propagator
-from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Records
 from compare.kit.trials import Start
 from compare.subjects.stability import claims as stability
 from compare.subjects.stability import measure as rates
 from model import Case, Parameters
 from model.arrays import Array
-from model.cases import TRAITS
 from model.kinematics import VARIABLES
-from tests.measured import measured, unnoticed
+from tests.measured import measured
 
 P = Parameters.named("reference")
 EPS = float(np.finfo(float).eps)
@@ -91,68 +82,6 @@ def test_a_run_counts_up_to_where_the_ball_leaves_the_case(lab: Lab) -> None:
     assert len(set(run.cases)) > 1
     assert all(case is first for case in run.cases[1 : rates.stays(run, first)])
     assert run.cases[rates.stays(run, first)] is not first
-
-
-@pytest.fixture(scope="module")
-def spectra() -> Records:
-    """What a perfect engine would measure."""
-    rough, rows = Parameters.named("high-wall-friction"), []
-    flows = {
-        Case.RR: (8.0,),
-        Case.RS: (0.0,),
-        Case.SR: (18.5, 28.0),
-        Case.SS: (20.0,),
-        Case.NR: (28.0,),
-        Case.NS: (15.0,),
-    }
-    for case, omega_0 in ((case, flow) for case, own in flows.items() for flow in own):
-        base = rough if case in (Case.SR, Case.NR) else P
-        p = base.replace(omega_0=omega_0)
-        (solution,) = (s for s in analytic.stationary_solutions(p) if s.case is case and (s.stable or case is Case.SR))
-        values = [*solution.eigenvalues, *([0.0j] if case is Case.NS else [])]
-        row = partial(measured, "rates", p=p, set="mine", case=case.name)
-        rows.append(row("modes", len(values), 0.0))
-        values = [complex(v.real, v.imag if abs(v.imag) > 1e-9 * abs(v) else 0.0) for v in values]
-        in_order = sorted((v for v in values if v.imag >= 0), key=lambda v: (v.imag, -v.real))
-        for mode, value in enumerate(in_order, start=1):
-            sure = 1e-4 * (abs(value) or 1.0)
-            rows.append(row("decay_rate", -value.real, sure, mode=mode))
-            rows.append(row("frequency", value.imag, sure, mode=mode))
-        slowest = 1 / analytic.slowest_time_constant(solution)
-        rows.append(row("slowest_decay", slowest, 1e-4 * slowest))
-        units, J = state_units(p), dynamics.jacobian(case, solution.state, p)
-        moved, names = expm(0.02 * J), TRAITS[case].active
-        for (i, of), (j, by) in product(enumerate(names), enumerate(names)):
-            scale = units[VARIABLES.index(by)] / units[VARIABLES.index(of)]
-            rows.append(row("response", moved[i, j] * scale, 1e-4, time=0.02, of=of, pushed=by))
-    return Records(tuple(rows))
-
-
-def test_the_right_theory_is_confirmed(spectra: Records) -> None:
-    for verdict in judge(stability.CLAIMS, spectra):
-        assert verdict.outcome is Outcome.CONFIRMED, verdict.claim.id
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda s: replace(s, eigenvalues=s.eigenvalues[:-1]),
-        lambda s: replace(s, eigenvalues=np.append(s.eigenvalues, s.eigenvalues[-1])),
-        lambda s: replace(s, stability=analytic.Stability.UNSTABLE),
-    ],
-)
-def test_wrong_spectra_are_noticed(
-    spectra: Records, monkeypatch: pytest.MonkeyPatch, change: Callable[..., Any]
-) -> None:
-    """One eigenvalue too few or too many; a state that theory calls unstable."""
-    right = analytic.stationary_solutions
-    monkeypatch.setattr(analytic, "stationary_solutions", lambda p: [change(s) for s in right(p)])
-    refuted = {each.claim.id for each in judge(stability.CLAIMS, spectra) if each.outcome is Outcome.REFUTED}
-    assert "prop-4-rate" in refuted
-
-
-def test_wrong_rates_and_exchanged_modes_are_noticed(spectra: Records) -> None:
-    assert not unnoticed(stability.CLAIMS, spectra, "eigenvalues_at", "eigenvalues", "leaning_modes")
 
 
 def test_the_rate_of_rolling_and_of_spinning_is_measured_with_mujoco(lab: Lab) -> None:

@@ -5,18 +5,13 @@ from __future__ import annotations
 import base64
 import dataclasses
 import html
-import itertools
 import json
 import math
 import pickle
 import re
-import shlex
 import shutil
 import subprocess
-import time
-import urllib.request
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -40,11 +35,6 @@ from model import Case, Parameters, StorageError
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-FLAGS = shlex.split("""--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-dev-shm-usage
---disable-background-networking --disable-component-update --disable-sync --hide-scrollbars --remote-debugging-port=0
---remote-allow-origins=*""")
-PATIENCE = 120.0
-"""How long to wait for the browser, s: long, since machines differ."""
 P = Parameters.named("reference")
 
 
@@ -313,156 +303,108 @@ def test_errata_are_the_documented_ones() -> None:
     assert "<h1>" not in text
 
 
-class Tab:
-    """A page in a browser, driven through its debugging protocol."""
-
-    def __init__(self, socket: Any) -> None:
-        self._socket, self._ids, self.events = socket, itertools.count(1), []
-        for domain in ("Runtime", "Log", "Page"):
-            self.call(f"{domain}.enable")
-
-    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Call a method of the protocol, wait for its answer, and keep the events before it."""
-        number = next(self._ids)
-        self._socket.send(json.dumps({"id": number, "method": method, "params": parameters}))
-        while (message := json.loads(self._socket.recv(PATIENCE))).get("id") != number:
-            self.events.append(message)
-        assert "error" not in message, message
-        return message["result"]
-
-    def open(self, url: str) -> None:
-        self.call("Page.navigate", url=url)
-        while not any(event["method"] == "Page.loadEventFired" for event in self.events):
-            self.events.append(json.loads(self._socket.recv(PATIENCE)))
-
-    def value(self, expression: str) -> Any:
-        answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True)
-        assert "exceptionDetails" not in answer, answer
-        return answer["result"].get("value")
-
-    @property
-    def complaints(self) -> list[Any]:
-        """Errors and warnings that the page has caused."""
-        return [
-            event
-            for event in self.events
-            if event["method"] == "Runtime.exceptionThrown"
-            or (event["method"] == "Runtime.consoleAPICalled" and event["params"]["type"] in ("error", "warning"))
-            or (event["method"] == "Log.entryAdded" and event["params"]["entry"]["level"] in ("error", "warning"))
-        ]
+# --- in a real browser ---------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def tab(page: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
-    client = pytest.importorskip("websockets.sync.client")
-    if BROWSER is None:
-        pytest.skip("no Chromium is installed")
-    profile = tmp_path_factory.mktemp("profile")
-    browser = subprocess.Popen(
-        [BROWSER, *FLAGS, f"--user-data-dir={profile}", "about:blank"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        told, limit = profile / "DevToolsActivePort", time.monotonic() + PATIENCE
-        while not (told.exists() and told.read_text().count("\n")):
-            if browser.poll() is not None or time.monotonic() > limit:
-                pytest.skip("Chromium does not start here")
-            time.sleep(0.1)
-        port = told.read_text().split("\n")[0]
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=PATIENCE) as answer:
-            (target, *_) = [target for target in json.load(answer) if target["type"] == "page"]
-        with client.connect(target["webSocketDebuggerUrl"], max_size=None, open_timeout=PATIENCE) as socket:
-            made = Tab(socket)
-            made.open(page.as_uri())
-            yield made
-    finally:
-        browser.terminate()
-        browser.wait(PATIENCE)
-
-
+HARNESS = """<!doctype html><iframe style="width:WIDTHpx; height:844px; border:0" srcdoc="PAGE"></iframe>
+<pre></pre><script>
+const frame = document.querySelector("iframe"), answers = [];
+frame.onload = async () => {
+  for (const each of ASKED) {
+    await new Promise(done => setTimeout(done, 300));
+    answers.push(frame.contentWindow.eval(each));
+  }
+  document.querySelector("pre").textContent = JSON.stringify(answers);
+};
+</script>"""
+"""The page in a frame, with expressions that are evaluated in it one after the other."""
 ROWS = "[...document.querySelectorAll('details.claim')]"
 SHOWN = f"{ROWS}.filter(row => !row.hidden).map(row => row.id)"
+FOUND = "[...document.querySelectorAll('#numbers-found tr')].map(row => [...row.cells].map(cell => cell.textContent))"
+TYPED = "words.dispatchEvent(new Event('input'))"
+SORT = "document.querySelector('[data-sort=id]').click()"
+EVERY = sum(len(verdict.checks) for verdict in RAN)
+FILTERED = (
+    (f"{ROWS}.length", len(RAN)),
+    ("document.title", "dualball: 2 of 5 claims as expected"),
+    (f"find.value = 'slip PROP. bro'; find.dispatchEvent(new Event('input')); {SHOWN}", ["broken"]),
+    ("document.getElementById('shown').textContent", "1 of 5 shown"),
+    ("find.value = ''; outcome.value = 'inconclusive'; outcome.dispatchEvent(new Event('change'))", True),
+    (SHOWN, ["coarse"]),
+    (
+        "[...document.querySelectorAll('main section')].filter(part => !part.hidden)"
+        ".map(part => part.firstElementChild.textContent)",
+        ["Stability"],
+    ),
+    (f"outcome.value = ''; outcome.dispatchEvent(new Event('change')); {SHOWN}.length", len(RAN)),
+    (f"{SORT}; {SORT}; {SHOWN}", ["good", "doubted", "bad", "coarse", "broken"]),  # within each section
+    (f"{SORT}; {SHOWN}", ["bad", "doubted", "good", "broken", "coarse"]),
+)
+NUMBERS = (
+    ("document.getElementById('found').textContent", f"{EVERY} of {EVERY}"),
+    (f"flow.value = '13.02'; {TYPED}; {FOUND}.map(cells => cells[1])", ["13"] * 4),
+    (f"flow.value = '13.4'; words.value = 'good'; {TYPED}; {FOUND}.map(cells => cells[1])", ["13"]),  # the nearest
+    (f"flow.value = ''; words.value = 'good RR'; {TYPED}; {FOUND}.length", report.ROWS + 40),
+    (f"words.value = 'good SS'; {TYPED}; {FOUND}.length", 0),
+    (f"document.querySelector('[data-claim=good]').click(); {FOUND}.length", report.ROWS + 40),
+    (f"{FOUND}[0].toSpliced(3, 1).join()", "reference,12,ω_c rad/s,mujoco,12,1e-9, 12,0,3e-9,good"),
+)
+OPEN = "document.querySelectorAll('details').forEach(row => { row.open = true; }); document.documentElement.scrollWidth"
+DARK = """for (const sheet of document.styleSheets) for (const rule of sheet.cssRules)
+    if (rule.media?.mediaText.includes("prefers-color-scheme")) rule.media.mediaText = "screen";"""
+CONTRAST = """(() => {
+    const light = colour => { const [r, g, b] = colour.match(/[\\d.]+/g).map(Number).map(v => v / 255)
+        .map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+    const ground = light(getComputedStyle(document.body).backgroundColor);
+    return Math.min(...["body", ".soft", ".verdict.pass", ".verdict.fail", ".verdict.other", "dt", "a"].map(name => {
+        const ink = light(getComputedStyle(document.querySelector(name)).color);
+        return (Math.max(ink, ground) + 0.05) / (Math.min(ink, ground) + 0.05); }));
+})()"""
 
 
-def test_the_page_loads_and_claims_are_filtered_and_sorted(tab: Tab) -> None:
-    assert tab.complaints == []
-    assert tab.value(f"{ROWS}.length") == len(RAN)
-    assert tab.value("document.title") == "dualball: 2 of 5 claims as expected"
-    tab.value("find.value = 'slip PROP. bro'; find.dispatchEvent(new Event('input'))")
-    assert tab.value(SHOWN) == ["broken"]
-    assert tab.value("document.getElementById('shown').textContent") == "1 of 5 shown"
-    tab.value("find.value = ''; outcome.value = 'inconclusive'; outcome.dispatchEvent(new Event('change'))")
-    assert tab.value(SHOWN) == ["coarse"]
-    sections = "[...document.querySelectorAll('main section')].filter(part => !part.hidden)"
-    assert tab.value(f"{sections}.map(part => part.firstElementChild.textContent)") == ["Stability"]
-    tab.value("outcome.value = ''; outcome.dispatchEvent(new Event('change'))")
-    assert len(tab.value(SHOWN)) == len(RAN)
-    for _ in range(2):
-        tab.value("document.querySelector('[data-sort=id]').click()")
-    assert tab.value(SHOWN) == ["good", "doubted", "bad", "coarse", "broken"]  # within each section
-    tab.value("document.querySelector('[data-sort=id]').click()")
-    assert tab.value(SHOWN) == ["bad", "doubted", "good", "broken", "coarse"]
+def browsed(folder: Path, *what: str) -> str:
+    """What Chromium, without a window, prints of a page; it may have nothing to complain of."""
+    if BROWSER is None:
+        pytest.skip("no Chromium is installed")
+    flags = "--headless --no-sandbox --disable-gpu --disable-dev-shm-usage --enable-logging=stderr"
+    patience = "--virtual-time-budget=60000", f"--user-data-dir={folder / 'profile'}"
+    command = [BROWSER, *flags.split(), *patience, *what]
+    answer = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert "CONSOLE" not in answer.stderr
+    return answer.stdout
 
 
-def test_numbers_are_found_by_flow_claim_and_words(tab: Tab) -> None:
-    rows = (
-        "[...document.querySelectorAll('#numbers-found tr')].map(row => [...row.cells].map(cell => cell.textContent))"
+def asked(page: Path, folder: Path, width: int, *expressions: str) -> list[Any]:
+    text = HARNESS.replace("WIDTH", str(width)).replace("ASKED", json.dumps(expressions))
+    harness = folder / "harness.html"
+    framed = page.read_text("utf-8").replace("<head>", '<head><base href="about:srcdoc">', 1)  # links stay within it
+    harness.write_text(text.replace("PAGE", html.escape(framed)), "utf-8")
+    shown = browsed(folder, f"--window-size={max(width, 800)},1000", "--dump-dom", harness.as_uri())
+    return list(json.loads(html.unescape(shown.rsplit("<pre>", 1)[1].split("</pre>")[0])))
+
+
+@pytest.mark.parametrize("table", [FILTERED, NUMBERS], ids=["claims", "numbers"])
+def test_claims_and_numbers_are_found(page: Path, tmp_path: Path, table: tuple[tuple[str, Any], ...]) -> None:
+    assert asked(page, tmp_path, 1200, *(each for each, _ in table)) == [expected for _, expected in table]
+
+
+def test_nothing_runs_over_the_side_and_text_is_legible(page: Path, tmp_path: Path) -> None:
+    """All rows open, on a phone, too; text against its ground has the contrast 4.5 of WCAG AA, light and dark."""
+    for width in (390, 1200):
+        reached, light, _, dark = asked(page, tmp_path, width, OPEN, CONTRAST, f"{DARK} 0", CONTRAST)
+        assert reached <= width
+        assert min(light, dark) >= 4.5
+        assert light != dark
+
+
+def test_an_address_opens_its_row_and_the_page_prints(page: Path, tmp_path: Path) -> None:
+    shown = browsed(tmp_path, "--dump-dom", f"{page.as_uri()}#good")
+    opened = re.findall(r'<details[^>]* id="(\w+)"[^>]*\bopen=', shown) + re.findall(
+        r'<details[^>]*\bopen=[^>]* id="(\w+)"', shown
     )
-    every = sum(len(verdict.checks) for verdict in RAN)
-    assert tab.value("document.getElementById('found').textContent") == f"{every} of {every}"
-    for change, expected in (
-        ("flow.value = '13.02'", {"13": 4}),
-        ("flow.value = '13.4'; words.value = 'good'", {"13": 1}),  # nothing within 1 %: the nearest
-        ("flow.value = ''; words.value = 'good RR'; document.getElementById('set').value = 'reference'", {"": 52}),
-        ("words.value = 'good SS'", {}),
-    ):
-        tab.value(f"{change}; words.dispatchEvent(new Event('input'))")
-        found = tab.value(rows)
-        assert len(found) == sum(expected.values())
-        assert all(cells[1] in expected or "" in expected for cells in found)
-    tab.value("document.querySelector('[data-claim=good]').click()")
-    found = tab.value(rows)
-    assert len(found) == report.ROWS + 40
-    assert found[0] == ["reference", "12", "ω_c rad/s", found[0][3], "mujoco", "12", "1e-9", " 12", "0", "3e-9", "good"]
-
-
-def test_an_address_opens_its_row(tab: Tab) -> None:
-    tab.value("location.hash = '#good'")
-    deadline = time.monotonic() + PATIENCE
-    while not tab.value("document.getElementById('good').open") and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert tab.value("document.getElementById('good').open")
-
-
-@pytest.mark.parametrize("width", [390, 1200])
-def test_nothing_runs_over_the_side(tab: Tab, width: int) -> None:
-    """All rows open; what is wide scrolls in a box of its own."""
-    tab.call("Emulation.setDeviceMetricsOverride", width=width, height=844, deviceScaleFactor=1, mobile=width < 600)
-    tab.value("document.querySelectorAll('details').forEach(row => { row.open = true; })")
-    assert tab.value("document.documentElement.scrollWidth") <= width
-    tab.call("Emulation.clearDeviceMetricsOverride")
-
-
-def test_dark_mode_is_legible(tab: Tab) -> None:
-    """Text against its ground has at least the contrast 4.5 of WCAG AA, light and dark."""
-    contrast = """(() => {
-        const light = colour => { const [r, g, b] = colour.match(/[\\d.]+/g).map(Number).map(v => v / 255)
-            .map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
-            return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
-        const ground = light(getComputedStyle(document.body).backgroundColor);
-        return ['body', '.soft', '.verdict.pass', '.verdict.fail', '.verdict.other', 'dt', 'a'].map(name => {
-            const ink = light(getComputedStyle(document.querySelector(name)).color);
-            return (Math.max(ink, ground) + 0.05) / (Math.min(ink, ground) + 0.05); });
-    })()"""
-    for scheme in ("light", "dark"):
-        tab.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
-        assert min(tab.value(contrast)) >= 4.5, scheme
-    tab.call("Emulation.setEmulatedMedia", features=[])
-
-
-def test_it_prints(tab: Tab) -> None:
-    printed = base64.b64decode(tab.call("Page.printToPDF", printBackground=True)["data"])
+    assert opened == ["good"]
+    browsed(tmp_path, f"--print-to-pdf={tmp_path / 'page.pdf'}", page.as_uri())
+    printed = (tmp_path / "page.pdf").read_bytes()
     assert printed.startswith(b"%PDF")
     assert printed.count(b"/Type /Page\n") + printed.count(b"/Type /Page ") + printed.count(b"/Type/Page") > 1
-    assert tab.complaints == []

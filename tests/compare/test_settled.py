@@ -1,4 +1,4 @@
-"""Protocols of stationary states, on one set with so much drag that everything settles at once."""
+"""Protocols of stationary states on one set, with so much drag that everything settles at once, and their claims."""
 
 from __future__ import annotations
 
@@ -7,18 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import analytic
+from compare.claim import Outcome
+from compare.judge import judge
 from compare.kit import levels, settling
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab, time_unit
 from compare.kit.levels import EFFORT, Level
-from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records
 from compare.kit.sets import sets
 from compare.kit.trials import Start
+from compare.subjects.flowmeter import claims as flowmeter
 from compare.subjects.flowmeter import measure as characteristic
+from compare.subjects.stationary import claims as stationary
 from compare.subjects.stationary import measure as settled
 from compare.subjects.thresholds.measure import basins
 from model import Case, Parameters
-from tests.measured import thresholds
+from tests.measured import measured, thresholds
 
 THICK = Parameters.named("reference").replace(c=10.0)
 FLOWS = (0.6, 1.4, 2.0, 2.6)
@@ -58,29 +62,14 @@ class TestSettled:
         assert seen[2.6, "rest"] is Case.NR
         assert [seen[flow, "on the wall"] for flow in FLOWS] == [Case.NS, Case.NS, Case.NS, Case.NR]
 
-    def test_forces_balance(self, records: Records) -> None:
-        """Rolling has the sums of its forces only; drag carries a part of the weight of a ball that sinks."""
-        p, weight = THICK, THICK.m * THICK.g
-        rolls, rides, sinks = (_values(records, *at) for at in ((0.6, Case.RR), (2.6, Case.NR), (1.4, Case.NS)))
-        assert {q for q in rolls if q.startswith("force")} == set(settling.SUMS)
-        assert rolls["force_Ay+By"].value == pytest.approx(weight, abs=3 * rolls["force_Ay+By"].uncertainty)
-        assert rides["force_Bx"].value == pytest.approx(p.m * p.R * rides["omega_c"].value ** 2, rel=1e-6)
-        assert rides["force_Ay"].value == 0.0
-        assert sinks["force_By"].value - p.m * p.c * sinks["v_y"].value == pytest.approx(weight, rel=1e-6)
-        assert sinks["force_By"].value == pytest.approx(p.eta * sinks["force_Bx"].value, rel=1e-9)
-
-    def test_values_resolve_what_they_should(self, records: Records) -> None:
-        for m in records.select("settled", where=lambda m: m.quantity != "case"):
-            assert 0 < 3 * m.uncertainty <= quantity(m.quantity).resolves * settling.scale(m.quantity, m.parameters)
-
     def test_what_does_not_settle_is_missing(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(levels.EFFORT, "settling.rounds", ((1.0,),) * 3)
         monkeypatch.setattr(settling, "SOLVED", 1e-3)
-        measured = _measured(lab, monkeypatch, THICK, 0.6)
-        assert not measured.measurements
-        starts = [each for each in measured.missing if " still drifts" in each.reason]
-        states = [each for each in measured.missing if "no values of it" in each.reason]
-        assert len(starts) + len(states) == len(measured.missing)
+        found = _measured(lab, monkeypatch, THICK, 0.6)
+        assert not found.measurements
+        starts = [each for each in found.missing if " still drifts" in each.reason]
+        states = [each for each in found.missing if "no values of it" in each.reason]
+        assert len(starts) + len(states) == len(found.missing)
         assert sum(each.rows for each in starts) == 4
         assert len(states) == 3  # from rest and with the fluid the ball ends in the same
         assert all(each.rows > 10 for each in states)
@@ -93,23 +82,17 @@ class TestSettled:
             return [replace(each, case=Case.SN) for each in states] if how.get("refine") == 2 else states
 
         monkeypatch.setattr(settled, "settle", other_case)
-        measured = _measured(lab, monkeypatch, THICK, 0.6)
-        assert {m.quantity for m in measured.measurements} == {"case"}
-        assert len(measured.missing) == 3
-        assert all("is SN with half the time step" in each.reason and each.rows > 10 for each in measured.missing)
+        found = _measured(lab, monkeypatch, THICK, 0.6)
+        assert {m.quantity for m in found.measurements} == {"case"}
+        assert len(found.missing) == 3
+        assert all("is SN with half the time step" in each.reason and each.rows > 10 for each in found.missing)
 
     def test_what_quadratic_drag_does_not_settle_has_no_values(self, lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
         """A ball that goes round with the fluid keeps a slight lag; one that slips or sinks settles."""
-        measured = _measured(lab, monkeypatch, sets(Level.QUICK)["blunt"], 0.6, 2.0)
-        cases = {m.conditions["case"] for m in measured.measurements if m.quantity == "omega_c"}
+        found = _measured(lab, monkeypatch, sets(Level.QUICK)["blunt"], 0.6, 2.0)
+        cases = {m.conditions["case"] for m in found.measurements if m.quantity == "omega_c"}
         assert cases == {"SS", "NS"}
-        assert any("quadratic drag fades with the lag" in each.reason for each in measured.missing)
-
-    def test_states_of_different_steps_share_what_separates_them(self, records: Records) -> None:
-        # Half of the step is measured from the mean of the whole: the difference is part of the uncertainty.
-        m = _values(records, 1.4, Case.SS)["omega_c"]
-        solved = settling.SOLVED / (THICK.c * coarse_step(THICK)) * m.parameters.omega_0
-        assert m.uncertainty >= solved
+        assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
 
 
 def test_a_steady_mean_is_as_sure_as_it_says_and_passes_over_oscillations() -> None:
@@ -123,29 +106,69 @@ def test_a_steady_mean_is_as_sure_as_it_says_and_passes_over_oscillations() -> N
         assert abs(means[0] - 2.0) <= 24**2 / (np.pi * (turns / 2 - 4) ** (settling.TAPER + 1))
 
 
+def _outcomes(records: Records) -> dict[str, Outcome]:
+    claims = (*stationary.CLAIMS, *stationary.DIAGRAMS, *flowmeter.CLAIMS)
+    return {verdict.claim.id: verdict.outcome for verdict in judge(claims, records)}
+
+
+def test_theory_agrees_as_far_as_it_is_asked(records: Records) -> None:
+    outcome_of = _outcomes(records)
+    for name in ("prop-1", "prop-3-5", "prop-4", "prop-6"):
+        assert outcome_of[name] is Outcome.CONFIRMED, name
+    assert outcome_of["slope-jump"] is outcome_of["fig-13-left"] is Outcome.NOT_RUN
+
+
+@pytest.mark.parametrize(
+    ("Omega_0", "case", "before", "outcome"),
+    [
+        (2.6, Case.SS, "SS", Outcome.CONFIRMED),  # a ball keeps to its branch
+        (2.6, Case.NR, "NR", Outcome.CONFIRMED),
+        (2.6, Case.SS, "NR", Outcome.REFUTED),
+        (2.6, Case.NR, "SS", Outcome.REFUTED),
+        (1.7, Case.SS, "NR", Outcome.CONFIRMED),  # and leaves it where it has ended
+    ],
+)
+def test_a_ball_keeps_to_its_branch_of_the_loop(Omega_0: float, case: Case, before: str, outcome: Outcome) -> None:
+    """At 2.6 SS and NR last side by side."""
+    p = Parameters.named("reference").replace(mu=0.3)
+    q = p.replace(omega_0=Omega_0 / time_unit(p))
+    s = next(s for s in analytic.stable_solutions(q) if s.case is case)
+    at = {"case": case.name, "before": before, "side": "up", "level": 1.0}
+    values = {"case": (float(case), 0.0), "omega_c": (float(s.x[2]), 1e-9 * q.omega_0)}
+    rows = (measured("hysteresis", what, *value, q, "slipping", **at) for what, value in values.items())
+    assert _outcomes(Records(tuple(rows)))["fig-13-left"] is outcome
+
+
+def test_a_slope_of_a_state_that_theory_does_not_know_is_a_refutation() -> None:
+    p = Parameters.named("reference").replace(omega_0=24.0)
+    row = measured("slope", "slope", 1.0, 1e-6, p, by="neighbours", case="NR")
+    assert _outcomes(Records((row,)))["slope-rolling"] is Outcome.REFUTED
+
+
 class TestOthers:
     def test_slopes_are_one_for_what_follows_the_fluid(self, lab: Lab, records: Records) -> None:
-        measured = Records.of(characteristic.slope(lab, {"thick": THICK}, records))
-        by_case = {str(m.conditions["case"]): m for m in measured.measurements}
+        found = Records.of(characteristic.slope(lab, {"thick": THICK}, records))
+        by_case = {str(m.conditions["case"]): m for m in found.measurements}
         assert set(by_case) == {"RR", "SS", "NR"}
         for name in ("RR", "NR"):
             assert by_case[name].value == pytest.approx(1.0, abs=3 * by_case[name].uncertainty)
-        assert abs(by_case["SS"].value - 1.0) > 0.1
+        outcome_of = _outcomes(found)
+        assert outcome_of["slope-rolling"] is outcome_of["slope-slipping"] is Outcome.CONFIRMED
 
     def test_the_jump_is_looked_for_where_slipping_was_seen_to_begin(self, lab: Lab) -> None:
         known = thresholds("thick", THICK, "omega_01")
         (only,) = characteristic.slope(lab, {"thick": THICK}, known)
         assert isinstance(only, Measurement)
-        assert only.value == pytest.approx(-1.0, abs=3 * only.uncertainty)
+        assert _outcomes(Records((only,)))["slope-jump"] is Outcome.CONFIRMED
 
     def test_the_flow_is_raised_and_lowered(self, lab: Lab, records: Records) -> None:
-        measured = Records.of(characteristic.hysteresis(lab, {"thick": THICK}, records))
-        sides = {str(m.conditions["side"]) for m in measured.select("hysteresis", "case")}
+        found = Records.of(characteristic.hysteresis(lab, {"thick": THICK}, records))
+        sides = {str(m.conditions["side"]) for m in found.select("hysteresis", "case")}
         assert sides == {"up", "down"}
-        first, *_, last = measured.select("hysteresis", "case")
+        first, *_, last = found.select("hysteresis", "case")
         assert first.value == last.value == Case.RR
         assert last.conditions["before"] == "SS"
-        assert Case.NR in {Case(int(m.value)) for m in measured.select("hysteresis", "case")}
+        assert Case.NR in {Case(int(m.value)) for m in found.select("hysteresis", "case")}
 
     def test_no_loop_without_a_change_from_slipping_to_riding(self, lab: Lab) -> None:
         assert [type(row) for row in characteristic.hysteresis(lab, {"thick": THICK}, Records())] == [Missing]

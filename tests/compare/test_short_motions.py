@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cache
 from types import SimpleNamespace
@@ -15,13 +14,11 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.slipping import slip_stability
 from compare.claim import Outcome, Verdict
 from compare.judge import judge
-from compare.kit.lab import Lab, coarse_step, time_unit
+from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.record import Missing, Records
 from compare.kit.sets import sets
-from compare.kit.settling import family
 from compare.kit.short import random_state
-from compare.kit.statistics import settled_case
 from compare.kit.tasks import Task
 from compare.subjects.formal import claims as formal
 from compare.subjects.motion import claims as motion
@@ -31,7 +28,7 @@ from compare.subjects.slipping.measure import growth, onset
 from compare.subjects.thresholds.measure.thresholds import birth
 from model import Case, Parameters, Trajectory, storage
 from model.cases import TRAITS
-from tests.measured import thresholds, unnoticed
+from tests.measured import thresholds
 
 QUICK = sets(Level.QUICK)
 SETS = {"reference": QUICK["reference"]}
@@ -99,52 +96,6 @@ def test_the_right_theory_is_confirmed(measured: Measured, protocol: str, ids: s
         assert found["slip-RR-SR"].outcome in (Outcome.CONFIRMED, Outcome.NOT_RUN)  # the wall of this set slips, too
     if protocol == "motions":
         assert len({check.predicted for check in found["cases"].checks}) >= 7
-
-
-@pytest.mark.parametrize(
-    ("protocol", "functions"),
-    [
-        ("field", tuple(f"dynamics.{case}" for case in ("_rs", "_sr", "_nr", "_ns", "_rn", "_sn"))),
-        ("growth", ("gamma", "slip_rates")),
-        ("bounds", ("rr_to_rs_stationary", "nr_to_ns")),
-        ("lift", ("lift_acceleration",)),
-        ("impacts", ("collide",)),
-    ],
-)
-def test_wrong_theories_are_noticed(measured: Measured, protocol: str, functions: tuple[str, ...]) -> None:
-    claims = motion.LAWS + motion.EQUATIONS + slipping.CLAIMS
-    assert not unnoticed(claims, measured(protocol), *functions)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("end", "inner", "beyond"),
-    [("omega_01", Case.RR, Case.SS), ("omega_03", Case.RR, Case.NR), ("omega_02", Case.NR, Case.NS)],
-)
-def test_slight_slips_all_round_die_out_where_rolling_is_stable(lab: Lab, end: str, inner: Case, beyond: Case) -> None:
-    """The ball comes back to rolling on one side of the flow at which rolling ends, and slips for good on the other."""
-    k, golden = np.arange(8) + 0.5, np.pi * (1 + 5**0.5)
-    if inner is Case.NR:
-        directions = np.stack([0 * k, np.sin(k * np.pi / 4), np.cos(k * np.pi / 4)], axis=-1)
-    else:  # Fibonacci's lattice on the sphere
-        flat = np.sqrt(1 - (1 - k / 4) ** 2)
-        directions = np.stack([flat * np.cos(golden * k), flat * np.sin(golden * k), 1 - k / 4], axis=-1)
-    tasks = []
-    # With eta < j rolling at both points ends by slip, else by lift.
-    shown = {"omega_01": lambda p: p.eta < p.j, "omega_03": lambda p: p.eta > p.j}.get(end, lambda p: True)
-    for p in filter(shown, QUICK.values()):
-        for side in (0.97, 1.03):
-            q = p.replace(omega_0=side * getattr(analytic.thresholds(p), end))
-            # The fluid has to bring back what the slip has taken; on the wall there is room to slip down.
-            step, lasts = coarse_step(q) / 2, 10 * time_unit(q) if inner is Case.NR else 8 / q.c
-            x = analytic.solution(q, inner, formal=True).x + (inner is Case.NR) * 10 * q.R * np.eye(8)[0]
-            for n in directions:
-                slip = 0.02 * math.sqrt(q.g * q.R) / q.r * np.array([0, 0, 0, *n, 0, 0])
-                tasks.append(lab.task(q, x + slip, 64 * step * math.ceil(lasts / step / 64), step, samples=64))
-    assert len(tasks) >= 2 * 3 * 8
-    for task, run in zip(tasks, lab.run(tasks), strict=True):
-        stable = slip_stability.stability(inner, task.parameters) is slip_stability.SlipStability.STABLE
-        assert family(settled_case(run)) is (inner if stable else beyond), task
 
 
 def test_the_fold_is_born_at_the_critical_drag(lab: Lab) -> None:

@@ -44,13 +44,6 @@ def test_predictions_are_as_sure_as_they_say(records, monkeypatch):
         assert abs(one.value - finer.value) <= one.uncertainty
 
 
-@pytest.mark.parametrize(("claim", "other"), [("fig-13-right", {"eta": 1.01}), ("push", {"j": 1.02})])
-def test_claims_notice_other_friction_and_inertia(records, monkeypatch, claim, other):
-    right, changed = analytic.simulate, {name: factor * getattr(P, name) for name, factor in other.items()}
-    monkeypatch.setattr(analytic, "simulate", lambda p, *args, **more: right(p.replace(**changed), *args, **more))
-    assert {v.claim.id: v.outcome for v in judge(UNLOADING, records)}[claim] is Outcome.REFUTED
-
-
 def test_first_top_lies_between_samples():
     run = analytic.simulate(P, [0.05, 1.0, 0, 0, 0, 0, 0.01, 0], 0.5, sample_interval=0.01)
     fine = analytic.simulate(P, [0.05, 1.0, 0, 0, 0, 0, 0.01, 0], 0.5, sample_interval=1e-4)
