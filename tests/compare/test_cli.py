@@ -423,7 +423,6 @@ def test_bad_inputs_drawn_from_the_parsers(
         ("search --range mu=-1:1", "mu = -1"),
         ("basins --across omega=5:45:2 --up slip_x=0:1:2", "unknown state variable 'omega'"),
         ("league --engine mujco", "did you mean 'mujoco'?"),
-        ("league --engine no.such -o .", "nothing to compare: no.such can't be used: ModuleNotFoundError"),
         ("grade nowhere.xml", "there is no such file"),
         ("grade --engine event", "event has no time step"),
         ("grade --engine time-stepping --solimp 0.9", "of time-stepping only --timestep can be given"),

@@ -123,6 +123,8 @@ def test_the_league_of_theory_alone(tmp_path, capsys):
     page = (tmp_path / "league.html").read_text("utf-8")
     assert "data:image/svg+xml,<" in page
     assert "only for a ball in a vessel" in page
+    assert cli.main(["league", "--engine", "no.such", "-o", str(tmp_path), "--quiet"]) == 2
+    assert "nothing to compare: no.such can't be used: ModuleNotFoundError: No module" in capsys.readouterr().err
 
 
 def test_the_set_as_files(tmp_path, capsys):
