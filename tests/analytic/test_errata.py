@@ -203,6 +203,11 @@ def test_documents_name_what_exists(document: str) -> None:
         assert f"def {name}(" in everything, name
     for module, name in re.findall(r"`(\w+)\.(?!py`)(\w+)`", text):
         source = next(
-            (s for path, s in sources.items() if path.name == f"{module}.py" and "tests" not in path.parts), ""
+            (
+                s
+                for path, s in sources.items()
+                if path.name == f"{module}.py" and path.relative_to(root).parts[0] != "tests"
+            ),
+            "",
         )
         assert re.search(rf"^(def |class )?{name}\b", source, re.MULTILINE), f"{module}.{name}"
