@@ -452,7 +452,12 @@ def tables(f: Forecast) -> list[tuple[str, list[list[str]]]]:
     return [(title, rest), ("In motion", motion)]
 
 
+def changed(f: Forecast, after: Forecast) -> tuple[str, list[list[str]]]:
+    """Title and table of what the change was for, after it."""
+    return "After the change", tables(after)[bool(f.change and f.change.quantity == "largest_step")][1]
+
+
 def html(f: Forecast, after: Forecast | None, file: str) -> str:
     """The forecast, and that after the change, as one self-contained page."""
-    shown = tables(f) + ([("After the change", tables(after)[0][1])] if after else [])
+    shown = tables(f) + ([changed(f, after)] if after else [])
     return pages.render("compare.bench", "forecast.html", file=file, tables=shown, sentences=list(sentences(f)))

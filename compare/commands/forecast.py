@@ -57,7 +57,7 @@ def foretold(args: argparse.Namespace) -> int:
     shown: list[Any] = [pages.table(title, rows, **LOOK) for title, rows in forecast.tables(found)]
     shown += [Text(f"• {line}") for line in forecast.sentences(found)]
     if after:
-        shown += [Text(""), pages.table("After the change", forecast.tables(after)[0][1], **LOOK)]
+        shown += [Text(""), pages.table(*forecast.changed(found, after), **LOOK)]
     options.show({"before": dataclasses.asdict(found), "after": after and dataclasses.asdict(after)}, args.json, *shown)
     limits = ("creep", "m/s", args.max_creep), ("depth", "m", args.max_depth)
     code = 0
