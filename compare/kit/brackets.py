@@ -69,7 +69,8 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     """Narrow every search down to its width, or as far as runs show it, all of them together, round by round.
 
     A round asks inside every bracket, and once more, for longer, where the run doesn't show the answer; one that breaks
-    down shows none. The new bracket is from the last yes before the first no to that no.
+    down shows none. The new bracket is from the last yes before the first no to the first no beyond which runs show all
+    answers.
 
     With `careful` the ends of the brackets are asked once more with half the time step: one that doesn't hold is as
     uncertain as the bracket before it was wide, see `Bracket.shift`.
@@ -103,8 +104,9 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             inside = slice(n * sections, (n + 1) * sections)
             ends = brackets[k].runs
             said, shown = [True, *answers[inside], False], [ends[0], *runs[inside], ends[1]]
-            no = said.index(False)
-            yes = max(m for m in range(no) if said[m])
+            yes = max(m for m in range(said.index(False)) if said[m])
+            open_ = [m for m, (answer, run) in enumerate(zip(said, shown, strict=True)) if answer is None and run]
+            no = said.index(False, max(open_, default=yes))
             by = tuple(tasks[inside][max(yes - 1, 0) : no])
             all_said = *brackets[k].said, *zip(values[k][1:-1], answers[inside], strict=True)
             new = Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by, said=all_said)
