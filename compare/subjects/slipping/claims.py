@@ -137,7 +137,7 @@ CLAIMS = (
                     if arrow == _NR_NS
                     else []
                 ),
-                _strays("growth", _along(arrow, "", "dragged", "rest", "sideways")),
+                _strays("growth", _along(arrow, "", "dragged", "sideways")),  # at rest RS and RN look the same
                 _strays("bounds", _along(arrow, "held", "stationary")),
             ),
         )
