@@ -128,7 +128,7 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it or it has no such keyframe.
     """
     if not path.is_file():
-        raise StorageError(f"cannot read {path}: there is no such file")
+        raise StorageError(f"cannot read {path}: {'it is a directory' if path.is_dir() else 'there is no such file'}")
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:

@@ -142,7 +142,7 @@ def read(path: Path) -> Native:
         If it is no MJCF, or lacks a ball or anything for it to pair.
     """
     if not path.is_file():
-        raise StorageError(f"cannot read {path}: there is no such file")
+        raise StorageError(f"cannot read {path}: {'it is a directory' if path.is_dir() else 'there is no such file'}")
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:

@@ -7,6 +7,7 @@ import dataclasses
 import json
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -182,6 +183,8 @@ def ranked(args: argparse.Namespace) -> int:
     with progress.shown(quiet=args.json or args.quiet) as show:
         found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)
     if all(result.skipped for results in found.values() for result in results):
+        with suppress(OSError):  # it holds what was there before
+            args.output.rmdir()
         raise InputError(f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}")
     data = league.to_mapping(found)
     write_text(args.output / JSON, json.dumps(data, indent=1))
