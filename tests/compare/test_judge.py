@@ -138,4 +138,4 @@ def test_a_set_of_ones_own_need_not_show_what_refutes_a_claim():
 
 
 def test_what_is_not_run_says_why():
-    assert "about" in str(judge([claim()], measured(1.0, FINE, "v_y"))[0].missing[0])
+    assert "no number bears on" in str(judge([claim()], measured(1.0, FINE, "v_y"))[0].missing[0])
