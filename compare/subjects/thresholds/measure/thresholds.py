@@ -231,7 +231,8 @@ def lifts(end: Bracket) -> bool:
     """Whether two-point rolling ends by lifting off: the floor carries no more than what hovers, and the wall holds.
 
     Just below omega_03 the floor carries as little, but rolling may end there by slip at both contacts, which is as
-    fast at one as at the other. Before a ball lifts off, it slips on the floor alone.
+    fast at one as at the other, and lasts. A ball that lifts off slips on the floor alone before, or rolls on the wall
+    in the end.
     """
     if (run := end.runs[1]) is None:
         return False
@@ -239,8 +240,8 @@ def lifts(end: Bracket) -> bool:
     unloaded = bool(run.force_A[tail(run), 1].mean() < PRESSES * p.m * p.g)
     lifted = [case.A is Contact.N for case in run.cases]
     on = slice(0, lifted.index(True) if any(lifted) else None)
-    floor, wall = (float(speeds[on].max(initial=0.0)) for speeds in sliding_speeds(run))
-    return unloaded and wall <= max(floor / 2, SLIPPING_SPEED * math.sqrt(p.g * p.R))
+    floor, wall = sliding_speeds(run)
+    return unloaded and bool(slip(wall, run) < 1 or wall[on].max(initial=0.0) <= floor[on].max(initial=0.0) / 2)
 
 
 def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
