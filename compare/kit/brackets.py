@@ -105,8 +105,8 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             ends = brackets[k].runs
             said, shown = [True, *answers[inside], False], [ends[0], *runs[inside], ends[1]]
             yes = max(m for m in range(said.index(False)) if said[m])
-            open_ = [m for m, (answer, run) in enumerate(zip(said, shown, strict=True)) if answer is None and run]
-            no = said.index(False, max(open_, default=yes))
+            undecided = [m for m, (answer, run) in enumerate(zip(said, shown, strict=True)) if answer is None and run]
+            no = said.index(False, max(undecided, default=yes))
             by = tuple(tasks[inside][max(yes - 1, 0) : no])
             all_said = *brackets[k].said, *zip(values[k][1:-1], answers[inside], strict=True)
             new = Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by, said=all_said)

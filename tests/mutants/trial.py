@@ -47,7 +47,7 @@ _PAGE = """\
 # What the verdicts notice
 
 Every verdict must be able to be lost. Here the theory is replaced by slightly wrong ones, one at a time,
-and measurements stored at the levels {levels} are judged again{until}.
+and stored measurements ({levels}) are judged again{until}.
 Then MuJoCo is replaced by slightly wrong engines that measure anew. A fault is noticed if the verdict on a claim
 changes. A prediction that takes longer than {patience:g} s of processor time is given up: its claim says nothing of the
 fault, and faults that hang some claim are counted apart.

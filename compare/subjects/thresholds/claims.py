@@ -1,7 +1,4 @@
-"""Claims about the bifurcations over omega_0: Table 5, Proposition 7, and the branch that divides two attractors.
-
-No ball can show Fig. 12, or (83) for eta > 1, since a contact would have to pull: they are checked by algebra alone.
-"""
+"""Claims about the bifurcations over omega_0: Table 5, Proposition 7, and the branch that divides two attractors."""
 
 from __future__ import annotations
 
