@@ -18,8 +18,7 @@ from compare.judge import forget, select
 from compare.kit import programme
 from compare.kit.campaign import Campaign
 from compare.kit.drawing import Material
-from compare.kit.engines import MUJOCO, Engine
-from compare.kit.engines import engine as engine_of
+from compare.kit.engines import WITNESSES, Engine
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.progress import Show, Whole, nowhere
@@ -40,7 +39,7 @@ def validate(
     level: Level = Level.DEFAULT,
     claims: Sequence[str] | None = None,
     sets: Mapping[str, Parameters] | None = None,
-    engine: Engine = MUJOCO,
+    engine: Engine | None = None,
     workers: int | Workers = 1,
     limit: float = math.inf,
     progress: Show = nowhere,
@@ -57,7 +56,7 @@ def validate(
     level : how much is measured
     claims : ids; all that the level measures for None
     sets : parameter sets by name; those of the level for None
-    engine : the engine on trial; the witnesses beside it are `Engine.beside`
+    engine : the engine on trial, alone; MuJoCo and the witnesses beside it for None
     workers : number of processes, or `Workers` of another kind
     limit : longest real time a run may take, s
     progress, announce : called with how far it is, and with every verdict
@@ -74,7 +73,7 @@ def validate(
     results.open_directory(output)
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
     todo = [protocol for protocol in programme.needed(PROTOCOLS, names) if protocol.level <= level]
-    engines = [engine, *map(engine_of, engine.beside)]
+    engines = [engine] if engine else [*WITNESSES]
     testimony = {each.name: dict.fromkeys(each.refine, Records()) for each in engines}
     broken, judged = dict[str, str](), dict[str, Future[Verdict]]()
 
@@ -102,7 +101,7 @@ def validate(
             whole.measured(name)
             if isinstance(found, Records):
                 testimony[lab.engine.name][lab.refine] += found
-            elif lab.engine is engine:  # a protocol that breaks down takes its own claims with it, and no others
+            elif lab.engine is engines[0]:  # a protocol that breaks down takes its own claims with it, and no others
                 broken[protocol.name] = f"{protocol.name}: {type(found).__name__}: {found}"
             else:
                 why = Missing(protocol.name, "all", f"{name}: {type(found).__name__}: {found}")

@@ -64,8 +64,12 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--restitution", type=number, help=restitution)
 
 
-def add_engine_name(parser: argparse._ActionsContainer) -> None:
-    """The option that chooses an engine."""
+def add_engine_name(
+    parser: argparse._ActionsContainer,
+    default: engines.Engine | None = engines.MUJOCO,
+    usual: str = "analytic is event; default mujoco",
+) -> None:
+    """The option that chooses an engine; `usual` says what is if none is named."""
 
     def engine(name: str) -> engines.Engine:
         try:
@@ -75,9 +79,9 @@ def add_engine_name(parser: argparse._ActionsContainer) -> None:
 
     known = (
         "mujoco has corrections between its steps, mujoco-plain none, mujoco-defaults is MuJoCo as it comes; others: "
-        f"{', '.join(list(engines.ENGINES)[3:])} (analytic is event; default mujoco)"
+        f"{', '.join(list(engines.ENGINES)[3:])} ({usual})"
     )
-    parser.add_argument("--engine", type=engine, default=engines.MUJOCO, metavar="NAME", help=known)
+    parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)
 
 
 def settings(args: argparse.Namespace, p: Parameters) -> Settings:

@@ -32,7 +32,7 @@ def add(commands: options.Commands) -> None:
     own = command.add_mutually_exclusive_group()
     own.add_argument("--set", metavar="NAME", help=f"one set instead of many: {', '.join(Parameters.names())}")
     own.add_argument("--parameters", type=Path, help="your own set, a TOML file, instead of many")
-    running.add_engine_name(command)
+    running.add_engine_name(command, None, "only this one is heard; default: the first three")
     command.add_argument("--list", action="store_true", help="list the claims and stop")
     running.add_workers(command)
 

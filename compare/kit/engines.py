@@ -66,8 +66,6 @@ class Engine:
     allowance: float = 0.0
     """Share of its scale by which a number may be off, chosen before anything was measured so; 0 where each measurement
     has a tolerance of its own."""
-    beside: tuple[str, ...] = ()
-    """Engines that measure beside it, as further witnesses, when it is on trial."""
     mark: str
     """Marker of matplotlib."""
 
@@ -178,7 +176,6 @@ MUJOCO = Engine(
     as_it_comes="mujoco-defaults",
     title="MuJoCo with corrections between its steps",
     about="they make rigid stationary states exact by construction; measured at two time steps of at most 4 and 2 ms",
-    beside=("mujoco-plain", "mujoco-defaults"),
     mark="o",
 )
 PLAIN = replace(
@@ -189,7 +186,6 @@ PLAIN = replace(
     stream=_unwarned,
     title="MuJoCo without corrections, in the limit of no time step",
     about="the same joints and contact settings, nothing between the steps but drag and the wall's tangent plane",
-    beside=(),
     refine=(1, 2, 3, 4),
     mark="P",
 )
@@ -198,7 +194,6 @@ NEWCOMER = replace(
     name="mujoco-defaults",
     title="MuJoCo as it comes",
     about="a free ball in flat facets, MuJoCo's own parameters, 2 ms; confirmed is what is off by no more than 5 %",
-    beside=(),
     refine=(2,),
     allowance=0.05,
     configure=lambda given, p: as_it_comes(given.get("timestep", 2e-3)),
@@ -229,7 +224,9 @@ _OTHERS = (
     *_adapted(drake, Library("drake", "pydrake.all"), "D+"),
     *_adapted(siconos, siconos.LIBRARY, "p2"),
 )
-ENGINES: dict[str, Engine] = {each.name: each for each in (MUJOCO, PLAIN, NEWCOMER, EVENT, MOREAU, *_OTHERS)}
+WITNESSES = (MUJOCO, PLAIN, NEWCOMER)
+"""Who is heard of a claim where no engine is named: the one on trial, and two beside it."""
+ENGINES: dict[str, Engine] = {each.name: each for each in (*WITNESSES, EVENT, MOREAU, *_OTHERS)}
 """Every engine by name."""
 
 

@@ -85,6 +85,14 @@ def test_one_failure_takes_its_own_claim_only(tmp_path: Path, counted: list[str]
     assert (tmp_path / results.REPORT).exists()
 
 
+def test_an_engine_that_is_named_is_heard_alone(tmp_path: Path, counted: list[str]) -> None:
+    for engine, heard in ((None, ["mujoco", "mujoco-plain", "mujoco-defaults"]), (MUJOCO, ["mujoco"])):
+        (said,) = validation.validate(
+            tmp_path, level=Level.QUICK, sets=SETS, workers=0, engine=engine, claims=["of-round"]
+        )
+        assert [witness.engine for witness in said.witnesses] == heard
+
+
 def test_what_needs_a_broken_protocol_is_not_measured_without_it(
     tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
