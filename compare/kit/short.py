@@ -34,12 +34,13 @@ def slip_unit(p: Parameters) -> float:
     return p.g / p.r * (1 + p.j) / p.j
 
 
-def lag_error(p: Parameters) -> float:
+def lag_error(p: Parameters, refine: int = 1) -> float:
     """Least uncertainty of a force divided by the weight, which halving the step may by chance not show.
 
-    Half the square of the lag `LAG` in units of `time_unit`: the second order, once the first is extrapolated.
+    Half the square of the lag `LAG` in units of `time_unit`: the second order, once the first is extrapolated. The
+    steps of `REFINED` may be divided by `refine`.
     """
-    return (LAG * coarse_step(p) / REFINED / time_unit(p)) ** 2 / 2
+    return (LAG * coarse_step(p) / (REFINED * refine) / time_unit(p)) ** 2 / 2
 
 
 def polynomials(time: Array, values: Array, degrees: tuple[int, int], at: float = 0.0) -> tuple[Array, Array]:

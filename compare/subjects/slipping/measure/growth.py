@@ -97,11 +97,11 @@ class Push:
             return BESIDE
         return SMALL if self.outer in (Case.RS, Case.SR) else LARGE
 
-    def pair(self, lab: Lab, size: float) -> list[Task]:
-        """The runs with one size of slip, in units of `start_unit`, with either step."""
+    def pair(self, lab: Lab, size: float, refine: int = 1) -> list[Task]:
+        """The runs with one size of slip, in units of `start_unit`, with either step, each divided by `refine`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
-        return lab.pair(p, x, STEPS, coarse_step(p) / REFINED)
+        return lab.pair(p, x, STEPS * refine, coarse_step(p) / (REFINED * refine))
 
     def tasks(self, lab: Lab) -> list[Task]:
         """The pairs of every size."""

@@ -152,10 +152,10 @@ def _points(
     it is uncertain by what the step and the degree of the polynomials change, and nan if the case was another or a run
     broke down, which the strays say.
     """
-    tasks = []
+    tasks, refine = [], lab.effort("bounds.refined")
     for push in (push for pushes in rows for push in pushes):
         large_size, small_size = MEDIUM if push.inner is Case.NR else push.sizes
-        tasks.append([*push.pair(lab, large_size), push.pair(lab, small_size)[1]])
+        tasks.append([*push.pair(lab, large_size, refine), push.pair(lab, small_size, refine)[1]])
     runs, todo = lab.groups(tasks), iter(tasks)
     for pushes in rows:
         points, own = [], [next(todo) for _ in pushes]
@@ -171,7 +171,7 @@ def _points(
                 strays.append(stray)
             coarse, large, small = (push.rates(run) for run in records)
             best, change = without_size(np.array([large, small])), (large - coarse)[0]
-            noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p) * slip_unit(p))
+            noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p, refine) * slip_unit(p))
             points.append((p.omega_0, best[0] + change * LIMIT, noise))
         tasks_of_row = [task for each in own for task in each]
         yield np.reshape(points, (-1, 3)).T, tasks_of_row, strays
