@@ -132,10 +132,7 @@ class _Simulator:
 
     def _follow(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
         """One case up to the first guard or `until`; samples are recorded even if it is interrupted."""
-        if case is Case.RR:
-            motion = two_point_rolling.chart(at, self.p, fluid, self.settings.leave_rolling)
-        else:
-            motion = charts.chart(case, at, self.p, fluid, self.settings.rtol)
+        motion = charts.chart(case, at, self.p, fluid, self.settings.rtol, self.settings.leave_rolling)
         lands, until = motion.landing <= until, min(until, motion.landing)
         times, states = [at.time], [motion.start]
         sampled, guard = [self.recorder.taken == 0], None

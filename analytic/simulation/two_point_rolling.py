@@ -1,14 +1,13 @@
 """Motion in RR, with Stokes' drag in closed form, and the moment when it ends.
 
 There (23) is linear, omega_c' = -k (omega_c - omega_0) with k = c/(1+2j), and omega_0 is a line and waves between the
-breakpoints of the flow; `chart` is for the other laws. What RR leaves open is its forces: where it ends is the choice
+breakpoints of the flow; `charts` has the other laws. What RR leaves open is its forces: where it ends is the choice
 of `Settings.leave_rolling`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -16,8 +15,8 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from analytic.mechanics import drag, rolling_forces
-from analytic.simulation.motion import Chart, Fluid, Moment, Path, natural_units
-from model import Case, Parameters, State
+from analytic.simulation.motion import Fluid, Moment, Path
+from model import Parameters, State
 from model.arrays import Array
 
 _SCAN = 256
@@ -85,19 +84,3 @@ def end(at: Moment, until: float, p: Parameters, omega_0: Fluid, leave_rolling: 
             ends = times[first - 1], times[first]
             return float(brentq(value, *ends, xtol=4 * math.ulp(until), rtol=4 * math.ulp(1.0)))
     return None
-
-
-def chart(at: Moment, p: Parameters, omega_0: Fluid, leave_rolling: str) -> Chart:
-    """Coordinates (theta, omega_c, work) and rates (23) for any law of drag."""
-    margin, (T, _, _, E) = MARGINS[leave_rolling], natural_units(p)
-
-    def rates(t: float, z: Sequence[float]) -> list[float]:
-        omega_c, lag = z[1], z[1] - omega_0(t)
-        pull = -drag.coefficient(p.R * abs(lag), p) * lag
-        return [omega_c, pull / (1 + 2 * p.j), p.m * p.R**2 * pull * omega_c]
-
-    def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
-        return (float(margin(z[1], p, omega_0(t))),)
-
-    start = [at.theta, at.x.omega_c, at.work]
-    return Chart(Case.RR, start, [1.0, 1 / T, E], rates, ("RR ends",), guards, lambda t, z: _path(t, *z))

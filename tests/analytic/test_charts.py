@@ -49,10 +49,7 @@ def test_rates_are_those_of_the_vector_field(case, law):
     p = P.replace(drag=law, nu_f=1e-5)
     for seed in range(20):
         at = moment(case, seed)
-        if case is Case.RR:
-            chart = two_point_rolling.chart(at, p, ramp, "infeasible")
-        else:
-            chart = charts.chart(case, at, p, ramp, FLOOR)
+        chart = charts.chart(case, at, p, ramp, FLOOR, "infeasible")
         rate = np.array(chart.rates(at.time, chart.start))
         step = 1e-7
         t, z = at.time + step * np.array([-1.0, 0, 1]), np.array(chart.start)[:, None]
@@ -86,7 +83,7 @@ def test_vanishing_slip_has_a_direction(case):
     if case.B is Contact.S:
         x = x._replace(slip_y=0.0, slip_z=0.0)
     at = motion.Moment(at.time, at.theta, x, at.alpha, at.beta)
-    chart = charts.chart(case, at, P, ramp, FLOOR)
+    chart = charts.chart(case, at, P, ramp, FLOOR, "infeasible")
     assert chart.least_slip(chart.start) == pytest.approx(0.0, abs=1e-15)
     path = chart.path(np.array([at.time]), np.array(chart.start)[:, None])
     for given, kept in ((at.alpha, path.alpha[0]), (at.beta, path.beta[0])):

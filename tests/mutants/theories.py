@@ -349,15 +349,19 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "landings with 5 % more floor friction": given(other(mu=1.05)),
     },
     "simulation.transitions.choose": {"after an event μ and η are exchanged": given(swapped)},
-    "simulation.charts._rates": {"motions with one slip have 2 % more inertia": given(other(j=1.02))},
-    "simulation.charts._one_slip": {"one contact slips with 3 % more floor friction": given(other(mu=1.03))},
-    "simulation.charts._ss": {"both contacts slip with 3 % more wall friction": given(other(eta=1.03))},
-    "simulation.charts._off_floor": {"off the floor there is 3 % more drag": given(other(c=1.03))},
-    "simulation.charts._rn": {"rolling off the wall with 5 % more drag": given(other(c=1.05))},
-    "simulation.charts._sn": {"slipping off the wall with 3 % more friction": given(other(mu=1.03))},
-    "simulation.charts._nn": {
-        "flight with 5 % more drag": given(other(c=1.05)),
-        "flight with 1 % less weight": given(other(g=0.99)),
+    "simulation.charts._at_wall": {
+        "motions at the wall have 2 % more inertia": given(other(j=1.02)),
+        "one contact slips with 3 % more floor friction": where(
+            lambda case: case in (Case.RS, Case.SR), given(other(mu=1.03))
+        ),
+        "both contacts slip with 3 % more wall friction": in_case(Case.SS, given(other(eta=1.03))),
+        "off the floor there is 3 % more drag": where(lambda case: case in (Case.NR, Case.NS), given(other(c=1.03))),
+    },
+    "simulation.charts._away_from_wall": {
+        "rolling off the wall with 5 % more drag": in_case(Case.RN, given(other(c=1.05))),
+        "slipping off the wall with 3 % more friction": in_case(Case.SN, given(other(mu=1.03))),
+        "flight with 5 % more drag": in_case(Case.NN, given(other(c=1.05))),
+        "flight with 1 % less weight": in_case(Case.NN, given(other(g=0.99))),
     },
     "simulation.two_point_rolling.omega_c": {"two-point rolling with 5 % more drag": given(other(c=1.05))},
     "simulation.two_point_rolling.end": {"two-point rolling ends with 5 % more floor friction": given(other(mu=1.05))},
