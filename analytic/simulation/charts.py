@@ -32,28 +32,25 @@ from model.arrays import Array
 from model.drag import STOKES
 from model.kinematics import SLIP_XYZ
 
+_LOADS: dict[str, Callable[[Forces, Parameters], float]] = {
+    "A slips": lambda f, p: p.mu * f.A_y - math.hypot(f.A_x, f.A_z),
+    "B slips": lambda f, p: p.eta * f.B_x - math.hypot(f.B_y, f.B_z),
+    "A lifts": lambda f, p: f.A_y,
+    "B opens": lambda f, p: f.B_x,
+}
+"""Forces in N that are positive until a contact slips or opens."""
 _ENDS = {
     Case.RR: ("RR ends",),
     Case.RS: ("B sticks", "A slips"),
     Case.SR: ("A sticks", "B slips", "A lifts"),
     Case.SS: ("A sticks", "B sticks", "A lifts", "B opens"),
-    Case.NR: ("B slips", "A lands"),
-    Case.NS: ("B sticks", "A lands"),
+    Case.NR: ("A lands", "B slips"),
+    Case.NS: ("A lands", "B sticks"),
     Case.RN: ("A slips", "B lands"),
     Case.SN: ("A sticks", "B lands"),
     Case.NN: ("B lands", "A lands"),
 }
-"""What can end each case."""
-_LEFT: dict[str, Callable[[State, Forces, Sequence[float], Parameters], float]] = {
-    "A sticks": lambda x, f, slips, p: p.r * slips[0] / math.sqrt(p.g * p.R),
-    "B sticks": lambda x, f, slips, p: p.r * slips[-1] / math.sqrt(p.g * p.R),
-    "A slips": lambda x, f, slips, p: (p.mu * f.A_y - math.hypot(f.A_x, f.A_z)) / (p.m * p.g),
-    "B slips": lambda x, f, slips, p: (p.eta * f.B_x - math.hypot(f.B_y, f.B_z)) / (p.m * p.g),
-    "A lifts": lambda x, f, slips, p: f.A_y / (p.m * p.g),
-    "B opens": lambda x, f, slips, p: f.B_x / (p.m * p.g),
-    "A lands": lambda x, f, slips, p: x.y / p.R,
-}
-"""How far a ball at the wall is from that, in natural units, by state, forces and speeds of slip in rad s-1."""
+"""What can end each case; at the wall what the coordinates show first, then what forces do."""
 
 
 def chart(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float, leave_rolling: str) -> Chart:
@@ -80,6 +77,9 @@ def _at_wall(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float
         scale += [w] + [1.0] * turns
     line = [(math.copysign(1.0, math.sin(angle)), 0.0) for _, angle, _ in slips]
     """Direction of a slip that keeps to one."""
+    coordinates = {"A lands": 1, "A sticks": first, "B sticks": len(start) - 1 - turns}
+    shown = [coordinates[end] for end in _ENDS[case] if end in coordinates]
+    loads = [_LOADS[end] for end in _ENDS[case] if end in _LOADS]
 
     def at_z(z: Any, sin: Any = math.sin, cos: Any = math.cos) -> tuple[State, Any, list[dynamics.Direction]]:
         """The state, and speed and direction of each slip."""
@@ -115,16 +115,18 @@ def _at_wall(case: Case, at: Moment, p: Parameters, omega_0: Fluid, floor: float
     def guards(t: float, z: Sequence[float]) -> tuple[float, ...]:
         if case is Case.RR:
             return (float(MARGINS[leave_rolling](z[1], p, omega_0(t))),)
-        x, speeds, along = at_z(z)
-        f = forces(t, x, along)
-        return tuple([_LEFT[end](x, f, speeds, p) for end in _ENDS[case]])
+        near = [z[k] / scale[k] for k in shown]
+        if loads:
+            x, _, along = at_z(z)
+            f = forces(t, x, along)
+            near += [load(f, p) / (p.m * p.g) for load in loads]
+        return tuple(near)
 
     def path(t: Array, z: Array) -> Path:
         x, *_ = at_z(z, np.sin, np.cos)
-        angles = dict(
-            zip((k for k, *_ in slips), z[first + 1 : -1 : 2] if turns else (a for _, a, _ in slips), strict=True)
-        )
-        alpha, beta = (angles.get(k, math.nan) + np.zeros_like(t) for _, k, *_ in points)
+        angles = z[first + 1 : -1 : 2] if turns else [angle for _, angle, _ in slips]
+        own = {k: angle for (k, *_), angle in zip(slips, angles, strict=True)}
+        alpha, beta = (own.get(k, math.nan) + np.zeros_like(t) for _, k, *_ in points)
         return Path(t, z[0], x.stacked(), alpha, beta, z[-1])
 
     own = tuple(range(first, len(start), 2)) if turns else ()
