@@ -20,7 +20,8 @@ from analytic.flowmeter.characteristic import (
 )
 from analytic.mechanics.dynamics import contact_forces, vector_field
 from analytic.simulation.ensemble import Ensemble, simulate_many
-from analytic.simulation.simulator import Settings, simulate
+from analytic.simulation.settings import Settings
+from analytic.simulation.simulator import simulate
 from analytic.slipping.slip_stability import SlipStability
 from analytic.stationary.solutions import (
     Stability,

@@ -16,7 +16,8 @@ from scipy.optimize import brentq
 
 from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import drag
-from analytic.simulation.simulator import Settings, simulate
+from analytic.simulation.settings import Settings
+from analytic.simulation.simulator import simulate
 from analytic.simulation.two_point_rolling import MARGINS
 from analytic.slipping import slip_bounds
 from model import Case, Flow, Parameters, SimulationError, State

@@ -27,7 +27,7 @@ from then on. Where that fails, it starts again from zero and from damped sweeps
 
 A solution exists where mu < 1 or eta < 1 (Acary, Cadoux, Lemarechal & Malick, ZAMM 91 (2011) 155: the ball can move so
 that v_n - target > friction * |v_t| at both contacts). Where both are greater, floor and wall can lock the ball in the
-corner, so that no impulses meet a target > 0; `unlocked` is for those. Where mu > 1, sticking and slipping may both
+corner, so that no impulses meet a target > 0, but some a target of 0. Where mu > 1, sticking and slipping may both
 obey the law. The solution found is then the one near the first guess: with the impulses of the last step the ball goes
 on rolling until no impulses near the present ones hold it.
 
@@ -136,16 +136,6 @@ def solve(
         at_B = project(b, eta)
     P = Forces(*(p.m * each for each in (at_A.s, at_A.n, at_A.t, *at_B)))
     return rigid_body.apply(free, P, p), P
-
-
-def unlocked(error: NotConvergedError, p: Parameters) -> Closed:
-    """The target of a contact when no impulses make both rebound: to stay closed.
-
-    Raises the error again if friction can't have locked the ball.
-    """
-    if p.mu < 1 or p.eta < 1:
-        raise error
-    return Closed()
 
 
 def project(need: Impulse, friction: Friction) -> Impulse:

@@ -23,7 +23,8 @@ from analytic.orbits import periodic as orbits
 from analytic.orbits.periodic import NoOrbitError, Orbit, extent, lands, scale
 from analytic.simulation.ensemble import interval, random_starts, simulate_many
 from analytic.simulation.motion import natural_units
-from analytic.simulation.simulator import Settings, fitting_step, simulate
+from analytic.simulation.settings import Settings, fitting_step
+from analytic.simulation.simulator import simulate
 from analytic.stationary.solutions import StationarySolution, stable_solutions
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array

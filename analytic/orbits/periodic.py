@@ -21,7 +21,8 @@ from scipy.integrate import solve_ivp
 
 from analytic.mechanics import dynamics
 from analytic.simulation.motion import natural_units
-from analytic.simulation.simulator import Settings, simulate
+from analytic.simulation.settings import Settings
+from analytic.simulation.simulator import simulate
 from model import Case, Contact, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS

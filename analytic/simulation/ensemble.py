@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analytic.simulation.simulator import Settings, sample_times, start_state
+from analytic.simulation.settings import Settings, sample_times, start_state
 from model import Flow, InputError, Parameters, State
 from model.arrays import Array
 from model.kinematics import TURNING, VARIABLES

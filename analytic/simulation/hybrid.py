@@ -17,7 +17,7 @@ from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import charts, transitions, two_point_rolling
 from analytic.simulation.integrator import StalledError, Stretch
 from analytic.simulation.motion import REPORT_EVERY, Event, Fluid, Moment, Path, Recorder, natural_units
-from analytic.simulation.simulator import Settings
+from analytic.simulation.settings import Settings
 from analytic.simulation.transitions import Shortest
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array

@@ -1,69 +1,21 @@
-"""Where simulations start: settings, checks of the arguments, choice of the method; and two motions of the paper."""
+"""One simulation, by the method that its settings name; and two motions of the paper."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from analytic.bifurcation import diagram as bifurcation
-from analytic.mechanics import drag
 from analytic.simulation.motion import Recorder
+from analytic.simulation.settings import Settings, sample_times, start_state
 from analytic.stationary import solutions as stationary
-from model import Case, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory, time_scales
-from model.arrays import Array
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_names, check_number
-
-MAX_SAMPLES = 5e7
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """How to simulate.
-
-    Raises `InputError` if a value is out of range.
-    """
-
-    method: str = "event"
-    """``event``: integrate case by case and locate every change of case. ``time-stepping``: Moreau-Jean, see there."""
-    rtol: float = 1e-9
-    """Relative tolerance of the integrator (event); the absolute one is a thousandth of it in natural units: lengths in
-    R, times in sqrt(R/g), the ball's spin in that of a ball that rolls at sqrt(g R)."""
-    timestep: float | None = None
-    """Longest time step, s, at most half of `model.time_scales.shortest_time`; `fitting_step` of 500 if None
-    (time-stepping)."""
-    restitution: float = 0.0
-    """Newton's coefficient of restitution e of both contacts, 0 <= e <= 1. A ball that hops in the corner is slow
-    (event): a series of hops on the floor takes about ln(rtol)/ln(e) impacts, of which each takes about a millisecond,
-    and each hit of the wall, itself one of a series, starts another. At e = 0.9 there may be 1e4."""
-    leave_rolling: str = "slip-stability"
-    """When RR ends, whose forces are not determined (event). ``slip-stability``: as soon as a slight slip would last,
-    Definitions 1-3 (docs/theory.md, section 7). ``infeasible``: when no forces within both Coulomb cones hold it. On
-    the stationary orbit both are the same for mu <= 1; on rougher floors, and off it, the second is later."""
-    initial_impact: bool = False
-    """Let a ball that starts with a speed into a closed contact collide at once, instead of refusing it."""
-
-    def __post_init__(self) -> None:
-        check_choice("method", self.method, ("event", "time-stepping"))
-        check_choice("leave_rolling", self.leave_rolling, ("slip-stability", "infeasible"))
-        if not isinstance(self.initial_impact, bool):
-            raise InputError(f"initial_impact = {self.initial_impact!r} must be true or false")
-        check_number("rtol", self.rtol, "1", Range(100 * float(np.finfo(float).eps), 1e-2))
-        check_number("restitution", self.restitution, "1", Range(0.0, 1.0))
-        if self.timestep is not None:
-            check_number("timestep", self.timestep, "s", POSITIVE)
-
-
-def fitting_step(steps: float, p: Parameters, flow: Flow, t_end: float) -> float:
-    """sqrt(R/g)/`steps`, or the longest step that the times of a run of t_end s allow if that is shorter; s."""
-    shortest, _ = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p))
-    return min(math.sqrt(p.R / p.g) / steps, shortest / 2)
+from model import Case, Flow, Header, InputError, Parameters, SimulationError, Trajectory
+from model.parameters import check_names, check_number
 
 
 def simulate(
@@ -134,30 +86,6 @@ def simulate(
     if cause:
         raise SimulationError(failure, trajectory) from cause
     return trajectory
-
-
-def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
-    """The state at the start, or `InputError` if the ball can't be in it."""
-    x = State.one(x0)
-    check_number("y", x.y, "m", NOT_NEGATIVE, "to be above the floor it")
-    check_number("h", x.h, "m", Range(0.0, p.R, below=True), "to be between wall and axis it")
-    if not settings.initial_impact:
-        for place, gap, name, speed in (("floor", x.y, "v_y", x.v_y), ("wall", x.h, "v_h", x.v_h)):
-            if gap == 0:
-                meaning = f"touching the {place} and without initial_impact it"
-                check_number(name, speed, "m s-1", NOT_NEGATIVE, meaning)
-    return x
-
-
-def sample_times(t_end: float, interval: float | None) -> Array:
-    """Multiples of the interval, and t_end."""
-    t_end = check_number("t_end", t_end, "s", POSITIVE)
-    if interval is None:
-        return np.linspace(0.0, t_end, 1001)
-    meaning = f"for at most {MAX_SAMPLES:g} samples it"
-    interval = check_number("sample_interval", interval, "s", Range(t_end / MAX_SAMPLES), meaning)
-    count = math.ceil(t_end / interval * (1 - 4 * float(np.finfo(float).eps)))
-    return np.append(np.arange(count) * interval, t_end)
 
 
 def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> Trajectory:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,8 +14,12 @@ import numpy.typing as npt
 from analytic.mechanics import contact_problem, drag, rigid_body
 from analytic.mechanics.contact_problem import Friction, Impulse, both, project
 from analytic.mechanics.rigid_body import Forces, Velocities, mean
-from analytic.simulation.compiling import callable_when_compiled, compiled
 from model.arrays import Array
+
+try:
+    import numba
+except ImportError:
+    numba = None
 
 TOLERANCE, BARELY = 1e-14, 1e-11
 """Change of an impulse per mass at which sweeps stop, relative to sqrt(g R) or the fastest velocity; and where friction
@@ -34,7 +41,24 @@ ROLLS, SLIPS, OPEN = 0, 1, 2
 """State of a contact; three times that of A plus that of B is the code of the case, see `model.Case`."""
 
 
-callable_when_compiled(drag.rate, mean, rigid_body.state, *contact_problem.COMPILED)
+F = TypeVar("F", bound=Callable[..., Any])
+_SOURCES = contact_problem, drag, rigid_body
+_DIGEST = hashlib.sha256(b"".join(Path(str(source.__file__)).read_bytes() for source in _SOURCES)).hexdigest()[:16]
+if numba is not None:
+    for each in (drag.rate, mean, rigid_body.state, *contact_problem.COMPILED):
+        numba.extending.register_jitable(error_model="numpy")(each)
+
+
+def compiled(function: F) -> F:
+    """The function, compiled by numba (the extra `fast`) at its first call, so that threads can run it at once.
+
+    Numba keeps what it compiles on disk by name and compiles it again when this file has changed, but not when that of
+    a function has which it calls: the name contains the digest of those. Without numba the function itself, slower.
+    """
+    if numba is None:
+        return function
+    function.__qualname__ += f"_{_DIGEST}"
+    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
 class Constants(NamedTuple):

@@ -27,7 +27,7 @@ from analytic.mechanics.contact_problem import NotConvergedError
 from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import stepping
 from analytic.simulation.motion import Event, Recorder
-from analytic.simulation.simulator import Settings, fitting_step
+from analytic.simulation.settings import Settings, fitting_step
 from model import Case, Flow, Parameters, State, time_scales
 from model.arrays import Array
 

@@ -118,8 +118,10 @@ def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, short
     B = Closed(max(0.0, -restitution * x.v_h)) if x.h == 0 else None
     try:
         u, P = contact_problem.solve(before, A, B, p)
-    except NotConvergedError as error:
-        A = B = contact_problem.unlocked(error, p)
+    except NotConvergedError:
+        if p.mu < 1 or p.eta < 1:
+            raise
+        A = B = Closed()  # friction locks the ball in the corner: no rebound
         u, P = contact_problem.solve(before, A, B, p)
     work = at.work + rigid_body.contact_work(rigid_body.mean(before, u), P, p)
     v_h, v_y = B.target if B and P.B_x > 0 else u.v_h, A.target if A and P.A_y > 0 else u.v_y

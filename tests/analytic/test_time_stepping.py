@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from analytic import Settings, simulate, simulate_many
-from analytic.simulation.compiling import compiled, forget_stale
-from analytic.simulation.stepping import TOLERANCE, step
+from analytic.simulation.stepping import TOLERANCE, compiled, step
 from analytic.simulation.time_stepping import prepared
 from model import Case, Flow, InputError, Parameters, SimulationError, State
 
@@ -220,12 +219,3 @@ def test_compiled_and_not_are_the_same(tmp_path):
         subprocess.run([sys.executable, "-c", SCRIPT, file], check=True, env=os.environ | {"NUMBA_DISABLE_JIT": switch})
         results.append(np.load(file))
     np.testing.assert_allclose(results[0], results[1], rtol=1e-9, atol=1e-12)
-
-
-def test_what_was_compiled_from_other_sources_is_deleted(tmp_path):
-    source, kept = tmp_path / "called.py", tmp_path / "stepping.step-1.py311.nbi"
-    for text, compiles_again in (("a", True), ("a", False), ("b", True)):
-        source.write_text(text)
-        kept.write_text("")
-        forget_stale(tmp_path, [str(source)])
-        assert kept.exists() is not compiles_again

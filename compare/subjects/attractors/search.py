@@ -27,7 +27,7 @@ import numpy.typing as npt
 from analytic import Settings
 from analytic.orbits import fates
 from analytic.simulation.ensemble import interval
-from analytic.simulation.simulator import fitting_step, start_state
+from analytic.simulation.settings import fitting_step, start_state
 from compare.kit import pages
 from compare.kit.campaign import Campaign
 from compare.kit.engines import EVENT, MOREAU, MUJOCO
