@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.markdown import Markdown
 
 import analytic
 from analytic.orbits import orbit_branch
@@ -208,9 +207,11 @@ def searched(args: argparse.Namespace) -> int:
             searches = [search.run(args.output, asked, args.sets, running.workers(args), show)]
     if args.save:
         searches[0].save(args.save)
+    tables = [(search.summary(each), search.table(each)) for each in searches]
     if args.page:
-        write_text(args.page, search.page(*searches))
-    options.show([dataclasses.asdict(each) for each in searches], args.json, Markdown(search.page(*searches)))
+        write_text(args.page, "\n\n".join(f"{text}\n\n{pages.markdown(rows)}" for text, rows in tables) + "\n")
+    shown = (pages.table("Where the ball hops for ever", rows, caption=text) for text, rows in tables)
+    options.show([dataclasses.asdict(each) for each in searches], args.json, *shown)
     return 0
 
 

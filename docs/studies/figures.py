@@ -12,7 +12,7 @@ import matplotlib
 from compare.kit import drawing
 from compare.subjects.attractors.search import Basins, Searched
 from docs.studies import cases, hopping
-from model.files import make_directory
+from model.files import make_directory, write_text
 
 DOCS = Path(__file__).parents[1]
 DATA = DOCS / "studies" / "data"
@@ -26,7 +26,9 @@ def main() -> None:
     make_directory(DOCS / "cases")
     for name, draw in (("fig-2", cases.draw_2), ("fig-3", cases.draw_3), ("fig-6", cases.draw_6)):
         drawing.save(draw(), DOCS / "cases" / f"{name}.svg")
-    search, basins = Searched.load(SEARCHES[0]), Basins.load(DATA / "basins.json")
+    search, *others = map(Searched.load, SEARCHES)
+    write_text(DOCS / "hopping.md", hopping.page(search, *others))
+    basins = Basins.load(DATA / "basins.json")
     hopping.draw_where(search).savefig(DOCS / "attractors" / "where.png", dpi=110)
     drawing.save(hopping.draw_plane(basins), DOCS / "attractors" / "basins.png")
     print(hopping.caption_where(search), hopping.caption_plane(basins), sep="\n")

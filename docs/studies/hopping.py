@@ -10,9 +10,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from analytic.simulation.ensemble import interval
-from compare.kit import style
-from compare.subjects.attractors.search import FATES, LOGARITHMIC, Basins, Searched
+from compare.kit import pages, style
+from compare.subjects.attractors.search import FATES, LOGARITHMIC, Basins, Searched, share, summary, table
 from model.kinematics import UNITS, VARIABLES
 
 _PAIRS = (("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0"))
@@ -62,8 +61,22 @@ def caption_where(record: Searched) -> str:
 
 
 def _share(hits: int, of: int) -> str:
-    low, high = interval(hits, of)
-    return f"{100 * hits / of:.2f} % ({100 * low:.2f} to {100 * high:.2f} % with 95 % confidence)"
+    return "{:.2f} % ({:.2f} to {:.2f} % with 95 % confidence)".format(*share(hits, of))
+
+
+def page(*searches: Searched) -> str:
+    """The page on searches: how often the ball hops for ever in each part of the box."""
+    text = [
+        "# Where the ball hops for ever",
+        "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: mu and eta are "
+        "the friction of floor and wall, kappa = c√(R/g) and Omega_0 = ω₀√(R/g). An attractor with a small basin is "
+        "missed by a few starts. `python -m docs.studies.figures` writes this page from what `dualball search --save` "
+        "kept.",
+    ]
+    for record in searches:
+        least, most = record.search.box["kappa"]
+        text += [f"## Drag from kappa = {least:.3g} to {most:.3g}", summary(record), pages.markdown(table(record))]
+    return "\n\n".join(text) + "\n"
 
 
 def draw_plane(basins: Basins) -> Figure:

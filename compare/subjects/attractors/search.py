@@ -15,7 +15,7 @@ import hashlib
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -177,57 +177,37 @@ def run(directory: Path, search: Search, count: int, workers: Workers, show: Sho
     return Searched(search, len(rows), found, sum(row["failed"] for row in rows))
 
 
-def parts(record: Searched) -> Iterator[tuple[str, float, float, int, int]]:
+def share(hits: int, of: int) -> tuple[float, float, float]:
+    """How many of all, in %, and the ends of the 95 % interval; a share of nothing is nan."""
+    low, high = interval(hits, of)
+    return (100 * hits / of if of else math.nan), 100 * low, 100 * high
+
+
+def table(record: Searched) -> pages.Rows:
     """Each sixth of the range of each group, with the number of sets in it, and of those with confirmed hopping."""
-    points = record.search.points(record.sets)
+    points, rows = record.search.points(record.sets), []
     for k, name in enumerate(BOX):
         edges = (np.geomspace if name in LOGARITHMIC else np.linspace)(*record.search.box[name], 7)
         sets, _ = np.histogram(points[:, k], edges)
         hopping, _ = np.histogram([row[name] for row in record.confirmed], edges)
         for low, high, n, hits in zip(edges, edges[1:], sets.tolist(), hopping.tolist(), strict=False):
-            yield name, float(low), float(high), n, hits
+            part, least, most = (f"{value:.2f}" for value in share(hits, n))
+            rows.append([name, f"{low:.3g}", f"{high:.3g}", str(n), str(hits), part, f"{least} … {most}"])
+    return [["", "from", "to", "sets", "hopping", "share, %", "95 % interval, %"], *rows]
 
 
-def page(*searches: Searched) -> str:
-    """Results as a page of Markdown: how often the ball hops for ever in each part of the box, with confidence."""
-
-    def share(hits: int, of: int) -> tuple[str, str, str]:
-        """In %, empty for a share of nothing, and the ends of the 95 % interval."""
-        low, high = interval(hits, of)
-        return f"{100 * hits / of:.2f}" if of else "", f"{100 * low:.2f}", f"{100 * high:.2f}"
-
-    text = [
-        "# Where the ball hops for ever",
-        "A ball hops if it goes on landing on the floor for ever. Sets of parameters fill a box evenly: mu and eta are "
-        "the friction of floor and wall, kappa = c√(R/g) and Omega_0 = ω₀√(R/g). "
-        "`dualball search --kept docs/studies/data/hopping-*.json --page docs/hopping.md` writes this page.",
-    ]
-    for record in searches:
-        search, rows, count = record.search, record.confirmed, len(record.confirmed)
-        percent, low, high = share(count, record.sets)
-        periods = Counter(row["confirmed"]["landings"] for row in rows)
-        kinds = [f"{periods[n]} with {n or 'no period found'}" for n in sorted(periods, key=lambda n: (n == 0, n))]
-        landings = f"Sets by landings in a period: {', '.join(kinds)}. " if kinds else ""
-        others = f", {len(record.rows) - count} of them not confirmed" if len(record.rows) > count else ""
-        broken = f" {record.failed} runs broke down." if record.failed else ""
-        box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in search.box.items())
-        least, most = search.box["kappa"]
-        ends = [[name, *(f"{end(row[name] for row in rows):.3g}" for end in (min, max))] for name in BOX if rows]
-        table = [
-            [name, f"{a:.3g}", f"{b:.3g}", str(n), str(hits), share(hits, n)[0], " … ".join(share(hits, n)[1:])]
-            for name, a, b, n, hits in parts(record)
-        ]
-        text += [
-            f"## Drag from kappa = {least:.3g} to {most:.3g}: {record.sets} sets",
-            f"The box is {box}. Each set was started from {search.starts} random states. In {count} sets some start "
-            f"leads to hopping that the event-driven simulation confirms: {percent} %, or {low} to {high} % with 95 % "
-            f"confidence. That is what {search.starts} starts find: an attractor with a small basin is missed. "
-            f"{landings}By time stepping {len(record.rows)} sets still hopped after 60/c{others}.{broken} "
-            "In all other sets every ball stopped landing.",
-            pages.markdown([["", "smallest with hopping", "largest"], *ends]),
-            pages.markdown([["", "from", "to", "sets", "hopping", "share, %", "95 % interval, %"], *table]),
-        ]
-    return "\n\n".join(text) + "\n"
+def summary(record: Searched) -> str:
+    """What a search has found in all, with confidence."""
+    count, broken = len(record.confirmed), f" {record.failed} runs broke down." if record.failed else ""
+    periods = Counter(row["confirmed"]["landings"] for row in record.confirmed)
+    kinds = [f"{periods[n]} with {n or 'no period found'}" for n in sorted(periods, key=lambda n: (n == 0, n))]
+    box = ", ".join(f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in record.search.box.items())
+    return (
+        f"The box is {box}. In {count} of {record.sets} sets some of {record.search.starts} random starts lead to "
+        "hopping that the event-driven simulation confirms: {:.2f} %, or {:.2f} to {:.2f} % with 95 % confidence. "
+        f"Sets by landings in a period: {', '.join(kinds) or 'none'}. By time stepping {len(record.rows)} sets still "
+        f"hopped after 60/c; in all others every ball stopped landing.{broken}"
+    ).format(*share(count, record.sets))
 
 
 @dataclass(frozen=True, eq=False)
