@@ -58,11 +58,6 @@ def every(*whens: When) -> When:
     return lambda m: all(when(m) for when in whens)
 
 
-def one(m: Measurement) -> float:
-    """The natural size of a ratio, an angle, or a deviation that is divided by its scale already."""
-    return 1.0
-
-
 @dataclass(frozen=True)
 class Bearing:
     """Measurements that bear on a claim, and what theory says they should be."""
@@ -74,7 +69,7 @@ class Bearing:
     _: KW_ONLY
     when: When = lambda m: True
     size: Callable[[Measurement], float] | None = None
-    """Natural size of the quantity, by which errors are divided; None for the predicted value itself."""
+    """By what errors are divided, where that isn't the natural size of the quantity."""
     relation: Relation = Relation.EQUAL
     by: str = ""
     """The function or equation that predicts, for the reader."""

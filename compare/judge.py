@@ -15,6 +15,7 @@ from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.kit.check import Check
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records
+from compare.kit.scales import natural_size
 from compare.kit.statistics import COVERAGE, Measured
 from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
@@ -105,7 +106,7 @@ def check(bearing: Bearing, m: Measurement) -> Check:
     """One measurement beside its prediction; the scale of what must be exactly equal is 1."""
     try:
         prediction = bearing.predict(m)
-        size = bearing.size(m) if bearing.size else None
+        size = bearing.size(m) if bearing.size else natural_size(m.quantity, m.parameters)
     except UNKNOWN:
         prediction, size = math.nan, 1.0
     own = prediction if isinstance(prediction, Measured) else Measured(float(prediction), 0.0)

@@ -8,7 +8,7 @@ from analytic.bifurcation import diagram as bifurcation
 from compare.claim import When
 from compare.judge import theory
 from compare.kit.record import Measurement
-from compare.kit.settling import family, forces, scale
+from compare.kit.settling import family, forces
 from model import Case, Parameters
 
 
@@ -46,11 +46,6 @@ def number(quantity: str, s: StationarySolution, p: Parameters) -> float:
     if quantity.startswith("force_"):
         return float(forces(s.force_A, s.force_B)[quantity.removeprefix("force_")])
     return float(getattr(s.state, quantity))
-
-
-def natural_size(m: Measurement) -> float:
-    """The size by which errors of a settled state are divided."""
-    return scale(m.quantity, m.parameters)
 
 
 def is_in(*cases: Case) -> When:

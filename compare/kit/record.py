@@ -57,6 +57,10 @@ class Measurement:
         for name in ("value", "uncertainty"):  # whole numbers and numpy's come back from a file as floats
             object.__setattr__(self, name, float(getattr(self, name)))
 
+    def at(self, name: str) -> float:
+        """A number among the conditions."""
+        return float(self.conditions[name])
+
     @property
     def unit(self) -> str:
         """Unit of value and uncertainty."""

@@ -42,6 +42,8 @@ class Trial(Start):
     """Parameters of the runs that are read together; empty for one run with those of the start."""
     conditions: Mapping[str, Condition] = field(default_factory=dict)
     """Of all measurements of this trial."""
+    rows: int = 1
+    """Measurements that are left out if a run breaks down."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Resu
     for trial, own in tasks:
         runs = lab.attempt(own)
         if isinstance(runs, str):
-            yield Missing(protocol, trial.set, f"{trial.name}: the run {runs}")
+            yield Missing(protocol, trial.set, f"{trial.name}: the run {runs}", trial.rows)
         else:
             half = len(runs) // 2
             yield Result(protocol, trial, own, trial.read(*runs[:half]), trial.read(*runs[half:]))

@@ -24,20 +24,16 @@ _PERIODIC = "Section 5.3, last paragraph"
 
 def _hops(m: Measurement) -> float:
     """Whether theory's ball still hops after a run of the same length from the same state."""
-    return hops(simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000))
+    return hops(simulated(m.parameters, state(m), m.at("duration"), 2000))
 
 
 def _hops_on(m: Measurement) -> float:
     """Whether the hop of a ball that rebounds is stable, by continuation from the hop without a rebound."""
-    p, end = m.parameters, float(m.conditions["restitution"])
+    p, end = m.parameters, m.at("restitution")
     orbit = theory(orbits.refine, p, TOP, 0.22)  # s, about its period
     for restitution in [*np.arange(0.2, end, 0.1).tolist(), end] if end else []:
         orbit = theory(orbits.refine, p, tuple(orbit.loop.x.tolist()), orbit.period, restitution)
     return float(orbit.stable)
-
-
-def _birth(m: Measurement) -> float:
-    return analytic.thresholds(m.parameters).omega_02
 
 
 def _death(orbit: Orbit) -> float:
@@ -47,14 +43,12 @@ def _death(orbit: Orbit) -> float:
 
 
 _ORBIT: dict[str, Callable[[Orbit], float]] = {
-    "orbit_period": lambda orbit: orbit.period,
-    "orbit_omega_c": lambda orbit: orbit.turn / orbit.period,
-    "orbit_height": lambda orbit: float(orbit.cycle.y.max()),
-    "orbit_multiplier": lambda orbit: float(np.abs(orbit.multipliers).max()),
-    "orbit_death": _death,
-    "swing_period": lambda orbit: orbit.period,
-    "swing_omega_c": lambda orbit: orbit.turn / orbit.period,
-    "swing_size": lambda orbit: float(np.ptp(orbit.cycle.omega_c)),
+    "period": lambda orbit: orbit.period,
+    "omega_c": lambda orbit: orbit.turn / orbit.period,
+    "height": lambda orbit: float(orbit.cycle.y.max()),
+    "multiplier": lambda orbit: float(np.abs(orbit.multipliers).max()),
+    "death": _death,
+    "size": lambda orbit: float(np.ptp(orbit.cycle.omega_c)),
 }
 
 
@@ -62,7 +56,8 @@ def _orbiting(protocol: str, *quantities: str) -> tuple[Bearing, ...]:
     """Numbers of the closed orbit of theory near what was measured."""
 
     def predict(m: Measurement) -> float:
-        return _ORBIT[m.quantity](theory(orbits.refine, m.parameters, state(m), float(m.conditions["period"])))
+        _, _, of = m.quantity.partition("_")
+        return _ORBIT[of](theory(orbits.refine, m.parameters, state(m), m.at("period")))
 
     return tuple(Bearing(protocol, quantity, predict, by="analytic.orbits.periodic.refine") for quantity in quantities)
 
@@ -74,11 +69,10 @@ def _after_rest(m: Measurement) -> float:
 
 
 def _only(m: Measurement) -> float:
-    """The one stationary motion that lasts by Definitions 1-3; LookupError if there are more."""
+    """The one stationary motion that lasts by Definitions 1-3; nan if there are more."""
     those = analytic.stable_solutions(m.parameters)
-    if len(those) != 1:
-        raise LookupError(f"{len(those)} motions last")
-    return float(those[0].case if m.quantity == "case" else those[0].state.omega_c)
+    lasts = those[0].case if m.quantity == "case" else those[0].state.omega_c
+    return float(lasts) if len(those) == 1 else math.nan
 
 
 _HOP = "orbit_period", "orbit_omega_c", "orbit_height"
@@ -125,7 +119,14 @@ CLAIMS = (
         "hopping-birth",
         f"{_PERIODIC}, (85)",
         "Hopping begins with hops of no height at ω₀₂, where the wall begins to carry the ball.",
-        (Bearing("recurrent", "orbit_birth", _birth, by="analytic.thresholds: omega_02"),),
+        (
+            Bearing(
+                "recurrent",
+                "orbit_birth",
+                lambda m: analytic.thresholds(m.parameters).omega_02,
+                by="analytic.thresholds: omega_02",
+            ),
+        ),
         level=Level.DEFAULT,
     ),
     Claim(

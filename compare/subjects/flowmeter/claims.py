@@ -10,33 +10,30 @@ import numpy as np
 
 import analytic
 from analytic.flowmeter import design
-from compare.claim import Bearing, Claim, Text, When, every, given, one
+from compare.claim import Bearing, Claim, Text, every, given
 from compare.judge import simulated, theory
 from compare.kit.check import Relation
 from compare.kit.record import Measurement, state
 from compare.kit.settling import family
 from compare.kit.statistics import Measured
-from compare.settled import cases, detected, from_floor, is_in, lasting, lifts_first, natural_size, reached, slips_first
+from compare.settled import cases, detected, from_floor, is_in, lasting, lifts_first, reached, slips_first
 from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
 from model import Case, Contact, Trajectory
 from model.drag import QUADRATIC, STOKES
 
+_SIMULATED = "analytic.simulate"
 RTOL = 1e-9
 """Relative tolerance of simulations of unloading and pushes: the speed of a landing is measured to 1e-6."""
 
 
-def _slopes(by: str, predict: Callable[[Measurement], float], function: str, *cases: Case) -> Bearing:
+def _slope(by: str, predict: Callable[[Measurement], float], function: str, *cases: Case) -> tuple[Bearing]:
     """Slopes measured in one way, in units of the slope of rolling."""
     when = every(given(by=by), is_in(*cases))
-    return Bearing("slope", "slope", predict, when=when, size=one, by=f"analytic.{function}")
+    return (Bearing("slope", "slope", predict, when=when, by=f"analytic.{function}"),)
 
 
 def _local(m: Measurement) -> float:
     return theory(analytic.characteristic_slope, m.parameters, detected(m))
-
-
-def _settled(quantity: str, predict: Callable[[Measurement], float], when: When) -> Bearing:
-    return Bearing("settled", quantity, predict, when=when, size=natural_size)
 
 
 def _only_rolling(m: Measurement) -> float:
@@ -59,11 +56,6 @@ def _reads_flow(m: Measurement) -> float:
     return p.omega_0 if within else reads
 
 
-def _unloads(m: Measurement) -> float:
-    """A ball on the wall stays above the limit of unloading, and sinks below."""
-    return float(Case.NR if m.parameters.omega_0 > analytic.unloading_limit(m.parameters) else Case.NS)
-
-
 def _branch(m: Measurement) -> Case:
     """Case at a level of the hysteresis loop: that of the branch it comes from while it attracts, else of the other."""
     states = cases(m.parameters) - {Case.NS}
@@ -79,26 +71,23 @@ def _reading(m: Measurement) -> float:
     return next(float(s.state.omega_c) for s in lasting(m.parameters) if s.case is case)
 
 
-def _flows(m: Measurement) -> bool:
-    return m.parameters.omega_0 > 0
-
-
 def _stays(m: Measurement) -> bool:
     """Whether there is a flow, and the ball doesn't sink."""
-    return _flows(m) and detected(m) is not Case.NS
+    return m.parameters.omega_0 > 0 and detected(m) is not Case.NS
 
 
 def _run(m: Measurement) -> Trajectory:
-    return simulated(m.parameters, state(m), float(m.conditions["duration"]), 2000, rtol=RTOL)
+    return simulated(m.parameters, state(m), m.at("duration"), 2000, rtol=RTOL)
 
 
-def _ends(*starts: str) -> Bearing:
-    """The case in which a motion ends that starts in one of these ways."""
+def _ends(*starts: str) -> tuple[Bearing, ...]:
+    """The case in which motions end that start in one of these ways."""
 
     def case(m: Measurement) -> float:
-        return float(family(Case(_run(m).case[-1])))
+        return family(Case(_run(m).case[-1]))
 
-    return Bearing("unloading", "case", case, when=lambda m: m.conditions["start"] in starts, by="analytic.simulate")
+    ends = (given(start=start) for start in starts)
+    return tuple(Bearing("unloading", "case", case, when=when, by=_SIMULATED) for when in ends)
 
 
 def _at_event(m: Measurement) -> Measured:
@@ -141,6 +130,10 @@ def _limit(m: Measurement, relation: Relation) -> float:
     return design.threshold_spread(list(design.corners(make, values, TOLERANCES)))[m.quantity][1]
 
 
+def _stokes(m: Measurement) -> bool:
+    return m.parameters.drag == STOKES
+
+
 def _one_end(m: Measurement) -> bool:
     """Whether one and the same threshold ends the operating range at every corner of `TOLERANCES`."""
     p, off = m.parameters, TOLERANCES["eta"]
@@ -158,26 +151,26 @@ CLAIMS = (
         "slope-rolling",
         "Section 5.3",
         "Rolling at both points, or carried by the wall alone, the ball reads the flow: dω_c/dω₀ = 1.",
-        (_slopes("neighbours", _local, "characteristic_slope", Case.RR, Case.NR),),
+        _slope("neighbours", _local, "characteristic_slope", Case.RR, Case.NR),
     ),
     Claim(
         "slope-slipping",
         "Section 5.3, (38), (41)",
         "While the ball slips at both points its reading rises by (38), (41), at first hardly at all.",
-        (_slopes("neighbours", _local, "characteristic_slope", Case.SS),),
+        _slope("neighbours", _local, "characteristic_slope", Case.SS),
     ),
     Claim(
         "slope-jump",
         "Section 5.3",
         "At ω₀₁ the slope of the characteristic curve jumps: from 1 to 0, as the equations have it.",
-        (_slopes("jump", lambda m: analytic.slope_jump(m.parameters), "slope_jump", Case.SS),),
+        _slope("jump", lambda m: analytic.slope_jump(m.parameters), "slope_jump", Case.SS),
     ),
     Claim(
         "slope-mean",
         "Section 5.3",
         "Between ω₀₁ and ω₀₂ the slope is small: what is measured on average from end to end is what theory says, "
         "a few hundredths for the reference.",
-        (_slopes("mean", lambda m: analytic.mean_slope(m.parameters), "mean_slope", Case.SS),),
+        _slope("mean", lambda m: analytic.mean_slope(m.parameters), "mean_slope", Case.SS),
     ),
     Claim(
         "operating-range",
@@ -185,9 +178,10 @@ CLAIMS = (
         "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, from rest the ball "
         "slips (η < j), and on the wall it stays (η > j).",
         (
-            _settled("case", _only_rolling, every(from_floor, _flows, slips_first)),
-            _settled("case", _only_rolling, every(_stays, lifts_first)),
-            _settled("omega_c", _reads_flow, _stays),
+            # Slipping on the floor no ball sinks.
+            Bearing("settled", "case", _only_rolling, when=every(from_floor, _stays, slips_first)),
+            Bearing("settled", "case", _only_rolling, when=every(_stays, lifts_first)),
+            Bearing("settled", "omega_c", _reads_flow, when=_stays),
         ),
     ),
     Claim(
@@ -195,7 +189,12 @@ CLAIMS = (
         "Section 5.3, (85)",
         "The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and sinks.",
         (
-            _settled("case", _unloads, given(start="on the wall")),
+            Bearing(
+                "settled",
+                "case",
+                lambda m: Case.NR if m.parameters.omega_0 > analytic.unloading_limit(m.parameters) else Case.NS,
+                when=given(start="on the wall"),
+            ),
             Bearing(
                 "thresholds",
                 "omega_02",
@@ -211,7 +210,7 @@ CLAIMS = (
         "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
         (
             Bearing("hysteresis", "case", lambda m: float(_branch(m)), by="analytic.stable_solutions"),
-            Bearing("hysteresis", "omega_c", _reading, size=natural_size, by="(32), (38), (46)"),
+            Bearing("hysteresis", "omega_c", _reading, by="(32), (38), (46)"),
         ),
         text=Text.CORRECTED,
         reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that is above ω₀₄.",
@@ -222,9 +221,9 @@ CLAIMS = (
         "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
         "rolling at both points.",
         (
-            _ends(UNLOADED),
+            *_ends(UNLOADED),
             *(
-                Bearing("unloading", quantity, _at_event, by="analytic.simulate")
+                Bearing("unloading", quantity, _at_event, by=_SIMULATED)
                 for quantity in ("time", "landing_speed", "landing_impulse")
             ),
         ),
@@ -233,7 +232,7 @@ CLAIMS = (
         "push",
         "section 5.3",
         "A small push lifts the ball from SR to NR, where it stays off the floor.",
-        (_ends(UPWARDS, BY_SPIN), Bearing("unloading", "lift", _at_event, by="analytic.simulate")),
+        (*_ends(UPWARDS, BY_SPIN), Bearing("unloading", "lift", _at_event, by=_SIMULATED)),
     ),
     Claim(
         "design-limit",
@@ -245,7 +244,7 @@ CLAIMS = (
                 "thresholds",
                 end,
                 partial(_limit, relation=relation),
-                when=every(first, lambda m: m.parameters.drag == STOKES, *[_one_end] * (relation is Relation.AT_MOST)),
+                when=every(first, _stokes, *([_one_end] if relation is Relation.AT_MOST else ())),
                 relation=relation,
                 by="analytic.flowmeter.design",
             )
@@ -257,7 +256,7 @@ CLAIMS = (
         "design-reading",
         "extension, Fig. 13",
         "A meter reads the lowest of a design's readings while the flow rises, the highest while it falls.",
-        (Bearing("hysteresis", "omega_c", _between, size=natural_size, by="analytic.flowmeter.design.readings"),),
+        (Bearing("hysteresis", "omega_c", _between, by="analytic.flowmeter.design.readings"),),
     ),
     Claim(
         "time-constants",

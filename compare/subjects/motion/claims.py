@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 
 import analytic
 from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
-from compare.claim import Bearing, Claim, Text, given, one
+from compare.claim import Bearing, Claim, Text, given
 from compare.judge import RTOL, simulated, theory
-from compare.kit.lab import state_units
-from compare.kit.record import Measurement, state
+from compare.kit.record import Condition, Measurement, state
 from compare.kit.settling import forces
 from compare.subjects.motion.measure.laws import FLUIDS
 from compare.subjects.motion.measure.motions import NAMES
@@ -23,46 +22,36 @@ from model.kinematics import VARIABLES
 _OWN = "The paper has no equations away from the wall: (20), with a drag on radial motion, is this project's extension."
 
 
-def _coefficient(m: Measurement) -> float:
-    """The friction coefficient of the contact."""
-    return m.parameters.mu if m.conditions["contact"] == "A" else m.parameters.eta
-
-
-def _dimension(m: Measurement) -> float:
-    """The dimension of the domain of a case, as Table 4 prints it."""
-    return {"RR": 1.0, "RS": 2.0, "SR": 2.0, "SS": 4.0, "NR": 4.0, "NS": 6.0}[str(m.conditions["case"])]
+_DIMENSIONS: dict[Condition, float] = {"RR": 1.0, "RS": 2.0, "SR": 2.0, "SS": 4.0, "NR": 4.0, "NS": 6.0}
+"""Of the domain of each case, as Table 4 prints them."""
+_RUN = "analytic.simulate"
+_TORQUE = "analytic.flowmeter.real_fluid.rolling"
+_HOLDS = "analytic.slip_stability.stability"
 
 
 def _sinking(m: Measurement) -> float:
     """v_y in m/s by Stokes' drag, from the properties of fluid and ball."""
-    return -drag.sinking_speed(**{name: float(m.conditions[name]) for name in FLUIDS[m.set]})
+    return -drag.sinking_speed(**{name: m.at(name) for name in FLUIDS[m.set]})
 
 
 def _end(m: Measurement) -> float:
     """A column of theory's motion where the measured one ends."""
-    motion = simulated(m.parameters, state(m), float(m.conditions["time"]))
+    motion = simulated(m.parameters, state(m), m.at("time"))
     return float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
 
 
 def _ends(*starts: str) -> tuple[Bearing, ...]:
     """The state at the end of motions from starts whose names begin so, in units of what gravity does."""
-    return tuple(
-        Bearing(
-            "runs",
-            f"end_{name}",
-            _end,
-            when=lambda m: str(m.conditions["start"]).startswith(starts),
-            size=lambda m: float(state_units(m.parameters)[VARIABLES.index(m.quantity.removeprefix("end_"))]),
-            by="analytic.simulate",
-        )
-        for name in VARIABLES
-    )
+
+    def when(m: Measurement) -> bool:
+        return str(m.conditions["start"]).startswith(starts)
+
+    return tuple(Bearing("runs", f"end_{name}", _end, when=when, by=_RUN) for name in VARIABLES)
 
 
-def _on_smooth_wall(m: Measurement) -> float:
-    """RS while slip at the floor dies out, else SS."""
-    holds = slip_stability.stability(Case.RS, m.parameters) is SlipStability.STABLE
-    return float(Case.RS if holds else Case.SS)
+def _holds(case: Case, m: Measurement) -> bool:
+    """Whether slip out of a case dies out."""
+    return slip_stability.stability(case, m.parameters) is SlipStability.STABLE
 
 
 def _braked_rolls(m: Measurement) -> float:
@@ -72,32 +61,18 @@ def _braked_rolls(m: Measurement) -> float:
     return float(Case.RR)
 
 
-def _slip_lasts(m: Measurement) -> float:
-    """RR where slip dies out, else the case in which theory's motion ends: it slips at both points, or is lifted."""
-    if slip_stability.stability(Case.RR, m.parameters) is SlipStability.STABLE:
-        return float(Case.RR)
-    return float(theory(analytic.simulate, m.parameters, state(m), float(m.conditions["time"]), rtol=RTOL).case[-1])
+def _last(m: Measurement, leave_rolling: str = "slip-stability") -> float:
+    """The case in which theory's motion ends."""
+    run = theory(analytic.simulate, m.parameters, state(m), m.at("time"), leave_rolling=leave_rolling, rtol=RTOL)
+    return float(run.case[-1])
 
 
-def _case(m: Measurement) -> float:
-    """The case in which theory's motion ends.
-
-    Where forces admit rolling at both points and slip would last, too, the internal force between floor and wall
-    decides, which the state doesn't contain (docs/theory.md, 7): both outcomes then agree with theory.
+def _either(m: Measurement) -> float:
+    """The same. Where forces admit rolling at both points and slip would last, too, the internal force between floor
+    and wall decides, which the state doesn't contain (docs/theory.md, 7): both outcomes then agree with theory.
     """
-
-    def end(how: str) -> float:
-        time = float(m.conditions["time"])
-        return float(theory(analytic.simulate, m.parameters, state(m), time, leave_rolling=how, rtol=RTOL).case[-1])
-
-    leaves = end("slip-stability")
-    return leaves if leaves == m.value or end("infeasible") != m.value else m.value
-
-
-def _speed(m: Measurement) -> float:
-    """The natural size of a velocity, or of a rate of rotation, after a landing."""
-    p, name = m.parameters, m.quantity.removeprefix("after_")
-    return math.sqrt(p.g * p.R) / {"v_y": 1.0, "v_h": 1.0, "omega_c": p.R}.get(name, p.r)
+    leaves = _last(m)
+    return leaves if leaves == m.value or _last(m, "infeasible") != m.value else m.value
 
 
 LAWS = (
@@ -108,8 +83,11 @@ LAWS = (
         "times the normal force and opposes the slip. (That contacts press, and that friction stays within its limit, "
         "(12) and (13), is built into any solver of friction cones: it is not counted.)",
         (
-            Bearing("laws", "law_in_motion", lambda m: 0.0, size=one, by="Table 3, (14)-(17)"),
-            Bearing("laws", "friction_ratio", _coefficient, by="(14), (15)"),
+            Bearing("laws", "law_in_motion", lambda m: 0.0, by="Table 3, (14)-(17)"),
+            *(
+                Bearing("laws", "friction_ratio", coefficient, when=given(contact=contact), by="(14), (15)")
+                for contact, coefficient in (("A", lambda m: m.parameters.mu), ("B", lambda m: m.parameters.eta))
+            ),
         ),
     ),
     Claim(
@@ -117,7 +95,7 @@ LAWS = (
         "Table 4, (22)",
         "A ball that is pushed a little out of a stationary motion has as many ways to move as the domain of its case "
         "has dimensions.",
-        (Bearing("rates", "modes", _dimension, by="Table 4"),),
+        (Bearing("rates", "modes", lambda m: _DIMENSIONS[m.conditions["case"]], by="Table 4"),),
     ),
     Claim(
         "eq-10",
@@ -132,7 +110,7 @@ LAWS = (
         "Fig. 2, Table 3",
         "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
         "equations of motion say.",
-        (Bearing("motions", "case", _case, by="analytic.simulate"),),
+        (Bearing("motions", "case", _either, by=_RUN),),
     ),
     Claim(
         "flight",
@@ -161,7 +139,11 @@ LAWS = (
         "as long as slip at the floor dies out; faster, it slips.",
         (
             Bearing(
-                "runs", "case", _on_smooth_wall, when=given(start="smooth wall"), by="analytic.slip_stability.stability"
+                "runs",
+                "case",
+                lambda m: Case.RS if _holds(Case.RS, m) else Case.SS,
+                when=given(start="smooth wall"),
+                by=_HOLDS,
             ),
         ),
     ),
@@ -170,9 +152,14 @@ LAWS = (
         "Definitions 1 and 2, (82)",
         "On a floor so rough, μ > 1, that forces would allow a ball to jam between floor and wall and roll on beyond "
         "ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
+        # Where slip lasts, theory's motion ends slipping at both points, or lifted.
         (
             Bearing(
-                "runs", "case", _slip_lasts, when=given(start="rough floor"), by="analytic.slip_stability.stability"
+                "runs",
+                "case",
+                lambda m: Case.RR if _holds(Case.RR, m) else _last(m),
+                when=given(start="rough floor"),
+                by=_HOLDS,
             ),
         ),
     ),
@@ -182,14 +169,8 @@ LAWS = (
         "A fluid that brakes the spin of a ball makes it roll slower than the fluid goes round, at first order in the "
         "torque.",
         (
-            Bearing("torque", "case", _braked_rolls, by="analytic.flowmeter.real_fluid.rolling"),
-            Bearing(
-                "torque",
-                "omega_c",
-                lambda m: real_fluid.rolling(m.parameters).omega_c,
-                size=lambda m: m.parameters.omega_0,
-                by="analytic.flowmeter.real_fluid.rolling",
-            ),
+            Bearing("torque", "case", _braked_rolls, by=_TORQUE),
+            Bearing("torque", "omega_c", lambda m: real_fluid.rolling(m.parameters).omega_c, by=_TORQUE),
         ),
         reason="The paper leaves the torque out; so does all else here, unless parameters give it.",
     ),
@@ -199,7 +180,7 @@ LAWS = (
         "A ball that lands does not rebound, and friction takes its share of the impulse.",
         (
             Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
-            *(Bearing("impacts", f"after_{name}", _end, size=_speed, by="analytic.simulate") for name in NAMES),
+            *(Bearing("impacts", f"after_{name}", _end, by=_RUN) for name in NAMES),
         ),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
     ),
@@ -221,26 +202,23 @@ _FORCES = ("Ax", "Ay", "Az", "Bx", "By", "Bz", "Ax-By", "Ay+By", "Bx+By")
 """Where both contacts roll only A_z, B_z and the sums are determined, and measured."""
 
 
-def _rate(case: Case, name: str) -> Bearing:
-    return Bearing(
-        "field",
-        f"rate_{name}",
-        lambda m: float(theory(analytic.vector_field, case, state(m), m.parameters)[VARIABLES.index(name)]),
-        when=given(case=case.name),
-        size=lambda m: m.parameters.g / {"v_y": 1.0, "v_h": 1.0, "omega_c": m.parameters.R}.get(name, m.parameters.r),
-        by="analytic.vector_field",
-    )
+def _moving(case: Case) -> Iterator[Bearing]:
+    """Rates of change, and forces."""
 
+    def rate(m: Measurement) -> float:
+        rates = theory(analytic.vector_field, case, state(m), m.parameters)
+        return float(rates[VARIABLES.index(m.quantity.removeprefix("rate_"))])
 
-def _force(case: Case, name: str) -> Bearing:
-    return Bearing(
-        "field",
-        f"moving_force_{name}",
-        lambda m: float(forces(*theory(analytic.contact_forces, case, state(m), m.parameters))[name]),
-        when=given(case=case.name),
-        size=lambda m: m.parameters.m * m.parameters.g,
-        by="analytic.contact_forces",
-    )
+    def force(m: Measurement) -> float:
+        both = theory(analytic.contact_forces, case, state(m), m.parameters)
+        return float(forces(*both)[m.quantity.removeprefix("moving_force_")])
+
+    when = given(case=case.name)
+    for name in TRAITS[case].active:
+        if name not in ("y", "h"):
+            yield Bearing("field", f"rate_{name}", rate, when=when, by="analytic.vector_field")
+    for name in _FORCES:
+        yield Bearing("field", f"moving_force_{name}", force, when=when, by="analytic.contact_forces")
 
 
 EQUATIONS = tuple(
@@ -248,10 +226,7 @@ EQUATIONS = tuple(
         f"motion-{case.name}",
         _SOURCES.get(case, "(20)"),
         f"In case {case.name} the accelerations and contact forces are those of the equations of motion.",
-        (
-            *(_rate(case, name) for name in TRAITS[case].active if name not in ("y", "h")),
-            *(_force(case, name) for name in _FORCES),
-        ),
+        tuple(_moving(case)),
         text=Text.CORRECTED if case in _CORRECTED else Text.PRINTED,
         reason=_CORRECTED.get(case, "" if case in _SOURCES else _OWN),
     )

@@ -10,11 +10,10 @@ import numpy as np
 import analytic
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
-from compare.claim import Bearing, Claim, Outcome, Text, When, every, given, one
+from compare.claim import Bearing, Claim, Outcome, Text, When, every, given
 from compare.judge import simulated
 from compare.kit.check import Relation
 from compare.kit.record import Measurement, state
-from compare.kit.short import slip_unit
 from model import Case
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ
@@ -24,11 +23,6 @@ _NR_NS, _RR_RS, _RR_SR, _RR_SS = (Case.NR, Case.NS), (Case.RR, Case.RS), (Case.R
 
 def _x(m: Measurement) -> Array:
     return np.array(state(m))
-
-
-def _at(m: Measurement, name: str) -> float:
-    """A number among the conditions."""
-    return float(m.conditions[name])
 
 
 def _arrow(m: Measurement) -> tuple[Case, Case]:
@@ -41,44 +35,31 @@ def _along(arrow: tuple[Case, Case], *by: str) -> When:
     return lambda m: _arrow(m) == arrow and m.conditions.get("by", "") in by
 
 
-def _growth(
-    predict: Callable[[Measurement], float],
-    when: When,
-    by: str = "slip_stability.gamma",
-    relation: Relation = Relation.EQUAL,
-) -> Bearing:
-    return Bearing(
-        "growth", "gamma", predict, when=when, size=lambda m: slip_unit(m.parameters), relation=relation, by=by
-    )
-
-
 def _gamma(m: Measurement) -> float:
-    n = [_at(m, f"n_{name[-1]}") for name in slip_stability.normals(*_arrow(m))]
+    n = [m.at(f"n_{name[-1]}") for name in slip_stability.normals(*_arrow(m))]
     return float(slip_stability.gamma(*_arrow(m), _x(m), np.array(n), m.parameters))
 
 
-def _strays(protocol: str, when: When) -> Bearing:
+def _followed(m: Measurement) -> float:
     """The case that follows where a slip doesn't last."""
-
-    def case(m: Measurement) -> float:
-        n = np.array([_at(m, name) for name in ("n_x", "n_y", "n_z")])
-        x = _x(m)
-        x[SLIP_XYZ] += _at(m, "slip") * n
-        return float(simulated(m.parameters, tuple(x.tolist()), _at(m, "time")).case[-1])
-
-    return Bearing(protocol, "case", case, when=when, by="analytic.simulate")
+    x = _x(m)
+    x[SLIP_XYZ] += m.at("slip") * np.array([m.at(name) for name in ("n_x", "n_y", "n_z")])
+    return float(simulated(m.parameters, tuple(x.tolist()), m.at("time")).case[-1])
 
 
 def _gamma_nr(m: Measurement) -> float:
-    return float(slip_bounds.gamma_nr(math.atan2(_at(m, "n_y"), _at(m, "n_z")), _x(m), m.parameters))
+    return float(slip_bounds.gamma_nr(math.atan2(m.at("n_y"), m.at("n_z")), _x(m), m.parameters))
 
 
 def _lacking(m: Measurement) -> float:
     """gamma from the forces of NR: friction that rolling needs along the slip, minus eta times the normal force."""
     p = m.parameters
     _, (B_x, B_y, B_z) = analytic.contact_forces(Case.NR, _x(m), p)
-    lacks = B_y * _at(m, "n_z") - B_z * _at(m, "n_y") - p.eta * B_x
-    return float((1 + p.j) / (p.j * p.m * p.r) * lacks)
+    return float((1 + p.j) / (p.j * p.m * p.r) * (B_y * m.at("n_z") - B_z * m.at("n_y") - p.eta * B_x))
+
+
+def _steepest(m: Measurement) -> float:
+    return float(slip_bounds.steepest_nr(_x(m), m.parameters))
 
 
 def _greatest_as_printed(m: Measurement) -> float:
@@ -116,6 +97,10 @@ def _neutral(quantity: str, case: Case, by: str) -> Bearing:
     )
 
 
+def _share(m: Measurement) -> float:
+    return slip_bounds.filippov_share(_arrow(m)[1], m.at("omega_c"), m.parameters)
+
+
 def _on_the_wall(m: Measurement) -> float:
     """NR where it is stable with respect to slipping, else NS."""
     stable = slip_stability.stability(Case.NR, m.parameters) is slip_stability.SlipStability.STABLE
@@ -131,14 +116,18 @@ CLAIMS = (
             f"A slight slip out of {arrow[0].name} in any direction of {arrow[1].name} grows at the rate γ while the "
             "forces admit it; else the ball passes into another case, as the equations of motion say.",
             (
-                _growth(_gamma, _along(arrow, "", "dragged")),
                 *(
-                    [_growth(_gamma_nr, _along(arrow, "", "dragged"), "slip_bounds.gamma_nr")]
-                    if arrow == _NR_NS
-                    else []
+                    Bearing("growth", "gamma", gamma, when=_along(arrow, "", "dragged"), by=by)
+                    for gamma, by in ((_gamma, "slip_stability.gamma"), (_gamma_nr, "slip_bounds.gamma_nr"))
+                    if gamma is _gamma or arrow == _NR_NS
                 ),
-                _strays("growth", _along(arrow, "", "dragged", "sideways")),  # at rest RS and RN look the same
-                _strays("bounds", _along(arrow, "held", "stationary")),
+                *(
+                    Bearing(protocol, "case", _followed, when=_along(arrow, *by), by="analytic.simulate")
+                    for protocol, by in (
+                        ("growth", ("", "dragged", "sideways")),  # at rest RS and RN look the same
+                        ("bounds", ("held", "stationary")),
+                    )
+                ),
             ),
         )
         for arrow in slip_stability.SLIP_ARROWS
@@ -147,22 +136,14 @@ CLAIMS = (
         "eq-58",
         "(58)",
         "Out of rolling on the wall alone, slip grows the most along β₁, whatever the state.",
-        (
-            Bearing(
-                "steepest",
-                "steepest",
-                lambda m: float(slip_bounds.steepest_nr(_x(m), m.parameters)),
-                size=one,
-                by="slip_bounds.steepest_nr",
-            ),
-        ),
+        (Bearing("steepest", "steepest", _steepest, by="slip_bounds.steepest_nr"),),
     ),
     Claim(
         "eq-13-gamma",
         "3.2, last paragraph",
         "On the wall alone slip in a direction grows in proportion to the friction that rolling needs in it, less "
         "what Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
-        (_growth(_lacking, _along(_NR_NS, "", "dragged"), "analytic.contact_forces, (13)"),),
+        (Bearing("growth", "gamma", _lacking, when=_along(_NR_NS, "", "dragged"), by="analytic.contact_forces, (13)"),),
     ),
     Claim(
         "eq-61",
@@ -174,7 +155,7 @@ CLAIMS = (
         "eq-66",
         "(66)",
         "A ball that lags behind the fluid begins to slip at the wall where (66) says.",
-        _bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, _at(m, "omega_c"), round(_at(m, "n_y")))),
+        _bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, m.at("omega_c"), round(m.at("n_y")))),
         text=Text.CORRECTED,
         reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
     ),
@@ -188,7 +169,7 @@ CLAIMS = (
         "eq-73",
         "(73)",
         "A ball that lags behind the fluid begins to slip at the floor where (73) says.",
-        _bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, _at(m, "omega_c"), round(_at(m, "n_x")))),
+        _bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, m.at("omega_c"), round(m.at("n_x")))),
     ),
     Claim(
         "eq-74",
@@ -224,15 +205,7 @@ CLAIMS = (
         "eq-69",
         "(69)",
         "Rolling at both points is the convex combination of slipping to either side that doesn't slip.",
-        (
-            Bearing(
-                "growth",
-                "filippov_share",
-                lambda m: slip_bounds.filippov_share(_arrow(m)[1], _at(m, "omega_c"), m.parameters),
-                size=one,
-                by="slip_bounds.filippov_share",
-            ),
-        ),
+        (Bearing("growth", "filippov_share", _share, by="slip_bounds.filippov_share"),),
     ),
     Claim(
         "definition-3",
@@ -240,7 +213,7 @@ CLAIMS = (
         "Rolling is stable with respect to slipping up to a flow at which it is neutral, and unstable beyond (on the "
         "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
         (
-            _growth(_gamma, _along(_RR_RS, "rest")),
+            Bearing("growth", "gamma", _gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"),
             _neutral("omega_01", Case.RR, "onset of slip"),
             _neutral("omega_02", Case.NR, "onset of sliding on the wall"),
             _neutral("omega_03", Case.RR, "loss of the floor"),
@@ -251,11 +224,13 @@ CLAIMS = (
         "after (80)",
         "(α, β) = (0, 0) and (π, π) are the global extrema of γ.",
         (
-            _growth(
+            Bearing(
+                "growth",
+                "gamma",
                 _greatest_as_printed,
-                _along(_RR_SS, "sideways"),
-                "slip_stability.gamma at (0, 0), (π, π)",
-                Relation.AT_MOST,
+                when=_along(_RR_SS, "sideways"),
+                relation=Relation.AT_MOST,
+                by="slip_stability.gamma at (0, 0), (π, π)",
             ),
         ),
         expected=Outcome.REFUTED,

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-
 import numpy as np
 
 import analytic
 from analytic import StationarySolution
 from analytic.mechanics import dynamics
-from compare.claim import Bearing, Claim, Text, When, given, one
+from compare.claim import Bearing, Claim, Text, given
 from compare.judge import theory
 from compare.kit.lab import state_units
 from compare.kit.record import Measurement
@@ -20,6 +18,7 @@ from model.cases import TRAITS
 from model.kinematics import VARIABLES
 
 _JACOBIAN = "analytic.stationary_solutions: eigenvalues of the exact Jacobian"
+_LEANING = "analytic.leaning_modes"
 
 
 def _stationary(m: Measurement) -> StationarySolution:
@@ -38,9 +37,9 @@ def _spectrum(m: Measurement) -> tuple[complex, ...]:
     return (*([0.0] if state.case is Case.NS else []), *(complex(value) for value in state.eigenvalues))
 
 
-def _mode(m: Measurement, eigenvalues: Callable[[Measurement], Iterable[complex]] = _spectrum) -> complex:
+def _mode(m: Measurement) -> complex:
     """The eigenvalue that belongs to a measured one: each to one, in the order of frequency and decay."""
-    values = [complex(v) for v in eigenvalues(m)]
+    values = _spectrum(m)
     real = 1e-9 * max(map(abs, values))  # round-off in the imaginary part of one that is real
     upper = sorted((v.imag if v.imag > real else 0.0, -v.real) for v in values if v.imag >= -real)
     if not (mode := int(m.conditions["mode"])) <= len(upper):
@@ -53,18 +52,6 @@ def _size(m: Measurement) -> float:
     value = _mode(m)
     parts = (-value.real, value.imag)
     return natural_size(*(parts if m.quantity == "decay_rate" else parts[::-1]), m.parameters)
-
-
-def _rate(
-    quantity: str, when: When, eigenvalues: Callable[[Measurement], Iterable[complex]] = _spectrum, by: str = _JACOBIAN
-) -> Bearing:
-    """Decay rates or frequencies."""
-
-    def predict(m: Measurement) -> float:
-        value = _mode(m, eigenvalues)
-        return -value.real if quantity == "decay_rate" else value.imag
-
-    return Bearing("rates", quantity, predict, when=when, size=_size, by=by)
 
 
 def _response(m: Measurement) -> float:
@@ -90,16 +77,23 @@ def _moved(case: Case, x: tuple[float, ...], p: Parameters, time: float) -> Arra
 def _bearings(case: Case) -> tuple[Bearing, ...]:
     """The whole spectrum of the state of a case."""
     when = given(case=case.name)
-    count = Bearing("rates", "modes", lambda m: float(len(_spectrum(m))), when=when, by=_JACOBIAN)
-    by = "analytic.leaning_modes" if case is Case.SR else "exponential of the exact Jacobian"
-    answers = Bearing("rates", "response", _response, when=when, size=one, by=by)
-    slowest = Bearing("rates", "slowest_decay", _slowest_decay, when=when, by="analytic.slowest_time_constant")
-    return _rate("decay_rate", when), _rate("frequency", when), count, answers, slowest
-
-
-def _slowest_decay(m: Measurement) -> float:
-    """The slowest of the decays, whatever grows or stays besides."""
-    return 1 / analytic.slowest_time_constant(_stationary(m))
+    leans = case is Case.SR
+    return (
+        Bearing("rates", "decay_rate", lambda m: -_mode(m).real, when=when, size=_size, by=_JACOBIAN),
+        Bearing("rates", "frequency", lambda m: _mode(m).imag, when=when, size=_size, by=_JACOBIAN),
+        Bearing("rates", "modes", lambda m: float(len(_spectrum(m))), when=when, by=_JACOBIAN),
+        Bearing(
+            "rates", "response", _response, when=when, by=_LEANING if leans else "exponential of the exact Jacobian"
+        ),
+        # The slowest of the decays, whatever grows or stays besides.
+        Bearing(
+            "rates",
+            "slowest_decay",
+            lambda m: 1 / analytic.slowest_time_constant(_stationary(m)),
+            when=when,
+            by="analytic.slowest_time_constant",
+        ),
+    )
 
 
 def _slowest(m: Measurement) -> float:
@@ -129,7 +123,7 @@ CLAIMS = (
         "below, at the rates of the eigenvalues of f_SR.",
         (
             *_bearings(Case.SR),
-            Bearing("rates", "decay_rate", _slowest, when=given(case="SR", mode=1), size=_size, by="leaning_modes"),
+            Bearing("rates", "decay_rate", _slowest, when=given(case="SR", mode=1), size=_size, by=_LEANING),
         ),
         text=Text.CORRECTED,
         reason="With A_y = 0 the state is on the border to NR: the eigenvalues show on the side where the ball leans "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
@@ -13,8 +13,8 @@ from compare.claim import Bearing, Claim, Text, When, every, given
 from compare.judge import theory
 from compare.kit.check import Relation
 from compare.kit.record import Measurement
-from compare.kit.settling import FORCES, SUMS, scale
-from compare.settled import cases, detected, from_floor, is_in, lifts_first, natural_size, number, reached, slips_first
+from compare.kit.settling import FORCES, SUMS
+from compare.settled import cases, detected, from_floor, is_in, lifts_first, number, reached, slips_first
 from model import Case
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
@@ -27,9 +27,9 @@ def case(m: Measurement) -> float:
     sinks where not.
     """
     allowed = cases(m.parameters)
-    if m.conditions["start"] == "on the wall" and detected(m) is Case.NS and _exists(Case.NR, m):
-        raise LookupError("NR exists, and yet the ball sinks")
     if m.conditions["start"] == "on the wall":
+        if detected(m) is Case.NS and _exists(Case.NR, m):
+            raise LookupError("NR exists, and yet the ball sinks")
         allowed &= {Case.NR} if Case.NR in allowed else {Case.NS}
     else:
         allowed -= {Case.NS}
@@ -62,7 +62,7 @@ def bearings(quantities: Iterable[str], when: When, by: str, of: Case | None = N
         state = theory(analytic.solution, m.parameters, of) if of else reached(m)
         return number(m.quantity, state, m.parameters)
 
-    return tuple(Bearing("settled", q, predict, when=when, size=natural_size, by=by) for q in quantities)
+    return tuple(Bearing("settled", quantity, predict, when=when, by=by) for quantity in quantities)
 
 
 def _cases(when: When) -> Bearing:
@@ -74,14 +74,11 @@ def _with_fluid(when: When = lambda m: True) -> Bearing:
     return Bearing("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 
 
-def _along_branch(name: str, sign: float = 1.0) -> Callable[[Measurement], float]:
+def _along_branch(m: Measurement) -> float:
     """A force along the branch of SS in closed form, N, at the flow and before the fold."""
-
-    def force(m: Measurement) -> float:
-        p = m.parameters
-        return sign * float(getattr(slipping_branch.branch(slipping_branch.points_at(p)[0], p), name)) * p.m * p.g
-
-    return force
+    p = m.parameters
+    branch = slipping_branch.branch(slipping_branch.points_at(p)[0], p)
+    return float({"force_Ay": branch.A_y, "force_Bx": branch.B_x, "force_Az": -branch.drag}[m.quantity]) * p.m * p.g
 
 
 def _region(m: Measurement) -> Exists:
@@ -100,6 +97,11 @@ def _in_region(m: Measurement) -> float:
     return float(sum(1 << case for flag, case in _LASTING.items() if flag in region))
 
 
+def _lasting(m: Measurement) -> float:
+    """The same by the stationary states that last."""
+    return float(sum(1 << case for case in cases(m.parameters)))
+
+
 def _dividing(m: Measurement) -> float:
     """omega_c of SS beyond the fold; LookupError where the region lacks it, or an attractor that it divides."""
     if Exists.SS | Exists.SS_BEYOND_FOLD | Exists.NR not in _region(m):
@@ -108,10 +110,8 @@ def _dividing(m: Measurement) -> float:
 
 
 def _leaning(m: Measurement) -> float:
-    """How many modes SR has; LookupError where the region has no SR."""
-    if Exists.SR not in _region(m):
-        raise LookupError("the region has no SR")
-    return 2.0
+    """How many modes SR has, none where the region has no SR."""
+    return 2.0 * (Exists.SR in _region(m))
 
 
 def _born(m: Measurement) -> float:
@@ -123,6 +123,10 @@ def _born(m: Measurement) -> float:
     if born.meets != ("omega_02", "omega_04"):
         raise LookupError("no fold is born")
     return p.c * math.sqrt(p.eta / born.eta)
+
+
+def _all_meet(m: Measurement) -> float:
+    return bifurcation.double_points(m.parameters)[-1].omega_0
 
 
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
@@ -171,7 +175,7 @@ CLAIMS = (
         "A ball that has settled slipping at both points slips inwards at the floor and up the wall, cos α > 0, and "
         "backwards, sin α < 0: there is no such motion with cos α < 0.",
         tuple(
-            Bearing("settled", slip, lambda m: 0.0, when=_SLIPS, size=natural_size, relation=relation, by="(40)")
+            Bearing("settled", slip, lambda m: 0.0, when=_SLIPS, relation=relation, by="(40)")
             for slip, relation in (("slip_z", Relation.AT_LEAST), ("slip_x", Relation.AT_MOST))
         ),
     ),
@@ -181,12 +185,8 @@ CLAIMS = (
         "Slipping at both points, the normal forces at floor and wall are the closed forms in α, and friction holds "
         "the ball back along its orbit.",
         tuple(
-            Bearing("settled", quantity, predict, when=_SLIPS, size=natural_size, by="slipping_branch.branch")
-            for quantity, predict in (
-                ("force_Ay", _along_branch("A_y")),
-                ("force_Bx", _along_branch("B_x")),
-                ("force_Az", _along_branch("drag", -1.0)),
-            )
+            Bearing("settled", force, _along_branch, when=_SLIPS, by="slipping_branch.branch")
+            for force in ("force_Ay", "force_Bx", "force_Az")
         ),
     ),
     Claim(
@@ -233,15 +233,7 @@ DIAGRAMS = (
             f"Fig. {figure[-1]}",
             f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
             "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR).",
-            (
-                Bearing(
-                    "plane",
-                    "cases",
-                    lambda m: float(sum(1 << case for case in cases(m.parameters))),  # the measurement's bit mask
-                    when=given(figure=figure),
-                    by="analytic.stable_solutions",
-                ),
-            ),
+            (Bearing("plane", "cases", _lasting, when=given(figure=figure), by="analytic.stable_solutions"),),
         )
         for figure, axis in (("fig-7", "η"), ("fig-8", "μ = η"))
     ),
@@ -252,13 +244,7 @@ DIAGRAMS = (
         "ones and in NS, SS beyond the fold divides two basins, and in SR a ball leans on the floor.",
         (
             Bearing("plane", "cases", _in_region, by="analytic.bifurcation.diagram.case_map"),
-            Bearing(
-                "edge",
-                "edge_omega_c",
-                _dividing,
-                size=lambda m: scale("omega_c", m.parameters),
-                by="case_map, analytic.solution",
-            ),
+            Bearing("edge", "edge_omega_c", _dividing, by="case_map, analytic.solution"),
             Bearing("rates", "modes", _leaning, when=given(case="SR"), by="case_map"),
         ),
     ),
@@ -268,12 +254,7 @@ DIAGRAMS = (
         "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j rolling ends at ω₀₃ = √(g/(jR)), where all meet.",
         (
             Bearing("birth", "critical_drag", _born, by="analytic.bifurcation.diagram.double_points"),
-            Bearing(
-                "thresholds",
-                "omega_03",
-                lambda m: bifurcation.double_points(m.parameters)[-1].omega_0,
-                by="analytic.bifurcation.diagram.double_points",
-            ),
+            Bearing("thresholds", "omega_03", _all_meet, by="analytic.bifurcation.diagram.double_points"),
         ),
     ),
 )

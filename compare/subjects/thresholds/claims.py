@@ -14,23 +14,18 @@ from compare.claim import Bearing, Claim, When, given
 from compare.judge import theory
 from compare.kit.check import Relation
 from compare.kit.record import Measurement
-from compare.kit.settling import scale
 from compare.settled import number
 from model import Case, Parameters
 
+_BY = "analytic.thresholds"
 SLIPPING = "floor force of settled slipping → 0"
 """How omega_02 is measured where slipping at both points ends without a fold: that is a claim of its own."""
 
 
 def _at(quantity: str, when: When = lambda m: m.conditions["by"] != SLIPPING, protocol: str = "thresholds") -> Bearing:
     """A threshold."""
-    return Bearing(
-        protocol,
-        quantity,
-        lambda m: float(getattr(_known(m), quantity)),
-        when=when,
-        by=f"analytic.thresholds: {quantity}",
-    )
+    by = f"{_BY}: {quantity}"
+    return Bearing(protocol, quantity, lambda m: float(getattr(_known(m), quantity)), when=when, by=by)
 
 
 def _known(m: Measurement) -> analytic.Thresholds:
@@ -44,7 +39,6 @@ def _edge(name: str) -> Bearing:
         "edge",
         f"edge_{name}",
         lambda m: number(name, theory(analytic.solution, m.parameters, Case.SS, stable=False), m.parameters),
-        size=lambda m: scale(name, m.parameters),
         by="analytic.solution: SS beyond the fold, (37)-(41)",
     )
 
@@ -57,17 +51,10 @@ _HOLDS: dict[str, Callable[[float, Parameters], float]] = {
 """Functions that change sign where the contacts can no longer hold a ball that rolls with the fluid."""
 
 
-def _holds(name: str, quantity: str) -> Bearing:
+def _ends(name: str, p: Parameters) -> float:
     """The flow up to which forces admit rolling, which is where rolling ends for mu < 1."""
-
-    def end(p: Parameters) -> float:
-        unit = math.sqrt(p.g / p.R)
-        return float(brentq(_HOLDS[name], 0.01 * unit, 100 * unit, args=(p,), rtol=1e-12))
-
-    def predict(m: Measurement) -> float:
-        return theory(end, m.parameters.replace(omega_0=1.0))
-
-    return Bearing("thresholds", quantity, predict, when=lambda m: m.parameters.mu < 1, by=f"rolling_forces.{name}")
+    unit = math.sqrt(p.g / p.R)
+    return float(brentq(_HOLDS[name], 0.01 * unit, 100 * unit, args=(p,), rtol=1e-12))
 
 
 CLAIMS = (
@@ -81,7 +68,17 @@ CLAIMS = (
         "rolling-holds",
         "(12), (13), (22)",
         "Rolling at both points goes on just as long as forces within both friction cones admit it, for μ < 1.",
-        tuple(_holds(name, quantity) for name in _HOLDS for quantity in ("omega_01", "omega_03")),
+        tuple(
+            Bearing(
+                "thresholds",
+                quantity,
+                lambda m, name=name: theory(_ends, name, m.parameters.replace(omega_0=1.0)),  # type: ignore[misc]
+                when=lambda m: m.parameters.mu < 1,
+                by=f"rolling_forces.{name}",
+            )
+            for name in _HOLDS
+            for quantity in ("omega_01", "omega_03")
+        ),
     ),
     Claim(
         "table-5-P2",
@@ -102,9 +99,7 @@ CLAIMS = (
         "leaves it.",
         (
             _at("omega_03"),
-            Bearing(
-                "thresholds", "lifts", lambda m: math.isnan(_known(m).omega_01), by="analytic.thresholds: omega_01"
-            ),
+            Bearing("thresholds", "lifts", lambda m: math.isnan(_known(m).omega_01), by=f"{_BY}: omega_01"),
         ),
     ),
     Claim(
@@ -113,12 +108,7 @@ CLAIMS = (
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
         (
             _at("omega_04"),
-            Bearing(
-                "thresholds",
-                "folds",
-                lambda m: math.isfinite(_known(m).omega_04),
-                by="analytic.thresholds: omega_04",
-            ),
+            Bearing("thresholds", "folds", lambda m: math.isfinite(_known(m).omega_04), by=f"{_BY}: omega_04"),
         ),
     ),
     Claim(
@@ -133,14 +123,9 @@ CLAIMS = (
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
         "the wall at ω₀₂, without a jump.",
         (
+            Bearing("thresholds", "folds", lambda m: m.parameters.eta > _known(m).eta_cr, by=f"{_BY}: eta_cr"),
             Bearing(
-                "thresholds", "folds", lambda m: m.parameters.eta > _known(m).eta_cr, by="analytic.thresholds: eta_cr"
-            ),
-            Bearing(
-                "birth",
-                "critical_drag",
-                lambda m: bifurcation.critical_drag(m.parameters),
-                by="analytic.bifurcation.diagram.critical_drag",
+                "birth", "critical_drag", lambda m: bifurcation.critical_drag(m.parameters), by="diagram.critical_drag"
             ),
             _at("omega_02", given(by=SLIPPING)),
         ),
@@ -155,13 +140,13 @@ CLAIMS = (
                 "omega_04",
                 lambda m: max(_known(m).omega_01, _known(m).omega_02),
                 relation=Relation.AT_LEAST,
-                by="analytic.thresholds: omega_01, omega_02",
+                by=f"{_BY}: omega_01, omega_02",
             ),
             Bearing(
                 "thresholds",
                 "folds",
                 lambda m: bifurcation.number_of_folds(m.parameters),
-                by="analytic.bifurcation.diagram.number_of_folds",
+                by="diagram.number_of_folds",
             ),
         ),
     ),

@@ -35,7 +35,7 @@ from compare.kit.short import (
 )
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
-from compare.kit.trials import Start
+from compare.kit.trials import Start, Trial, carry_out
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -57,9 +57,8 @@ MOVING = {
     for case in Case
 }
 """The variables whose rates of change are measured."""
-COMPONENTS = ("Ax", "Ay", "Az", "Bx", "By", "Bz")
 STATE, RATES, FORCES = slice(0, 8), slice(8, 16), slice(16, 22)
-"""Parts of what is read at the centre of a window (22,): state, rates of change in SI, and `COMPONENTS` in N."""
+"""Parts of what is read at the centre of a window (22,): state, rates of change in SI, and forces at A and B in N."""
 
 STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
     # Falls from mid-air onto the floor, slides, rolls outwards to the wall, hops, slips at both points, sticks.
@@ -111,49 +110,48 @@ NAMES = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 
 def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Rates of change and contact forces, each with the state they belong to."""
-    starts = []
-    for name, p in sets.items():
-        rng = np.random.default_rng([SEED, *name.encode()])
-        for case, k in product(Case, range(lab.effort("field.starts"))):
-            x = random_state(case, p, rng)
-            # Friction at two rolling contacts can balance only a slight lag.
-            rolls = case is Case.RR
-            omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
-            starts.append(Start(name, p.replace(omega_0=omega_0), case.name, x))
-            if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < len(FASTEST):
-                # The same in a fluid so thin that the ball moves through it at this Reynolds number, and drag shows.
-                _, v_y, omega_c, *_, h, v_h = x
-                speed = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0))
-                q = starts[-1].p
-                q = q.replace(nu_f=2 * p.r * speed / FASTEST[k], c=24 / (p.C_D * FASTEST[k] * time_unit(p)))
-                starts.append(replace(starts[-1], p=q))
-    steps = CENTRES[-1] + HALF_WINDOW + NEAR
-    tasks = [lab.pair(start.p, start.x0, steps, coarse_step(start.p) / REFINED) for start in starts]
-    runs: list[tuple[Start, list[Task], list[Trajectory]]] = []
-    for start, pair, got in zip(starts, tasks, lab.groups(tasks), strict=True):
-        if isinstance(got, str):
-            yield Missing("field", start.set, f"from {start.name}: the run {got}", 0)
+    trials = [trial for name, p in sets.items() for trial in _moving(lab, name, p)]
+    results = []
+    for result in carry_out(lab, "field", trials):
+        if isinstance(result, Missing):
+            yield result
         else:
-            runs.append((start, pair, got))
+            results.append(result)
     kept = Counter[tuple[str, float, Case]]()
-    for centre in CENTRES:
-        for start, pair, (coarse, fine) in runs:
-            case = Case(int(coarse.case[centre]))
-            if kept[start.set, start.p.nu_f, case] == lab.effort("field.kept"):
-                continue
-            window = _window(case, coarse, fine, centre)
-            if window is None:
-                continue
-            values = _values(case, window, start.p)
-            kept[start.set, start.p.nu_f, case] += 1
-            for what, value in values.items():
-                at = state_of(window[0, STATE])
-                yield measurement(lab, "field", start.set, start.p, what, value, pair, case=case.name, **at)
+    for centre, result in product(CENTRES, results):
+        set, p, case = result.trial.set, result.trial.p, Case(int(result.coarse.case[centre]))
+        if kept[set, p.nu_f, case] < lab.effort("field.kept"):
+            window = _window(case, result.coarse, result.fine, centre)
+            if window is not None:
+                kept[set, p.nu_f, case] += 1
+                for what, value in _values(case, window, p).items():
+                    yield result.row(lab, what, value, case=case.name, **state_of(window[0, STATE]))
     for name, case in product(sets, Case):
         if lacking := lab.effort("field.kept") - kept[name, sets[name].nu_f, case]:
             why = f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
             rows = len(MOVING[case]) + len(_forces(case, np.zeros(6)))
             yield Missing("field", name, why, lacking * rows)
+
+
+def _moving(lab: Lab, name: str, p: Parameters) -> Iterator[Trial]:
+    """Random starts in every case; under laws of drag other than Stokes' some in so thin a fluid that the ball moves
+    through it at Reynolds numbers as balls in water have them, so that drag shows.
+    """
+    rng = np.random.default_rng([SEED, *name.encode()])
+    for case, k in product(Case, range(lab.effort("field.starts"))):
+        x = random_state(case, p, rng)
+        # Friction at two rolling contacts can balance only a slight lag.
+        rolls = case is Case.RR
+        omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
+        q = p.replace(omega_0=omega_0)
+        t_end, refine = (CENTRES[-1] + HALF_WINDOW + NEAR) * coarse_step(q) / REFINED, (REFINED, 2 * REFINED)
+        trial = Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0)
+        yield trial
+        if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < len(FASTEST):
+            _, v_y, omega_c, *_, h, v_h = x
+            speed = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0))
+            thin = {"nu_f": 2 * p.r * speed / FASTEST[k], "c": 24 / (p.C_D * FASTEST[k] * time_unit(p))}
+            yield replace(trial, p=q.replace(**thin))
 
 
 def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
@@ -212,11 +210,11 @@ def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
 
 def _forces(case: Case, forces: Array) -> dict[str, float]:
     """Of forces (6,) those that the motion determines, of the contacts that are closed."""
-    named = dict(zip(COMPONENTS, forces.tolist(), strict=True))
+    A_x, A_y, A_z, B_x, B_y, B_z = forces.tolist()
     if case is Case.RR:  # the contacts share the load in ways that Newton's laws don't tell apart
-        A_x, A_y, A_z, B_x, B_y, B_z = named.values()
         return {"Ax-By": A_x - B_y, "Ay+By": A_y + B_y, "Bx+By": B_x + B_y, "Az": A_z, "Bz": B_z}
-    return {name: force for name, force in named.items() if getattr(case, name[0]) is not Contact.N}
+    floor = {} if case.A is Contact.N else {"Ax": A_x, "Ay": A_y, "Az": A_z}
+    return floor | ({} if case.B is Contact.N else {"Bx": B_x, "By": B_y, "Bz": B_z})
 
 
 def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -293,38 +291,39 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
     It does so where its gap, once it has stopped to shrink, grows by more than `REBOUND`.
     """
-    starts = [_start(name, p, FLOW, x, how) for name, p in sets.items() for how, x in LANDINGS.items()]
-    steps = [coarse_step(start.p) / REFINED for start in starts]
-    pairs = [
-        lab.pair(start.p, start.x0, round(LANDED * time_unit(start.p) / step), step)
-        for start, step in zip(starts, steps, strict=True)
-    ]
-    rebounds = dict.fromkeys(sets, 0)
-    for start, step, pair, got in zip(starts, steps, pairs, lab.groups(pairs), strict=True):
-        if isinstance(got, str):
-            yield Missing("impacts", start.set, f"{start.name}: the run {got}", len(NAMES))
+    trials = []
+    for name, p in sets.items():
+        for how, x in LANDINGS.items():
+            start = _start(name, p, FLOW, x, how)
+            step = coarse_step(start.p) / REFINED
+            conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
+            t_end, refine = round(LANDED * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
+            trials.append(Trial(name, start.p, how, start.x0, t_end, refine, conditions=conditions, rows=len(NAMES)))
+    rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
+    changed = [VARIABLES.index(name) for name in NAMES]
+    for landing in carry_out(lab, "impacts", trials):
+        if isinstance(landing, Missing):
+            yield landing
             continue
-        coarse, fine = got
-        for run in got:
-            gap = run.y if start.name.startswith("floor") else run.h
+        trial, coarse, fine = landing.trial, landing.coarse, landing.fine
+        p, units, on_floor = trial.p, state_units(trial.p), trial.name.startswith("floor")
+        tasks[trial.set] += landing.tasks
+        for run in (coarse, fine):
+            gap = run.y if on_floor else run.h
             low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
-            rebounds[start.set] += bool(gap[low:].max() > gap[low] + REBOUND * start.p.R)
-        contact = [case.A if start.name.startswith("floor") else case.B for case in coarse.cases]
+            rebounds[trial.set] += bool(gap[low:].max() > gap[low] + REBOUND * p.R)
+        contact = [case.A if on_floor else case.B for case in coarse.cases]
         at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + AFTER
         if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
-            why = f"{start.name}: the contact did not close for good within {LANDED:g} sqrt(R/g)"
-            yield Missing("impacts", start.set, why, len(NAMES))
+            why = f"{trial.name}: the contact did not close for good within {LANDED:g} sqrt(R/g)"
+            yield Missing("impacts", trial.set, why, len(NAMES))
             continue
-        p, units = start.p, state_units(start.p)
-        changed = [VARIABLES.index(name) for name in NAMES]
         change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
         # The contact closes at a whole step, up to one late; until then weight and friction differ.
-        late = step / time_unit(p) / 2
-        conditions: dict[str, Condition] = {"start": start.name, "time": float(coarse.time[at]), **state_of(start.x0)}
+        late = coarse_step(p) / REFINED / time_unit(p) / 2
         for quantity, k in zip(NAMES, changed, strict=True):
             value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
-            yield measurement(lab, "impacts", start.set, p, f"after_{quantity}", value, pair, **conditions)
+            yield landing.row(lab, f"after_{quantity}", value, time=float(coarse.time[at]))
     for name, count in rebounds.items():
-        own = [task for start, pair in zip(starts, pairs, strict=True) if start.set == name for task in pair]
-        p = next(start.p for start in starts if start.set == name)
-        yield measurement(lab, "impacts", name, p, "rebounds", count, own)
+        p = next(trial.p for trial in trials if trial.set == name)
+        yield measurement(lab, "impacts", name, p, "rebounds", count, tasks[name])

@@ -22,11 +22,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from compare.kit.lab import Lab, coarse_step, state_units, time_unit
-from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
+from compare.kit.record import Condition, Measurement, Missing, Records, state_of
 from compare.kit.settling import PRESSES, reading
 from compare.kit.statistics import Measured
-from compare.kit.tasks import Task
-from compare.kit.trials import Start
+from compare.kit.trials import Start, Trial, carry_out
 from model import Parameters, State
 from model.kinematics import VARIABLES
 
@@ -49,8 +48,6 @@ ROUGH, JAMMED, SLIGHT = 1.7, (1.5, 1.7, 1.8, 2.0, 2.2), 5e-3
 """Friction of a rough floor, flows along it in the same units, and a slight slip divided by the ball's spin."""
 BRAKED, SLOW = 0.5, 0.6
 """Rate of the fluid's torque divided by c, and the flow omega_0 sqrt(R/g), on contacts with a friction of 1."""
-REFINED = 8, 16
-"""Time steps in a coarse one."""
 
 
 def torque(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -63,40 +60,45 @@ def torque(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """Where each start ends: its state, or on a smooth wall its case."""
-    runs: list[tuple[str, str, Parameters, State, float]] = []
-    for name, p in sets.items():
-        unit = time_unit(p)
-        for how, (flow, lasts, x) in STARTS.items():
-            runs.append((name, how, p.replace(omega_0=flow / unit), State(*(np.array(x) * state_units(p))), lasts))
-        for flow in SMOOTH:
-            going = State(omega_c=flow / unit, slip_y=math.sqrt(p.g * p.R) / p.r)
-            runs.append((name, "smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, SPUN))
-        for flow in JAMMED:
-            spin = flow / unit * p.R / p.r
-            slight = State(omega_c=flow / unit, slip_x=-SLIGHT / 10 * spin, slip_z=SLIGHT * spin)
-            runs.append((name, "rough floor", p.replace(omega_0=flow / unit, mu=ROUGH), slight, SPUN))
-    pairs: list[list[Task]] = []
-    for _, _, p, x, lasts in runs:
-        step = coarse_step(p)
-        count = round(lasts * time_unit(p) / step)
-        pairs.append([lab.task(p, x, count * step, step / times, samples=count) for times in REFINED])
-    for (name, how, p, x, _), tasks, got in zip(runs, pairs, lab.groups(pairs), strict=True):
-        if isinstance(got, str):
-            yield Missing("runs", name, f"{how}: the run {got}", 1 if how in ("smooth wall", "rough floor") else len(x))
+    """Where each start ends: its state, or on a smooth wall and a rough floor its case."""
+    for run in carry_out(lab, "runs", [trial for name, p in sets.items() for trial in _trials(name, p)]):
+        if isinstance(run, Missing):
+            yield run
             continue
-        coarse, fine = got
-        at: dict[str, Condition] = {"start": how, "time": float(fine.time[-1]), **state_of(x.stacked())}
+        p, how, coarse, fine = run.trial.p, run.trial.name, run.coarse, run.fine
+        time = float(fine.time[-1])
         if coarse.case[-1] != fine.case[-1]:
-            yield Missing("runs", name, f"{how}: with half the time step the ball ends in another case")
+            yield Missing("runs", run.trial.set, f"{how}: with half the time step the ball ends in another case")
         elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
-            yield Missing("runs", name, f"{how}: the contact force is so small that the ball may hover")
+            yield Missing("runs", run.trial.set, f"{how}: the contact force is so small that the ball may hover")
         elif how in ("smooth wall", "rough floor"):
-            yield measurement(lab, "runs", name, p, "case", float(fine.case[-1]), tasks, **at)
+            yield run.row(lab, "case", float(fine.case[-1]), time=time)
         else:
             # The change of one variable may vanish by chance: the largest, in natural units, is used for all.
             units, ends = state_units(p), (coarse.x[-1], fine.x[-1])
             change = float(np.abs((ends[1] - ends[0]) / units).max())
             for variable, value, size in zip(VARIABLES, ends[1].tolist(), units.tolist(), strict=True):
-                sure = Measured(value, change * size)
-                yield measurement(lab, "runs", name, p, f"end_{variable}", sure, tasks, **at)
+                yield run.row(lab, f"end_{variable}", Measured(value, change * size), time=time)
+
+
+def _trials(name: str, p: Parameters) -> Iterator[Trial]:
+    """All starts of a set."""
+    unit = time_unit(p)
+
+    def trial(how: str, p: Parameters, x: State, lasts: float, rows: int = 1) -> Trial:
+        count = round(lasts * unit / coarse_step(p))
+        at: dict[str, Condition] = {"start": how, **state_of(x.stacked())}
+        return Trial(
+            name, p, how, x.stacked(), count * coarse_step(p), (8, 16), samples=count, conditions=at, rows=rows
+        )
+
+    for how, (flow, lasts, x) in STARTS.items():
+        start = State(*(np.array(x) * state_units(p)))
+        yield trial(how, p.replace(omega_0=flow / unit), start, lasts, rows=len(VARIABLES))
+    for flow in SMOOTH:
+        going = State(omega_c=flow / unit, slip_y=math.sqrt(p.g * p.R) / p.r)
+        yield trial("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, SPUN)
+    for flow in JAMMED:
+        spin = flow / unit * p.R / p.r
+        slight = State(omega_c=flow / unit, slip_x=-SLIGHT / 10 * spin, slip_z=SLIGHT * spin)
+        yield trial("rough floor", p.replace(omega_0=flow / unit, mu=ROUGH), slight, SPUN)
