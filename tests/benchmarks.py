@@ -1,0 +1,184 @@
+"""``python -m tests.benchmarks``: speed, as ratios within one run.
+
+They depend less on the machine and its load than times do.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import math
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from rich.console import Console
+
+from analytic import stable_solutions
+from compare.kit import pages
+from compare.kit.campaign import Campaign, run_batch
+from compare.kit.engines import MUJOCO
+from compare.kit.tasks import Task, carry_out
+from compare.kit.workers import Workers, dask, processes
+from mjsim import scene
+from mjsim.contact_settings import ContactSettings
+from mjsim.engine import Run
+from mjsim.stepping import Polar
+from model import Flow, Parameters, State, storage
+
+REPEATS = 5
+BATCH = 64
+FINISHED = 10_000
+COUNT = 20_000_000
+SLIPPING = Parameters.named("reference").replace(omega_0=25.0)
+"""Slipping at both points: both contacts closed, and friction on its cone."""
+
+
+def main() -> None:
+    """Measure the loop over bare steps, alone and in a batch; then campaigns. Show it as a table."""
+    rows = [["", "bare mj_step", "whole loop", "ratio"]]
+    for name, runs in (("one simulation", 1), (f"batch of {BATCH}", BATCH)):
+        bare, whole, ratio = cost(runs)
+        rows.append([name, f"{1e6 * bare:.2f} µs", f"{1e6 * whole:.2f} µs", f"{ratio:.2f}"])
+    two_over_one, machine, dask_over_processes = throughputs()
+    rows += [
+        ["campaign: two processes against one", "", "", f"{two_over_one:.2f}"],
+        ["the same of bare arithmetic: the machine's limit", "", "", f"{machine:.2f}"],
+        ["campaign: two Dask workers against two processes", "", "", f"{dask_over_processes:.2f}"],
+        ["campaign: bookkeeping of a task", "", f"{1e3 * bookkeeping():.1f} ms", ""],
+        [f"campaign: resuming {FINISHED} finished tasks", "", f"{resuming():.1f} s", ""],
+    ]
+    Console().print(pages.table("Cost of the study's loop", rows))
+
+
+def cost(runs: int, steps: int = 2500) -> list[float]:
+    """Processor time of a bare and of a whole step of one simulation, s, and their ratio: medians over `REPEATS`.
+
+    There is a sample every 100 steps. Timings are taken in turn, each whole one between two bare ones: a machine that
+    slows down does so for both. The bare steps are those of a settled run with its forces, margins and surface
+    velocities left as they are, and the ball held at its azimuth, where the wall stands, by an assignment a step.
+    """
+    settings, p = ContactSettings(), SLIPPING
+    (state,) = stable_solutions(p)
+    model, _ = scene.build(p, settings)
+    omega_0 = np.full((500, 1), p.omega_0)
+    settled = Polar([model], [p], settings, [state.x], 0.0, omega_0[0], batched=False)
+    settled.advance(omega_0)
+    starts = [p] * runs, [state.x] * runs, steps * settings.timestep, [Flow.steady(p.omega_0)] * runs, settings
+    bare, whole = [_bare(settled, runs, steps)], []
+    for _ in range(REPEATS):
+        loop = Run(*starts, sample_interval=100 * settings.timestep, batched=runs > 1)
+        whole.append(_seconds(functools.partial(list, loop), time.process_time))
+        bare.append(_bare(settled, runs, steps))
+    ratios = [2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)]
+    each = steps * runs
+    return [statistics.median(bare) / each, statistics.median(whole) / each, statistics.median(ratios)]
+
+
+def _bare(settled: Polar, runs: int, steps: int) -> float:
+    """Time in s of the given steps with no more around them than a loop."""
+    model, data = settled.model, settled.data
+    if runs == 1:
+        azimuth, step = data.qpos[:1], functools.partial(mujoco.mj_step, model, data)
+    else:
+        batch = Batch(model, nsim=runs, nthread=1)
+        for name in ("qpos", "qvel", "qfrc_applied", "mocap_quat", "qacc_warmstart"):
+            batch.bind(name)[:] = getattr(data, name)
+        azimuth, step = batch.bind("qpos")[:, 0], batch.step
+    held = float(data.qpos[0])
+
+    def loop() -> None:
+        for _ in range(steps):
+            step()
+            azimuth[:] = held
+
+    return _seconds(loop, time.process_time)
+
+
+def _seconds(work: Callable[[], Any], clock: Callable[[], float] = time.perf_counter) -> float:
+    start = clock()
+    work()
+    return clock() - start
+
+
+def throughputs() -> tuple[float, float, float]:
+    """Speed of two processes divided by that of one, in campaigns and in bare arithmetic; and of two Dask workers
+    divided by that of two processes. Medians of neighbouring timings; nan without Dask."""
+    kinds = processes(1), processes(2)
+    times = [[_longer(work, kind) for work in (_campaign, _arithmetic) for kind in kinds] for _ in range(REPEATS)]
+    by_dask = [math.nan]
+    if importlib.util.find_spec("distributed"):
+        from distributed import LocalCluster
+
+        given: dict[str, Any] = {"n_workers": 2, "threads_per_worker": 1, "silence_logs": 50}
+        cluster: Any = LocalCluster(host="127.0.0.1", dashboard_address=None, **given)  # type: ignore[no-untyped-call]
+        with cluster:
+            turns = [[_longer(_campaign, kind) for kind in (kinds[1], dask(cluster.scheduler_address))] for _ in times]
+        by_dask = [two / other for two, other in turns]
+    two_over_one, machine = (statistics.median(row[k] / row[k + 1] for row in times) for k in (0, 2))
+    return two_over_one, machine, statistics.median(by_dask)
+
+
+def _longer(work: Callable[[Workers, int], None], kind: Workers) -> float:
+    """Time that twice the work takes more than the work: what workers take to begin and to end cancels."""
+    once, twice = (_seconds(functools.partial(work, kind, size)) for size in (1, 2))
+    return twice - once
+
+
+def _campaign(kind: Workers, size: int) -> None:
+    with tempfile.TemporaryDirectory() as directory, Campaign(Path(directory), kind) as campaign:
+        campaign.complete(_tasks(4 * size * BATCH, 2.0))
+
+
+def _arithmetic(kind: Workers, size: int) -> None:
+    executor = kind.start()
+    list(executor.map(_count, [size * COUNT] * 2))
+    kind.stop(executor, False)
+
+
+def _count(times: int) -> None:
+    for _ in range(times):
+        pass
+
+
+def _tasks(count: int, t_end: float = 0.01) -> list[Task]:
+    """Runs from rest at different omega_0."""
+    sets = [SLIPPING.replace(omega_0=15 + 10 * k / count) for k in range(count)]
+    return [Task(engine=MUJOCO.name, parameters=p, x0=State(), t_end=t_end) for p in sets]
+
+
+def bookkeeping() -> float:
+    """Median over `REPEATS` of what a task of a campaign in this process takes beyond simulating and storing it, s."""
+    spent, tasks = [], _tasks(BATCH)
+
+    def campaign() -> None:
+        with tempfile.TemporaryDirectory() as runs, Campaign(Path(runs), workers=0) as here:
+            here.complete(tasks)
+
+    with tempfile.TemporaryDirectory() as directory:
+        alone = functools.partial(run_batch, tasks, Path(directory), "alone", math.inf)
+        alone()  # imports
+        for _ in range(REPEATS):
+            spent.append((-_seconds(alone, time.process_time) + _seconds(campaign, time.process_time)) / BATCH)
+    return statistics.median(spent)
+
+
+def resuming() -> float:
+    """Time to find out that `FINISHED` tasks are done, s."""
+    with tempfile.TemporaryDirectory() as directory:
+        tasks = _tasks(FINISHED)
+        (run,) = carry_out(tasks[:1])
+        for k in range(0, FINISHED, BATCH):
+            storage.save_batch({task.key: run for task in tasks[k : k + BATCH]}, Path(directory) / f"runs-{k:024x}.h5")
+        with Campaign(Path(directory), workers=0) as campaign:
+            return _seconds(functools.partial(campaign.complete, tasks))
+
+
+if __name__ == "__main__":
+    main()
