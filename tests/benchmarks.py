@@ -110,7 +110,7 @@ def _seconds(work: Callable[[], Any], clock: Callable[[], float] = time.perf_cou
 def throughputs() -> tuple[float, float, float]:
     """Speed of two processes divided by that of one, in campaigns and in bare arithmetic; and of two Dask workers
     divided by that of two processes. Medians of neighbouring timings; nan without Dask."""
-    kinds = processes(1), processes(2)
+    kinds = functools.partial(processes, 1), functools.partial(processes, 2)
     times = [[_longer(work, kind) for work in (_campaign, _arithmetic) for kind in kinds] for _ in range(REPEATS)]
     by_dask = [math.nan]
     if importlib.util.find_spec("distributed"):
@@ -119,15 +119,16 @@ def throughputs() -> tuple[float, float, float]:
         given: dict[str, Any] = {"n_workers": 2, "threads_per_worker": 1, "silence_logs": 50}
         cluster: Any = LocalCluster(host="127.0.0.1", dashboard_address=None, **given)  # type: ignore[no-untyped-call]
         with cluster:
-            turns = [[_longer(_campaign, kind) for kind in (kinds[1], dask(cluster.scheduler_address))] for _ in times]
+            both = kinds[1], functools.partial(dask, cluster.scheduler_address)
+            turns = [[_longer(_campaign, kind) for kind in both] for _ in times]
         by_dask = [two / other for two, other in turns]
     two_over_one, machine = (statistics.median(row[k] / row[k + 1] for row in times) for k in (0, 2))
     return two_over_one, machine, statistics.median(by_dask)
 
 
-def _longer(work: Callable[[Workers, int], None], kind: Workers) -> float:
+def _longer(work: Callable[[Workers, int], None], kind: Callable[[], Workers]) -> float:
     """Time that twice the work takes more than the work: what workers take to begin and to end cancels."""
-    once, twice = (_seconds(functools.partial(work, kind, size)) for size in (1, 2))
+    once, twice = (_seconds(functools.partial(lambda n: work(kind(), n), size)) for size in (1, 2))
     return twice - once
 
 

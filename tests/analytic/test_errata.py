@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analytic import contact_forces, stationary_solutions, thresholds, vector_field
-from model import Case, Parameters, State
-from model.cases import TRAITS
+from analytic import contact_forces, thresholds, vector_field
+from model import Case, Parameters
 from model.kinematics import slip_velocities
 
 P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
@@ -106,88 +105,6 @@ def test_equation_28() -> None:
     assert agrees(row_6(1, w_y), truth[:, 5])
     for sign, w in ((-1, w_x), (-1, w_y), (1, w_x)):
         assert not agrees(row_6(sign, w), truth[:, 5])
-
-
-def test_equation_29() -> None:
-    """What the damaged lines for A_z and B_z in SS must have said."""
-    x = states(v_y=True)
-    _, _, omega_c, w_x, w_y, w_z, _, _ = x.T
-    qA, qB = np.hypot(w_z, w_x), np.hypot(w_z, w_y)
-    den = 1 + P.mu * P.eta * w_z**2 / (qA * qB)
-    F_A, F_B = contact_forces(Case.SS, x, P)
-    u, G = P.m * P.R * omega_c**2, P.m * P.g
-    assert agrees((G - P.eta * u * w_z / qB) / den * P.mu * w_x / qA, F_A[:, 2])
-    assert agrees(-(u + P.mu * G * w_z / qA) / den * P.eta * w_y / qB, F_B[:, 2])
-
-
-def test_equation_35() -> None:
-    """SR carries the weight by friction at the wall from omega_0 = sqrt(g/(eta R)) upwards, not downwards."""
-    edge = thresholds(P).omega_02
-    exists = {}
-    for factor in (0.9, 1.1):
-        (s,) = (s for s in stationary_solutions(P.replace(omega_0=factor * edge)) if s.case is Case.SR)
-        friction, normal = abs(s.force_B[1]), s.force_B[0]
-        exists[factor] = friction <= P.eta * normal
-    assert exists == {0.9: False, 1.1: True}
-
-
-def test_equation_49() -> None:
-    """Five unknowns, four printed rows: omega_c = omega_0 is the one that is missing."""
-    (s,) = (s for s in stationary_solutions(P.replace(omega_0=9.0)) if s.case is Case.NS)
-    assert s.state.omega_c == 9.0
-
-
-def test_table_4() -> None:
-    printed = {Case.RS: "slip_x", Case.SR: "slip_y", Case.NR: "slip_y"}
-    for case, name in printed.items():
-        assert name not in TRAITS[case].active
-        assert name in TRAITS[case].constraints
-
-
-def test_equation_62() -> None:
-    """A state of RR has omega_c third (19): first, it would be a height."""
-    rate = State.of(vector_field(Case.RR, [0, 0, 12.0, 0, 0, 0], P))
-    np.testing.assert_allclose(rate.omega_c, -P.c * (12.0 - P.omega_0) / (1 + 2 * P.j))
-
-
-def test_equation_66() -> None:
-    """Slip at B is held by the friction of the wall: the limit moves with eta and not with mu."""
-    omega_c = 8.0
-
-    def limit(p: Parameters) -> float:
-        factor = p.j * p.c / ((1 + p.j) * (1 + 2 * p.j) * omega_c**2)
-        lags = np.linspace(0.0, 500.0, 200_001)
-        forwards, backwards = (
-            State.of(vector_field(Case.RS, State(omega_c=omega_c, slip_y=slip), p, omega_c + lags)).slip_y
-            for slip in (1e-9, -1e-9)
-        )
-        holds = (forwards < 0) & (backwards > 0)
-        return float(lags[holds].max() * factor)
-
-    step = 500.0 / 200_000
-    for mu, eta in ((0.3, 0.45), (0.6, 0.45), (0.3, 0.2)):
-        border = limit(P.replace(mu=mu, eta=eta))
-        tolerance = 2 * step * P.j * P.c / ((1 + P.j) * (1 + 2 * P.j) * omega_c**2)
-        assert abs(border - eta) <= tolerance
-
-
-def test_section_5_3() -> None:
-    """Between omega_02 and omega_04 a stable SS lags behind: omega_c = omega_0 is unique again beyond omega_04 only."""
-    p = Parameters.named("reference")
-    t = thresholds(p)
-    for omega_0, unique in ((0.5 * (t.omega_02 + t.omega_04), False), (1.01 * t.omega_04, True)):
-        stable = [s for s in stationary_solutions(p.replace(omega_0=omega_0)) if s.exists and s.stable]
-        assert stable
-        assert all(s.state.omega_c == omega_0 for s in stable) == unique
-
-
-def test_proposition_3() -> None:
-    """A_y = 0: the stationary solution of SR is one of NR too, for which y is neutral."""
-    p = Parameters.named("reference").replace(omega_0=35.0)
-    by_case = {s.case: s for s in stationary_solutions(p)}
-    np.testing.assert_array_equal(by_case[Case.SR].x, by_case[Case.NR].x)
-    assert abs(by_case[Case.SR].force_A[1]) <= 1e-14 * p.m * p.g * (1 + p.j * p.R * p.omega_0**2 / p.g)
-    assert "y" in by_case[Case.NR].family
 
 
 @pytest.mark.parametrize("document", ["errata.md", "theory.md"])

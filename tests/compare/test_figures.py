@@ -30,20 +30,16 @@ from compare.subjects.slipping import figures as slipping
 from compare.subjects.thresholds import figures as bifurcations
 from compare.subjects.unsteady import figures as unsteady
 from model import Case, InputError, Parameters, StorageError
+from tests.measured import measured
 
 DEPENDS = dict.fromkeys(FIGURES, "μηjκ") | {"fig-7": "μjκ", "fig-8": "jκ"}
 WITH_SCALES = ["fig-7", "fig-8", "fig-9", "fig-10", "fig-11", "fig-12", "fig-13-left", "fig-13-right"]
 
 
 def measurement(quantity: str, value: float, set: str = "reference", omega_0: float = 10.0, **changes) -> Measurement:
-    given = {
-        "protocol": "settled",
-        "uncertainty": 1e-9,
-        "engine": "mujoco",
-        "conditions": {"case": "RR", "start": "rest"},
-        "parameters": Parameters.named(set).replace(omega_0=omega_0),
-    }
-    return Measurement(quantity=quantity, value=value, set=set, **(given | changes))
+    p = Parameters.named(set).replace(omega_0=omega_0)
+    made = measured("settled", quantity, value, 1e-9, p, set, case="RR", start="rest")
+    return dataclasses.replace(made, **changes)
 
 
 def check(m: Measurement, predicted: float, tolerance: float = 3e-9) -> Check:

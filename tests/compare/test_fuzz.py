@@ -20,11 +20,12 @@ from compare.kit.adapters import loop
 from compare.kit.adapters.adapter import Floats, Library, Touch
 from compare.kit.engines import ENGINES
 from compare.kit.levels import Level
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Missing, Records
 from compare.report import results
 from compare.view import inspection
 from model import Flow, InputError, Parameters, State, StorageError, Trajectory, storage
 from model.files import seal
+from tests.measured import measured
 
 ENOUGH = pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.slow)])
 """Mutations of one file."""
@@ -101,21 +102,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     storage.save(analytic.simulate(P, State(), 5.0, sample_interval=1e-3), kept[CHUNKS])
     sweep.collect(made / "runs", kept["collection"])
     storage.save_batch({name: storage.load(kept[name]) for name in RUNS[:3]}, kept["batch"])
-    measured = [
-        Measurement(
-            protocol="settled",
-            quantity=quantity,
-            value=value,
-            uncertainty=1e-9,
-            engine="mujoco",
-            set="reference",
-            parameters=P,
-            conditions={"case": "RR", "y": 0.1},
-            runs=("runs/a.h5",),
-        )
-        for quantity, value in (("omega_c", 11.9), ("force_Ay", 0.1))
-    ]
-    record.save(Records(tuple(measured), (Missing("settled", "x", "it never settles"),)), kept["measurements"], {})
+    values = ("omega_c", 11.9), ("force_Ay", 0.1)
+    rows = (measured("settled", *each, 1e-9, case="RR", y=0.1) for each in values)
+    record.save(Records(tuple(rows), (Missing("settled", "x", "it never settles"),)), kept["measurements"], {})
     return kept
 
 

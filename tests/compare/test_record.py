@@ -14,23 +14,15 @@ from compare.kit import record
 from compare.kit.record import Measurement, Missing, Records
 from model import InputError, Parameters, StorageError
 from model.files import seal
+from tests.measured import measured
 
 P = Parameters.named("reference")
 BLUNT = P.replace(drag="quadratic", nu_f=1e-6, C_D=0.5, density_ratio=0.125)
 
 
 def measurement(quantity: str = "omega_c", value: float = 11.9, **conditions: record.Condition) -> Measurement:
-    return Measurement(
-        protocol="settled",
-        quantity=quantity,
-        value=value,
-        uncertainty=1e-9,
-        engine="mujoco",
-        set="reference",
-        parameters=P,
-        conditions=conditions,
-        runs=("runs/a.h5", "runs/b.h5"),
-    )
+    made = measured("settled", quantity, value, 1e-9, **conditions)
+    return dataclasses.replace(made, runs=("runs/a.h5", "runs/b.h5"))
 
 
 RECORDS = Records(

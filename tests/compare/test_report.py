@@ -27,15 +27,17 @@ from compare.kit.check import Check
 from compare.kit.drawing import Drawing, GapError, Material
 from compare.kit.levels import Level
 from compare.kit.pages import readable
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Missing, Records
 from compare.kit.workers import spread
 from compare.report import pictures, report, results, wording
 from compare.report.results import Summary
 from model import Case, Parameters, StorageError
+from tests.measured import measured
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 P = Parameters.named("reference")
+RUNS = ("runs/there.h5",)
 
 
 def claim(name: str, section: str = "Stationary states", **changes: Any) -> Claim:
@@ -47,13 +49,11 @@ def claim(name: str, section: str = "Stationary states", **changes: Any) -> Clai
 def checks(count: int, deviation: float = 0.0, tolerance: float = 3e-9) -> tuple[Check, ...]:
     """Made-up numbers, each with the same tolerance, the k-th off by k parts of `deviation`."""
     conditions = {"case": "RR", "start": "a start with a name that is rather long", "y": 0.02, "v_y": 0.0}
-    given = {"protocol": "settled", "quantity": "omega_c", "engine": "mujoco", "set": "reference", "value": 12.0}
-    given |= {"uncertainty": 1e-9, "conditions": conditions, "runs": ("runs/there.h5",)}
-    made = [Measurement(parameters=P.replace(omega_0=12.0 + k), **given) for k in range(count)]
-    predicted = [12.0 - deviation * (k + 1) / count for k in range(count)]
+    sets = [P.replace(omega_0=12.0 + k) for k in range(count)]
+    made = [dataclasses.replace(measured("settled", "omega_c", 12.0, 1e-9, p, **conditions), runs=RUNS) for p in sets]
     return tuple(
-        Check(measurement=m, predicted=each, tolerance=tolerance, scale=12.0)
-        for m, each in zip(made, predicted, strict=True)
+        Check(measurement=m, predicted=12.0 - deviation * (k + 1) / count, tolerance=tolerance, scale=12.0)
+        for k, m in enumerate(made)
     )
 
 
@@ -227,11 +227,11 @@ def test_summary_is_read_back(page: Path, directory: Path) -> None:
 def test_measurements_are_found_again(tmp_path: Path) -> None:
     kept = tmp_path / "measurements" / "settled.h5"
     kept.parent.mkdir()
-    measured = Records(tuple(check.measurement for check in checks(3)))
-    record.save(measured, kept, {})
+    known = Records(tuple(check.measurement for check in checks(3)))
+    record.save(known, kept, {})
     results.save(Summary.of(tmp_path, [], Level.FULL, {"mujoco": {1: [kept]}}), tmp_path)
     again = results.testimony(results.load(tmp_path).files(tmp_path))["mujoco"][1]
-    assert [m.value for m in again.measurements] == [m.value for m in measured.measurements]
+    assert [m.value for m in again.measurements] == [m.value for m in known.measurements]
 
 
 @pytest.mark.parametrize(
