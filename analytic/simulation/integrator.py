@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,21 +46,29 @@ class Step(NamedTuple):
     """The guard that fired at its end."""
 
 
-@dataclass(frozen=True)
 class Stretch:
-    """What to integrate, and how well."""
+    """What to integrate, and how well; and the guards of the case, of which one fires when it falls below zero.
 
-    motion: Chart
-    start: float
-    until: float
-    """End, s."""
-    times: Array
-    """When to sample, s, outside the stretch, too."""
-    relative: float
-    absolute: float
-    """Tolerances, the second in natural units."""
-    steady: bool
-    """Whether the flow stays what it is."""
+    Parameters
+    ----------
+    motion, start, until : the case, and times in s
+    times : when to sample, s, outside the stretch, too
+    relative, absolute : tolerances, the second in natural units
+    steady : whether the flow stays what it is
+
+    A guard that starts at zero, where round-off mustn't end the case, has to rise above `absolute` first, or to fall
+    below -`relative`; a gap is armed by any height.
+    """
+
+    def __init__(
+        self, motion: Chart, start: float, until: float, times: Array, relative: float, absolute: float, steady: bool
+    ) -> None:
+        self.motion, self.start, self.until, self.times = motion, start, until, times
+        self.relative, self.absolute, self.steady = relative, absolute, steady
+        self._arm = [0.0 if name in GAPS else absolute for name in motion.ends]
+        values = motion.guards(start, motion.start)
+        self._level = [0.0 if value > arm else -relative for value, arm in zip(values, self._arm, strict=True)]
+        self._opens = any(gap == 0 for gap, name in zip(values, motion.ends, strict=True) if name in GAPS)
 
     def steps(self, first_step: float | None) -> Iterator[Step]:
         """Steps with the samples in them, the last of them ending at a guard or at `until`.
@@ -71,14 +78,14 @@ class Stretch:
         again. Raises `StalledError` after `MAX_RESTARTS`.
         """
         t, z, small = self.start, self.motion.start, self.motion.least_slip(self.motion.start) < ONSET_SLIP
-        watch, failures = Watch(self.motion, t, self.absolute, self.relative), 0
-        if watch.touches and (last := self._straight(t, z)):
+        failures = 0
+        if self._opens and (last := self._straight(t, z)):
             yield last
             return
         while t < self.until:
             try:
                 slow = 0
-                for step in self._solve(BDF if small else LSODA, t, z, first_step, watch):
+                for step in self._solve(BDF if small else LSODA, t, z, first_step):
                     yield step
                     t, z, first_step = step.time, step.z, None
                     if step.guard:
@@ -114,9 +121,7 @@ class Stretch:
         due = self.times[slice(*np.searchsorted(self.times, [t, self.until], side="right"))]
         return Step(self.until, there, due.tolist(), (here + np.outer(due - t, rates)).tolist())
 
-    def _solve(
-        self, method: Any, start: float, z: list[float], first_step: float | None, watch: Watch
-    ) -> Iterator[Step]:
+    def _solve(self, method: Any, start: float, z: list[float], first_step: float | None) -> Iterator[Step]:
         """Steps of one solver; its time runs from zero, for directions settle in less than the round-off of `start`."""
         motion, times = self.motion, self.times
         least = np.array(motion.scale)
@@ -150,14 +155,19 @@ class Stretch:
             if solver.status == "failed" or not math.isfinite(sum(z)):
                 raise StalledError(f"{method.__name__} in case {motion.case.name}: {message}")
             t = self.until if solver.t == solver.t_bound else start + float(solver.t)
-            fired = watch.fired(t, z)
+            fired = []
+            for k, value in enumerate(motion.guards(t, z)):
+                if value > self._arm[k]:
+                    self._level[k] = 0.0
+                elif value < self._level[k]:
+                    fired.append(k)
             if not fired and (taken == len(times) or times[taken] > t):
                 yield Step(t, z)
                 continue
             between, guard = solver.dense_output(), None
             if fired:
                 span = float(solver.t_old), float(solver.t)
-                end, guard = min((watch.root(k, between, start, *span), motion.ends[k]) for k in fired)
+                end, guard = min((self._root(k, between, start, *span), motion.ends[k]) for k in fired)
                 t, z = start + end, between(end).tolist()
             due = int(np.searchsorted(times, t, side="right"))
             samples = between(times[taken:due] - start).T.tolist() if due > taken else []
@@ -166,40 +176,14 @@ class Stretch:
                 return
             taken = due
 
-
-class Watch:
-    """Watches the guards of a case: one fires when it falls below zero.
-
-    A guard that starts at zero, where round-off mustn't end the case, has to rise above `arm` first, or to fall below
-    -`slack`; a gap is armed by any height.
-    """
-
-    def __init__(self, motion: Chart, start: float, arm: float, slack: float) -> None:
-        self._motion = motion
-        self._arm = [0.0 if name in GAPS else arm for name in motion.ends]
-        values = motion.guards(start, motion.start)
-        self.touches = any(gap == 0 for gap, name in zip(values, motion.ends, strict=True) if name in GAPS)
-        """Whether a gap has yet to open."""
-        self._level = [0.0 if value > arm else -slack for value, arm in zip(values, self._arm, strict=True)]
-
-    def fired(self, t: float, z: list[float]) -> list[int]:
-        """Which guards are below their level."""
-        fired = []
-        for k, value in enumerate(self._motion.guards(t, z)):
-            if value > self._arm[k]:
-                self._level[k] = 0.0
-            elif value < self._level[k]:
-                fired.append(k)
-        return fired
-
-    def root(self, k: int, between: Callable[[float], Array], origin: float, start: float, end: float) -> float:
+    def _root(self, k: int, between: Callable[[float], Array], origin: float, start: float, end: float) -> float:
         """When within (start, end) after the origin guard k fell through its level.
 
         The interpolant may differ from the step's ends by round-off.
         """
 
         def value(t: float) -> float:
-            return self._motion.guards(origin + t, between(t).tolist())[k] - self._level[k]
+            return self.motion.guards(origin + t, between(t).tolist())[k] - self._level[k]
 
         if value(start) <= 0:
             return start
