@@ -175,11 +175,12 @@ class ContactSettings:
         `load` is the normal force over the mass (m s-2), `friction` the coefficient, `slip_speed` in m s-1. The value
         is negative where the contact can't be continuous.
         """
-        return (self.softness * load - friction * self._cone_excess(load, friction, slip_speed)) / self.k
+        return self.softness * load * (1 - self.hover_number(load, friction, slip_speed)) / self.k
 
     def hover_number(self, load: float, friction: float, slip_speed: float) -> float:
-        """mu |w| / (R f): sliding contact is continuous below 1."""
-        return friction * self._cone_excess(load, friction, slip_speed) / (self.softness * load)
+        """mu |w| / (R f): sliding contact is continuous below 1; `load` > 0."""
+        kept = 0.0 if self.memory else friction * self.softness / self.impratio * load
+        return friction * max(0.0, self.b_f * slip_speed - kept) / (self.softness * load)
 
     def fastest_slip(self, load: float, friction: float) -> float:
         """Slip speed (m s-1) up to which contact is continuous, where `hover_number` is 1."""
@@ -187,11 +188,6 @@ class ContactSettings:
             return math.inf
         kept = 0.0 if self.memory else friction**2 / self.impratio
         return self.softness * load * (1 + kept) / (friction * self.b_f)
-
-    def _cone_excess(self, load: float, friction: float, slip_speed: float) -> float:
-        """|w| of a sliding contact, m s-2."""
-        kept = 0.0 if self.memory else friction * self.softness / self.impratio * load
-        return max(0.0, self.b_f * slip_speed - kept)
 
     def regularisation_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) below which one step can't build up the friction force m `load`: R_t f_t / b_f."""
@@ -257,13 +253,9 @@ class ContactSettings:
         """
         return _FALL * self.touching(g) / self.timestep if self.servo else math.inf
 
-    def to_mapping(self) -> dict[str, Any]:
-        """All values, JSON-able."""
-        return dataclasses.asdict(self)
-
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
-        """Inverse of `to_mapping`; raises `InputError` for an unknown name."""
+        """Settings from the values of their fields, as JSON has them; raises `InputError` for an unknown name."""
         check_names(values, [f.name for f in dataclasses.fields(cls)], "contact setting")
         changes = dict(values)
         if "solref" in changes:

@@ -16,7 +16,7 @@ from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactSettings
 from mjsim.free import Free
 from mjsim.journal import Journal
-from mjsim.stepping import Polar, Stepper
+from mjsim.stepping import Polar
 from model import Events, Flow, Header, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.kinematics import UNITS, VARIABLES
@@ -95,12 +95,15 @@ class Run:
         built = {p: (build or scene.build)(p, settings) for p in dict.fromkeys(scenes)}
         models = [built[p][0] for p in scenes]
         given = models, parameters, settings, states, theta_0
-        self._stepper: Stepper = (
+        self._stepper: Free | Polar = (
             Free(*given)
             if settings.coordinates == "free"
             else Polar(*given, next(self._omega_0(0, 1)), batched or len(models) > 1)
         )
-        shown = settings.to_mapping() | {"t_end": float(t_end), "sample_interval": self._interval * settings.timestep}
+        shown = dataclasses.asdict(settings) | {
+            "t_end": float(t_end),
+            "sample_interval": self._interval * settings.timestep,
+        }
         shown |= {"x0": None, "theta_0": theta_0, "event_times": EVENT_TIMES}
         self.headers = [
             Header("mujoco", p, flow, shown | {"x0": list(x)}, built[still][1])

@@ -19,7 +19,6 @@ import numpy.typing as npt
 from mjsim import recorder
 from mjsim.contact_settings import ContactSettings
 from mjsim.corrections import Ball, followed, resistance
-from mjsim.stepping import Stepper
 from model import Parameters
 from model.arrays import Array
 from model.kinematics import Motion, from_world, rotated, to_world
@@ -27,8 +26,8 @@ from model.kinematics import Motion, from_world, rotated, to_world
 _INTEGRATION = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
-class Free(Stepper):
-    """Simulations of free balls, one after the other; arguments as for `mjsim.stepping.Polar`."""
+class Free:
+    """Simulations of free balls, one after the other; arguments and methods as of `mjsim.stepping.Polar`."""
 
     def __init__(
         self,

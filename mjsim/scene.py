@@ -16,13 +16,6 @@ from model import InputError, Parameters
 
 SCENE = Path(__file__).with_name("scene.xml")
 
-_ELEMENTS = {
-    "body": ("ball", "tangent"),
-    "geom": ("ball", "floor", "wall", "vessel"),
-    "pair": ("A", "B"),
-    "sensor": ("A", "B"),
-    "joint": ("azimuth", "inward", "upward", "spin"),
-}
 _MAXFORCE = 2
 """Code of reduce="maxforce" in a contact sensor."""
 
@@ -30,27 +23,26 @@ _MAXFORCE = 2
 def spec(p: Parameters, settings: ContactSettings) -> Any:
     """The scene as an `mujoco.MjSpec`."""
     spec = mujoco.MjSpec.from_string(SCENE.read_text("utf-8"))
-    named = {kind: {name: getattr(spec, kind)(name) for name in names} for kind, names in _ELEMENTS.items()}
-    option, body, geom, height = spec.option, named["body"]["ball"], named["geom"], 2 * p.r
+    option, body, wall, height = spec.option, spec.body("ball"), spec.geom("wall"), 2 * p.r
     option.gravity = (0.0, 0.0, -p.g)
     for name in ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations"):
         setattr(option, name, getattr(settings, name))
     option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     body.pos, body.mass, body.inertia = (p.R, 0.0, p.r), p.m, (p.j * p.m * p.r**2,) * 3
-    named["joint"]["azimuth"].pos = (p.R, -p.r, 0.0)
-    geom["ball"].size = (p.r, 0.0, 0.0)
-    geom["wall"].pos, geom["wall"].size = (p.R + p.r, 0.0, height), (height, height, p.r)
-    geom["floor"].size = (4 * p.R, 4 * p.R, p.r)
-    geom["vessel"].pos, geom["vessel"].size = (0.0, 0.0, height * 1.005), (p.R + p.r, height, 0.0)
+    spec.joint("azimuth").pos = (p.R, -p.r, 0.0)
+    spec.geom("ball").size = (p.r, 0.0, 0.0)
+    wall.pos, wall.size = (p.R + p.r, 0.0, height), (height, height, p.r)
+    spec.geom("floor").size = (4 * p.R, 4 * p.R, p.r)
+    spec.geom("vessel").pos, spec.geom("vessel").size = (0.0, 0.0, height * 1.005), (p.R + p.r, height, 0.0)
     for name, friction in (("A", p.mu), ("B", p.eta)):
-        _set_pair(named["pair"][name], friction, settings)
+        _set_pair(spec.pair(name), friction, settings)
     if settings.coordinates == "free":
-        for each in (*(spec.sensor(name) for name in ("gap A", "gap B")), *named["joint"].values()):
+        for each in (*map(spec.sensor, ("gap A", "gap B")), *map(spec.joint, ("azimuth", "inward", "upward", "spin"))):
             spec.delete(each)
         body.add_freejoint(name="free")
     if settings.wall == "prism":  # of fixed planes, tangent to the vessel's cylinder
-        wall, sensor = geom["wall"], named["sensor"]["B"]
+        sensor = spec.sensor("B")
         for facet in range(settings.facets):
             azimuth = 2 * math.pi * facet / settings.facets
             outwards = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
@@ -62,7 +54,7 @@ def spec(p: Parameters, settings: ContactSettings) -> Any:
         # Where two facets meet, the one that carries more is reported.
         sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_BODY, "world"
         sensor.intprm[1] = _MAXFORCE
-        spec.delete(named["pair"]["B"])
+        spec.delete(spec.pair("B"))
         spec.delete(wall)
     return spec
 

@@ -14,7 +14,7 @@ Polar coordinates end at the vessel's axis: `mjsim.axis` takes a ball past it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -42,29 +42,8 @@ _SHARE, _MOST = 16, 30_000
 a contact that opens and closes for ever takes all 128."""
 
 
-class Stepper(Protocol):
-    """One or many simulations in the engine."""
-
-    margins: Array
-    """Margins of the contacts, shape (2, runs), m."""
-    given_up: Array
-    """When each run was given up, as its steps were divided again and again, s; inf for those that go on."""
-
-    def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
-        """Take a step for each omega_0 (runs,), and note its sensors, (steps, runs, `NSENSOR`).
-
-        A row (runs, `COLUMNS`) gets (qpos, qvel, sensors) of the first step and the time by which positions are ahead.
-        """
-
-    def state(self) -> dict[str, Array]:
-        """Copies of all that is carried from one step to the next."""
-
-    def restore(self, state: dict[str, Array]) -> None:
-        """Go on from such a state."""
-
-
-class Polar(Stepper):
-    """Balls on joints along the paper's coordinates.
+class Polar:
+    """One or many balls on joints along the paper's coordinates.
 
     Parameters
     ----------
@@ -82,10 +61,12 @@ class Polar(Stepper):
         self._balls = balls = Balls(models, parameters, settings, batched)
         self.model, self.data = models[0], balls.engine.data
         self.margins = balls.margins
+        """Margins of the contacts, shape (2, runs), m."""
         self._sensors = balls.sensors.T
         self._parameters = parameters
         self._R, self._r = (np.array([getattr(p, name) for p in parameters]) for name in "Rr")
         self.given_up, self._steps = np.full(len(models), np.inf), 0
+        """When each run was given up, as its steps were divided again and again, s; inf for those that go on."""
         self._more, self._counted = np.zeros(len(models)), 0
         """Divided steps that each run has taken beyond its share, and the whole steps that were counted."""
         self._passing = np.full((6, len(models)), np.nan)
@@ -97,6 +78,10 @@ class Polar(Stepper):
         landing.begin(balls, omega_0)
 
     def advance(self, omega_0: Iterable[Array], sensors: Array | None = None, row: Array | None = None) -> None:
+        """Take a step for each omega_0 (runs,), and note its sensors, (steps, runs, `NSENSOR`).
+
+        A row (runs, `COLUMNS`) gets (qpos, qvel, sensors) of the first step and the time by which positions are ahead.
+        """
         balls = self._balls
         if row is not None:
             row[:, : recorder.NQ], row[:, recorder.NQ : recorder.SENSORS] = balls.qpos.T, balls.qvel.T
@@ -199,6 +184,7 @@ class Polar(Stepper):
         return rates
 
     def state(self) -> dict[str, Array]:
+        """Copies of all that is carried from one step to the next."""
         return (
             self._balls.state()
             | {"steps": np.array([self._steps, self._counted])}
@@ -206,6 +192,7 @@ class Polar(Stepper):
         )
 
     def restore(self, state: dict[str, Array]) -> None:
+        """Go on from such a state."""
         self._balls.restore(state)
         self._steps, self._counted = state["steps"].tolist()
         for name in _CARRIED:

@@ -1,6 +1,7 @@
 """What settings are refused, and those that fit a problem."""
 
 import contextlib
+import dataclasses
 
 import numpy as np
 import pytest
@@ -40,7 +41,7 @@ def test_refused(changes, words) -> None:
 
 def test_mapping_round_trip_and_unknown_names() -> None:
     settings = ContactSettings.at(4e-3, impratio=50.0)
-    assert ContactSettings.from_mapping(settings.to_mapping()) == settings
+    assert ContactSettings.from_mapping(dataclasses.asdict(settings)) == settings
     with pytest.raises(InputError, match=r"unknown contact setting 'solimpp' .did you mean 'solimp'"):
         ContactSettings.at(1e-3, solimpp=0.1)
 
