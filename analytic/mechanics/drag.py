@@ -23,8 +23,6 @@ EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
 """Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds numbers."""
 SPEED_STEPS = 8
 """Steps of Newton's method from less than twice the root to round-off: 6, and 2 more for the corner of `Law`."""
-POWERS = (1.0, 1.0 + EXPONENT, 2.0)
-"""Exponents of the speed in the force of each term of `Law`."""
 
 
 class Law(NamedTuple):
@@ -79,8 +77,8 @@ def slope(speed: Real, p: Parameters) -> Real:
 
 def speed_of(acceleration: npt.ArrayLike, p: Parameters) -> Array:
     """The speed |w| (m s-1) at which the drag per mass c(|w|) |w| is a given one >= 0 (m s-2); inf where c = 0."""
-    given, terms = np.asarray(acceleration, dtype=float), law(p)
-    alone = [(given / term) ** (1 / power) for term, power in zip(terms, POWERS, strict=True) if term > 0]
+    given, terms, powers = np.asarray(acceleration, dtype=float), law(p), (1.0, 1.0 + EXPONENT, 2.0)
+    alone = [(given / term) ** (1 / power) for term, power in zip(terms, powers, strict=True) if term > 0]
     if not alone:
         return np.where(given > 0, np.inf, given)
     speed: Array = np.minimum.reduce(alone)
@@ -121,19 +119,13 @@ def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity:
 
 def fall(t: Any, y: float, v_y: float, p: Parameters) -> tuple[Any, Any]:
     """Height (m) and vertical velocity (m s-1) after a time t (s, float or array) of flight with Stokes' drag."""
-    return y + v_y * _decay(t, p.c) - p.g * t**2 * ramp_lag(p.c * t), fall_speed(t, v_y, p)
+    return y + v_y * t - (p.c * v_y + p.g) * t**2 * ramp_lag(p.c * t), fall_speed(t, v_y, p)
 
 
 def fall_speed(t: Any, v_y: float, p: Parameters) -> Any:
     """The vertical velocity of `fall` alone."""
-    return v_y - (p.c * v_y + p.g) * _decay(t, p.c)
-
-
-def _decay(t: Any, c: float) -> Any:
-    """(1 - exp(-c t))/c."""
-    if c == 0:
-        return t
-    return -(math.expm1(-c * t) if isinstance(t, float) else np.expm1(-c * t)) / c
+    decay = (math.expm1(-p.c * t) if isinstance(t, float) else np.expm1(-p.c * t)) / -p.c if p.c else t
+    return v_y - (p.c * v_y + p.g) * decay
 
 
 def fall_time(y: float, v_y: float, p: Parameters) -> float:

@@ -63,13 +63,9 @@ def contact_forces(
     case = Case(case)
     state, fluid = _checked(case, x, p, omega_0)
     if case is Case.RR:
-        best = rolling_forces.least_utilisation(state.omega_c, p, fluid)
-        greatest = rolling_forces.admissible_interval(state.omega_c, p, fluid)[1]  # where the ball can jam
-        B_y = np.where(np.isfinite(best.B_y), best.B_y, greatest)
-        if np.any(stuck := (best.utilisation > 1) | np.isnan(B_y)):
-            value, need = (
-                np.extract(stuck, np.broadcast_to(a, B_y.shape))[0] for a in (state.omega_c, best.utilisation)
-            )
+        B_y, used = (best := rolling_forces.least_utilisation(state.omega_c, p, fluid)).B_y, best.utilisation
+        if np.any(stuck := (used > 1) | np.isnan(B_y)):
+            value, need = (np.extract(stuck, np.broadcast_to(a, B_y.shape))[0] for a in (state.omega_c, used))
             raise InputError(
                 f"omega_c = {value:g} rad s-1 cannot be rolled at both points: "
                 f"it takes {need:.4g} times the friction there is, the limit is 1"

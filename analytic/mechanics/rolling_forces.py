@@ -24,7 +24,8 @@ class LeastUtilisation:
     """The member of the family whose larger friction utilisation is the least; arrays of one shape."""
 
     B_y: Array
-    """Its free component, N; -inf if the least is only approached as the forces grow without bound."""
+    """Its free component, N; where the least is only approached as the forces grow without bound, since the ball can
+    jam, the greatest that is admissible, and nan if none is."""
     utilisation: Array
     """max(|friction at A|/(mu A_y), |friction at B|/(eta B_x)); RR can go on where it is <= 1 with finite forces."""
 
@@ -103,8 +104,8 @@ def least_utilisation(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayL
     at_A, limit_A, at_B, limit_B = friction(q)
     use_A = np.where(A_binds, _least_alone(a, z, p.mu), _ratio(at_A, limit_A))
     use_B = np.where(B_binds & ~A_binds, _least_alone(k, z, p.eta), _ratio(at_B, limit_B))
-    with np.errstate(divide="ignore"):
-        B_y = p.m * p.g * (2 - 1 / q)
+    jams = q == 0
+    B_y = np.where(jams, admissible_interval(omega_c, p, omega_0)[1], p.m * p.g * (2 - 1 / np.where(jams, 1.0, q)))
     return LeastUtilisation(B_y, np.maximum(use_A, use_B))
 
 

@@ -170,9 +170,7 @@ def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:
     """Contact forces along a path, shape (n, 6), N; in RR those of least friction utilisation."""
     x = State.of(path.x)
     if case is Case.RR:
-        B_y = rolling_forces.least_utilisation(x.omega_c, p, omega_0).B_y
-        jammed = rolling_forces.admissible_interval(x.omega_c, p, omega_0)[1]
-        f = dynamics.rolling_family(x.omega_c, p, omega_0, np.where(np.isfinite(B_y), B_y, jammed))
+        f = dynamics.rolling_family(x.omega_c, p, omega_0, rolling_forces.least_utilisation(x.omega_c, p, omega_0).B_y)
     else:
         slip_A = (np.sin(path.alpha), np.cos(path.alpha)) if case.A is Contact.S else None
         slip_B = (np.sin(path.beta), np.cos(path.beta)) if case.B is Contact.S else None

@@ -60,14 +60,14 @@ def simulate(
     check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
     settings = dataclasses.replace(settings or Settings(), **changes)
     if settings.method == "event":
+        if p.fluid_torque:
+            raise InputError(
+                f"fluid_torque = {p.fluid_torque:g} s-1: the event-driven simulation leaves the torque out; "
+                "method = 'time-stepping' takes it"
+            )
         from analytic.simulation.hybrid import run  # here, because the integrators of scipy take half a second to load
     else:
         from analytic.simulation.time_stepping import run
-    if settings.method == "event" and p.fluid_torque:
-        raise InputError(
-            f"fluid_torque = {p.fluid_torque:g} s-1: the event-driven simulation leaves the torque out; "
-            "method = 'time-stepping' takes it"
-        )
     flow = Flow.steady(p.omega_0) if flow is None else flow
     x = start_state(x0, p, settings)
     times = sample_times(t_end, sample_interval)

@@ -58,12 +58,8 @@ def path(t: Array, at: Moment, p: Parameters, omega_0: Fluid) -> Path:
     power = -p.m * p.c * p.R**2 * w * (w - omega_0(nodes))
     theta, work = (np.append(0.0, np.cumsum(half * (f @ _WEIGHTS))) for f in (w, power))
     here = np.searchsorted(ends, t)
-    return _path(t, at.theta + theta[here], omega_c(t, at, p, omega_0), at.work + work[here])
-
-
-def _path(t: Array, theta: Array, omega_c: Array, work: Array) -> Path:
-    none = np.full_like(t, np.nan)
-    return Path(t, theta, State(omega_c=omega_c).stacked(), none, none, work)
+    x, none = State(omega_c=omega_c(t, at, p, omega_0)), np.full_like(t, np.nan)
+    return Path(t, at.theta + theta[here], x.stacked(), none, none, at.work + work[here])
 
 
 def end(at: Moment, until: float, p: Parameters, omega_0: Fluid, leave_rolling: str) -> float | None:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from analytic.mechanics import dynamics, roots
 from model import Case, Contact, Parameters, State
-from model.arrays import Array
+from model.arrays import Array, Real
 from model.cases import TRAITS
 
 SLIP_ARROWS = (
@@ -138,17 +138,13 @@ def neutral_flow(case: Case, p: Parameters) -> float:
     Looked for between a thousandth and a thousand times sqrt(g/R), by bisection down to round-off; nan if it is the
     same at both. p.omega_0 plays no part.
     """
-    unit = float(np.sqrt(p.g / p.R))
+    unit, order = float(np.sqrt(p.g / p.R)), list(SlipStability)
+
+    def side(flow: Real) -> int:
+        return order.index(stability(case, p.replace(omega_0=float(flow)))) - 1
+
     low, high = 1e-3 * unit, 1e3 * unit
-    below, above = (stability(case, p.replace(omega_0=flow)) for flow in (low, high))
-    if below is above:
-        return float("nan")
-    while (middle := (low + high) / 2) not in (low, high):
-        here = stability(case, p.replace(omega_0=middle))
-        if here is SlipStability.NEUTRAL:
-            return middle
-        low, high = (middle, high) if here is below else (low, middle)
-    return low
+    return float("nan") if side(low) == side(high) else float(roots.bisected(side, low, high))
 
 
 def _sign(drive: float, hold: float) -> SlipStability:

@@ -152,7 +152,7 @@ def _solution(
         family = (*family, "omega_c")
     if case is Case.RR:
         B_y = float(rolling_forces.least_utilisation(x.omega_c, p).B_y)
-        force = dynamics.rolling_family(x.omega_c, p, p.omega_0, B_y if np.isfinite(B_y) else 0.0)
+        force = dynamics.rolling_family(x.omega_c, p, p.omega_0, 0.0 if np.isnan(B_y) else B_y)
     else:
         force = dynamics.forces(case, x, p, p.omega_0)
     zeros = len(family)
@@ -191,8 +191,7 @@ def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) ->
 def _rr(p: Parameters) -> list[StationarySolution]:
     """Proposition 1. Without drag every omega_c is stationary."""
     best = rolling_forces.least_utilisation(p.omega_0, p)
-    exists = bool(best.utilisation <= 1 and (np.isfinite(best.B_y) or rolling_forces.margin(p.omega_0, p) >= 0))
-    return [_solution(Case.RR, p, State(omega_c=p.omega_0), exists)]
+    return [_solution(Case.RR, p, State(omega_c=p.omega_0), bool(best.utilisation <= 1 and not np.isnan(best.B_y)))]
 
 
 def _rs(p: Parameters) -> list[StationarySolution]:
