@@ -21,9 +21,7 @@ from numba.extending import intrinsic
 from mjsim import memory
 from model.arrays import Array
 
-_KEPT, _WIDTH = memory.KEPT, memory.WIDTH
-_INSIDE = 0.999
-"""Share of the cone up to which a contact surely sticks."""
+_KEPT, _INSIDE, _WIDTH = memory.KEPT, memory.INSIDE, memory.WIDTH
 compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
 
 

@@ -14,7 +14,6 @@ press on its normal row, so memory fades out where ten to twenty times the cone 
 from __future__ import annotations
 
 import copy
-import functools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -38,10 +37,16 @@ _APART = np.array([1e6, 1e6, 1, 1, 1, 1, 1, 1])
 _OPEN = 1e9
 """Approach that a contact allows which is open, m s-2."""
 _ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
+INSIDE = 0.999
+"""Share of the cone up to which a contact surely sticks."""
+STILL = 1e-9
+"""Most that contacts and bodies may move, m or rad, for what depends on their poses to stay as it is."""
 WIDTH = 29
 """Numbers remembered of a contact: geoms (2), its place on both in their axes (6), friction on both in their axes (3 of
 force and moment each, 12), what each pair of a pyramid's edges bears (5), normal in the axes of the first geom (3), and
 gap; m, N, N m."""
+CORNER = 1.05 * math.pi
+"""Angle without other points of its patch that a corner of the patch sees at least."""
 SAME = 0.01
 """Share of the larger radius up to which two points of contact count as one."""
 
@@ -72,7 +77,8 @@ class FrictionMemory:
         if servo is not None:
             check_number("servo", servo, "s", Range(float(model.opt.timestep)), "to be no faster than a step it")
         self._check_integrator()
-        self._recall, self._retain = _kernels()
+        self._near = SAME * model.geom_rbound.min(where=model.geom_rbound > 0, initial=1e9)
+        self._kernels = _kernels()
         self.reset()
 
     def _check_integrator(self) -> None:
@@ -111,14 +117,13 @@ class FrictionMemory:
         if data.model is not model:
             raise InputError("data belong to another MjModel than this friction memory")
         self._check_integrator()
-        elliptic, recall, retain = model.opt.cone == _ELLIPTIC, self._recall, self._retain
-        near = SAME * model.geom_rbound.min(where=model.geom_rbound > 0, initial=1e9)
+        elliptic, recall, retain = model.opt.cone == _ELLIPTIC, self._kernels.recall, self._kernels.retain
         for _ in range(nstep):
             mujoco.mj_step1(model, data)
             if data.time != self._time:  # another state, or one that MuJoCo has reset as it diverged
                 self.reset()
             kept, used, moved = recall(model, data, self._kept, elliptic, False)
-            if moved > near and put_back(model, data, self._kept):
+            if moved > self._near and put_back(model, data, self._kept):
                 kept, used, _ = recall(model, data, self._kept, elliptic, True)
             if self._servo:
                 self._lift = self._lifted(data, kept, used, elliptic)
@@ -163,99 +168,129 @@ def acceleration(model: Any, data: Any) -> Array:
 
 
 def put_back(model: Any, data: Any, before: Array) -> bool:
-    """Put back points that the collider has dropped, of pairs that keep others, where bodies overlap as they did."""
-    geom = before[:, :2].astype(int)
+    """Put back points that the collider has dropped, corners of patches that have others, if still overlapping."""
+    place, geom = data.contact.pos.copy(), before[:, :2].astype(int)
+    pair, others = geom @ (model.ngeom, 1), data.contact.geom @ (model.ngeom, 1)
+    left, had = ((pair[:, None] == each).sum(axis=1) for each in (others, pair))
+    fewer = (left > 0) & (left < had)
+    before, geom, pair = before[fewer], geom[fewer], pair[fewer]
     axes = data.geom_xmat[geom].reshape(-1, 2, 3, 3)
     first, second = np.moveaxis(data.geom_xpos[geom] + (axes @ before[:, 2:8].reshape(-1, 2, 3, 1))[..., 0], 1, 0)
     normal, apart = (axes[:, 0] @ before[:, 25:28, None])[..., 0], second - first
     opened = (normal * apart).sum(axis=1)
     gap, slip = before[:, 28] + opened, np.hypot.reduce(apart - opened[:, None] * normal, axis=1)
-    near, found, place = SAME * model.geom_rbound[geom].max(axis=1), data.contact.geom.copy(), data.contact.pos.copy()
+    near = SAME * model.geom_rbound[geom].max(axis=1)
     for k in np.flatnonzero((gap < 0) & (slip < near / 10)):
-        others, middle = (found == geom[k]).all(axis=1), (first[k] + second[k]) / 2
-        if not 0 < others.sum() < (geom == geom[k]).all(axis=1).sum():
-            continue
-        if (np.hypot.reduce(place[others] - middle, axis=1) > near[k]).all():
-            point = copy.copy(data.contact[others.argmax()])
-            across = np.cross(normal[k], np.eye(3)[abs(normal[k]).argmin()])
-            across /= np.hypot.reduce(across)
-            point.pos, point.dist = middle, gap[k]
-            point.frame = np.concatenate([normal[k], across, np.cross(normal[k], across)])
+        same, middle = others == pair[k], (first[k] + second[k]) / 2
+        across = np.cross(normal[k], np.eye(3)[abs(normal[k]).argmin()])
+        across /= np.hypot.reduce(across)
+        frame = np.array([normal[k], across, np.cross(normal[k], across)])
+        _, x, y = frame @ (place[same] - middle).T
+        angles = np.sort(np.arctan2(y, x))
+        corner = np.diff(angles, append=angles[0] + 2 * math.pi).max() > CORNER
+        if corner and np.hypot(x, y).min() > near[k]:
+            point = copy.copy(data.contact[same.argmax()])
+            point.pos, point.dist, point.frame = middle, gap[k], frame.ravel()
             mujoco.mj_addContact(model, data, point)
-    if data.ncon == len(found):
+    if data.ncon == len(place):
         return False
     for renew in (mujoco.mj_makeConstraint, mujoco.mj_island, mujoco.mj_projectConstraint, mujoco.mj_fwdVelocity):
         renew(model, data)
     return True
 
 
-def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, Array, float]:
-    """Add to the reference accelerations what contacts remember; return what is known of them, with no forces yet.
+class Formulas:
+    """What contacts remember, by formulas on arrays. What depends on poses alone is kept while nothing moves.
 
-    Also which contacts they are, and how far they have moved on the bodies, at most, m.
-
-    Parameters
-    ----------
-    before : what is remembered of the last step, (n, `WIDTH`)
-    elliptic : whether cones are elliptic
-    scattered : whether contacts of a pair may stand apart
+    Friction of the rows of a contact is one number in each, of elliptic cones: (rows,); of a pyramid two edges bear it:
+    (2, rows).
     """
-    contact, reference, softness = data.contact, data.efc_aref, data.efc_R
-    used = np.flatnonzero((contact.efc_address >= 0) & (contact.dim > 1) & (contact.geom >= 0).all(axis=1))
-    used = used[data.efc_KBIP[contact.efc_address[used] + 1, 1] > 0]
-    geom, frame, friction = contact.geom[used], contact.frame[used].reshape(-1, 3, 3), contact.friction[used]
-    address, axes = contact.efc_address[used], data.geom_xmat[geom].reshape(-1, 2, 3, 3)
-    arm = contact.pos[used][:, None] - data.geom_xpos[geom]
-    kept, world, moved = np.zeros((len(used), WIDTH)), np.zeros((len(used), 3, 2)), 0.0
-    kept[:, :2], kept[:, 2:8] = geom, (arm[:, :, None] @ axes).reshape(-1, 6)
-    kept[:, 25:28], kept[:, 28] = (frame[:, :1] @ axes[:, 0])[:, 0], contact.dist[used]
-    pairs = np.zeros((len(used), 5))
-    if len(before) and len(used):
-        nearest, same = _nearest(before, kept)
-        moved = np.hypot.reduce(before[same, 2:8] - kept[nearest[same], 2:8], axis=1).max(initial=0.0) / math.sqrt(2)
-        nearest, forces = nearest[same], before[same, 8:20].reshape(-1, 2, 3, 2)
-        np.add.at(world, nearest, (axes[nearest] @ forces).sum(axis=1) / 2)
-        np.add.at(pairs, nearest, before[same, 20:25])
-    force = (frame @ world).reshape(-1, 6)[:, _COLUMNS]
-    own = contact.dim[used][:, None] - 1 > _ROWS
-    if elliptic:
-        rows = (address[:, None] + 1 + _ROWS)[own]
-        reference[rows] += softness[rows] * force[own]
-    else:
-        rows = (address[:, None] + 2 * _ROWS)[own]
-        lean = np.where(own, force / friction, 0.0)
-        pairs = np.maximum(pairs, np.abs(lean))
-        pairs -= pairs.sum(axis=1, keepdims=True) / own.sum(axis=1, keepdims=True)
-        for side, sign in enumerate((1, -1)):
-            reference[rows + side] += softness[rows + side] * ((pairs + sign * lean) / 2)[own]
-    return kept, used, moved
 
+    def __init__(self) -> None:
+        self._kept, self._poses = np.empty((0, WIDTH)), np.empty(0)
 
-def retain(model: Any, data: Any, kept: Array, used: Array, elliptic: bool) -> None:
-    """Remember the friction that the step came to, and what pairs of edges bear."""
-    contact, forces = data.contact, data.efc_force
-    address, friction, own = contact.efc_address[used], contact.friction[used], contact.dim[used][:, None] - 1 > _ROWS
-    holding = (data.efc_aref - acceleration(model, data)) / data.efc_R
-    force, asked = np.zeros(own.shape), np.zeros(own.shape)
-    if elliptic:
-        rows = (address[:, None] + 1 + _ROWS)[own]
-        force[own], asked[own], load = forces[rows], holding[rows], forces[address]
-        share = np.sqrt(((asked / friction) ** 2).sum(axis=1))
-    else:
-        rows = (address[:, None] + 2 * _ROWS)[own]
-        asked[own] = np.abs(holding[rows] - holding[rows + 1])
-        share = asked.sum(axis=1)
-        asked[own], force[own] = forces[rows] + forces[rows + 1], forces[rows] - forces[rows + 1]
-        load = asked.sum(axis=1)
-        force *= friction
-    kept_share = np.clip(2 - share / np.maximum(KEPT * load, 1e-300), 0, 1)[:, None]
-    along = np.zeros((len(used), 6))
-    along[:, _COLUMNS] = force * kept_share
-    world = contact.frame[used].reshape(-1, 3, 3).transpose(0, 2, 1) @ along.reshape(-1, 3, 2)
-    axes = data.geom_xmat[contact.geom[used]].reshape(-1, 2, 3, 3).transpose(0, 1, 3, 2)
-    kept[:, 8:20] = (axes @ world[:, None]).reshape(-1, 12)
-    if not elliptic:
-        kept[:, 20:25] = asked * kept_share
+    def recall(
+        self, model: Any, data: Any, before: Array, elliptic: bool, scattered: bool
+    ) -> tuple[Array, npt.NDArray[np.intp], float]:
+        """Add to the reference accelerations what contacts remember; return what is known of them, with no forces yet.
+
+        Also which contacts they are, and how far they have moved on the bodies, at most, m.
+
+        Parameters
+        ----------
+        before : what is remembered of the last step, (n, `WIDTH`)
+        elliptic : whether cones are elliptic
+        scattered : whether contacts of a pair may stand apart
+        """
+        contact, moved = data.contact, 0.0
+        places = contact.pos, contact.frame, data.geom_xpos, data.geom_xmat
+        rows = contact.geom, contact.dim, contact.efc_address, contact.friction, data.efc_KBIP[:, 1]
+        poses = np.concatenate((*places, *rows), axis=None)
+        then = self._poses
+        if not (before is self._kept and len(poses) == len(then) and abs(poses - then).max(initial=0) < STILL):
+            self._poses = poses
+            self._find(data, elliptic)
+            moved = self._hand_on(before)
+        forces = self._forces
+        if not elliptic:
+            mean = np.bincount(self._of, forces.sum(axis=0), len(self._used)) / (2 * self._own.sum(axis=1))
+            forces = forces - mean[self._of]
+        data.efc_aref[self._rows] += data.efc_R[self._rows] * forces
+        return self._kept, self._used, moved
+
+    def _find(self, data: Any, elliptic: bool) -> None:
+        """Contacts that have friction, their places, axes and rows."""
+        contact = data.contact
+        used = np.flatnonzero((contact.efc_address >= 0) & (contact.dim > 1) & (contact.geom >= 0).all(axis=1))
+        self._used = used = used[data.efc_KBIP[contact.efc_address[used] + 1, 1] > 0]
+        geom, self._address = contact.geom[used], contact.efc_address[used]
+        axes = data.geom_xmat[geom].reshape(-1, 2, 3, 3).swapaxes(2, 3)
+        arm = contact.pos[used][:, None] - data.geom_xpos[geom]
+        self._turn = axes @ contact.frame[used].reshape(-1, 1, 3, 3).swapaxes(2, 3)
+        self._kept = np.zeros((len(used), WIDTH))
+        self._kept[:, :2], self._kept[:, 2:8] = geom, (axes @ arm[..., None]).reshape(-1, 6)
+        self._kept[:, 25:28], self._kept[:, 28] = self._turn[:, 0, :, 0], contact.dist[used]
+        self._own = contact.dim[used][:, None] - 1 > _ROWS
+        self._of, row = np.nonzero(self._own)
+        self._place, self._friction = 6 * self._of + _COLUMNS[row], contact.friction[used][self._own]
+        first = self._address[self._of]
+        self._rows = first + 1 + row if elliptic else first + 2 * row + np.array([[0], [1]])
+
+    def _hand_on(self, before: Array) -> float:
+        """Give what is remembered to the contacts found; return how far these have moved, m."""
+        moved, carried = 0.0, np.zeros((len(self._used), 17))
+        if len(before) and len(self._used):
+            nearest, same = _nearest(before, self._kept)
+            nearest, before = nearest[same], before[same]
+            moved = np.hypot.reduce(before[:, 2:8] - self._kept[nearest, 2:8], axis=1).max(initial=0.0) / math.sqrt(2)
+            np.add.at(carried, nearest, before[:, 8:25])
+        turned = self._turn.swapaxes(2, 3) @ carried[:, :12].reshape(-1, 2, 3, 2)
+        self._forces = turned.sum(axis=1).ravel()[self._place] / 2
+        if self._rows.ndim == 2:
+            lean = self._forces / self._friction
+            self._forces = (np.maximum(carried[:, 12:][self._own], abs(lean)) + lean * np.array([[1], [-1]])) / 2
+        return float(moved)
+
+    def retain(self, model: Any, data: Any, kept: Array, used: npt.NDArray[np.intp], elliptic: bool) -> None:
+        """Remember the friction that the step came to, and what pairs of edges bear."""
+        of, count, forces = self._of, len(used), data.efc_force[self._rows]
+        if elliptic:
+            load = data.efc_force[self._address]
+            sticks = np.bincount(of, (forces / self._friction) ** 2, count) <= (INSIDE * load) ** 2
+        else:
+            load, sticks = np.bincount(of, forces.sum(axis=0), count), forces > 0
+        if not sticks.all():  # a row that isn't limited has what it asks for
+            asked = ((data.efc_aref - acceleration(model, data)) / data.efc_R)[self._rows]
+            if elliptic:
+                asked = np.sqrt(np.bincount(of, (asked / self._friction) ** 2, count))
+            else:
+                asked = np.bincount(of, abs(asked[0] - asked[1]), count)
+            forces *= np.clip(2 - asked / np.maximum(KEPT * load, 1e-300), 0, 1)[of]
+        self._forces, along = forces, np.zeros(6 * count)
+        along[self._place] = forces if elliptic else self._friction * (forces[0] - forces[1])
+        kept[:, 8:20] = (self._turn @ along.reshape(-1, 1, 3, 2)).reshape(-1, 12)
+        if not elliptic:
+            kept[:, 20:25][self._own] = forces.sum(axis=0)
 
 
 def _nearest(kept: Array, others: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
@@ -265,11 +300,10 @@ def _nearest(kept: Array, others: Array) -> tuple[npt.NDArray[np.intp], npt.NDAr
     return nearest, (place[:, :2] == others[nearest, :2]).all(axis=1)
 
 
-@functools.cache
-def _kernels() -> tuple[Any, Any]:
+def _kernels() -> Any:
     """`recall` and `retain`, compiled if numba is installed."""
     try:
         from mjsim import compiled_memory
     except ImportError:
-        return recall, retain
-    return compiled_memory.recall, compiled_memory.retain
+        return Formulas()
+    return compiled_memory

@@ -147,7 +147,7 @@ def cost(way: dict[str, Any], rounds: int = 15) -> float:
 
 def uncompiled(way: dict[str, Any]) -> float:
     """Cost of a memory without numba."""
-    with mock.patch.object(memory, "_kernels", return_value=(memory.recall, memory.retain)):
+    with mock.patch.object(memory, "_kernels", memory.Formulas):
         return cost(way)
 
 
