@@ -36,12 +36,12 @@ def write(output: Path, material: Material, formats: Sequence[str] = ("svg",)) -
     for name, each in FIGURES.items():
         try:
             data = each.select(material)
-            figure = each.draw(data)
+            figure, caption = each.draw(data)
         except (GapError, StorageError) as gap:
             yield name, f"not drawn: {gap}"
             continue
         for suffix in formats:
             drawing.save(figure, output / f"{name}.{suffix}")
-        captions.append(f"{name}\n{each.title}. {each.caption(data)}\n")
+        captions.append(f"{name}\n{each.title}. {caption}\n")
         yield name, ""
     write_text(output / CAPTIONS, "\n".join(captions))

@@ -21,7 +21,7 @@ Checks = tuple[Check, ...]
 
 def of(claim: str) -> Drawing:
     """The figure of a claim that has none of its own."""
-    return Drawing(f"Deviations of {claim}", partial(select, claim=claim), draw, caption, (claim,))
+    return Drawing(f"Deviations of {claim}", partial(select, claim=claim), draw, (claim,))
 
 
 def select(material: Material, claim: str) -> Checks:
@@ -32,19 +32,7 @@ def select(material: Material, claim: str) -> Checks:
     return checks
 
 
-def caption(checks: Checks) -> str:
-    """What is shown, and with which parameters."""
-    sets = dict.fromkeys(c.measurement.set for c in checks)
-    alone = f"{next(iter(sets))}: {style.named(checks[0].measurement.parameters)}"
-    return (
-        f"Measured less predicted, divided by the tolerance of each of the {len(checks)} numbers "
-        f"({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}), a strip for each quantity, and in it one for "
-        "each engine. Shaded: within tolerance, three standard uncertainties; darker: within one; arrows: beyond the "
-        "frame."
-    )
-
-
-def draw(checks: Checks) -> Figure:
+def draw(checks: Checks) -> tuple[Figure, str]:
     """As high as there are quantities."""
     names = list(dict.fromkeys(c.measurement.quantity for c in checks))
     engines = list(dict.fromkeys(c.measurement.engine for c in checks))
@@ -77,4 +65,11 @@ def draw(checks: Checks) -> Figure:
     axes.set(xlim=(-edge, edge), ylim=(len(names) - 0.5, -0.5), xlabel="(measured − predicted)/tolerance")
     if len(engines) > 1:
         style.legend(figure, loc="outside upper center", ncols=4)
-    return figure
+    sets = dict.fromkeys(c.measurement.set for c in checks)
+    alone = f"{next(iter(sets))}: {style.named(checks[0].measurement.parameters)}"
+    return figure, (
+        f"Measured less predicted, divided by the tolerance of each of the {len(checks)} numbers "
+        f"({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}), a strip for each quantity, and in it one for "
+        "each engine. Shaded: within tolerance, three standard uncertainties; darker: within one; arrows: beyond the "
+        "frame."
+    )

@@ -70,9 +70,8 @@ class Drawing:
     title: str
     select: Callable[[Material], Any]
     """All that is drawn, as data whose repr tells it apart; raises `GapError` where results are missing."""
-    draw: Callable[[Any], Figure]
-    caption: Callable[[Any], str]
-    """What is shown, with the parameters."""
+    draw: Callable[[Any], tuple[Figure, str]]
+    """The figure, and its caption: what is shown, with the parameters."""
     claims: tuple[str, ...] = ()
     """The claims beside which it stands."""
 

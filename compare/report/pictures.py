@@ -40,7 +40,8 @@ def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
     """
     path, drawing, data = new
     try:
-        picture, caption = svg(drawing.draw(data)), drawing.caption(data)
+        figure, caption = drawing.draw(data)
+        picture = svg(figure)
         described = picture.replace("<defs>", f"<desc>{html.escape(caption)}</desc><defs>", 1)
         write_text(path, described + _mark(drawing, data))
     except (GapError, StorageError) as error:

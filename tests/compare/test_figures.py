@@ -22,12 +22,11 @@ from compare.catalogue import CLAIMS
 from compare.gallery import FIGURES, figures_of
 from compare.kit import deviations, drawing, style
 from compare.kit.check import Check
-from compare.kit.drawing import Diagram, GapError, Material, Motion
+from compare.kit.drawing import GapError, Material, Motion
 from compare.kit.engines import ENGINES
 from compare.kit.record import Measurement, Records
 from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.slipping import figures as slipping
-from compare.subjects.thresholds import figures as bifurcations
 from compare.subjects.unsteady import figures as unsteady
 from model import Case, InputError, Parameters, StorageError
 from tests.measured import measured
@@ -90,10 +89,10 @@ def few_points() -> Iterator[None]:
 
 
 @functools.cache
-def alone(name: str) -> tuple[Any, Figure]:
-    """What a figure of theory alone shows, and the figure."""
+def alone(name: str) -> tuple[Any, Figure, str]:
+    """What a figure of theory alone shows, the figure, and its caption."""
     data = FIGURES[name].select(Material())
-    return data, FIGURES[name].draw(data)
+    return data, *FIGURES[name].draw(data)
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -103,11 +102,11 @@ def test_every_figure_draws_and_gives_its_parameters(name: str, material: Materi
         with pytest.raises(GapError, match="measured"):
             alone(name)
     else:
-        assert drawing.caption(alone(name)[0]).endswith(".")
-    data, buffer = drawing.select(material), io.BytesIO()
-    drawing.draw(data).savefig(buffer, format="png", dpi=40)
+        assert alone(name)[2].endswith(".")
+    buffer = io.BytesIO()
+    figure, caption = drawing.draw(drawing.select(material))
+    figure.savefig(buffer, format="png", dpi=40)
     assert buffer.tell() > 1000
-    caption = drawing.caption(data)
     assert caption.endswith(".")
     for symbol in DEPENDS[name]:
         assert f"{symbol} = " in caption
@@ -152,9 +151,10 @@ def test_stable_and_unstable_parts_of_figure_10() -> None:
 
 
 def test_the_hopf_point_of_figure_12_is_marked() -> None:
-    (axes,) = alone("fig-12")[1].axes
+    _, figure, caption = alone("fig-12")
+    (axes,) = figure.axes
     assert {"P3", "NF2", "NT1", "F", "H"} <= {text.get_text() for text in axes.texts}
-    assert "Hopf" in FIGURES["fig-12"].caption(Diagram("fig-12", bifurcations.RELEASED))
+    assert "Hopf" in caption
 
 
 @pytest.mark.parametrize("name", ["fig-4", "fig-5"])
@@ -171,18 +171,20 @@ def test_the_path_of_slip_bends_and_ends_as_the_paper_says(name: str) -> None:
 def test_the_bistable_region_is_named_and_points_not_as_predicted_are_crossed(material: Material) -> None:
     for name in ("fig-7", "fig-8"):
         data = FIGURES[name].select(material)
-        (axes,) = FIGURES[name].draw(data).axes
+        figure, caption = FIGURES[name].draw(data)
+        (axes,) = figure.axes
         assert any("bistable" in text.get_text() for text in axes.texts)
         crosses = [line for line in axes.lines if line.get_label() == "not as predicted"]
         assert [float(x) for line in crosses for x in line.get_ydata()] == [10.0] * (name == "fig-7")
-        assert ("not as predicted in 1 (crossed)" in FIGURES[name].caption(data)) == (name == "fig-7")
+        assert ("not as predicted in 1 (crossed)" in caption) == (name == "fig-7")
 
 
 def test_measured_states_have_their_engines_marks(material: Material) -> None:
     """Plain MuJoCo and MuJoCo as it comes stand beside the engine on trial, and the caption says with which step."""
     data = FIGURES["characteristic"].select(material)
-    assert "mujoco-plain and mujoco-defaults: as measured with a time step of 2 ms" in flowmeter.caption_curves(data)
-    axes = FIGURES["characteristic"].draw(data).axes[0]
+    figure, caption = FIGURES["characteristic"].draw(data)
+    assert "mujoco-plain and mujoco-defaults: as measured with a time step of 2 ms" in caption
+    axes = figure.axes[0]
     shown = {line.get_marker() for line in axes.lines}
     assert shown >= {ENGINES[engine].mark for engine in ("mujoco", "mujoco-plain", "mujoco-defaults")}
 
@@ -192,11 +194,12 @@ def test_deviations_are_drawn_over_tolerance() -> None:
     far = dataclasses.replace(check(m, 10.0), predicted=9.0)
     made = Material({"x": (check(m, 10.0 - 1.5e-9), far)})
     drawing = deviations.of("x")
-    (axes,) = drawing.draw(drawing.select(made)).axes
+    figure, caption = drawing.draw(drawing.select(made))
+    (axes,) = figure.axes
     points = [line for line in axes.lines if line.get_marker() == "o"]
     assert [float(v) for line in points for v in line.get_xdata()] == pytest.approx([0.5], rel=1e-6)
     assert sum(len(line.get_xdata()) for line in axes.lines if line.get_marker() == ">") == 1
-    assert "μ = 0.2" in drawing.caption(drawing.select(made))
+    assert "μ = 0.2" in caption
     with pytest.raises(GapError):
         drawing.select(Material({"x": (check(measurement("case", 0.0), 0.0, 0.0),)}))
 

@@ -175,8 +175,8 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path: Path, mo
         raise GapError("the run <is> lost")
 
     figures = {
-        "fall": Drawing("A fall", lambda _: None, lambda _: Figure(figsize=(1, 1)), lambda _: "", ("good", "bad")),
-        "gap": Drawing("A gap", lambda _: None, refuse, lambda _: "", ("good",)),
+        "fall": Drawing("A fall", lambda _: None, lambda _: (Figure(figsize=(1, 1)), ""), ("good", "bad")),
+        "gap": Drawing("A gap", lambda _: None, refuse, ("good",)),
     }
     monkeypatch.setattr(report, "FIGURES", {})
     monkeypatch.setattr(report, "figures_of", lambda claim: {n: f for n, f in figures.items() if claim in f.claims})
@@ -263,7 +263,7 @@ def test_a_missing_summary_names_the_command(tmp_path: Path) -> None:
 
 
 def test_a_picture_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawing = Drawing("t", lambda _: None, lambda _: Figure(figsize=(1, 1)), lambda data: f"<&> {data}")
+    drawing = Drawing("t", lambda _: None, lambda data: (Figure(figsize=(1, 1)), f"<&> {data}"))
     path = tmp_path / "made.svg"
     assert pictures.kept(path, drawing, ("a", 1.0)) is None
     first = pictures.drawn((path, drawing, ("a", 1.0)))

@@ -45,20 +45,7 @@ def _branch() -> OrbitBranch:
     return orbit_branch.follow(_orbit(), "omega_0", LOW * edge, HIGH * edge)
 
 
-def caption_branch(of: Diagram) -> str:
-    """Of both diagrams."""
-    factors = np.abs([orbit.multipliers[0] for orbit in _branch().orbits])
-    return style.caption(
-        of.p,
-        "Stationary motions as in Fig. 13 (left) and Figs. 9 and 10 (right), and the hopping ball (purple): its mean "
-        "over a period, shaded from least to greatest. Hops begin with no height at ω₀₂, where NS, NR, SR and the "
-        f"unstable SS meet; the largest |multiplier| is {factors.min():.3f} … {factors.max():.3f} here. Dashed: "
-        f"unstable. r/R = {of.p.r / of.p.R:.3g},",
-        states=of.states,
-    )
-
-
-def draw_branch(of: Diagram) -> Figure:
+def draw_branch(of: Diagram) -> tuple[Figure, str]:
     """omega_c and the spin on the wall over the flow."""
     p, branch = of.p, _branch()
     edge = bifurcation.thresholds(p).omega_02
@@ -99,24 +86,21 @@ def draw_branch(of: Diagram) -> Figure:
     wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, p)))
     style.points(orbit, of.states)
     style.legend(orbit, loc="center right")
-    return figure
-
-
-def caption_orbit(of: Diagram) -> str:
-    """Of the orbit."""
-    orbit = _orbit()
-    named = style.named(of.p, "mu", "eta", "j", "kappa", "omega_0")
-    return (
-        f"The hopping ball over one period of {orbit.period:.5g} s: height, and the orbit in two planes of the state "
-        "space, coloured by case, a gap at the impact. It lands, slips at both points for 0.5 ms, slips up the wall "
-        f"(NS), sticks to it (NR), rises to {1e3 * orbit.cycle.y.max():.3g} mm and falls. Largest |Floquet multiplier| "
-        f"{abs(orbit.multipliers[0]):.4g}; {named} rad/s."
+    factors = np.abs([each.multipliers[0] for each in branch.orbits])
+    return figure, style.caption(
+        p,
+        "Stationary motions as in Fig. 13 (left) and Figs. 9 and 10 (right), and the hopping ball (purple): its mean "
+        "over a period, shaded from least to greatest. Hops begin with no height at ω₀₂, where NS, NR, SR and the "
+        f"unstable SS meet; the largest |multiplier| is {factors.min():.3f} … {factors.max():.3f} here. Dashed: "
+        f"unstable. r/R = {p.r / p.R:.3g},",
+        states=of.states,
     )
 
 
-def draw_orbit(of: Diagram) -> Figure:
+def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     """Height over time, height over its rate, and height over the slip."""
-    cycle = _orbit().cycle
+    orbit = _orbit()
+    cycle = orbit.cycle
     figure, axes = style.panels(9.0, 3.2, 1, 3, sharey=True)
     shown = {"$t$ (ms)": 1e3 * cycle.time, "$v_y$ (m/s)": cycle.v_y, "$\\tilde\\omega_x$ (rad/s)": cycle.slip_x}
     for ax, (label, x) in zip(axes, shown.items(), strict=True):
@@ -126,7 +110,13 @@ def draw_orbit(of: Diagram) -> Figure:
         ax.set_xlabel(label)
     axes[0].set_ylabel("$y$ (mm)")
     style.legend(axes[0], loc="lower right", markerscale=4)
-    return figure
+    named = style.named(of.p, "mu", "eta", "j", "kappa", "omega_0")
+    return figure, (
+        f"The hopping ball over one period of {orbit.period:.5g} s: height, and the orbit in two planes of the state "
+        "space, coloured by case, a gap at the impact. It lands, slips at both points for 0.5 ms, slips up the wall "
+        f"(NS), sticks to it (NR), rises to {1e3 * cycle.y.max():.3g} mm and falls. Largest |Floquet multiplier| "
+        f"{abs(orbit.multipliers[0]):.4g}; {named} rad/s."
+    )
 
 
 def walls() -> dict[str, Any]:
@@ -152,19 +142,7 @@ def walls() -> dict[str, Any]:
     return branch
 
 
-def caption_walls(of: Diagram) -> str:
-    """What happens along the branch."""
-    at = {place["kind"]: f"η = {place['value']:.4g}" for place in reversed(walls()["places"])}
-    mark = " Shaded: the least wall friction at which hops don't last, as measured." if of.states else ""
-    return (
-        "Height and mean ω_c of the hopping ball against the friction of the wall. From no height "
-        f"({at['nonsmooth birth']}) hops grow; they lose stability in a torus bifurcation ({at['torus']}), turn back "
-        f"in a fold ({at['fold']}), and end in hops of no height. Dots without names: the sequence of cases changes. "
-        f"Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} rad/s.{mark}"
-    )
-
-
-def draw_walls(of: Diagram) -> Figure:
+def draw_walls(of: Diagram) -> tuple[Figure, str]:
     """Height and mean omega_c of the hops over the friction of the wall."""
     branch = walls()
     orbits, places = branch["orbits"], branch["places"]
@@ -185,17 +163,22 @@ def draw_walls(of: Diagram) -> Figure:
         axes.set(xlabel="wall friction $\\eta$", ylabel=label)
         axes.margins(0.2, 0.1)
     style.legend(panels[0], loc="upper left")
-    return figure
+    at = {place["kind"]: f"η = {place['value']:.4g}" for place in reversed(places)}
+    mark = " Shaded: the least wall friction at which hops don't last, as measured." if of.states else ""
+    return figure, (
+        "Height and mean ω_c of the hopping ball against the friction of the wall. From no height "
+        f"({at['nonsmooth birth']}) hops grow; they lose stability in a torus bifurcation ({at['torus']}), turn back "
+        f"in a fold ({at['fold']}), and end in hops of no height. Dots without names: the sequence of cases changes. "
+        f"Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} rad/s.{mark}"
+    )
 
 
 _RECORDS = (
-    ("hopping-orbit", "a ball that hops for ever", "omega_c", draw_orbit, caption_orbit, "hopping"),
-    ("hopping-branch", "Figs. 9, 10 and 13 with hopping", "omega_c", draw_branch, caption_branch, "hopping-birth"),
-    ("hopping-walls", "hops along rougher walls", "death", draw_walls, caption_walls, "hopping-death"),
+    ("hopping-orbit", "a ball that hops for ever", "omega_c", draw_orbit, "hopping"),
+    ("hopping-branch", "Figs. 9, 10 and 13 with hopping", "omega_c", draw_branch, "hopping-birth"),
+    ("hopping-walls", "hops along rougher walls", "death", draw_walls, "hopping-death"),
 )
 FIGURES = {
-    name: Drawing(
-        f"Beyond the paper: {title}", functools.partial(select, quantity=f"orbit_{what}"), draw, caption, (claim,)
-    )
-    for name, title, what, draw, caption, claim in _RECORDS
+    name: Drawing(f"Beyond the paper: {title}", functools.partial(select, quantity=f"orbit_{what}"), draw, (claim,))
+    for name, title, what, draw, claim in _RECORDS
 }

@@ -41,19 +41,7 @@ def select_curves(material: Material) -> tuple[Diagram, ...]:
     )
 
 
-def caption_curves(curves: tuple[Diagram, ...]) -> str:
-    """Of the characteristic curves with all settled states."""
-    sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in zip(("left", "right"), curves, strict=True))
-    states = [m for curve in curves for m in curve.states]
-    return (
-        f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
-        "dashed where unstable; SR and NR lie on one line. Settled states were measured from rest, going round "
-        f"with the fluid, and high up on the wall. Below: relative deviation from the nearest attracting "
-        f"solution; what is below 1e-16 is drawn there.{style.marks(states)}"
-    )
-
-
-def draw_curves(curves: tuple[Diagram, ...]) -> Figure:
+def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
     """Two columns, one a parameter set: the curve above, deviations from the nearest attracting solution below."""
 
     def nearest(m: Measurement) -> float:
@@ -73,7 +61,14 @@ def draw_curves(curves: tuple[Diagram, ...]) -> Figure:
         above.grid(alpha=0.25)
         style.deviations(below, curve.states, nearest)
         below.set(xlabel=style.OMEGA_0)
-    return figure
+    sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in zip(("left", "right"), curves, strict=True))
+    states = [m for curve in curves for m in curve.states]
+    return figure, (
+        f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: closed-form theory, "
+        "dashed where unstable; SR and NR lie on one line. Settled states were measured from rest, going round "
+        f"with the fluid, and high up on the wall. Below: relative deviation from the nearest attracting "
+        f"solution; what is below 1e-16 is drawn there.{style.marks(states)}"
+    )
 
 
 def select_figure_13(material: Material, figure: str) -> Diagram:
@@ -87,23 +82,15 @@ def select_figure_13(material: Material, figure: str) -> Diagram:
     return Diagram(figure, Parameters.named(name), tuple(m for m in rows if m.set == name))
 
 
-def caption_figure_13(of: Diagram) -> str:
-    """Of either panel."""
-    text = (
-        "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where the flow came from "
-        "(arrows)."
-        if of.p.eta < of.p.j
-        else "The curves of RR, SR and NR lie on one line: the widest is NR, the narrowest RR. "
-        "Black dot: where a ball that is carried by the wall drops when the flow falls, see the figure of its fall."
-    )
-    return style.caption(of.p, "Characteristic curve of the flowmeter.", text, "Dashed: unstable.", states=of.states)
-
-
-def draw_figure_13(of: Diagram) -> Figure:
+def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     """One panel, with both scales."""
     p, top = of.p, _top(of.p)
     figure, axes = style.panels(6.0, 4.3)
     if p.eta < p.j:
+        said = (
+            "Between ω₀₂ and ω₀₄ two motions are stable: which one the ball is in depends on where the flow came from "
+            "(arrows)."
+        )
         t = _theory(axes, p, top)
         slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
         look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
@@ -114,6 +101,10 @@ def draw_figure_13(of: Diagram) -> Figure:
             style.points(axes, [m for m in of.states if m.conditions.get("side") == side], way=text, marker=mark)
         style.points(axes, [m for m in of.states if m.protocol == "edge"], way=", edge", ms=3.5)
     else:
+        said = (
+            "The curves of RR, SR and NR lie on one line: the widest is NR, the narrowest RR. "
+            "Black dot: where a ball that is carried by the wall drops when the flow falls, see the figure of its fall."
+        )
         t = bifurcation.thresholds(p)
         for case, ends, width, line, at in (
             (Case.NR, (t.omega_02, top), 9, style.STABLE, (0.75, (9, -9))),
@@ -129,7 +120,9 @@ def draw_figure_13(of: Diagram) -> Figure:
     axes.set(xlim=(0, top), ylim=(0, 1.15 * top), ylabel=style.OMEGA_C, xlabel=style.OMEGA_0)
     style.legend(axes, loc="upper left")
     style.dimensionless(axes, p, style.FREE_0, style.FREE_C)
-    return figure
+    return figure, style.caption(
+        p, "Characteristic curve of the flowmeter.", said, "Dashed: unstable.", states=of.states
+    )
 
 
 def _top(p: Parameters) -> float:
@@ -163,19 +156,7 @@ def select_fall(material: Material) -> Motion:
     return Motion("held", EVENT.name, p, partial(simulator.unloading, p, 5.0))
 
 
-def caption_fall(fall: Motion) -> str:
-    """Of the fall."""
-    return style.caption(
-        fall.p,
-        "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the wall (NS), sinks, "
-        "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the impact at t = 0, "
-        "magnified in time and height (dots: samples): it stops the sinking at once; a hop would show as a gap, "
-        "a depth as a negative one. "
-        f"Background: the case, by name above; engine: {fall.engine}.",
-    )
-
-
-def draw_fall(fall: Motion) -> Figure:
+def draw_fall(fall: Motion) -> tuple[Figure, str]:
     """Height, velocities and slip around the fall, and 20 ms about the landing: the gaps as high as the ball hops."""
     run = fall.load()
     landings = [t for t, to in zip(run.events.time, run.events.to_case, strict=True) if Case(to).A is not Contact.N]
@@ -220,17 +201,24 @@ def draw_fall(fall: Motion) -> Figure:
             axes.axvline(unit * (lands - origin), color="0.3", lw=0.8)
             if column is whole:
                 style.legend(axes, frameon=False)
-    return figure
+    return figure, style.caption(
+        fall.p,
+        "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the wall (NS), sinks, "
+        "hits the floor, slips at both points (SS), at the floor (SR), and rolls (RR). Right: the impact at t = 0, "
+        "magnified in time and height (dots: samples): it stops the sinking at once; a hop would show as a gap, "
+        "a depth as a negative one. "
+        f"Background: the case, by name above; engine: {fall.engine}.",
+    )
 
 
 FIGURES = {
-    "characteristic": Drawing("Characteristic curves", select_curves, draw_curves, caption_curves),
+    "characteristic": Drawing("Characteristic curves", select_curves, draw_curves),
     **{
-        name: Drawing(title, partial(select_figure_13, figure=name), draw_figure_13, caption_figure_13, (name,))
+        name: Drawing(title, partial(select_figure_13, figure=name), draw_figure_13, (name,))
         for name, title in (
             ("fig-13-left", "Fig. 13, left: hysteresis, η < j"),
             ("fig-13-right", "Fig. 13, right: η > j"),
         )
     },
-    "unloading": Drawing("Section 5.3: the fall at unloading", select_fall, draw_fall, caption_fall, ("fig-13-right",)),
+    "unloading": Drawing("Section 5.3: the fall at unloading", select_fall, draw_fall, ("fig-13-right",)),
 }

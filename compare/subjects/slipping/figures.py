@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from analytic.bifurcation import diagram as bifurcation
 from analytic.simulation import simulator
 from compare.kit import style
 from compare.kit.drawing import Drawing, Material, Motion
@@ -31,20 +30,7 @@ def select(_: Material, figure: str) -> Motion:
     return Motion(f"{SLIP}, {BETA}", EVENT.name, p, partial(simulator.slip_perturbation, p, SLIP, BETA, t_end=_LASTS))
 
 
-def caption(push: Motion) -> str:
-    """Of either figure."""
-    p = push.p
-    stable = p.omega_0 > bifurcation.thresholds(p).omega_02
-    dies = "above ω₀₂: the slip dies out within finite time, and the ball rolls on the wall again"
-    grows = "below ω₀₂: the slip grows, and the ball keeps slipping (NS)"
-    return (
-        f"The stationary orbit on the wall (NR), pushed by a slip of {SLIP:g} rad/s in the direction β = {BETA:g}, "
-        f"{dies if stable else grows}. Left: the slip over time. Right: its path in the plane orthogonal to NR, from "
-        f"the cross; dotted: the straight line. Event-driven simulation; {style.named(p)}, Ω₀ = {p.Omega_0:.3g}."
-    )
-
-
-def draw(push: Motion) -> Figure:
+def draw(push: Motion) -> tuple[Figure, str]:
     """Slip at the wall over time, and its path in the orthogonal plane (55)."""
     run = push.load()
     figure = style.figure(8.4, 3.3)
@@ -75,10 +61,17 @@ def draw(push: Motion) -> Figure:
     for axes in (time, plane):
         axes.axhline(0, **style.GUIDE)
     plane.axvline(0, **style.GUIDE)
-    return figure
+    dies = "above ω₀₂: the slip dies out within finite time, and the ball rolls on the wall again"
+    grows = "below ω₀₂: the slip grows, and the ball keeps slipping (NS)"
+    return figure, (
+        f"The stationary orbit on the wall (NR), pushed by a slip of {SLIP:g} rad/s in the direction β = {BETA:g}, "
+        f"{dies if stops else grows}. Left: the slip over time. Right: its path in the plane orthogonal to NR, from "
+        "the cross; dotted: the straight line. Event-driven simulation; "
+        f"{style.named(push.p)}, Ω₀ = {push.p.Omega_0:.3g}."
+    )
 
 
 FIGURES = {
-    name: Drawing(title, partial(select, figure=name), draw, caption, ("slip-NR-NS",))
+    name: Drawing(title, partial(select, figure=name), draw, ("slip-NR-NS",))
     for name, title in (("fig-4", "Fig. 4: a slip that dies out"), ("fig-5", "Fig. 5: a slip that grows"))
 }

@@ -67,23 +67,7 @@ def select_plane(material: Material, figure: str) -> Plane:
     return Plane(chosen[0].measurement.parameters if chosen else _THEORY, figure == "fig-8", chosen)
 
 
-def plane_caption(plane: Plane) -> str:
-    """Of either figure."""
-    p, runs = plane.p, len(plane.checks)
-    fixed = style.named(p, "j", "kappa") if plane.equal else style.named(p, "mu", "j", "kappa")
-    text = (
-        f"Which stationary solutions exist over ω₀ and {'η = μ' if plane.equal else 'η'}, for {fixed}. Lines: the "
-        "thresholds (84)-(88); dots: where they meet; SS*: the unstable part of SS; hatched: two stable motions (SS, "
-        "and SR or NR)."
-    )
-    if runs:
-        failed = sum(not check.agrees for check in plane.checks)
-        text += f" Marks: the {runs} points at which runs were started; they ended "
-        text += f"not as predicted in {failed} (crossed)." if failed else "as predicted in all."
-    return text
-
-
-def draw_plane(plane: Plane) -> Figure:
+def draw_plane(plane: Plane) -> tuple[Figure, str]:
     """Regions with their names, the thresholds between them, measured points by what was reached there."""
     p = plane.p
     figure = style.figure(6.4, 4.9)
@@ -110,7 +94,16 @@ def draw_plane(plane: Plane) -> Figure:
     axes.set(xlabel=friction, ylabel=style.OMEGA_0, xlim=(0, _WIDEST), ylim=(0, fastest))
     style.legend(figure, loc="outside lower center", ncols=6, handlelength=3.2)
     style.dimensionless(axes, p, y=style.FREE_0)
-    return figure
+    fixed = style.named(p, "j", "kappa") if plane.equal else style.named(p, "mu", "j", "kappa")
+    caption = (
+        f"Which stationary solutions exist over ω₀ and {'η = μ' if plane.equal else 'η'}, for {fixed}. Lines: the "
+        "thresholds (84)-(88); dots: where they meet; SS*: the unstable part of SS; hatched: two stable motions (SS, "
+        "and SR or NR)."
+    )
+    if plane.checks:
+        caption += f" Marks: the {len(plane.checks)} points at which runs were started; they ended "
+        caption += f"not as predicted in {len(failed)} (crossed)." if failed else "as predicted in all."
+    return figure, caption
 
 
 def _regions(axes: Axes, p: Parameters, mu: Array, eta: Array, omega_0: Array) -> None:
@@ -191,18 +184,7 @@ def select_diagram(material: Material, figure: str) -> Diagram:
     return Diagram(figure, Parameters.named(name), own)
 
 
-def diagram_caption(of: Diagram) -> str:
-    """Of Figs. 9-12, with their parameters."""
-    p = of.p
-    text = f"Stationary solutions {_SHOWN[of.figure]}; {style.named(p)}, r/R = {p.r / p.R:g}. Dashed: unstable."
-    if of.figure == "fig-12" and slipping_branch.hopf_places(p):
-        text += " H: a Hopf point of SS, beyond which an oscillation grows, too."
-    if of.states and of.figure in ("fig-10", "fig-11"):
-        text += " A ball on the wall (NR) has the spin of SR, also where SR is unstable."
-    return text + style.marks(of.states)
-
-
-def draw_diagram(of: Diagram) -> Figure:
+def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     """One diagram, with both scales."""
     figure, p = style.figure(5.8, 4.1), of.p
     axes, t = figure.add_subplot(), bifurcation.thresholds(of.p)
@@ -254,7 +236,12 @@ def draw_diagram(of: Diagram) -> Figure:
     style.guides(axes, guides)
     style.legend(axes, loc="upper left")
     style.dimensionless(axes, p, style.FREE_0, style.FREE_X)
-    return figure
+    caption = f"Stationary solutions {_SHOWN[of.figure]}; {style.named(p)}, r/R = {p.r / p.R:g}. Dashed: unstable."
+    if of.figure == "fig-12" and slipping_branch.hopf_places(p):
+        caption += " H: a Hopf point of SS, beyond which an oscillation grows, too."
+    if of.states and of.figure in ("fig-10", "fig-11"):
+        caption += " A ball on the wall (NR) has the spin of SR, also where SR is unstable."
+    return figure, caption + style.marks(of.states)
 
 
 def _branch(
@@ -284,10 +271,7 @@ _DIAGRAMS = {
     "fig-12": "Fig. 12: on the floor, η > j, (12) released",
 }
 FIGURES = {
-    name: Drawing(title, partial(select, figure=name), draw, caption, (name,))
-    for titles, select, draw, caption in (
-        (_PLANES, select_plane, draw_plane, plane_caption),
-        (_DIAGRAMS, select_diagram, draw_diagram, diagram_caption),
-    )
+    name: Drawing(title, partial(select, figure=name), draw, (name,))
+    for titles, select, draw in ((_PLANES, select_plane, draw_plane), (_DIAGRAMS, select_diagram, draw_diagram))
     for name, title in titles.items()
 }

@@ -62,19 +62,7 @@ def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
     return f, onsets, [pulsation.mean_error(p, 1.5 * a, each, 1e-4) for each, a in zip(f, onsets, strict=True)]
 
 
-def caption_pulsation(of: Measurements) -> str:
-    """Of gain, phase, onset of slip and mean error."""
-    return style.caption(
-        of.mean,
-        f"A ball in a flow that pulsates about ω₀ = {of.mean.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, "
-        f"where it rolls at both points (RR) and where it slips at both (SS, ω₀ = {FLOWS[1]:g} rad/s). "
-        "Right: the amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast "
-        "pulsations; and the error of its mean reading when the amplitude is 1.5 times that (dots: computed).",
-        states=of.rows,
-    )
-
-
-def draw_pulsation(of: Measurements) -> Figure:
+def draw_pulsation(of: Measurements) -> tuple[Figure, str]:
     """Gain, phase, onset, mean error over frequency."""
     p = of.mean
     figure, ((gain, onset), (phase, error)) = style.panels(9.0, 5.6, 2, 2, sharex=True)
@@ -101,23 +89,17 @@ def draw_pulsation(of: Measurements) -> Figure:
     onset.margins(y=0.12)
     error.set(ylabel="mean of $\\omega_c - \\omega_0$ (rad/s)", xlabel="frequency (Hz)")
     style.legend(gain, loc="lower left")
-    return figure
-
-
-def caption_unsteady(of: Measurements) -> str:
-    """Of jumps and ramps."""
-    measured = " Dots: mujoco, half the difference of two small jumps, up and down." if of.runs else ""
-    return style.caption(
-        REFERENCE,
-        "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls approaches its "
-        f"new reading slowly, one that slips at both points swings.{measured} Middle: ramps of the flow past the fold "
-        "ω₀₄; the faster the ramp, the later the ball catches up. Right: by how much the flow has passed ω₀₄ when the "
-        "ball's lag has halved; dashed: the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).",
-        states=of.of("ramp_end"),
+    return figure, style.caption(
+        of.mean,
+        f"A ball in a flow that pulsates about ω₀ = {of.mean.omega_0:.4g} rad/s. Left: gain and phase lag of ω_c, "
+        f"where it rolls at both points (RR) and where it slips at both (SS, ω₀ = {FLOWS[1]:g} rad/s). "
+        "Right: the amplitude of the flow at which a rolling ball begins to slip, with its limits for slow and fast "
+        "pulsations; and the error of its mean reading when the amplitude is 1.5 times that (dots: computed).",
+        states=of.rows,
     )
 
 
-def draw_unsteady(of: Measurements) -> Figure:
+def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
     """Step responses, ramps, overshoot over rate."""
     figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
     t = np.linspace(0.0, 4.0, 800)
@@ -156,14 +138,22 @@ def draw_unsteady(of: Measurements) -> Figure:
         axis.set_minor_formatter(NullFormatter())
     for axes in (ramp, law):
         style.legend(axes, loc="upper left")
-    return figure
+    measured = " Dots: mujoco, half the difference of two small jumps, up and down." if of.runs else ""
+    return figure, style.caption(
+        REFERENCE,
+        "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls approaches its "
+        f"new reading slowly, one that slips at both points swings.{measured} Middle: ramps of the flow past the fold "
+        "ω₀₄; the faster the ramp, the later the ball catches up. Right: by how much the flow has passed ω₀₄ when the "
+        "ball's lag has halved; dashed: the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).",
+        states=of.of("ramp_end"),
+    )
 
 
 _PULSATION = ("pulsation-lag", "pulsation-slip", "pulsation-mean")
 FIGURES = {
-    name: Drawing(f"Unsteady flow: {title}", partial(select, figure=name), draw, caption, claims)
-    for name, title, draw, caption, claims in (
-        ("pulsation", "pulsation", draw_pulsation, caption_pulsation, _PULSATION),
-        ("unsteady", "jumps and ramps", draw_unsteady, caption_unsteady, ("jump-slipping", "ramp-fold")),
+    name: Drawing(f"Unsteady flow: {title}", partial(select, figure=name), draw, claims)
+    for name, title, draw, claims in (
+        ("pulsation", "pulsation", draw_pulsation, _PULSATION),
+        ("unsteady", "jumps and ramps", draw_unsteady, ("jump-slipping", "ramp-fold")),
     )
 }
