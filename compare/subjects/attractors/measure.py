@@ -43,30 +43,6 @@ REFINED = 8, 16
 """Time steps in one of `coarse_step`."""
 SAMPLE = 1e-3
 """Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
-WALLS = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
-"""Friction of the walls along which the hop is followed, in units of that of the set. The first steps are short, as the
-start is extrapolated from one or two hops, and a hop attracts from a small neighbourhood only."""
-REBOUNDS = tuple(round(0.04 * k, 2) for k in range(18))
-"""Coefficients of restitution along which it is followed."""
-LONG, LEFT, FINER = (0.0, 0.2, 0.4, 0.48, 0.6), 20.0, 40
-"""Coefficients at which a ball is run without further change, as at the first at which it no longer hops; for how long,
-s; and the number of time steps in a `coarse_step`. (0.6 was added after results had been seen: at 0.56 disturbances
-grow so slowly that 20 s don't show it.)"""
-LATEST = 8
-"""Hops about whose mean the next ones begin: they swing about it."""
-NEAR = 4
-"""The last walls; at one of them disturbances begin to grow."""
-FOLLOWED, ALONE = 10.0, 60.0
-"""How long the ball hops at each wall, and how long it is run at the last ones, s."""
-SWINGS, SWUNG = 24.0, 4.0
-"""Duration of the swing, and the last part of it that is measured, s."""
-STRONG_DRAG = {"mu": (0.05, 1.0), "eta": (0.05, 1.0), "j": (0.2, 0.6), "kappa": (2.0, 8.0), "Omega_0": (0.5, 6.0)}
-"""The box that the sets with strong drag fill evenly; the rest is as in the reference."""
-ROUGH = {
-    "rough-floor-1": (1.7222, 0.0388, 0.482, 0.292, 0.1099, 2.635),
-    "rough-floor-2": (1.2277, 0.1721, 0.611, 0.154, 0.1198, 2.099),
-}
-"""mu, eta, j, r/R, kappa, Omega_0."""
 
 
 def with_groups(p: Parameters, mu: float, eta: float, j: float, r: float, kappa: float, Omega_0: float) -> Parameters:
@@ -183,7 +159,9 @@ def birth(flows: Sequence[float], heights: Sequence[float]) -> Measured:
 def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """The wall beyond which disturbances of the hop grow, and whether balls hop on, on both sides of it."""
     p = Parameters.named(SET)
-    walls = [p.replace(eta=share * p.eta) for share in WALLS]
+    # The first steps are short: their starts are extrapolated from one or two hops, which attract from nearby only.
+    shares = (1.0, 1.005, 1.015, 1.03, 1.06, 1.1, 1.14, 1.18, 1.22, 1.26, 1.3, 1.34)
+    walls, lasts = [p.replace(eta=share * p.eta) for share in shares], 10.0
     etas = [q.eta for q in walls]
 
     def task(q: Parameters, x: Array, lasts: float, refined: int) -> Task:
@@ -195,48 +173,50 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
         ahead = steady[-1]
         if k > 1:
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
-        pair = [task(q, x, FOLLOWED, refined) for x, refined in zip(ahead, REFINED, strict=True)]
+        pair = [task(q, x, lasts, refined) for x, refined in zip(ahead, REFINED, strict=True)]
         runs = lab.attempt(pair)
-        parts = [] if isinstance(runs, str) else [tops(run, LATER, FOLLOWED) for run in runs]
+        parts = [] if isinstance(runs, str) else [tops(run, LATER, lasts) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
             yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
             return
-        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, FOLLOWED))]
+        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * LATER, lasts))]
         factors.append([factor for factor, _ in maps])
         steady.append(np.array([state for _, state in maps[:2]]))
         tasks.append(pair)
         near.append(parts[1].conditions(q))
-    place = death(etas[-NEAR:], factors[-NEAR:])
-    used = [task for pair in tasks[-NEAR:] for task in pair]
-    yield measurement(lab, "followed", SET, walls[-NEAR], "orbit_death", place, used, **near[-NEAR])
-    again = [task(walls[k], np.array(tasks[k][1].x0), ALONE, REFINED[0]) for k in (-NEAR, -1)]
+    place = death(etas[-4:], factors[-4:])  # disturbances begin to grow at one of the last four walls
+    used = [task for pair in tasks[-4:] for task in pair]
+    yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near[-4])
+    again = [task(walls[k], np.array(tasks[k][1].x0), 60.0, REFINED[0]) for k in (-4, -1)]
     yield from _left_alone(lab, "followed", SET, again)
 
 
 def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Whether balls that rebound hop on, followed from one coefficient of restitution to the next.
 
-    By time stepping: MuJoCo's contacts have no such coefficient.
+    By time stepping: MuJoCo's contacts have no such coefficient. At some, and at the first at which a ball no longer
+    hops, it is run for 20 s without further change. (0.6 is among them since results had been seen: at 0.56
+    disturbances grow so slowly that 20 s don't show it.)
     """
-    p, states = Parameters.named(SET), [TOP.stacked()]
+    p, x, left = Parameters.named(SET), TOP.stacked(), 20.0
 
     def task(x: Array, lasts: float, restitution: float) -> Task:
-        step = coarse_step(p) / FINER
+        step = coarse_step(p) / 40
         settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
         return replace(lab.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings)
 
-    for e in REBOUNDS:
-        (run,) = lab.run([task(states[-1], LAST, e)])
+    for e in (round(0.04 * k, 2) for k in range(18)):
+        (run,) = lab.run([task(x, LAST, e)])
         if hops(run):
             last = tops(run, 0.0, LAST)
-            states.append(last.x[-LATEST:].mean(axis=0))  # a hop attracts from a small neighbourhood only
+            x = last.x[-8:].mean(axis=0)  # the hops swing about their mean, and attract from nearby only
         elif not e:
             yield Missing("rebounding", SET, "the ball does not hop")
             return
-        if not hops(run) or e in LONG:
-            (run,) = lab.run([alone := task(states[-1], LEFT, e)])
-            at = last.conditions(p) | {"restitution": e, "duration": LEFT}
+        if not hops(run) or e in (0.0, 0.2, 0.4, 0.48, 0.6):
+            (run,) = lab.run([alone := task(x, left, e)])
+            at = last.conditions(p) | {"restitution": e, "duration": left}
             yield measurement(lab, "rebounding", SET, p, "hops", hops(run), [alone], **at)
             if not hops(run):
                 return
@@ -258,8 +238,9 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     """
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
-    (result,) = carry_out(lab, "swing", [Trial("reference", p, "swing", x0, SWINGS, (60, 80), 12_000)])
-    end = SWINGS - SWUNG
+    lasts, part = 24.0, 4.0  # how long it swings, and the last part of it that is measured, s
+    (result,) = carry_out(lab, "swing", [Trial("reference", p, "swing", x0, lasts, (60, 80), 12_000)])
+    end = lasts - part
     if isinstance(result, Missing):
         yield result
         return
@@ -267,8 +248,8 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         yield Missing("swing", "reference", "the ball does not slip at both points for ever")
         return
     parts = []
-    for run, start in (result.coarse, end), (result.fine, end), (result.fine, end - SWUNG):
-        inside = (run.time > start) & (run.time <= start + SWUNG)
+    for run, start in (result.coarse, end), (result.fine, end), (result.fine, end - part):
+        inside = (run.time > start) & (run.time <= start + part)
         time, omega_c = run.time[inside], run.omega_c[inside]
         (k, late), (low, lower) = peaks(omega_c), peaks(-omega_c)
         at = time[k] + late * (time[1] - time[0])
@@ -283,10 +264,10 @@ def swing(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
 def calm(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Whether balls still hop after 60/c of the weakest drag: three of each of 16 sets."""
     reference, rng, tasks = sets["reference"], np.random.default_rng(5), []
-    low, high = np.transpose(list(STRONG_DRAG.values()))
+    low, high = np.array([0.05, 0.05, 0.2, 2.0, 0.5]), np.array([1.0, 1.0, 0.6, 8.0, 6.0])
     for mu, eta, j, kappa, Omega_0 in (low + sobol(len(low), 16, 5) * (high - low)).tolist():
         p = with_groups(reference, mu, eta, j, reference.r, kappa, Omega_0)
-        lasts = 60.0 * time_unit(p) / STRONG_DRAG["kappa"][0]
+        lasts = 60.0 * time_unit(p) / low[3]
         for _ in range(3):
             slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, 3)
             x = State(rng.uniform(0, p.R), 0.0, p.omega_0 * rng.uniform(-0.5, 2), *slips)
@@ -306,10 +287,13 @@ def _left_alone(lab: Lab, protocol: str, set: str, tasks: list[Task]) -> Iterato
 
 def choice(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Case and omega_c of what a ball settles to from rest, in a flow above omega_01."""
-    p, starts = sets["reference"], []
-    for name, (mu, eta, j, ratio, *rates) in list(ROUGH.items())[: lab.effort("choice.sets")]:
-        starts.append(Start(name, with_groups(p, mu, eta, j, ratio * p.R, *rates), "rest", np.zeros(8)))
-    yield from reading(lab, "choice", starts)
+    p = sets["reference"]
+    rough = {
+        "rough-floor-1": with_groups(p, 1.7222, 0.0388, 0.482, 0.292 * p.R, 0.1099, 2.635),
+        "rough-floor-2": with_groups(p, 1.2277, 0.1721, 0.611, 0.154 * p.R, 0.1198, 2.099),
+    }
+    starts = [Start(name, q, "rest", np.zeros(8)) for name, q in rough.items()]
+    yield from reading(lab, "choice", starts[: lab.effort("choice.sets")])
 
 
 _HOPS = "hops that last are those of the set hopping"
