@@ -21,14 +21,6 @@ from model.arrays import Array
 from model.kinematics import slip_velocities
 
 PROTOCOL = "laws"
-LASTS = 768
-"""Length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples."""
-FASTEST = 3.0
-"""The flow rises from rest to this, or falls from it, omega_0 sqrt(R/g)."""
-SLIPS = 0.02
-"""Slip speed divided by sqrt(g R) above which friction must be that of slipping, whatever case is detected."""
-APART = 5
-"""Samples on either side of a change of case that don't count."""
 ROUNDING = 100 * float(np.finfo(float).eps)
 FLUIDS: Mapping[str, Mapping[str, float]] = {
     "steel-in-water": {"nu_f": 1.004e-6, "rho_f": 998.2, "rho_b": 7850.0, "r": 5e-3, "gravity": 9.81},
@@ -44,15 +36,15 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     balls = {name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2) for name, fluid in FLUIDS.items()}
     tasks = []
     for p in sets.values():
-        step, fast = coarse_step(p), FASTEST / time_unit(p)
-        t_end = LASTS * step
+        step, fast, samples = coarse_step(p), 3.0 / time_unit(p), 768
+        t_end = samples * step  # about 40 sqrt(R/g)
         # From rest in a flow that rises; high on the wall in one that falls; and along the floor towards the wall.
         up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
         down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
         half = Flow.steady(fast / 2)
         starts = (up, State()), (down, State(y=2 * p.R, omega_c=fast)), (half, State(omega_c=fast / 3, h=p.R / 2))
         finer = [(step / parts, *start) for parts in refined for start in starts]
-        tasks.append([lab.task(p, x, t_end, h, flow=flow, samples=LASTS) for h, flow, x in finer])
+        tasks.append([lab.task(p, x, t_end, h, flow=flow, samples=samples) for h, flow, x in finer])
     falls = []
     for p in balls.values():
         # In the middle of still fluid, off floor and wall, from rest and sinking already.
@@ -98,7 +90,8 @@ def deviations(runs: Sequence[Trajectory]) -> dict[tuple[str, str, str], float]:
     for contact in "AB":
         rows = [_rows(run, contact) for run in runs]
         normal, friction, against, speed, gap, letter = (np.concatenate(row) for row in zip(*rows, strict=True))
-        slides = (speed > SLIPS) & (normal > PRESSES) & (letter != "")
+        # A contact that slips so fast must have the friction of slipping, whatever case is detected.
+        slides = (speed > 0.02) & (normal > PRESSES) & (letter != "")
         for law, values in (
             ("where it rolls it doesn't slip", speed[letter == "R"]),
             ("where it is closed there is no gap", np.abs(gap[(letter == "R") | (letter == "S")])),
@@ -115,7 +108,7 @@ def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
     """Normal force, friction, and its difference from friction against the slip, divided by the weight.
 
     Of the difference only what exceeds the turn of the slip from one sample to the next. Then slip speed divided by
-    sqrt(g R), gap divided by R and the contact's letter, empty next to a change of case, each (n,).
+    sqrt(g R), gap divided by R and the contact's letter, empty within 5 samples of a change of case, each (n,).
     """
     p, k = run.header.parameters, "AB".index(contact)
     across, along = ((1, [0, 2]), (0, [1, 2]))[k]
@@ -125,7 +118,7 @@ def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
     direction = slip / np.maximum(speed, np.finfo(float).tiny)[:, None]
     turns = np.hypot(*np.diff(direction, axis=0, prepend=direction[:1]).T)
     against = np.maximum(np.hypot(*(tangent + friction[:, None] * direction).T) - friction * turns, 0.0)
-    changes = np.flatnonzero(np.diff(run.case))[:, None] + np.arange(1 - APART, APART + 1)
+    changes = np.flatnonzero(np.diff(run.case))[:, None] + np.arange(-4, 6)
     letters = np.array([case.name[k] for case in run.cases])
     letters[np.clip(changes, 0, len(letters) - 1)] = ""
     forces = (each / (p.m * p.g) for each in (normal, friction, against))

@@ -50,8 +50,6 @@ NEAR = 4
 TURN = 0.5
 """Largest change of a slip in a window, and of that which friction alone would make, divided by the slip: where slip is
 about to vanish, or very small, friction turns too fast."""
-FASTEST = (3e3, 3e4)
-"""Reynolds numbers of some starts under laws of drag other than Stokes', as balls in water have them."""
 MOVING = {
     case: [k for k, name in enumerate(VARIABLES) if name in TRAITS[case].active and name not in ("y", "h")]
     for case in Case
@@ -74,19 +72,11 @@ STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
     (1.20, (0.0, 0.0, 0.40, 0.6, 0.1, -0.5, 0.5, 0.0)),
 )
 """omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
-LASTS = 6.0
-"""Duration of a motion in units of sqrt(R/g)."""
 LENGTH = 40
 """Samples in a piece."""
 APART = 10
 """Samples between the ends of a piece and any change of case: three until a force has built up, three until the case
 is taken to have changed, and a few by which a change comes too early or late."""
-NARROW = 1e-4
-"""Least gap of an open contact divided by R at the ends of a piece: an unloaded contact may hover."""
-LATE = 2.0
-"""Steps by which two landings may be late; slip at the ends of a piece must exceed what weight causes in that time."""
-LEFT = 0.01
-"""Least reserve of friction, relative, of a rolling contact at the ends of a piece: with less it creeps."""
 
 LANDINGS: dict[str, tuple[float, ...]] = {
     "floor, with slip": (0.05, -0.5, 0.5, 0.6, 0.2, -0.9, 0.4, 0.0),
@@ -97,13 +87,6 @@ LANDINGS: dict[str, tuple[float, ...]] = {
     "wall, at a slant": (0.6, -0.5, 0.9, -0.4, -0.2, 0.1, 0.05, -0.3),
 }
 """States in the units of `STARTS`."""
-FLOW, LANDED = 0.8, 0.4
-"""omega_0 sqrt(R/g), and the duration in units of sqrt(R/g)."""
-AFTER = 6
-"""Steps of the coarser run after contact at which the ball is looked at: then friction has built up."""
-REBOUND = 1e-2
-"""Least height of a rebound divided by R: the starts are 4 to 5 times that high, and of a plastic landing nothing is
-left but the fall within a step."""
 NAMES = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 """Variables that a landing changes."""
 
@@ -147,11 +130,10 @@ def _moving(lab: Lab, name: str, p: Parameters) -> Iterator[Trial]:
         t_end, refine = (CENTRES[-1] + HALF_WINDOW + NEAR) * coarse_step(q) / REFINED, (REFINED, 2 * REFINED)
         trial = Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0)
         yield trial
-        if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < len(FASTEST):
+        if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2:
             _, v_y, omega_c, *_, h, v_h = x
-            speed = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0))
-            thin = {"nu_f": 2 * p.r * speed / FASTEST[k], "c": 24 / (p.C_D * FASTEST[k] * time_unit(p))}
-            yield replace(trial, p=q.replace(**thin))
+            speed, Re = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0)), (3e3, 3e4)[k]
+            yield replace(trial, p=q.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * time_unit(p))))
 
 
 def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
@@ -223,7 +205,7 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     tasks = []
     for start in starts:
         step = coarse_step(start.p) / REFINED
-        steps = round(LASTS * time_unit(start.p) / step)
+        steps = round(6.0 * time_unit(start.p) / step)
         tasks.append(lab.task(start.p, start.x0, steps * step, step, samples=steps))
     seen, count = set[tuple[str, Case]](), lab.effort("motions.pieces")
     for start, task, run in zip(starts, tasks, lab.each(tasks), strict=True):
@@ -251,8 +233,9 @@ def motions(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 def pieces(run: Trajectory, count: int) -> list[int]:
     """Where pieces begin, about evenly spread: their ends are away from changes of case.
 
-    There an open contact is open, a slipping one slips by more than a trace, and a rolling one needs less friction than
-    it may.
+    There the gap of an open contact exceeds 1e-4 R, for an unloaded one may hover; a slipping one slips by more than
+    weight causes in the two steps by which landings may be late; a rolling one needs 1 % less friction than it may, for
+    else it creeps.
     """
     p, A, B = run.header.parameters, run.force_A.T, run.force_B.T
     plain = np.full(len(run.time), True)
@@ -261,9 +244,9 @@ def pieces(run: Trajectory, count: int) -> list[int]:
         ("B", run.h, run.slip_speed_B, np.hypot(B[1], B[2]), p.eta * B[0]),
     ):
         contact = np.array([getattr(case, side).name for case in Case])[run.case]
-        plain &= (contact != "R") | (friction <= (1 - LEFT) * limit)
-        plain &= (contact != "N") | (gap > NARROW * p.R)
-        plain &= (contact != "S") | (speed > LATE * p.g * coarse_step(p) / REFINED)
+        plain &= (contact != "R") | (friction <= 0.99 * limit)
+        plain &= (contact != "N") | (gap > 1e-4 * p.R)
+        plain &= (contact != "S") | (speed > 2 * p.g * coarse_step(p) / REFINED)
     changes = np.flatnonzero(np.diff(run.case)) + 1
     firsts = np.arange(APART, len(run.time) - LENGTH - APART)
     for end in (0, LENGTH):
@@ -287,17 +270,19 @@ def _start(name: str, p: Parameters, Omega_0: float, state: tuple[float, ...], h
 
 
 def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
-    """The state shortly after every landing; and in how many runs, with both time steps, the contact opens again.
+    """The state six coarse steps after every landing, when friction has built up; and in how many runs, with both time
+    steps, the contact opens again.
 
-    It does so where its gap, once it has stopped to shrink, grows by more than `REBOUND`.
+    It does so where its gap, once it has stopped to shrink, grows by more than 1e-2 R: the starts are 4 to 5 times that
+    high, and of a plastic landing nothing is left but the fall within a step.
     """
     trials = []
     for name, p in sets.items():
         for how, x in LANDINGS.items():
-            start = _start(name, p, FLOW, x, how)
+            start = _start(name, p, 0.8, x, how)
             step = coarse_step(start.p) / REFINED
             conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
-            t_end, refine = round(LANDED * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
+            t_end, refine = round(0.4 * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
             trials.append(Trial(name, start.p, how, start.x0, t_end, refine, conditions=conditions, rows=len(NAMES)))
     rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
     changed = [VARIABLES.index(name) for name in NAMES]
@@ -311,11 +296,11 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         for run in (coarse, fine):
             gap = run.y if on_floor else run.h
             low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
-            rebounds[trial.set] += bool(gap[low:].max() > gap[low] + REBOUND * p.R)
+            rebounds[trial.set] += bool(gap[low:].max() > gap[low] + 1e-2 * p.R)
         contact = [case.A if on_floor else case.B for case in coarse.cases]
-        at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + AFTER
+        at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
         if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
-            why = f"{trial.name}: the contact did not close for good within {LANDED:g} sqrt(R/g)"
+            why = f"{trial.name}: the contact did not close for good within 0.4 sqrt(R/g)"
             yield Missing("impacts", trial.set, why, len(NAMES))
             continue
         change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))

@@ -42,19 +42,13 @@ STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
     "sinks along the wall": (1.0, 1.0, (5.0, -0.3, 0.7, 0.5, 0.6, 0.8, 0.0, 0.0)),
 }
 """omega_0, how long, and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
-SMOOTH, SPUN = (0.5, 0.7, 0.9, 1.1, 1.3), 1.0
-"""Flows omega_0 sqrt(R/g) along a smooth wall, and how long, in units of sqrt(R/g)."""
-ROUGH, JAMMED, SLIGHT = 1.7, (1.5, 1.7, 1.8, 2.0, 2.2), 5e-3
-"""Friction of a rough floor, flows along it in the same units, and a slight slip divided by the ball's spin."""
-BRAKED, SLOW = 0.5, 0.6
-"""Rate of the fluid's torque divided by c, and the flow omega_0 sqrt(R/g), on contacts with a friction of 1."""
 
 
 def torque(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Case and omega_c to which a ball settles from rest whose spin the fluid brakes, as `Parameters.fluid_torque`."""
     starts = []
     for name, p in sets.items():
-        q = p.replace(mu=1.0, eta=1.0, fluid_torque=BRAKED * p.c, omega_0=SLOW / time_unit(p))
+        q = p.replace(mu=1.0, eta=1.0, fluid_torque=0.5 * p.c, omega_0=0.6 / time_unit(p))
         starts.append(Start(name, q, "rest", np.zeros(8)))
     yield from reading(lab, "torque", starts)
 
@@ -95,10 +89,10 @@ def _trials(name: str, p: Parameters) -> Iterator[Trial]:
     for how, (flow, lasts, x) in STARTS.items():
         start = State(*(np.array(x) * state_units(p)))
         yield trial(how, p.replace(omega_0=flow / unit), start, lasts, rows=len(VARIABLES))
-    for flow in SMOOTH:
+    for flow in (0.5, 0.7, 0.9, 1.1, 1.3):
         going = State(omega_c=flow / unit, slip_y=math.sqrt(p.g * p.R) / p.r)
-        yield trial("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, SPUN)
-    for flow in JAMMED:
+        yield trial("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, 1.0)
+    for flow in (1.5, 1.7, 1.8, 2.0, 2.2):
         spin = flow / unit * p.R / p.r
-        slight = State(omega_c=flow / unit, slip_x=-SLIGHT / 10 * spin, slip_z=SLIGHT * spin)
-        yield trial("rough floor", p.replace(omega_0=flow / unit, mu=ROUGH), slight, SPUN)
+        slight = State(omega_c=flow / unit, slip_x=-5e-4 * spin, slip_z=5e-3 * spin)
+        yield trial("rough floor", p.replace(omega_0=flow / unit, mu=1.7), slight, 1.0)
