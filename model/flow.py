@@ -52,10 +52,9 @@ class Flow:
         k = np.maximum(np.searchsorted(self.start, t, side="right") - 1, 0)
         return np.asarray(self.value[k] + self.slope[k] * np.maximum(t - self.start[k], 0.0))
 
-    @property
-    def breakpoints(self) -> Array:
-        """Times in s at which omega_0 or its slope jumps: an integrator should stop there."""
-        return self.start[self.start > 0]
+    def knots(self, t_end: float) -> Array:
+        """Times in s between 0 and t_end at which omega_0 or its slope jumps: an integrator should stop there."""
+        return self.start[(self.start > 0) & (self.start < t_end)]
 
     @property
     def is_steady(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from importlib import resources
@@ -82,11 +82,13 @@ def check_choice(name: str, value: Any, known: Sequence[str]) -> None:
         raise InputError(f"{name} = {value!r} must be one of {', '.join(known)}{suggestion(str(value), known)}")
 
 
-def check_names(given: Iterable[str], known: Sequence[str], kind: str) -> None:
-    """`InputError` if a given name is none of the known ones."""
+def check_names(given: Collection[str], known: Sequence[str], kind: str, needed: Iterable[str] = ()) -> None:
+    """`InputError` if a given name is none of the known ones, or a needed one is not given."""
     for name in given:
         if name not in known:
             raise InputError(f"unknown {kind} {name!r}{suggestion(name, known)}; known: {', '.join(known)}")
+    if missing := [name for name in needed if name not in given]:
+        raise InputError(f"missing {kind} {', '.join(repr(name) for name in missing)}")
 
 
 def _shown(number: float) -> str:
@@ -206,9 +208,8 @@ class Parameters:
         """
         names = [f.name for f in dataclasses.fields(cls)]
         if "fluid" not in values:
-            check_names(values, [*names, "fluid"], "parameter")
-            needed = [f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING]
-            refuse_missing(values, needed, "parameter")
+            needed = (f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING)
+            check_names(values, [*names, "fluid"], "parameter", needed)
             return cls(**values)
         fluid = values["fluid"]
         if not isinstance(fluid, Mapping):
@@ -217,10 +218,8 @@ class Parameters:
         for name in ("m", "g", "c", "nu_f", "density_ratio"):
             if name in rest:
                 raise InputError(f"{name} follows from the [fluid] table and may not be given beside it")
-        check_names(rest, names, "parameter")
-        refuse_missing(rest, ["r", "R", "mu", "eta"], "parameter")
-        check_names(fluid, ["nu_f", "rho_f", "rho_b", "gravity"], "fluid property")
-        refuse_missing(fluid, ["nu_f", "rho_f", "rho_b"], "fluid property")
+        check_names(rest, names, "parameter", ("r", "R", "mu", "eta"))
+        check_names(fluid, ("nu_f", "rho_f", "rho_b", "gravity"), "fluid property", ("nu_f", "rho_f", "rho_b"))
         return cls.from_fluid(**rest, **fluid)
 
     @classmethod
@@ -270,10 +269,3 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise StorageError(f"{path} is not valid TOML: {error}") from error
-
-
-def refuse_missing(given: Mapping[str, Any], needed: list[str], kind: str) -> None:
-    """`InputError` if a needed name is not given."""
-    missing = [name for name in needed if name not in given]
-    if missing:
-        raise InputError(f"missing {kind} {', '.join(repr(name) for name in missing)}")

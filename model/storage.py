@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -126,14 +127,8 @@ def load(path: str | Path) -> Trajectory:
 
     Raises `StorageError`, in one line, for a file that isn't one or is damaged.
     """
-    path = Path(path)
-    if not path.parent.is_file():
-        with reading(path) as file:
-            return _read(file, slice(None))
-    try:
-        return load_runs(path.parent)[path.name]
-    except KeyError as error:
-        raise StorageError(f"cannot read {path}: {path.parent} holds no run of that name") from error
+    (whole,) = parts(path, sys.maxsize)
+    return whole
 
 
 def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
@@ -141,8 +136,12 @@ def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
 
     Each part has the header and all events; a run from a batch comes as one part. Raises `StorageError` as `load` does.
     """
-    if Path(path).parent.is_file():
-        yield load(path)
+    path = Path(path)
+    if path.parent.is_file():
+        try:
+            yield load_runs(path.parent)[path.name]
+        except KeyError as error:
+            raise StorageError(f"cannot read {path}: {path.parent} holds no run of that name") from error
         return
     with reading(path) as file:
         for start in range(0, max(len(dataset(file, "time")), 1), size):

@@ -22,7 +22,7 @@ def shortest_time(p: Parameters, flow: Flow, t_end: float, c: Callable[[float], 
     and 2 h <= 1/c keeps to half of it. Where c depends on the speed w, c w changes by up to 2 c(w) with w, taken where
     the ball lags by all of the fluid's speed. A wave of the flow is met at least twice a radian, 2 h <= 1/(2 pi f).
     """
-    times = np.append(flow.breakpoints[flow.breakpoints < t_end], [0.0, t_end])
+    times = np.append(flow.knots(t_end), [0.0, t_end])
     # Just before and after the jumps: between them omega_0 is linear.
     fastest = float(np.abs(flow.line(np.append(times, np.nextafter(times, -np.inf)))).max())
     fastest += float(np.abs(flow.waves[:, 0]).sum())

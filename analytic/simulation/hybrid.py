@@ -36,7 +36,7 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     stuck.
     """
     t_end = float(recorder.times[-1])
-    knots = [0.0, *(t for t in flow.start.tolist() if 0 < t < t_end), t_end]
+    knots = [0.0, *flow.knots(t_end).tolist(), t_end]
     simulator = _Simulator(p, settings, recorder)
     at, case = Moment(0.0, theta_0, x0), None
     for start, end in pairwise(knots):

@@ -51,7 +51,7 @@ class Stretches(NamedTuple):
     @classmethod
     def of(cls, times: Array, flow: Flow, longest: float) -> Self:
         """From sample to sample with steps of at most `longest` s."""
-        knots = np.union1d(times, flow.start[(flow.start > 0) & (flow.start < times[-1])])
+        knots = np.union1d(times, flow.knots(times[-1]))
         length = np.diff(knots)
         count = np.ceil(length / longest * (1 - 1e-12)).astype(np.int64)
         return cls(knots[:-1], length / count, count, np.isin(knots[1:], times))

@@ -12,7 +12,7 @@ from analytic.flowmeter.design import Interval, Request
 from compare.commands import options
 from model import InputError, Parameters, drag, parameters
 from model.files import write_text
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names, check_number, refuse_missing
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names, check_number
 
 Kinds = Mapping[str, tuple[str, Range]]
 """Numbers by name: unit and allowed range."""
@@ -68,13 +68,12 @@ def request(asked: Mapping[str, Any]) -> Request:
         raise InputError("material must be a list of tables, each under [[material]]")
     bounds: dict[str, dict[str, Interval]] = {}
     for each in materials:
-        check_names(each, ["name", *_BOUNDS], "property of a material")
-        refuse_missing(each, ["name"], "property of a material")
+        check_names(each, ["name", *_BOUNDS], "property of a material", ["name"])
         own = {"j": _USUAL["j"]} | {**common, **each}  # a material's own bounds, and else those of all
         name = own.pop("name")
         if not isinstance(name, str) or name in bounds:
             raise InputError(f"material.name = {name!r} must be a text, and no other material's")
-        refuse_missing(own, [*_BOUNDS], f"bound of {name}:")
+        check_names(own, [*_BOUNDS], f"bound of {name}:", _BOUNDS)
         bounds[name] = {key: _interval(f"{name}: {key}", own[key], *kind) for key, kind in _BOUNDS.items()}
     tolerances = _table(asked, "tolerances", _TOLERANCES)
     return Request(fluid={"gravity": _USUAL["gravity"]} | fluid, **flow, bounds=bounds, tolerances=tolerances)
@@ -98,7 +97,6 @@ def _table(
     table = asked.get(name, {})
     if not isinstance(table, Mapping):
         raise InputError(f"{name} = {table!r} must be a table, [{name}]")
-    check_names(table, [*kinds, *texts], f"entry of [{name}]")
-    refuse_missing(table, list(needed), f"entry of [{name}]")
+    check_names(table, [*kinds, *texts], f"entry of [{name}]", needed)
     numbers = {key: check_number(f"{name}.{key}", x, *kinds[key]) for key, x in table.items() if key in kinds}
     return {**table, **numbers}

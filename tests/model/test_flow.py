@@ -32,8 +32,8 @@ def test_values() -> None:
     assert sine(np.zeros((2, 3))).shape == (2, 3)
     assert steady.is_steady
     assert not any(flow.is_steady for flow in FLOWS[1:])
-    np.testing.assert_array_equal(stairs.breakpoints, [2, 4])
-    np.testing.assert_array_equal(ramp.breakpoints, [1, 6])
+    np.testing.assert_array_equal(stairs.knots(np.inf), [2, 4])
+    np.testing.assert_array_equal(ramp.knots(6.5), [1, 6])
 
 
 @pytest.mark.parametrize("flow", FLOWS, ids=lambda f: f.kind)
