@@ -17,7 +17,8 @@ from compare.witnesses import CEILING, COARSEST, extrapolated, hear
 from model import Parameters
 
 P = Parameters.named("reference")
-STEPS = 1 / np.array([1.0, 2.0, 3.0, 4.0])
+RATIOS = 1 / np.array([1.0, 2.0, 3.0, 4.0])
+STEPS = RATIOS / 20
 CLAIM = Claim(
     id="it",
     section="Stationary states",
@@ -34,7 +35,7 @@ def seen(error: float, engine: str, **conditions: float) -> Records:
 
 
 @pytest.mark.parametrize(
-    ("errors", "order"), [(0.3 * STEPS, 1.0), (0.3 * STEPS**2, 2.0), (0.1 * STEPS + 0.02 * STEPS**2, 1.13)]
+    ("errors", "order"), [(0.3 * RATIOS, 1.0), (0.3 * RATIOS**2, 2.0), (0.1 * RATIOS + 0.02 * RATIOS**2, 1.13)]
 )
 def test_known_sequences_have_their_limit_and_order(errors, order):
     limit, found = extrapolated(STEPS, 7.0 + errors, np.full(4, 1e-12))
@@ -54,7 +55,7 @@ def test_the_uncertainty_of_a_limit_covers_the_truth():
     for _ in range(400):
         first = int(rng.integers(1, 3))
         size = rng.uniform(0.3, 1.0, 5) * rng.choice([-1, 1], 5)
-        terms = [size[k] * 20.0**-k * STEPS ** (first + k) for k in range(5)]
+        terms = [size[k] * STEPS ** (first + k) for k in range(5)]
         own = 10 ** rng.uniform(-9, -4)
         truth = rng.normal()
         limit, _ = extrapolated(STEPS, truth + sum(terms) + own * rng.uniform(-1, 1, 4), np.full(4, own))
@@ -75,6 +76,15 @@ def test_a_claim_is_judged_in_the_limit_of_no_step(left, outcome):
     (check,) = plain.checks
     resolves = quantity("omega_c").resolves
     assert check.ceiling == max(resolves, min(CEILING * resolves, COARSEST))
+
+
+@pytest.mark.parametrize(("near", "outcome"), [(0.99, Outcome.INCONCLUSIVE), (0.9, Outcome.REFUTED)])
+def test_no_limit_is_taken_next_to_a_threshold(near, outcome):
+    """There the step decides on the case, and all of a state in the wrong case would be off."""
+    steps = {n: seen(0.05 + 0.01 / n, "mujoco-plain") for n in (1, 2, 3, 4)}
+    end = tests.measured.measured("thresholds", "omega_01", near * P.omega_0, 1e-6, P, "mine")
+    _, plain = hear(CLAIM, {"mujoco": {1: seen(0.0, "mujoco") + Records((end,))}, "mujoco-plain": steps}).witnesses
+    assert plain.outcome == outcome
 
 
 def test_other_states_are_not_aligned_and_two_steps_are_not_enough():
