@@ -7,8 +7,9 @@ import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.table import Table
 
 from compare.bench.case import TOLERANCE, VERSION, Case
@@ -18,6 +19,9 @@ from compare.kit import pages
 from compare.kit.pages import Rows
 from compare.kit.progress import Show
 from compare.kit.statistics import plain
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _OWN = "compare.bench.adapters"
 ENGINES: dict[str, str] = {
@@ -43,6 +47,12 @@ ENGINES: dict[str, str] = {
 """Where each engine is; NAME is in its best known settings, NAME-defaults as it comes."""
 KINDS = ("sticking", "rolling", "sliding", "landing")
 QUICK = (2e-3,)
+LEAST = 1e-11
+"""Smaller errors are drawn here."""
+MARKS, COLOURS = (
+    "osv^DPX*<>phd",
+    ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B"),
+)
 CAPTION = (
     "Errors at the shortest step in units of each case's scales; up to "
     f"{TOLERANCE:g} an engine passes. Order: power of the step with which errors fall, the median over the cases. "
@@ -195,3 +205,33 @@ def tables(league: Mapping[str, Sequence[Result]]) -> Iterator[Table]:
 def _median(values: Iterator[float]) -> float:
     known = list(values)
     return statistics.median(known) if known else math.nan
+
+
+def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
+    """A panel for each kind of case: the median of an engine's errors over that of its costs, its steps joined."""
+    from compare.kit import style  # here, because drawing takes a second to load
+
+    kinds = {case.name: kind(case) for case in cases()}
+    figure, panels = style.panels(7.6, 8.8, 2, 2, sharex=True, sharey=True)
+    tried = {name: [r for r in results if r.errors] for name, results in league.items()}
+    families = list(dict.fromkeys(name.removesuffix("-defaults") for name, own in tried.items() if own))
+    for axes, each in zip(panels.ravel(), KINDS, strict=True):
+        for name, results in tried.items():
+            own = np.array([[r.costs, r.errors] for r in results if kinds[r.case] == each])
+            if not len(own):
+                continue
+            known = np.isfinite(own[:, 1]).mean(0) > 0.5  # where the median is
+            cost, error = np.nanmedian(np.where(np.isfinite(own[:, 1:]), own, np.nan)[..., known], axis=0)
+            number = families.index(name.removesuffix("-defaults"))
+            look = {"marker": MARKS[number % len(MARKS)], "color": COLOURS[number % len(COLOURS)], "ms": 6, "lw": 1}
+            look |= {"mfc": "white", "ls": ":"} if name.endswith("-defaults") else {}
+            axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
+        axes.axhline(TOLERANCE, color="0.5", lw=0.8)
+        axes.set(xscale="log", yscale="log", title=each)
+        axes.grid(alpha=0.3)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("error, in units of the case's scales")
+    for axes in panels[1]:
+        axes.set_xlabel("processor time divided by simulated time")
+    style.legend(figure, loc="outside lower center", ncols=3)
+    return figure

@@ -1,9 +1,10 @@
-"""Exact cases for any engine: ``dualball cases``, ``league`` for all engines, ``grade`` for a person's own settings."""
+"""Contacts and engines: ``forecast`` for any MuJoCo model, ``grade`` for one's own settings, ``cases``, ``league``."""
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
+import itertools
 import json
 import re
 import sys
@@ -11,12 +12,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 from rich.text import Text
 
-from compare.bench import grade, league, native
+from compare.bench import exact, forecast, grade, league, native
 from compare.bench.case import VERSION
-from compare.bench.exact import cases
 from compare.bench.native import CHOICES, Native
 from compare.commands import options, running
 from compare.kit import engines, pages, progress
@@ -25,6 +26,7 @@ from model import InputError
 from model.files import make_directory, write_text
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names
 
+LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
 JSON, PAGE = "league.json", "league.html"
 _FEW = options.Number(allowed=Range(0, 1e5, whole=True))
 _NUMBERS: dict[str, tuple[options.Number, str]] = {
@@ -45,6 +47,18 @@ _PAIR: dict[str, tuple[Any, Any, str]] = {
 
 def add(commands: options.Commands) -> None:
     """Declare the commands."""
+    command = options.command(commands, "forecast", foretold, "scene.xml --try")
+    command.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
+    command.add_argument("--keyframe", metavar="NAME", help="begin with this keyframe, by name or number")
+    longest = "longest time to wait until the model has settled; 0 takes the state as it stands"
+    command.add_argument("--settle", type=options.moment, default=10.0, help=longest)
+    for name, unit, how in (("creep", "m s-1", "creeps faster"), ("depth", "m", "sinks in deeper")):
+        limit = options.Number(unit, POSITIVE)
+        command.add_argument(f"--max-{name}", type=limit, help=f"exit with 1 if a pair {how}, measured")
+    command.add_argument("--try", dest="tries", action="store_true", help="make the advised change and measure again")
+    command.add_argument("-o", "--output", type=options.written, help="HTML page to write")
+    options.outputs(command)
+
     command = options.command(commands, "grade", graded, "mine.xml -o card.html")
     mine = "MJCF file with a ball and its contacts"
     command.add_argument("file", type=Path, nargs="?", metavar="FILE.xml", help=mine)
@@ -76,12 +90,10 @@ def add(commands: options.Commands) -> None:
 
 def listed(args: argparse.Namespace) -> int:
     """List the cases, show one, or write all."""
-    own = {case.name: case for case in cases()}
+    own = {case.name: case for case in exact.cases()}
     check_names([args.name] if args.name else [], list(own), "case")
     if args.output:
-        from compare.bench import export  # here, because only this needs it
-
-        export.write(args.output)
+        exact.write(args.output)
     chosen = own[args.name] if args.name else None
     data = chosen.to_mapping() if chosen else {"version": VERSION, "cases": [c.to_mapping() for c in own.values()]}
     if chosen:
@@ -173,8 +185,7 @@ def _of_another(args: argparse.Namespace) -> tuple[dict[str, tuple[Any, float]],
 
 def ranked(args: argparse.Namespace) -> int:
     """Measure, show the table, write JSON and page."""
-    from compare.bench import figures  # here, because drawing takes a second to load
-    from compare.report.pictures import address, svg
+    from compare.report.pictures import address, svg  # here, because drawing takes a second to load
 
     chosen = {name: league.ENGINES.get(name, name) for name in args.engine or league.ENGINES}
     modules = {name for name in chosen if re.search(r"[.:]", name) or Path(f"{name}.py").exists()}
@@ -195,7 +206,7 @@ def ranked(args: argparse.Namespace) -> int:
         "about": league.about(found),
         "notes": list(league.notes(found)),
         "caption": league.CAPTION,
-        "picture": address(svg(figures.draw_league(found))),
+        "picture": address(svg(league.draw(found))),
     }
     write_text(args.output / PAGE, pages.render("compare.bench", "league.html", **shown))
     for what, why in league.notes(found):
@@ -205,3 +216,36 @@ def ranked(args: argparse.Namespace) -> int:
     if not args.json:
         print(f"page: {args.output / PAGE}")
     return 0
+
+
+def foretold(args: argparse.Namespace) -> int:
+    """Settle the model, print the forecast, and check the limits."""
+    good = {"creep": args.max_creep or forecast.CREEP, "depth": args.max_depth}
+    heard = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)  # it would write a log here; what it warns of is in the table
+    try:
+        model, data = forecast.load(args.file, args.keyframe)
+        found = forecast.forecast(model, data, forecast.settle(model, data, args.settle), **good)
+        after = None
+        if args.tries and found.change:
+            found, after = forecast.tried(model, data, found, args.settle, **good)
+    except forecast.UnsettledError as error:
+        print(f"dualball: {args.file}: {error}", file=sys.stderr)
+        return 1
+    finally:
+        mujoco.set_mju_user_warning(heard)
+    if args.output:
+        write_text(args.output, forecast.html(found, after, str(args.file)))
+    shown: list[Any] = [pages.table(title, rows, **LOOK) for title, rows in forecast.tables(found)]
+    shown += [Text(f"• {line}") for line in forecast.sentences(found)]
+    if after:
+        shown += [Text(""), pages.table(*forecast.changed(found, after), **LOOK)]
+    options.show({"before": dataclasses.asdict(found), "after": after and dataclasses.asdict(after)}, args.json, *shown)
+    limits = ("creep", "m/s", args.max_creep), ("depth", "m", args.max_depth)
+    code = 0
+    for pair, (name, unit, limit) in itertools.product(found.pairs, limits):
+        value = getattr(pair, f"{name}_measured")
+        if limit and value > limit:
+            print(f"dualball: {pair.name}: {name} {value:.3g} {unit}, more than {limit:g}", file=sys.stderr)
+            code = 1
+    return code

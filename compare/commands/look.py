@@ -96,9 +96,9 @@ def inspect(args: argparse.Namespace) -> int:
         options.show(gathered, args.json, sweep.table(gathered))
         return 0
     if args.plot:
-        from compare.view import plot as trajectory  # here, because drawing takes a second to load
+        from compare.view import motions  # here, because drawing takes a second to load
 
-        drawing.save(trajectory.draw(storage.load(args.file)), args.plot)
+        drawing.save(motions.draw(storage.load(args.file)), args.plot)
     about = inspection.describe(args.file)
     options.show(about, args.json, inspection.table(about))
     return 0
@@ -107,13 +107,13 @@ def inspect(args: argparse.Namespace) -> int:
 def compare(args: argparse.Namespace) -> int:
     """Lay two motions side by side."""
     from compare import testing
-    from compare.view import beside  # here, because drawing takes a second to load
+    from compare.view import motions  # here, because drawing takes a second to load
 
     a, b = testing.read(args.a), testing.read(args.b)
-    about = beside.describe(a, b)
+    about = motions.describe(a, b)
     if args.output:
-        drawing.save(beside.draw(a, b), args.output)
-    options.show(about, args.json, *beside.tables(about))
+        drawing.save(motions.draw_both(a, b), args.output)
+    options.show(about, args.json, *motions.tables(about))
     return 0
 
 

@@ -15,8 +15,8 @@ import numpy as np
 
 import analytic
 import mjsim
-from compare.kit.adapters import adapter, drake, loop, pybullet, siconos
-from compare.kit.adapters.adapter import Library
+from compare.kit.adapters import adapter, drake, pybullet, siconos
+from compare.kit.adapters.adapter import Library, simulate
 from mjsim import ContactSettings
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
@@ -148,7 +148,7 @@ def _adapted(adapter: Any, library: Library, marks: str) -> tuple[Engine, Engine
         settings=adapter.Settings,
         options=("timestep",),
         configure=lambda given, p: adapter.Settings(**given),
-        simulate=partial(loop.simulate, name, library, adapter.Scene),
+        simulate=partial(simulate, name, library, adapter.Scene),
         sources=("model", "mjsim", "compare.kit.adapters"),
         stands_on=("numpy",),
         needs=library,
@@ -159,7 +159,7 @@ def _adapted(adapter: Any, library: Library, marks: str) -> tuple[Engine, Engine
         best,
         name=other,
         configure=lambda given, p: replace(adapter.DEFAULTS, **given),
-        simulate=partial(loop.simulate, other, library, adapter.Scene),
+        simulate=partial(simulate, other, library, adapter.Scene),
         mark=marks[1],
     )
 

@@ -7,24 +7,55 @@ with the angular velocity it has, from an arbitrary beginning.
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import importlib
 import itertools
+import math
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import matplotlib
+import mujoco
 import numpy as np
 from matplotlib.colors import to_rgb
+from mujoco.rendering.classic import gl_context
 from PIL import Image, ImageDraw, ImageFont
+from scipy.spatial.transform import Rotation
 
 from compare.kit import style
 from compare.kit.style import BALL, FORCE, INK, SLIP
-from compare.view import stage
+from mjsim import ContactSettings, scene
 from model import Case, InputError, StorageError, Trajectory
+from model.arrays import Array
 from model.files import check_writable
+from model.kinematics import frame, slip_velocities, to_world
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
+from model.trajectory import columns
 
 WIDTHS = Range(160, 1920)
 """Of pictures, pixels."""
+STEP = 5e-3
+"""Longest time between points of the trail and of the rotation, s."""
+ARROW = 3.0
+"""Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball, unless said."""
+OFFSCREEN = ("egl", "osmesa")
+"""Kinds of OpenGL that need no display, the faster first."""
+_HIDDEN = 5
+"""A group of geoms that isn't drawn."""
+_SIDES = 120
+"""Of the polygon that is drawn for the wall."""
+_SPOTS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / math.sqrt(3)
+"""Directions of the spots that let the eye see the ball turn."""
+_LONGEST_TRAIL = 3.0
+"""s."""
+_TRAIL = 0.6
+"""How far back the trail reaches, revolutions."""
 
 
 def write(
@@ -46,7 +77,7 @@ def write(
     width : pixels; 960 for a picture and 640 for a film if None
     start, seconds, speed, rate : a film begins at `start` in s, is slowed down by `speed`, has `rate` frames a second,
         and takes so many seconds, fewer if the run ends before
-    arrows : `force_arrow` and `slip_arrow` of `stage.frames`
+    arrows : `force_arrow` and `slip_arrow` of `frames`
 
     Raises `InputError` for what can't be shown, or on a machine without OpenGL; `StorageError` if the file can't be
     written.
@@ -65,9 +96,9 @@ def write(
     for name, radii in arrows.items():
         check_number(name, radii, "radii", NOT_NEGATIVE)
     times = np.arange(begin, min(begin + seconds * speed, end) + 1e-12, speed / rate) if film else np.array([begin])
-    shown, note = stage.resampled(run, times), f"× {speed:.3g}" if film else ""
+    shown, note = resampled(run, times), f"× {speed:.3g}" if film else ""
     slips = bool(np.any(run.slip_speed_A + run.slip_speed_B))
-    pairs = stage.frames(run, times, width, **arrows)
+    pairs = frames(run, times, width, **arrows)
     images = (_labelled(*pair, shown, k, note, slips) for k, pair in enumerate(pairs))
     first, options = next(images), dict[str, Any](optimize=True)
     if film:
@@ -80,9 +111,9 @@ def write(
         chosen = np.concatenate([shades.reshape(-1, 3), tints.reshape(-1, 3)])
         palette = Image.new("P", (1, 1))
         palette.putpalette([*seen[:360], *np.round(255 * chosen).astype(int).ravel().tolist()])
-        frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in itertools.chain([first], images)]
-        first = frames[0]
-        options = {"save_all": True, "append_images": frames[1:], "duration": round(1000 / rate), "loop": 0}
+        all_ = itertools.chain([first], images)
+        first, *rest = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in all_)
+        options = {"save_all": True, "append_images": rest, "duration": round(1000 / rate), "loop": 0}
     try:
         first.save(output, **options)
     except OSError as error:
@@ -124,3 +155,178 @@ def _labelled(image: Image.Image, small: Image.Image, run: Trajectory, k: int, n
         draw.line((margin, y, margin + 30 * unit, y), fill=colour, width=max(2, round(5 * unit)))
         draw.text((margin + 40 * unit, y), label, INK, font=text, anchor="lm")
     return image
+
+
+def frames(
+    run: Trajectory, times: Array, width: int, force_arrow: float = ARROW, slip_arrow: float = ARROW
+) -> Iterator[tuple[Image.Image, Image.Image]]:
+    """Pictures of a run at times (n,) in s: from outside, in 16:10, and from beside the ball, a small square.
+
+    Raises `InputError` if there is no OpenGL, or the run holds no scene with a ball.
+    """
+    p, now = run.header.parameters, resampled(run, times)
+    steps = max(1, math.ceil((run.time[-1] - run.time[0]) / STEP))
+    past = resampled(run, np.linspace(run.time[0], run.time[-1], steps + 1))
+    turns = orientations(past)[np.searchsorted(past.time, times).clip(max=steps)]
+    centres, axes = to_world(now.x, now.theta, p).position, frame(now.theta)
+    # Of floor and wall, (2, n, 3) in world axes: normals, contact points, forces, slips in the tangent plane.
+    normals = np.stack([axes[:, 1], axes[:, 0]])
+    contacts = centres - p.r * normals
+    forces, slips = (
+        np.einsum("nab,cna->cnb", axes, v) for v in ([now.force_A, now.force_B], slip_velocities(now.x, p))
+    )
+    slips -= np.sum(slips * normals, axis=-1, keepdims=True) * normals
+    fastest = max(float(np.abs(v).max()) for v in slip_velocities(run.x, p))
+
+    height = width * 10 // 16
+    inset = height * 5 // 12
+    model = _model(run, 2 * width, 2 * height)
+    data, ball, most = mujoco.MjData(model), model.geom("ball").id, 100 + math.ceil(_LONGEST_TRAIL / STEP)
+    mujoco.mj_forward(model, data)
+    choose_opengl()
+    above, behind = mujoco.MjvCamera(), mujoco.MjvCamera()
+    above.lookat, above.distance = (0.0, 0.0, 0.35 * p.r), 2.9 * (p.R + p.r)
+    above.azimuth, above.elevation = 90.0, -38.0
+    behind.distance, behind.elevation = 6.4 * p.r, -14.0
+    with (  # twice the size, scaled down: smooth edges without support of the driver
+        mujoco.Renderer(model, 2 * height, 2 * width, most) as outside,
+        mujoco.Renderer(model, 2 * inset, 2 * inset, most) as beside,
+    ):
+        for k, centre in enumerate(centres):
+            data.geom_xpos[ball], data.geom_xmat[ball] = centre, turns[k].as_matrix().ravel()
+            # From behind the ball and a little inwards, so that floor and wall are both seen edge-on.
+            behind.lookat, behind.azimuth = centre, math.degrees(now.theta[k]) + 78.0
+            outside.update_scene(data, above)
+            beside.update_scene(data, behind)
+            # The trail: where the ball touched the floor's height before, in the colours of the cases, fading.
+            some = (past.time > now.time[k] - _LONGEST_TRAIL) & (past.time < now.time[k])
+            age = np.abs(past.theta[some] - now.theta[k]) / (2 * math.pi * _TRAIL)
+            points = to_world(past.x[some], past.theta[some], p).position - [0.0, 0.0, 0.92 * p.r]
+            for i, case in enumerate(past.case[some][:-1]):
+                if max(age[i], age[i + 1]) < 1:
+                    colour, alpha = style.COLOURS[Case(case)], 0.9 * (1 - age[i])
+                    geom = _add(outside.scene, mujoco.mjtGeom.mjGEOM_CAPSULE, colour, alpha)
+                    mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.07 * p.r, points[i], points[i + 1])
+            arrows = []
+            for normal, contact, force, slip in zip(
+                normals[:, k], contacts[:, k], forces[:, k], slips[:, k], strict=True
+            ):
+                arrows.append((0.16 * p.r, contact, force * (force_arrow * p.r / (p.m * p.g)), FORCE))
+                if fastest > 0 and np.any(force):
+                    begin = contact + 0.1 * p.r * normal
+                    arrows.append((0.13 * p.r, begin, slip * (slip_arrow * p.r / fastest), SLIP))
+            images = []
+            for renderer in (outside, beside):
+                for spot in turns[k].apply(_SPOTS):
+                    geom = _add(renderer.scene, mujoco.mjtGeom.mjGEOM_SPHERE, "#8a6d1f")
+                    geom.size[:], geom.pos[:] = 0.11 * p.r, centre + 0.95 * p.r * spot
+                for thick, begin, arrow, colour in arrows:
+                    if np.linalg.norm(arrow) > 2 * thick:
+                        geom = _add(renderer.scene, mujoco.mjtGeom.mjGEOM_ARROW, colour)
+                        mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, thick, begin, begin + arrow)
+                renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+                size = (renderer.width // 2, renderer.height // 2)
+                images.append(Image.fromarray(renderer.render()).resize(size, Image.Resampling.LANCZOS))
+            yield images[0], images[1]
+
+
+def _add(drawn: Any, kind: Any, colour: str, alpha: float = 1.0) -> Any:
+    """Another thing in MuJoCo's scene."""
+    geom = drawn.geoms[drawn.ngeom]
+    rgba = np.array([*to_rgb(colour), alpha], np.float32)
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
+    drawn.ngeom += 1
+    return geom
+
+
+def _model(run: Trajectory, width: int, height: int) -> Any:
+    """The scene to be drawn in pixels: what only serves contact is hidden, the vessel is a ring of glass.
+
+    It is that of the MJCF which the run holds, or of its parameters if it holds none. Raises `InputError` if the MJCF
+    is not valid or has no ball.
+    """
+    p = run.header.parameters
+    mjcf = run.header.mjcf or scene.build(p, ContactSettings())[1]
+    try:
+        made = mujoco.MjSpec.from_string(mjcf)
+    except ValueError as error:
+        raise InputError(f"the run holds no valid MJCF: {' '.join(str(error).split())}") from error
+    ball, floor = made.geom("ball"), made.geom("floor")
+    if ball is None:
+        raise InputError("the run's MJCF has no geom named 'ball' to show")
+    for geom in made.geoms:
+        if geom.name not in ("ball", "floor"):
+            geom.group = _HIDDEN
+    ball.material, ball.rgba = "", (*to_rgb(BALL), 0.26)  # arrows stand inside
+    if floor is not None:
+        floor.material, floor.rgba = "", (0.80, 0.82, 0.85, 1.0)
+    made.visual.global_.offwidth, made.visual.global_.offheight = width, height
+    made.visual.quality.offsamples, made.visual.quality.shadowsize = 0, 2048
+    # The vessel's wall, a little higher than the ball, as a mesh.
+    angle = np.linspace(0.0, 2 * math.pi, _SIDES, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(_SIDES)], axis=-1)
+    inside, outside = (p.R + p.r) * circle, (p.R + 1.15 * p.r) * circle
+    up = np.array([0.0, 0.0, 2.2 * p.r])
+    corners = np.concatenate([inside, inside + up, outside + up, outside])
+    here = np.arange(4 * _SIDES).reshape(4, _SIDES)
+    beside, above = np.roll(here, -1, axis=1), np.roll(here, -1, axis=0)
+    faces = [here, beside, above], [beside, np.roll(above, -1, axis=1), above]
+    triangles = np.concatenate([np.stack(corner, axis=-1).reshape(-1, 3) for corner in faces])
+    mesh = made.add_mesh(name="ring", uservert=corners.ravel(), userface=triangles.ravel())
+    mesh.smoothnormal = False
+    glass = {"rgba": (0.45, 0.65, 0.80, 0.22), "contype": 0, "conaffinity": 0}
+    made.worldbody.add_geom(name="ring", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ring", **glass)
+    return made.compile()
+
+
+def resampled(run: Trajectory, times: Array) -> Trajectory:
+    """The run at times (n,) in s, interpolated linearly; the case is that of the last sample before."""
+    place = np.interp(times, run.time, np.arange(len(run.time)))
+    before = place.astype(int)
+    after, share = np.minimum(before + 1, len(run.time) - 1), place - before
+
+    def at(values: Array) -> Array:
+        change = values[after] - values[before]
+        return np.asarray(values[before] + change * share.reshape(-1, *[1] * (values.ndim - 1)))
+
+    values: dict[str, Any] = {name: at(getattr(run, name)) for name in columns(Trajectory) if name != "case"}
+    return dataclasses.replace(run, **values, case=run.case[before])
+
+
+def orientations(run: Trajectory) -> Rotation:
+    """How the ball is turned at each sample, from its angular velocity in the middle between them; upright at first."""
+    middle = resampled(run, (run.time[1:] + run.time[:-1]) / 2)
+    spin = to_world(middle.x, middle.theta, run.header.parameters).spin
+    turned = [Rotation.identity()]
+    for step in Rotation.from_rotvec(spin * np.diff(run.time)[:, None]):
+        turned.append(step * turned[-1])
+    return Rotation.concatenate(turned)
+
+
+@functools.cache
+def choose_opengl() -> None:
+    """Let `mujoco.Renderer` draw with the kind of OpenGL that MUJOCO_GL names, else with one that works.
+
+    Raises `InputError` if there is none.
+    """
+    chosen = os.environ.get("MUJOCO_GL", "").strip().lower()
+    working = platform.system() != "Linux" or next(filter(works, [chosen] if chosen else OFFSCREEN), None)
+    if not working:
+        remedy = "on Debian and Ubuntu: apt-get install libegl1 libgl1-mesa-dri (or libosmesa6)"
+        if chosen:
+            remedy = f"unset MUJOCO_GL = {chosen!r}, or set it to one of {', '.join(OFFSCREEN)}"
+        raise InputError(f"there is no OpenGL to draw with; {remedy}")
+    if isinstance(working, str) and not chosen:  # MuJoCo chose one that needs a display when it was imported
+        gl_context.GLContext = importlib.import_module(f"mujoco.{working}").GLContext
+
+
+def works(kind: str) -> bool:
+    """Whether a kind of OpenGL works, tried in a process of its own.
+
+    A library that is missing or has no driver may end the process, or leave it unable to load another one.
+    """
+    # OSMesa's context can't be freed while Python shuts down: the process ends at once, without cleaning up.
+    code = "import mujoco, os; mujoco.Renderer(mujoco.MjModel.from_xml_string('<mujoco/>'), 8, 8); os._exit(0)"
+    environment = os.environ | {"MUJOCO_GL": kind}
+    tried = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, timeout=60, check=False)
+    return tried.returncode == 0

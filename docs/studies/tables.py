@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import cast
 
 from compare.bench import league
-from compare.bench.figures import draw_league
 from compare.bench.runner import Result
 from compare.kit import drawing, pages, progress
 from compare.kit.campaign import Campaign
@@ -101,7 +100,7 @@ def _league(kept: Path) -> dict[str, list[Result]]:
     if missing := [results[0].skipped for results in found.values() if all(result.skipped for result in results)]:
         raise InputError(f"the page is about all engines: {missing[0]}")
     write_text(kept / "league.json", json.dumps(league.to_mapping(found)))
-    drawing.save(draw_league(found), Path(__file__).parents[1] / "league.svg")
+    drawing.save(league.draw(found), Path(__file__).parents[1] / "league.svg")
     return found
 
 

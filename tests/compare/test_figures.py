@@ -20,7 +20,7 @@ from analytic.orbits import orbit_branch
 from compare import gallery as registry
 from compare.catalogue import CLAIMS
 from compare.gallery import FIGURES, figures_of
-from compare.kit import deviations, drawing, style
+from compare.kit import drawing, style
 from compare.kit.check import Check
 from compare.kit.drawing import GapError, Material, Motion
 from compare.kit.engines import ENGINES
@@ -193,7 +193,7 @@ def test_deviations_are_drawn_over_tolerance() -> None:
     m = measurement("omega_c", 10.0)
     far = dataclasses.replace(check(m, 10.0), predicted=9.0)
     made = Material({"x": (check(m, 10.0 - 1.5e-9), far)})
-    drawing = deviations.of("x")
+    drawing = figures_of("x")["claim-x"]
     figure, caption = drawing.draw(drawing.select(made))
     (axes,) = figure.axes
     points = [line for line in axes.lines if line.get_marker() == "o"]

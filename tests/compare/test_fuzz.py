@@ -16,7 +16,7 @@ import pytest
 import analytic
 from compare.commands import cli
 from compare.kit import record, sweep
-from compare.kit.adapters import loop
+from compare.kit.adapters import adapter
 from compare.kit.adapters.adapter import Floats, Library, Touch
 from compare.kit.engines import ENGINES
 from compare.kit.levels import Level
@@ -83,7 +83,7 @@ class Resting:
 def resting(name: str) -> Trajectory:
     """A run with the header, settings and versions that the adapter of an engine writes."""
     given = P, State(), 0.05, Flow.steady(P.omega_0), ENGINES[name].configure({}, P), None
-    return loop.simulate(name, Library(name, "math"), Resting, *given, lambda done: None)
+    return adapter.simulate(name, Library(name, "math"), Resting, *given, lambda done: None)
 
 
 @pytest.fixture(scope="module")

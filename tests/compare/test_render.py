@@ -14,7 +14,7 @@ import analytic
 import mjsim
 from compare.commands import cli
 from compare.kit import style
-from compare.view import render, stage
+from compare.view import render
 from model import Case, InputError, Parameters, Trajectory, storage
 from model.kinematics import angular_velocity
 
@@ -30,9 +30,9 @@ def run() -> Trajectory:
 
 @pytest.fixture
 def draws() -> None:
-    stage.choose_opengl.cache_clear()
+    render.choose_opengl.cache_clear()
     try:
-        stage.choose_opengl()
+        render.choose_opengl()
     except InputError as error:
         pytest.skip(str(error))
 
@@ -84,14 +84,14 @@ def test_the_ball_turns_with_its_angular_velocity(reference: Parameters) -> None
     """Rolling steadily, about an axis that itself goes round: the mean turn about z is that of o_y."""
     p, x = reference.replace(omega_0=5.0), np.array([0, 0, 5.0, 0, 0, 0])
     run = mjsim.simulate(p, x, 0.05, sample_interval=0.005)
-    rotations = stage.orientations(run)
+    rotations = render.orientations(run)
     step = (rotations[1] * rotations[0].inv()).magnitude() / (run.time[1] - run.time[0])
     # The rotation vector over a step is that of its middle, exact to the second order.
     assert step == pytest.approx(float(np.linalg.norm(angular_velocity(x, p))), rel=(5.0 * 5e-3) ** 2)
 
 
 def test_a_run_is_shown_between_its_samples(run: Trajectory) -> None:
-    between = stage.resampled(run, np.array([0.104, 0.8]))
+    between = render.resampled(run, np.array([0.104, 0.8]))
     assert between.omega_c == pytest.approx([0.6 * run.omega_c[10] + 0.4 * run.omega_c[11], run.omega_c[-1]])
     assert between.force_A[1] == pytest.approx(run.force_A[-1])
     assert between.case.tolist() == [run.case[10], run.case[-1]]
@@ -123,11 +123,11 @@ def test_a_scene_without_a_ball(run: Trajectory, tmp_path: Path) -> None:
 
 
 def test_no_opengl_is_one_line_that_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stage, "works", lambda name: False)
+    monkeypatch.setattr(render, "works", lambda name: False)
     monkeypatch.setattr("platform.system", lambda: "Linux")
     for chosen, message in (("", "apt-get install libegl1"), ("glfw", "unset MUJOCO_GL = 'glfw'")):
         monkeypatch.setenv("MUJOCO_GL", chosen)
-        stage.choose_opengl.cache_clear()
+        render.choose_opengl.cache_clear()
         with pytest.raises(InputError, match=message):
-            stage.choose_opengl()
-    stage.choose_opengl.cache_clear()
+            render.choose_opengl()
+    render.choose_opengl.cache_clear()

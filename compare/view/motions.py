@@ -1,4 +1,4 @@
-"""Two motions side by side: how far apart in each quantity, their cases, what they were made with."""
+"""Motions over time: one on its cases, or two side by side, how far apart and what they were made with."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from compare.kit import pages, style
 from compare.kit.quantities import QUANTITIES
 from compare.testing import UNITS, Series, common, difference
-from model import InputError
+from model import InputError, Trajectory
 
 COLOURS = "#0072B2", "#D55E00"
 SEEN = 1e-5
@@ -78,7 +78,7 @@ def tables(about: dict[str, Any]) -> list[Any]:
     return [pages.pairs({name: text for name, text in rows.items() if text}), shown]
 
 
-def draw(a: Series, b: Series) -> Figure:
+def draw_both(a: Series, b: Series) -> Figure:
     """Both motions in the quantities that both have, on the cases of the first, and how far they are apart in each."""
     names = [name for name in a.values if name in b.values]
     shown = ("omega_c", "slip_x", "slip_y", "slip_z", "y", "h")
@@ -100,4 +100,38 @@ def draw(a: Series, b: Series) -> Figure:
     style.legend(panels[-1], ncols=6)
     panels[-1].set(xlabel="time (s)", ylabel="|a − b|/max |b|")
     panels[-1].grid(alpha=0.3)
+    return figure
+
+
+def draw(run: Trajectory) -> Figure:
+    """omega_c, slip, gaps and forces over time; backgrounds in the colour of the case, named above."""
+    t, p = run.time, run.header.parameters
+    blue, green, orange, red, pink = "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7"
+    scale, unit = (1e3, "mm") if max(np.abs(run.y).max(), np.abs(run.h).max()) > 1e-5 else (1e6, "µm")
+    friction_A, friction_B = np.hypot(*run.force_A[:, [0, 2]].T), np.hypot(*run.force_B[:, [1, 2]].T)
+    slips = zip("xyz", (red, green, pink), ("-", "--", ":"), strict=True)
+    curves = {
+        "angular velocity (rad/s)": (
+            ("fluid, $ω_0$", run.header.flow(t), "0.6", "--"),
+            ("orbit, $ω_c$", run.omega_c, blue, "-"),
+        ),
+        "slip (rad/s)": tuple((style.symbol(f"slip_{k}"), getattr(run, f"slip_{k}"), *look) for k, *look in slips),
+        f"gap ({unit})": (("floor, $y$", scale * run.y, blue, "-"), ("wall, $h$", scale * run.h, orange, "--")),
+        "force (N)": (
+            (style.symbol("force_Ay"), run.force_A[:, 1], blue, "-"),
+            ("friction at A", friction_A, blue, ":"),
+            (style.symbol("force_Bx"), run.force_B[:, 0], orange, "-"),
+            ("friction at B", friction_B, orange, ":"),
+        ),
+    }
+    figure, panels = style.panels(9, 8.6, 4, sharex=True, height_ratios=[3, 3, 2, 3])
+    for axes, (label, lines) in zip(panels, curves.items(), strict=True):
+        for name, values, colour, line in lines:
+            axes.plot(t, values, color=colour, ls=line, label=name)
+        style.ground(axes, run, (t[0], t[-1]), named=axes is panels[0])
+        axes.set(ylabel=label, xlim=t[[0, -1]])
+        axes.grid(alpha=0.3)
+        style.legend(axes, ncols=4)
+    panels[-1].set_xlabel("time (s)")
+    figure.suptitle(f"{run.header.engine}: {style.named(p)}", fontsize=11)
     return figure
