@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 import mjsim
 from compare.kit import engines
-from compare.kit.engines import Engine, Settings
+from compare.kit.engines import Engine
 from mjsim.journal import Journal
 from model import Flow, InputError, Parameters, State, Trajectory, storage
 
@@ -42,27 +42,25 @@ class Task:
     """Initial state, 6 or 8 numbers; kept as a `State`."""
     t_end: float
     """s"""
-    flow: Flow | None = None
-    """omega_0 over time; None for a steady ``parameters.omega_0``."""
-    settings: Settings | None = None
-    """Numerical settings of the engine; None for its defaults."""
+    flow: Any = None
+    """A `Flow`, omega_0 over time; if None is given a steady one of ``parameters.omega_0``."""
+    settings: Any = None
+    """Numerical settings of the engine; if None is given its defaults."""
     sample_interval: float | None = None
     """s; None for a thousandth of t_end."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.settings, self.simulator.settings | None):
             raise InputError(f"settings of another engine were given to {self.engine!r}")
-        object.__setattr__(self, "x0", State.one(self.x0))
+        whole = {"x0": State.one(self.x0), "flow": self.flow or Flow.steady(self.parameters.omega_0)}
+        whole["settings"] = self.settings or self.simulator.configure({}, self.parameters)
+        for name, value in whole.items():
+            object.__setattr__(self, name, value)
 
     @property
     def simulator(self) -> Engine:
         """The engine itself; `InputError` if there is none of that name."""
         return engines.engine(self.engine)
-
-    @property
-    def fluid(self) -> Flow:
-        """omega_0 over time, also where `flow` is None."""
-        return self.flow or Flow.steady(self.parameters.omega_0)
 
     @functools.cached_property
     def key(self) -> str:
@@ -79,20 +77,15 @@ class Task:
             "parameters": dataclasses.asdict(self.parameters),
             "x0": self.x0,
             "t_end": self.t_end,
-            "flow": self.fluid.to_mapping(),
-            "settings": dataclasses.asdict(self.settings) if self.settings else None,
+            "flow": self.flow.to_mapping(),
+            "settings": dataclasses.asdict(self.settings),
             "sample_interval": self.sample_interval,
         }
 
     @property
-    def chosen_settings(self) -> Settings:
-        """The settings, also where `settings` is None."""
-        return self.settings or self.simulator.configure({}, self.parameters)
-
-    @property
     def steps(self) -> float:
         """Time steps; 1 for an engine that has none."""
-        return self.t_end / (self.chosen_settings.timestep or self.t_end)
+        return self.t_end / (self.settings.timestep or self.t_end)
 
     @property
     def samples(self) -> float:
@@ -108,8 +101,7 @@ class Task:
     def batch_key(self) -> str:
         """Tasks of equal batch key can be carried out together."""
         apart = () if self.long else ("parameters", "x0", "flow")
-        shared = {k: v for k, v in self.describe().items() if k not in apart} | {"settings": str(self.chosen_settings)}
-        return json.dumps(shared, sort_keys=True)
+        return json.dumps({k: v for k, v in self.describe().items() if k not in apart}, sort_keys=True)
 
 
 def deadline(limit: float) -> Callable[[], None]:
@@ -131,8 +123,8 @@ def carry_out(tasks: Sequence[Task], check: Callable[[], None] = lambda: None) -
     if simulate := tasks[0].simulator.simulate:
         return [
             simulate(
-                *(task.parameters, State.one(task.x0), task.t_end, task.fluid),
-                *(task.chosen_settings, task.sample_interval, lambda done: check()),
+                *(task.parameters, State.one(task.x0), task.t_end, task.flow),
+                *(task.settings, task.sample_interval, lambda done: check()),
             )
             for task in tasks
         ]
@@ -209,8 +201,8 @@ def journal_path(task: Task, path: Path) -> Path:
 def _begun(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
     """Runs that hand out their samples, in a batch unless they are long."""
     first, more = tasks[0], {"batched": not tasks[0].long, "journal": journal}
-    parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
-    run = parameters, x0s, first.t_end, flows, first.chosen_settings
+    parameters, x0s, flows = zip(*((task.parameters, task.x0, task.flow) for task in tasks), strict=True)
+    run = parameters, x0s, first.t_end, flows, first.settings
     assert first.simulator.stream
     return first.simulator.stream(*run, sample_interval=first.sample_interval, **more)
 
