@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import math
 import sys
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -41,11 +40,18 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config, items: list[pytest.Item]) -> None:
     """Add the cases, before ``-k`` and ``-m`` choose."""
     if engine := config.getoption("dualball_engine"):
-        from compare import bench  # here, because no other run needs it
+        from compare.bench import cases, runner  # here, because no other run needs it
 
-        cases = {case.name: case for case in bench.cases()}
-        known, trial = _known(config.getoption("dualball_known"), cases), _Trial(engine)
-        for name, case in cases.items():
+        own = {case.name: case for case in cases()}
+        known = _known(config.getoption("dualball_known"), own)
+
+        @functools.cache
+        def trial() -> runner.Trial:  # begins with the first case asked for
+            begun = runner.Trial(engine)
+            config.add_cleanup(begun.close)
+            return begun
+
+        for name, case in own.items():
             item = ExactCase.from_parent(session, name=name, nodeid=f"{engine}::{name}", case=case, trial=trial)
             if name in known:
                 item.add_marker(pytest.mark.xfail(reason=known[name]))
@@ -66,25 +72,10 @@ def _known(path: Path | None, cases: Any) -> dict[str, str]:
     return known
 
 
-class _Trial:
-    """An engine in a process of its own, which lasts from the first case asked for to the end of the run."""
-
-    def __init__(self, engine: str) -> None:
-        from compare.bench import runner
-
-        self._asked: deque[Any] = deque()
-        self._results = runner.run_all(iter(self._asked.popleft, None), engine)
-
-    def result(self, case: Any) -> Any:
-        """Of `compare.bench.run`."""
-        self._asked.append(case)
-        return next(self._results)
-
-
 class ExactCase(pytest.Item):
     """A case as a test: passed if the engine's error at its shortest step is small enough."""
 
-    def __init__(self, *, case: Any, trial: _Trial, **more: Any) -> None:
+    def __init__(self, *, case: Any, trial: Any, **more: Any) -> None:
         super().__init__(**more)
         self.case, self.trial = case, trial
 
@@ -92,7 +83,7 @@ class ExactCase(pytest.Item):
         """Run it, and keep a row of the summary."""
         from compare.bench.case import TOLERANCE  # here, because no other run needs it
 
-        found = self.trial.result(self.case)
+        found = self.trial().result(self.case)
         if found.engine.missing:
             self.session.shouldfail = found.engine.missing
             pytest.fail(found.engine.missing, pytrace=False)

@@ -23,6 +23,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -125,20 +126,16 @@ def run_all(
     cases: Iterable[Case], engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
 ) -> Iterator[Result]:
     """One engine on many cases, one after the other in one process, that is begun anew where it hangs or dies."""
-    given = engine.__name__ if hasattr(engine, "__spec__") else engine
-    server = _Server(given, limit)
-    try:
+    with closing(Trial(engine, limit)) as trial:
         for case in cases:
-            yield server.result(case, steps)
-    finally:
-        server.stop()
+            yield trial.result(case, steps)
 
 
-class _Server:
+class Trial:
     """A process with an engine in it."""
 
-    def __init__(self, engine: Any, limit: float) -> None:
-        self._engine, self._limit = engine, limit
+    def __init__(self, engine: Any, limit: float = LIMIT) -> None:
+        self._engine, self._limit = engine.__name__ if hasattr(engine, "__spec__") else engine, limit
         self.about = self._start()
 
     def _start(self) -> About:
@@ -161,17 +158,18 @@ class _Server:
         try:
             if self._pipe.poll(limit):
                 return self._pipe.recv()
-            self.stop()
+            self.close()
             return f"took longer than {limit:g} s"
         except (EOFError, OSError):
             return f"crashed (exit code {self._process.wait()})"
 
-    def stop(self) -> None:
+    def close(self) -> None:
+        """End it."""
         self._process.kill()
         self._process.wait()
         self._pipe.close()
 
-    def result(self, case: Case, steps: Sequence[float] | None) -> Result:
+    def result(self, case: Case, steps: Sequence[float] | None = None) -> Result:
         """Of all steps; later ones are not tried where one hangs."""
         about, found = self.about, Result(case.name, self.about)
         if about.missing:
