@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from compare.kit.statistics import plain
 from model.arrays import Array
 from model.kinematics import rotated
 
@@ -216,12 +217,10 @@ class Case:
 
     def to_mapping(self) -> dict[str, Any]:
         """All of it but the MJCF as JSON-able data; scales that are infinite are None."""
-        data = asdict(self) | {"schema": "dualball-case", "version": VERSION, "steps": STEPS, "tolerance": TOLERANCE}
-        data |= {"times": self.times.tolist(), "exact": self.exact.tolist(), "turned": self.round}
-        data["scales"] = [scale if math.isfinite(scale) else None for scale in self.scales]
-        data["wrong"] = {name: self.error(states) for name, states in self.wrong.items()}
+        data = vars(self) | {"schema": "dualball-case", "version": VERSION, "steps": STEPS, "tolerance": TOLERANCE}
+        data |= {"turned": self.round, "wrong": {name: self.error(states) for name, states in self.wrong.items()}}
         del data["motion"]
-        return data
+        return dict(plain(data))
 
 
 def _text(numbers: Any) -> str:

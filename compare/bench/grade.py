@@ -30,7 +30,6 @@ from compare.bench.two_contacts import SMOOTH
 from compare.kit import pages
 from compare.kit.engines import ENGINES, NEWCOMER, Engine
 from compare.kit.progress import Show, nowhere
-from compare.kit.statistics import plain
 from mjsim import ContactSettings
 from model import Case as Kinds
 from model.kinematics import slip_speeds
@@ -89,10 +88,6 @@ class Column:
     def of(self, case: str) -> Result:
         """What was measured in a case."""
         return next(result for result in self.results if result.case == case)
-
-    def to_mapping(self) -> dict[str, Any]:
-        """JSON-able data; None for what is missing."""
-        return dict(plain(dataclasses.asdict(self) | {"passed": self.passed, "cost": self.cost}))
 
 
 OTHERS: dict[str, tuple[Any, float]] = {

@@ -6,7 +6,6 @@ import math
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -187,7 +186,7 @@ def notes(league: Mapping[str, Sequence[Result]]) -> Iterator[tuple[str, str]]:
 def to_mapping(league: Mapping[str, Sequence[Result]]) -> dict[str, Any]:
     """JSON-able data."""
     entries = {
-        name: [asdict(result) | {"order": result.order, "passed": result.passed} for result in results]
+        name: [vars(result) | {"order": result.order, "passed": result.passed} for result in results]
         for name, results in league.items()
     }
     data: dict[str, Any] = plain({"version": VERSION, "tolerance": TOLERANCE, "engines": entries})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import itertools
 import shlex
 from collections.abc import Sequence
@@ -93,12 +92,12 @@ def run(args: argparse.Namespace) -> int:
         row: dict[str, Any] = {axis.name: getattr(p, axis.name) for axis in axes}
         row |= {"attractors": list(map(attractor_data, attractors)), "branches": list(map(branch_data, branches))}
         rows.append(row)
-    data = {"engine": args.engine.name, "seed": args.seed, "sets": rows}
+    data = plain({"engine": args.engine.name, "seed": args.seed, "sets": rows})
     table = _table(data)
     if args.page:
         write_text(args.page, _page(args.page.stem.capitalize(), args.words, options.parameters(args), data, table))
     title, lines = f"What balls come to ({args.engine.name})", []
-    for branch in itertools.chain.from_iterable(each["branches"] for each in rows):
+    for branch in itertools.chain.from_iterable(each["branches"] for each in data["sets"]):
         name, values = branch["parameter"], [orbit[branch["parameter"]] for orbit in branch["orbits"]]
         lines.append(f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:")
         lines += [f"  {place['kind']} at {place['value']:.7g} {place['reason']}" for place in branch["places"]]
@@ -107,45 +106,43 @@ def run(args: argparse.Namespace) -> int:
 
 
 def attractor_data(of: Attractor) -> dict[str, Any]:
-    """An attractor as JSON-able data, SI."""
+    """An attractor as data, SI."""
     fate, run, orbit = of.fate, of.run, of.fate.orbit
     states = {"mean": orbit.mean if orbit else run.x.mean(axis=0), "low": run.x.min(axis=0), "high": run.x.max(axis=0)}
     # Those of a period, or those of the last window in the order in which they first come up.
     cases = orbit.cases if orbit else dict.fromkeys(fate.last.cases)
-    data: dict[str, Any] = {
+    return {
         "kind": fate.kind.value,
-        "cases": [case.name for case in cases],
+        "cases": list(cases),
         "count": of.count,
         "starts": of.starts,
         "share": of.share,
         "share_95": of.interval,
         "period": orbit.period if orbit else fate.period,
         "period_in_the_run": fate.period,
-        "multipliers": [[v.real, v.imag] for v in orbit.multipliers] if orbit else [],
+        "multipliers": orbit.multipliers if orbit else [],
         "lyapunov": fate.exponent,
-        "theory": fate.solution.case.name if fate.solution else "orbit" if orbit else None,
+        "theory": fate.solution.case if fate.solution else "orbit" if orbit else None,
+        **{name: dict(zip(VARIABLES, x, strict=True)) for name, x in states.items()},
+        "failure": fate.failure,
     }
-    data = plain(data) | {name: dict(zip(VARIABLES, x.tolist(), strict=True)) for name, x in states.items()}
-    return data | {"failure": fate.failure}
 
 
 def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
-    """A branch as JSON-able data, SI; each place with the orbit there or nearest to it."""
+    """A branch as data, SI; each place with the orbit there or nearest to it."""
 
     def data(orbit: Orbit) -> dict[str, Any]:
         return {
             branch.name: getattr(orbit.p, branch.name),
             "period": orbit.period,
-            "omega_c": float(orbit.mean[VARIABLES.index("omega_c")]),
-            "height": float(orbit.cycle.y.max()),
+            "omega_c": orbit.mean[VARIABLES.index("omega_c")],
+            "height": orbit.cycle.y.max(),
             "stable": orbit.stable,
-            "multipliers": [[v.real, v.imag] for v in orbit.multipliers],
-            "x": orbit.loop.x.tolist(),
+            "multipliers": orbit.multipliers,
+            "x": orbit.loop.x,
         }
 
-    places = [
-        {"kind": p.kind.value, "value": p.value, "reason": p.reason, "orbit": data(p.orbit)} for p in branch.places
-    ]
+    places = [vars(place) | {"kind": place.kind.value, "orbit": data(place.orbit)} for place in branch.places]
     return {"parameter": branch.name, "places": places, "orbits": list(map(data, branch.orbits))}
 
 
@@ -211,7 +208,7 @@ def searched(args: argparse.Namespace) -> int:
     if args.page:
         write_text(args.page, "\n\n".join(f"{text}\n\n{pages.markdown(rows)}" for text, rows in tables) + "\n")
     shown = (pages.table("Where the ball hops for ever", rows, caption=text) for text, rows in tables)
-    options.show([dataclasses.asdict(each) for each in searches], args.json, *shown)
+    options.show(searches, args.json, *shown)
     return 0
 
 

@@ -144,7 +144,8 @@ def graded(args: argparse.Namespace) -> int:
     if args.output:
         write_text(args.output, grade.html(columns, described))
     advice = (Text(f"• {item}") for item in columns[0].advice)
-    options.show([column.to_mapping() for column in columns], args.json, grade.table(columns), *advice)
+    data = [vars(own) | {"passed": own.passed, "cost": own.cost} for own in columns]
+    options.show(data, args.json, grade.table(columns), *advice)
     return 0
 
 
@@ -240,7 +241,7 @@ def foretold(args: argparse.Namespace) -> int:
     shown += [Text(f"• {line}") for line in forecast.sentences(found)]
     if after:
         shown += [Text(""), pages.table(*forecast.changed(found, after), **LOOK)]
-    options.show({"before": dataclasses.asdict(found), "after": after and dataclasses.asdict(after)}, args.json, *shown)
+    options.show({"before": found, "after": after}, args.json, *shown)
     limits = ("creep", "m/s", args.max_creep), ("depth", "m", args.max_depth)
     code = 0
     for pair, (name, unit, limit) in itertools.product(found.pairs, limits):

@@ -44,30 +44,22 @@ def described(p: Parameters) -> dict[str, Any]:
     limit, solutions = analytic.operating_limit(p), []
     for s in analytic.stationary_solutions(p):
         Re = drag.reynolds_of(s.state, p)
-        solutions.append(
-            {
-                "case": s.case.name,
-                "Re": Re,
-                "drag_law_covers_Re": drag.covers(Re, p.drag) if p.nu_f else None,
-                "x": dict(zip(VARIABLES, map(float, s.x), strict=True)),
-                "units": dict(zip(VARIABLES, UNITS, strict=True)),
-                "force_A": s.force_A.tolist(),
-                "force_B": s.force_B.tolist(),
-                "eigenvalues": [[float(v.real), float(v.imag)] for v in s.eigenvalues],
-                "exists": bool(s.exists),
-                "stability": s.stability.value,
-                "slip_stable": bool(s.slip_stable),
-                "family": list(s.family),
-            }
-        )
+        solution = {
+            "case": s.case.name,
+            "Re": Re,
+            "drag_law_covers_Re": drag.covers(Re, p.drag) if p.nu_f else None,
+            "x": s.state._asdict(),
+            "units": dict(zip(VARIABLES, UNITS, strict=True)),
+            "stability": s.stability.value,
+        }
+        names = "force_A", "force_B", "eigenvalues", "exists", "slip_stable", "family"
+        solutions.append(solution | {name: getattr(s, name) for name in names})
     off = real_fluid.model_error(p)
     return {
-        "parameters": dataclasses.asdict(p),
+        "parameters": p,
         "model_holds": off <= real_fluid.LIMIT if p.nu_f else None,
         "model_error": off,
-        "fluid_torque": {
-            by: dataclasses.asdict(real_fluid.rolling(p, by == "boundary layer")) for by in ("Stokes", "boundary layer")
-        },
+        "fluid_torque": {by: real_fluid.rolling(p, by == "boundary layer") for by in ("Stokes", "boundary layer")},
         "groups": {"kappa": p.kappa, "Omega_0": p.Omega_0},
         "thresholds": dataclasses.asdict(analytic.thresholds(p)),
         "operating_range": limit.omega_0,
@@ -175,8 +167,8 @@ _ROWS: dict[str, Callable[[dict[str, Any], Callable[[float, int], str]], str]] =
     "within the case": lambda s, _: s["stability"].removesuffix(" stable"),
     "against slipping": lambda s, _: "stable" if s["slip_stable"] else "unstable",
     "rightmost eigenvalue (1/s)": lambda s, shown: (
-        shown(s["eigenvalues"][0][0], 4)
-        + (f" ± {shown(abs(s['eigenvalues'][0][1]), 4)}i" if s["eigenvalues"][0][1] else "")
+        shown(s["eigenvalues"][0].real, 4)
+        + (f" ± {shown(abs(s['eigenvalues'][0].imag), 4)}i" if s["eigenvalues"][0].imag else "")
     ),
     "free": lambda s, _: ", ".join(s["family"]) or "-",
     "Re": lambda s, shown: shown(s["Re"], 4),

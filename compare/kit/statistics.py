@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -26,12 +26,22 @@ class Measured:
 
 
 def plain(value: Any) -> Any:
-    """Nested data as JSON holds it: lists for tuples, Python's numbers for numpy's, None for one that is not finite."""
+    """Nested data as JSON holds it: dataclasses as mappings, arrays as lists, a case by its name, complex as a pair.
+
+    Of numbers that are not finite None is left.
+    """
+    if is_dataclass(value):
+        value = {each.name: getattr(value, each.name) for each in fields(value)}
     if isinstance(value, Mapping):
         return {name: plain(part) for name, part in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, complex):
+        value = value.real, value.imag
     if isinstance(value, list | tuple):
         return [plain(part) for part in value]
-    value = value.item() if isinstance(value, np.generic) else value
+    if isinstance(value, Case):
+        return value.name
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

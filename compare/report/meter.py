@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -157,10 +156,10 @@ def described(made: Design) -> dict[str, Any]:
 
     curve, p, ends = made.curve, made.choice.p, ("lowest", "highest")
     return {
-        "request": dataclasses.asdict(made.request),
+        "request": made.request,
         "material": made.material,
         "meter": meter(made.choice),
-        "parameters": dataclasses.asdict(p),
+        "parameters": p,
         "covers": made.choice.margin >= 1,
         "model_error": made.model_error,
         "model_holds": made.model_error <= real_fluid.LIMIT,
@@ -173,13 +172,11 @@ def described(made: Design) -> dict[str, Any]:
             key: {"value": getattr(made.thresholds, key), **dict(zip(ends, of, strict=True))}
             for key, of in made.spread.items()
         },
-        "sensitivities": {
-            key: {name: dataclasses.asdict(s) for name, s in own.items()} for key, own in made.sensitivities.items()
-        },
+        "sensitivities": made.sensitivities,
         "characteristic": {
-            "omega_0": curve.omega_0.tolist(),
-            "omega_c": dict(zip(ends, (each.tolist() for each in curve.meant), strict=True)),
-            "within_tolerances": dict(zip(ends, (each.tolist() for each in curve.band), strict=True)),
+            "omega_0": curve.omega_0,
+            "omega_c": dict(zip(ends, curve.meant, strict=True)),
+            "within_tolerances": dict(zip(ends, curve.band, strict=True)),
         },
     }
 

@@ -37,16 +37,16 @@ def describe(path: Path) -> dict[str, Any]:
         "complete": last.complete,
         "parameters": dataclasses.asdict(header.parameters),
         "flow": header.flow.to_mapping(),
-        "settings": dict(header.settings),
-        "versions": dict(header.versions),
+        "settings": header.settings,
+        "versions": header.versions,
         "samples": samples,
         "duration": float(last.time[-1]) if samples else 0.0,
         "cases": [{"case": case.name, "from": start, "to": end} for case, start, end in stretches],
         "events": [
-            {"time": float(t), "from": Case(a).name, "to": Case(b).name}
+            {"time": t, "from": Case(a).name, "to": Case(b).name}
             for t, a, b in zip(events.time, events.from_case, events.to_case, strict=True)
         ],
-        "last": dict(zip(VARIABLES, last.x[-1].tolist(), strict=True)) if samples else {},
+        "last": dict(zip(VARIABLES, last.x[-1], strict=True)) if samples else {},
     }
 
 
