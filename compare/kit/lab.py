@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from compare.kit import levels
-from compare.kit.campaign import Campaign, Failure
+from compare.kit.campaign import Campaign
 from compare.kit.engines import Engine
 from compare.kit.levels import Level
 from compare.kit.tasks import Task
@@ -69,29 +69,17 @@ class Lab:
         """A run of so many steps of so many s, and one with twice as many of half; each step is a sample."""
         return [self.task(p, x0, steps * step, step / times, samples=steps * times) for times in (1, 2)]
 
-    def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
-        """The trajectories of the tasks, in order; raises for one that failed."""
-        return self.campaign.run(tasks)
-
-    def attempt(self, tasks: Sequence[Task]) -> list[Trajectory] | str:
-        """The trajectories of the tasks, or why one of them failed."""
-        failures = self.complete(tasks)
-        return failures[0].reason if failures else self.run(tasks)
-
     def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory] | str]:
-        """The same group by group: all are carried out together, but not held in memory together."""
-        self.complete([task for group in groups for task in group])
-        yield from map(self.attempt, groups)
+        """The trajectories of each group, or why one failed: carried out together, not held in memory together."""
+        failures = self.campaign.complete([task for group in groups for task in group])
+        failed = {failure.task.key: failure.reason for failure in failures}
+        for group in groups:
+            yield next((failed[task.key] for task in group if task.key in failed), "") or self.campaign.run(group)
 
     def each(self, tasks: Sequence[Task]) -> Iterator[Trajectory | str]:
         """The trajectory of every task, one after the other, or why it failed."""
-        failed = {failure.task.key: failure.reason for failure in self.complete(tasks)}
-        for task in tasks:
-            yield failed.get(task.key) or self.run([task])[0]
-
-    def complete(self, tasks: Sequence[Task]) -> list[Failure]:
-        """Carry out the tasks and return those that failed."""
-        return self.campaign.complete(tasks)
+        for group in self.groups([[task] for task in tasks]):
+            yield group if isinstance(group, str) else group[0]
 
 
 def time_unit(p: Parameters) -> float:

@@ -73,9 +73,7 @@ def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Resu
             for p in trial.variants or (trial.p,):
                 task = lab.task(p, trial.x0, trial.t_end, step, flow=trial.flow, samples=samples)
                 tasks[-1][1].append(task)
-    lab.complete([task for _, own in tasks for task in own])
-    for trial, own in tasks:
-        runs = lab.attempt(own)
+    for (trial, own), runs in zip(tasks, lab.groups([own for _, own in tasks]), strict=True):
         if isinstance(runs, str):
             yield Missing(protocol, trial.set, f"{trial.name}: the run {runs}", trial.rows)
         else:

@@ -128,7 +128,7 @@ def _ran(lab, p, omega, x0=None, units=5.0):
     """A run at a flow from a state, rolling with the fluid if none is given."""
     q = p.replace(omega_0=omega)
     x0 = begin("", q, "with the fluid").x0 if x0 is None else x0
-    return lab.run([lab.task(q, x0, lasting(q, units), coarse_step(q))])[0]
+    return lab.campaign.run([lab.task(q, x0, lasting(q, units), coarse_step(q))])[0]
 
 
 def test_what_runs_away_beyond_the_fold_does_not_settle(lab):

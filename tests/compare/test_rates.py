@@ -76,7 +76,7 @@ def test_what_depends_on_the_size_of_the_push_and_on_the_step_is_extrapolated() 
 
 def test_a_run_counts_up_to_where_the_ball_leaves_the_case(lab: Lab) -> None:
     slow = P.replace(omega_0=1.0)
-    (run,) = lab.run([lab.task(slow, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, P.R / 2, -0.5], 0.2, 1e-3)])
+    (run,) = lab.campaign.run([lab.task(slow, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, P.R / 2, -0.5], 0.2, 1e-3)])
     first = run.cases[1]
     assert first in (Case.RN, Case.SN)
     assert len(set(run.cases)) > 1

@@ -101,7 +101,7 @@ def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(
     with Campaign(tmp_path, workers=0) as campaign:
         for engine in (MUJOCO, wrong):
             lab = Lab(campaign, engine, Level.QUICK)
-            (runs[engine.name],) = lab.run([lab.task(P, start, 0.4, 4e-3)])
+            (runs[engine.name],) = lab.campaign.run([lab.task(P, start, 0.4, 4e-3)])
     right, other = runs[MUJOCO.name], runs[wrong.name]
     assert other.header.parameters == right.header.parameters == P
     assert np.abs(other.x - right.x).max() > 1e-6

@@ -174,7 +174,7 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
         if k > 1:
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
         pair = [task(q, x, lasts, refined) for x, refined in zip(ahead, REFINED, strict=True)]
-        runs = lab.attempt(pair)
+        (runs,) = lab.groups([pair])
         parts = [] if isinstance(runs, str) else [tops(run, LATER, lasts) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
@@ -207,7 +207,7 @@ def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
         return replace(lab.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings)
 
     for e in (round(0.04 * k, 2) for k in range(18)):
-        (run,) = lab.run([task(x, LAST, e)])
+        (run,) = lab.campaign.run([task(x, LAST, e)])
         if hops(run):
             last = tops(run, 0.0, LAST)
             x = last.x[-8:].mean(axis=0)  # the hops swing about their mean, and attract from nearby only
@@ -215,7 +215,7 @@ def rebounding(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
             yield Missing("rebounding", SET, "the ball does not hop")
             return
         if not hops(run) or e in (0.0, 0.2, 0.4, 0.48, 0.6):
-            (run,) = lab.run([alone := task(x, left, e)])
+            (run,) = lab.campaign.run([alone := task(x, left, e)])
             at = last.conditions(p) | {"restitution": e, "duration": left}
             yield measurement(lab, "rebounding", SET, p, "hops", hops(run), [alone], **at)
             if not hops(run):

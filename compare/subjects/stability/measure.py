@@ -116,9 +116,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     yield from (each for each in found if isinstance(each, Missing))
     states = [each for each in found if isinstance(each, Pushed)]
     tasks = [state.tasks(lab) for state in states]
-    lab.complete([task for own in tasks for task in own])
-    for state, own in zip(states, tasks, strict=True):
-        runs, step = lab.attempt(own), coarse_step(state.start.p) / lab.effort("rates.refined")[1]
+    for state, own, runs in zip(states, tasks, lab.groups(tasks), strict=True):
+        step = coarse_step(state.start.p) / lab.effort("rates.refined")[1]
         if isinstance(runs, str):
             yield state.missing(f"a run {runs}")
             continue
