@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from compare.claim import Claim, Outcome, Verdict
-    from compare.kit.check import Check
     from compare.kit.levels import Level
+    from compare.kit.record import Check
     from compare.validation import validate
 
 __all__ = ["Check", "Claim", "Level", "Outcome", "Verdict", "validate"]
@@ -15,7 +15,7 @@ pytest_plugins = ("compare.plugin",)
 """Pytest's entry point is this package, not that module: a foreign ``compare`` has no such line, and breaks no run."""
 _CLAIM = "compare.claim"
 _MODULES = dict.fromkeys(("Claim", "Outcome", "Verdict"), _CLAIM) | {
-    "Check": "compare.kit.check",
+    "Check": "compare.kit.record",
     "Level": "compare.kit.lab",
     "validate": "compare.validation",
 }

@@ -12,10 +12,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
 
-from compare.kit.check import Check, Relation
 from compare.kit.levels import Level
 from compare.kit.quantities import quantity
-from compare.kit.record import Condition, Measurement, Missing
+from compare.kit.record import Check, Condition, Measurement, Missing, Relation
 from compare.kit.sets import sets
 from compare.kit.statistics import Measured
 

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from compare import subjects
 from compare.kit import drawing, style
-from compare.kit.check import Check
 from compare.kit.drawing import Drawing, Figures, GapError, Material
+from compare.kit.record import Check
 from compare.kit.statistics import COVERAGE
 from model import InputError, StorageError
 from model.files import make_directory, write_text

@@ -12,9 +12,8 @@ from typing import ParamSpec, TypeVar
 import analytic
 from analytic.orbits.periodic import NoOrbitError
 from compare.claim import Bearing, Claim, Outcome, Verdict
-from compare.kit.check import Check
 from compare.kit.quantities import quantity
-from compare.kit.record import Measurement, Missing, Records
+from compare.kit.record import Check, Measurement, Missing, Records
 from compare.kit.scales import natural_size
 from compare.kit.statistics import COVERAGE, Measured
 from model import Flow, InputError, Parameters, SimulationError, Trajectory

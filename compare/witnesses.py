@@ -21,11 +21,10 @@ from scipy.optimize import brentq, linear_sum_assignment
 
 from compare.claim import Claim, Outcome, Verdict, Witness
 from compare.judge import checks_of, outcome, verdict
-from compare.kit.check import Check, Relation
 from compare.kit.engines import Engine, engine
 from compare.kit.lab import coarse_step, state_units, time_unit
 from compare.kit.quantities import quantity
-from compare.kit.record import Measurement, Records, Testimony
+from compare.kit.record import Check, Measurement, Records, Relation, Testimony
 from compare.kit.statistics import COVERAGE, Measured
 from model.arrays import Array
 from model.kinematics import VARIABLES

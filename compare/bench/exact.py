@@ -1,25 +1,42 @@
-"""The set of exact cases, and the same as files for engines that don't speak Python."""
+"""The set of exact cases: those with two contacts, all of them, and all as files for engines that don't speak Python.
+
+Two contacts have bodies in a straight groove, in closed form, and the study's ball on floor and wall. The ball's motion
+is that of `analytic.simulate`, event-driven, at its sharpest; its wrong answers are the motions of other parameters.
+"""
 
 from __future__ import annotations
 
-import functools
 import json
+import math
+from collections.abc import Mapping
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from compare.bench import one_contact, two_contacts
-from compare.bench.case import TOLERANCE, VERSION, Case
+import analytic
+from compare.bench import one_contact
+from compare.bench.case import TOLERANCE, VERSION, Body, Case, Surface
+from compare.bench.one_contact import SPEED_ALONE, G, along, closed, slope, sphere
+from model import Parameters, State, Trajectory
+from model.arrays import Array
 from model.files import WholeFile, make_directory, write_text
+from model.kinematics import to_world
 from model.trajectory import current_versions
 
+SMOOTH, ROUGH = Parameters.named("reference"), Parameters.named("high-wall-friction")
 README = Path(__file__).with_name("templates") / "cases.md"
+SHARP = 1e-13
+"""Relative tolerance of the event-driven simulation."""
+BOUND = 1e-10
+"""Of what it then is wrong by: a hundred times what it differs by from itself at ten times the tolerance."""
 
 
-@functools.cache
+@cache
 def cases() -> tuple[Case, ...]:
     """All of them: those with one contact first."""
-    return (*one_contact.cases(), *two_contacts.cases())
+    return (*one_contact.cases(), *_grooves(), *_vessel())
 
 
 def write(directory: Path) -> None:
@@ -43,3 +60,127 @@ def write(directory: Path) -> None:
             group["time"].attrs["units"] = "s"
             group["exact"].attrs["columns"] = "position (m), velocity (m s-1), spin (rad s-1)"
         whole.finish()
+
+
+def _grooves() -> list[Case]:
+    """In a right-angled groove down a slope each plane carries m g cos/sqrt(2)."""
+    half = math.sqrt(0.5)
+
+    def planes(angle: float, mu: float) -> tuple[Surface, Surface]:
+        up = half * np.array(slope(angle)[1])
+        left, right = (tuple((up + side * np.array([0.0, half, 0.0])).tolist()) for side in (-1.0, 1.0))
+        return Surface("left", mu, normal=left), Surface("right", mu, normal=right)
+
+    def descends(t: Array, angle: float, size: float, lever: float = 2 * 0.4, mu: float = 9.0) -> Any:
+        """At g sin/(1 + j/sin^2 45) if it rolls, where friction allows; a block can't."""
+        way, normal = slope(angle)
+        a = max(G * math.sin(angle) / (1 + lever), G * (math.sin(angle) - mu * math.cos(angle) / half))
+        spin = a * t / (half * size) if lever < 9 else 0 * t
+        return along(way, a * t**2 / 2, a * t, spin, size / half * np.array(normal))
+
+    gentle, steep = math.atan(0.5), math.atan(0.9 * 0.5 / half)
+    turn = np.array([math.cos(steep / 2), 0.0, math.sin(steep / 2), 0.0])
+    across = np.array([math.cos(math.pi / 8), math.sin(math.pi / 8)])
+    orientation = (turn[0] * across[0], turn[0] * across[1], turn[2] * across[0], -turn[2] * across[1])
+    cube = {"shape": "box", "size": (0.1,) * 3, "mass": 1.0, "inertia": (0.04 / 6,) * 3}
+    source = "Newton and Euler; by symmetry both planes carry m g cos/sqrt(2)"
+    return [
+        closed(
+            "groove-rolls",
+            "a sphere rolls down a right-angled groove on two points, at 5/9 g sin",
+            sphere(),
+            planes(gentle, 0.5),
+            partial(descends, angle=gentle, size=0.1),
+            {"on one point, 5/7 g sin": {"lever": 0.4}, "a hollow sphere": {"lever": 4 / 3}},
+            until=1.0,
+            scales=(1.0, 2.0, 30.0),
+            contacts=lambda t: "RR",
+            source=source,
+        ),
+        closed(
+            "groove-rests",
+            "a cube pinched by its weight in a right-angled groove stays, at 0.9 of sqrt(2) times its friction",
+            cube | {"orientation": orientation},
+            planes(steep, 0.5),
+            partial(descends, angle=steep, size=0.1, lever=math.inf),
+            {"a threshold as on a plane": {"mu": 0.5 * half}, "at 0.85 of Coulomb's": {"mu": 0.425}},
+            until=2.0,
+            scales=SPEED_ALONE,
+            contacts=lambda t: "RR",
+            source=source,
+        ),
+    ]
+
+
+def _vessel() -> list[Case]:
+    weak, hollow, thin = {"mu": 0.95, "eta": 0.95}, {"j": 1.5}, {"c": 0.0}
+    weaker, bouncing = {"mu": 0.8, "eta": 0.8}, {"restitution": 0.3}
+    slipping = {"friction 5 % too weak": weak, "no drag": thin}
+    rolling = {"a hollow sphere": hollow, "no drag": thin}
+    landing = {"a hollow sphere": hollow, "friction 20 % too weak": weaker, "it bounces at 0.3 of its speed": bouncing}
+    kicked = State(omega_c=14.35, slip_x=-1.0, slip_y=2.0, slip_z=7.0)
+    lands = State(y=0.02, v_y=-0.2, omega_c=12.0, slip_x=30.0, slip_y=-10.0, slip_z=20.0)
+    hits = State(omega_c=10.0, slip_x=20.0, slip_y=10.0, slip_z=30.0, h=0.01, v_h=-0.3)
+    rides = State(y=0.1, v_y=0.1, omega_c=22.0, slip_x=5.0)
+    return [
+        ball("rolls-on-both", "rolling on floor and wall it is sped up by the fluid (RR)", SMOOTH, 12.0,
+             State(omega_c=8.0), 4.0, rolling),
+        ball("from-rest", "from rest it slips on the wall, then rolls on both, ever faster (RS, RR)",
+             SMOOTH, 12.0, State(), 8.0, rolling),
+        ball("slips-on-both", "slipping on floor and wall it comes to its stationary state (SS)",
+             SMOOTH, 25.0, kicked, 2.0, slipping),
+        ball("rides-the-wall", "the wall alone carries it, and it rolls there (NR)",
+             ROUGH, 25.0, rides, 1.0, rolling),
+        ball("onset-of-slip", "rolling on both it gets too fast and begins to slip on both, at 1.1 s (RR, SS)",
+             SMOOTH, 20.0, State(omega_c=8.0), 3.0, slipping),
+        ball("lands", "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, RR)",
+             SMOOTH, 12.0, lands, 0.5, landing),
+        ball("hits-the-wall", "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, RR)",
+             SMOOTH, 12.0, hits, 0.5, landing),
+        ball("falls-in", "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, RS, RR)",
+             SMOOTH, 12.0, State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, landing),
+    ]  # fmt: skip
+
+
+def ball(
+    name: str,
+    about: str,
+    p: Parameters,
+    omega_0: float,
+    x0: State,
+    until: float,
+    wrong: Mapping[str, Mapping[str, float]],
+) -> Case:
+    """The ball of the paper between floor and wall, sampled 25 times.
+
+    `wrong` are factors of its parameters, or a restitution.
+    """
+    p = p.replace(omega_0=omega_0)
+
+    def run(p: Parameters, rtol: float, restitution: float = 0.0) -> tuple[Array, Trajectory]:
+        found = analytic.simulate(p, x0, until, rtol=rtol, restitution=restitution, sample_interval=until / 25)
+        return np.concatenate(to_world(found.x, found.theta, p), axis=1)[1:], found
+
+    def mistaken(restitution: float = 0.0, **factors: float) -> Array:
+        changed = {key: factor * getattr(p, key) for key, factor in factors.items()}
+        return run(p.replace(**changed), 1e-9, restitution)[0]
+
+    exact, motion = run(p, SHARP)
+    place, velocity, spin = (part.tolist() for part in to_world(x0, 0.0, p))
+    return Case(
+        name=name,
+        about=f"a ball in a vessel: {about}",
+        body=Body((*place,), (*velocity,), (*spin,), "sphere", (p.r,), p.m, (p.j * p.m * p.r**2,) * 3),
+        surfaces=(Surface("floor", p.mu), Surface("wall", p.eta, radius=p.R + p.r)),
+        times=motion.time[1:],
+        exact=exact,
+        contacts=tuple(case.name for case in motion.cases[1:]),
+        bound=BOUND,
+        source=f"analytic.simulate, event-driven, rtol {SHARP:g}",
+        scales=(p.R, p.R * omega_0, p.R * omega_0 / p.r),
+        wrong={text: mistaken(**how) for text, how in wrong.items()},
+        g=p.g,
+        drag=p.c,
+        flow=omega_0,
+        motion=(p, x0),
+    )

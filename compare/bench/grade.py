@@ -23,10 +23,9 @@ from compare.bench import league
 from compare.bench.adapters import mujoco_free, simulators
 from compare.bench.adapters.simulators import Simulated
 from compare.bench.case import TOLERANCE
-from compare.bench.exact import cases
+from compare.bench.exact import SMOOTH, cases
 from compare.bench.native import Native
 from compare.bench.runner import Result, run_all
-from compare.bench.two_contacts import SMOOTH
 from compare.kit import pages
 from compare.kit.engines import ENGINES, NEWCOMER, Engine
 from compare.kit.progress import Show, nowhere

@@ -89,10 +89,9 @@ def figures(args: argparse.Namespace) -> int:
 
 def inspect(args: argparse.Namespace) -> int:
     """Describe a run or a collection."""
-    if sweep.is_collection(args.file):
+    if gathered := sweep.describe(args.file):
         if args.plot:
             raise InputError(f"{args.file} is a collection: only a run can be drawn")
-        gathered = sweep.describe(args.file)
         options.show(gathered, args.json, sweep.table(gathered))
         return 0
     if args.plot:

@@ -8,8 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from compare.kit.check import Check
-from compare.kit.record import Measurement, Records
+from compare.kit.record import Check, Measurement, Records
 from model import Parameters, StorageError, Trajectory, storage
 
 if TYPE_CHECKING:  # it takes half a second to load, and much that hands over material never draws

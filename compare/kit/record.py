@@ -1,4 +1,4 @@
-"""Measurements as data, and the file that keeps them.
+"""Measurements as data, the file that keeps them, and a measured number beside a predicted one.
 
 A measurement is a number with its standard uncertainty and all that it belongs to: what was measured, by which engine,
 with which parameters, under which named conditions, in which runs. Labels and sentences are made from it and never
@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +112,62 @@ def state_of(x: Array) -> dict[str, float]:
 def state(m: Measurement) -> tuple[float, ...]:
     """The state (8) among the conditions of a measurement, zero where it isn't named."""
     return tuple(float(m.conditions.get(name, 0.0)) for name in VARIABLES)
+
+
+class Relation(StrEnum):
+    """How a measured value should stand to the predicted one."""
+
+    EQUAL = "="
+    AT_MOST = "≤"
+    AT_LEAST = "≥"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """A measured number beside its prediction."""
+
+    measurement: Measurement
+    predicted: float
+    """nan where theory knows no such state."""
+    tolerance: float
+    """Largest deviation that still agrees."""
+    scale: float
+    relation: Relation = Relation.EQUAL
+    ceiling: float | None = None
+    """What it may overlook, where that isn't what its quantity says."""
+
+    @property
+    def deviation(self) -> float:
+        """Measured less predicted, as far as it goes against the relation."""
+        error = self.measurement.value - self.predicted
+        if self.relation is Relation.AT_MOST:
+            return max(error, 0.0)
+        return min(error, 0.0) if self.relation is Relation.AT_LEAST else error
+
+    @property
+    def share(self) -> float:
+        """Size of the deviation divided by the tolerance; inf where theory knows no such state, or without
+        tolerance."""
+        if self.deviation == 0:
+            return 0.0
+        share = abs(self.deviation / self.tolerance) if self.tolerance else math.inf
+        return math.inf if math.isnan(share) else share
+
+    @property
+    def resolves(self) -> float:
+        """Resolving power: the smallest relative error of the prediction that this check would notice."""
+        return self.tolerance / self.scale if self.scale else math.inf
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the deviation is within the tolerance; not for nan."""
+        return abs(self.deviation) <= self.tolerance
+
+    @property
+    def conclusive(self) -> bool:
+        """Whether the check resolves as much as its quantity asks for."""
+        ceiling = quantity(self.measurement.quantity).resolves if self.ceiling is None else self.ceiling
+        return self.resolves <= ceiling
 
 
 @dataclass(frozen=True)

@@ -184,20 +184,16 @@ def varied(of: Mapping[str, Any]) -> list[str]:
     return [f.name for f in dataclasses.fields(Parameters) if len(set(of.get(f.name, ()))) > 1]
 
 
-def is_collection(path: Path) -> bool:
-    """Whether a file holds many runs: a collection, or a batch of a campaign; raises `StorageError` if unreadable."""
-    if path.parent.is_file():  # one run of a batch
-        return False
-    with reading(path) as file:
-        return bool(file.attrs.get("schema") == SCHEMA) or storage.is_batch(file)
-
-
 def describe(path: Path) -> dict[str, Any]:
     """What a collection or batch holds: names of runs, engines, failures, the range of every column, JSON-able.
 
-    Raises `StorageError` for one that is not whole or of a newer version.
+    Empty for a file that holds a single run. Raises `StorageError` for one that is not whole or of a newer version.
     """
+    if path.parent.is_file():  # one run of a batch
+        return {}
     with reading(path) as file:
+        if file.attrs.get("schema") != SCHEMA and not storage.is_batch(file):
+            return {}
         if not storage.is_batch(file):
             version = file.attrs.get("schema_version")
             if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:

@@ -18,10 +18,9 @@ from markdown_it import MarkdownIt
 from compare.claim import Outcome, Verdict
 from compare.gallery import FIGURES, figures_of
 from compare.kit import pages
-from compare.kit.check import Check
 from compare.kit.drawing import Drawing, GapError, Material
 from compare.kit.levels import Level
-from compare.kit.record import Measurement, Records
+from compare.kit.record import Check, Measurement, Records
 from compare.kit.workers import Spread
 from compare.report import pictures, results, wording
 from compare.report.results import Summary

@@ -9,11 +9,10 @@ from statistics import median
 from typing import Any
 
 from compare.claim import Outcome, Text, Verdict, Witness
-from compare.kit.check import Check
 from compare.kit.engines import ENGINES
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES, quantity
-from compare.kit.record import Condition, Measurement
+from compare.kit.record import Check, Condition, Measurement
 from model import Case
 
 SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {n: n for n in ("v_h", "n_x", "n_y", "n_z")}

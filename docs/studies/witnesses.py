@@ -8,9 +8,9 @@ from statistics import median
 
 from compare.catalogue import CLAIMS
 from compare.claim import Outcome, Verdict
-from compare.kit.check import Relation
 from compare.kit.engines import PLAIN
 from compare.kit.pages import Rows
+from compare.kit.record import Relation
 from compare.report import wording
 from compare.validation import stored
 from compare.witnesses import hear

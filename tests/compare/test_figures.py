@@ -21,10 +21,9 @@ from compare import gallery as registry
 from compare.catalogue import CLAIMS
 from compare.gallery import FIGURES, figures_of
 from compare.kit import drawing, style
-from compare.kit.check import Check
 from compare.kit.drawing import GapError, Material, Motion
 from compare.kit.engines import ENGINES
-from compare.kit.record import Measurement, Records
+from compare.kit.record import Check, Measurement, Records
 from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.slipping import figures as slipping
 from compare.subjects.unsteady import figures as unsteady

@@ -131,7 +131,6 @@ READERS: list[tuple[str, Callable[[Path], Any]]] = [
     *((name, read) for name in RUNS for read in (whole, parts)),
     ("batch", storage.contents),
     ("batch", storage.load_runs),
-    ("collection", sweep.is_collection),
     ("collection", sweep.describe),
     ("measurements", record.load),
 ]

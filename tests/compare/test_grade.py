@@ -14,9 +14,9 @@ import pytest
 import analytic
 from compare.bench import cases, grade, native
 from compare.bench.contact_law import impedance
+from compare.bench.exact import SMOOTH
 from compare.bench.grade import Column
 from compare.bench.native import Native, Pair
-from compare.bench.two_contacts import SMOOTH
 from compare.commands import cli
 from mjsim import ContactSettings, scene
 from mjsim.scene import SCENE

@@ -10,9 +10,8 @@ import pytest
 import tests.measured
 from compare.claim import Bearing, Claim, Outcome, Text
 from compare.judge import judge, select, theory
-from compare.kit.check import Relation
 from compare.kit.quantities import quantity
-from compare.kit.record import Missing, Records
+from compare.kit.record import Missing, Records, Relation
 from compare.kit.statistics import COVERAGE, Measured
 from model import InputError, Parameters
 

@@ -23,11 +23,10 @@ from compare.claim import Bearing, Claim, Outcome, Text, Verdict
 from compare.commands import validate
 from compare.gallery import FIGURES
 from compare.kit import record
-from compare.kit.check import Check
 from compare.kit.drawing import Drawing, GapError, Material
 from compare.kit.levels import Level
 from compare.kit.pages import readable
-from compare.kit.record import Missing, Records
+from compare.kit.record import Check, Missing, Records
 from compare.kit.workers import spread
 from compare.report import pictures, report, results, wording
 from compare.report.results import Summary

@@ -12,8 +12,7 @@ import analytic
 from analytic.flowmeter import design
 from compare.claim import Bearing, Claim, Text, every, given
 from compare.judge import simulated, theory
-from compare.kit.check import Relation
-from compare.kit.record import Measurement, state
+from compare.kit.record import Measurement, Relation, state
 from compare.kit.settling import family
 from compare.kit.statistics import Measured
 from compare.settled import cases, detected, from_floor, is_in, lasting, lifts_first, reached, slips_first

@@ -22,9 +22,8 @@ from analytic.mechanics import dynamics
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary import slipping_branch
 from compare.claim import Claim, Text
-from compare.kit.check import Check
 from compare.kit.lab import state_units
-from compare.kit.record import Measurement
+from compare.kit.record import Check, Measurement
 from compare.kit.statistics import COVERAGE
 from model import Case, Flow, Parameters, State, drag
 from model.kinematics import TURNING, VARIABLES

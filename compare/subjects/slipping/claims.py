@@ -12,8 +12,7 @@ from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
 from compare.claim import Bearing, Claim, Outcome, Text, When, every, given
 from compare.judge import simulated
-from compare.kit.check import Relation
-from compare.kit.record import Measurement, state
+from compare.kit.record import Measurement, Relation, state
 from model import Case
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ

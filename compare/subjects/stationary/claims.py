@@ -11,8 +11,7 @@ from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
 from compare.claim import Bearing, Claim, Text, When, every, given
 from compare.judge import theory
-from compare.kit.check import Relation
-from compare.kit.record import Measurement
+from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
 from compare.settled import cases, detected, from_floor, is_in, lifts_first, number, reached, slips_first
 from model import Case

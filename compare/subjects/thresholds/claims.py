@@ -12,8 +12,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import rolling_forces
 from compare.claim import Bearing, Claim, When, given
 from compare.judge import theory
-from compare.kit.check import Relation
-from compare.kit.record import Measurement
+from compare.kit.record import Measurement, Relation
 from compare.settled import number
 from model import Case, Parameters
 

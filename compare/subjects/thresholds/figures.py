@@ -22,8 +22,8 @@ from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
 from compare.branches import fold_state, lifted, slipping, spin, spins
 from compare.kit import style
-from compare.kit.check import Check
 from compare.kit.drawing import Diagram, Drawing, Material
+from compare.kit.record import Check
 from compare.kit.style import UNSTABLE, Place
 from model import Case, Parameters, State
 from model.arrays import Array

@@ -9,8 +9,7 @@ import analytic
 from analytic.flowmeter import pulsation, response
 from compare.claim import Bearing, Claim, given
 from compare.judge import simulated, theory
-from compare.kit.check import Relation
-from compare.kit.record import Measurement, state
+from compare.kit.record import Measurement, Relation, state
 from compare.settled import lifts_first, slips_first
 from compare.subjects.unsteady.measure import caught_up
 from model import Case, Flow
