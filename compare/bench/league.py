@@ -9,12 +9,10 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.table import Table
 
 from compare.bench.case import TOLERANCE, VERSION, Case
 from compare.bench.exact import cases
 from compare.bench.runner import FLOORS, Result, run_all
-from compare.kit import pages
 from compare.kit.pages import Rows
 from compare.kit.progress import Show
 from compare.kit.statistics import plain
@@ -124,12 +122,6 @@ def rows(league: Mapping[str, Sequence[Result]]) -> Rows:
     return table
 
 
-def failed(league: Mapping[str, Sequence[Result]]) -> set[tuple[str, int]]:
-    """Case and column of the cells of `rows` that are not passed."""
-    columns = enumerate(tried(league).values(), 1)
-    return {(r.case, k) for k, results in columns for r in results if not (r.skipped or r.passed)}
-
-
 def tried(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
     """Engines that were tried in some case."""
     return {name: results for name, results in league.items() if not all(result.skipped for result in results)}
@@ -191,14 +183,6 @@ def to_mapping(league: Mapping[str, Sequence[Result]]) -> dict[str, Any]:
     }
     data: dict[str, Any] = plain({"version": VERSION, "tolerance": TOLERANCE, "engines": entries})
     return data
-
-
-def tables(league: Mapping[str, Sequence[Result]]) -> Iterator[Table]:
-    """The league for the terminal: the summary, and errors by case."""
-    yield pages.table("League", summary(league), no_wrap=True, padding=0)
-    table = rows(league)
-    head = [table[0][0], *(name.replace("-", "- ") for name in table[0][1:])]
-    yield pages.table("Errors by case", [head, *table[1:]], no_wrap=True, padding=0)
 
 
 def _median(values: Iterator[float]) -> float:

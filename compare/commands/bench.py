@@ -200,10 +200,11 @@ def ranked(args: argparse.Namespace) -> int:
         raise InputError(f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}")
     data = league.to_mapping(found)
     write_text(args.output / JSON, json.dumps(data, indent=1))
+    summary, rows, columns = league.summary(found), league.rows(found), enumerate(league.tried(found).values(), 1)
     shown = {
-        "summary": league.summary(found),
-        "rows": league.rows(found),
-        "failed": league.failed(found),
+        "summary": summary,
+        "rows": rows,
+        "failed": {(r.case, k) for k, results in columns for r in results if not (r.skipped or r.passed)},
         "about": league.about(found),
         "notes": list(league.notes(found)),
         "caption": league.CAPTION,
@@ -213,7 +214,10 @@ def ranked(args: argparse.Namespace) -> int:
     for what, why in league.notes(found):
         if what.endswith("all cases"):
             print(f"dualball: {what.removesuffix(', all cases')} is left out: {why}", file=sys.stderr)
-    options.show(data, args.json, *league.tables(found), league.CAPTION)
+    head = [name.replace("-", "- ") for name in rows[0]]  # which may be broken there
+    tables = {"League": summary, "Errors by case": [head, *rows[1:]]}
+    drawn = (pages.table(title, own, no_wrap=True, padding=0) for title, own in tables.items())
+    options.show(data, args.json, *drawn, league.CAPTION)
     if not args.json:
         print(f"page: {args.output / PAGE}")
     return 0

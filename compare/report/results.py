@@ -19,7 +19,7 @@ from compare.kit.levels import Level
 from compare.kit.record import Records, Testimony
 from compare.kit.statistics import plain
 from model.errors import StorageError
-from model.files import make_directory, write_text
+from model.files import make_directory, reading_json, write_text
 from model.trajectory import current_commit, current_versions
 
 SUMMARY, REPORT, RUNS, FIGURES = "summary.json", "report.html", "runs", "figures"
@@ -118,25 +118,17 @@ def open_directory(directory: Path) -> None:
 def load(directory: Path) -> Summary:
     """Read the summary; raises `StorageError` if there is none or it is of another version."""
     path = directory / SUMMARY
-    try:
-        content = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise StorageError(f"cannot read {path}: {error.strerror}; run 'dualball validate -o {directory}'") from error
-    except ValueError as error:
-        raise StorageError(f"{path} is not JSON: {error}") from error
-    if not isinstance(content, Mapping) or content.get("schema") != SCHEMA:
-        raise StorageError(f"{path} is not a {SCHEMA}")
-    if content.get("schema_version") != SCHEMA_VERSION:
-        raise StorageError(f"{path} is in another format than this program's: choose another directory with --output")
-    try:
+    if not path.exists():
+        raise StorageError(f"cannot read {path}: there is no such file; run 'dualball validate -o {directory}'")
+    with reading_json(path, "summary that this program reads") as content:
+        if (content["schema"], content["schema_version"]) != (SCHEMA, SCHEMA_VERSION):
+            raise ValueError("it is in another format; choose another directory with --output")
         Level[content["level"]]
         summary = Summary(
             content["level"], *(dict(content[name]) for name in ("measurements", "verdicts", "provenance"))
         )
         summary.files(directory)
         version, ours = summary.provenance["versions"]["dualball"], current_versions()["dualball"]
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise StorageError(f"{path} is damaged: it is not what a validation writes") from error
     if version != ours:
         held = f"{directory} holds results of dualball {version}, this is {ours}"
         raise StorageError(f"{held}: choose another directory with --output")

@@ -236,8 +236,8 @@ def test_measurements_are_found_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda text: "{", "is not JSON"),
-        (lambda text: "[]", "is not a dualball-summary"),
+        (lambda text: "{", "holds no summary that this program reads: Expecting"),
+        (lambda text: "[]", "holds no summary that this program reads: list"),
         (lambda text: text.replace('"schema_version": 5', '"schema_version": 4'), "in another format"),
         (lambda text: re.sub(r'"dualball": "[^"]*"', '"dualball": "0.0.0"', text), "holds results of dualball 0.0.0"),
     ],
