@@ -42,8 +42,8 @@ class Task:
     """Initial state, 6 or 8 numbers; kept as a `State`."""
     t_end: float
     """s"""
-    flow: Any = None
-    """A `Flow`, omega_0 over time; if None is given a steady one of ``parameters.omega_0``."""
+    flow: Flow | None = None
+    """omega_0 over time; None for a steady ``parameters.omega_0``."""
     settings: Any = None
     """Numerical settings of the engine; if None is given its defaults."""
     sample_interval: float | None = None
@@ -52,15 +52,18 @@ class Task:
     def __post_init__(self) -> None:
         if not isinstance(self.settings, self.simulator.settings | None):
             raise InputError(f"settings of another engine were given to {self.engine!r}")
-        whole = {"x0": State.one(self.x0), "flow": self.flow or Flow.steady(self.parameters.omega_0)}
-        whole["settings"] = self.settings or self.simulator.configure({}, self.parameters)
-        for name, value in whole.items():
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "x0", State.one(self.x0))
+        object.__setattr__(self, "settings", self.settings or self.simulator.configure({}, self.parameters))
 
     @property
     def simulator(self) -> Engine:
         """The engine itself; `InputError` if there is none of that name."""
         return engines.engine(self.engine)
+
+    @property
+    def fluid(self) -> Flow:
+        """omega_0 over time, also where `flow` is None."""
+        return self.flow or Flow.steady(self.parameters.omega_0)
 
     @functools.cached_property
     def key(self) -> str:
@@ -77,7 +80,7 @@ class Task:
             "parameters": dataclasses.asdict(self.parameters),
             "x0": self.x0,
             "t_end": self.t_end,
-            "flow": self.flow.to_mapping(),
+            "flow": self.fluid.to_mapping(),
             "settings": dataclasses.asdict(self.settings),
             "sample_interval": self.sample_interval,
         }
@@ -123,7 +126,7 @@ def carry_out(tasks: Sequence[Task], check: Callable[[], None] = lambda: None) -
     if simulate := tasks[0].simulator.simulate:
         return [
             simulate(
-                *(task.parameters, State.one(task.x0), task.t_end, task.flow),
+                *(task.parameters, State.one(task.x0), task.t_end, task.fluid),
                 *(task.settings, task.sample_interval, lambda done: check()),
             )
             for task in tasks
@@ -201,7 +204,7 @@ def journal_path(task: Task, path: Path) -> Path:
 def _begun(tasks: Sequence[Task], journal: Journal | None = None) -> mjsim.Run:
     """Runs that hand out their samples, in a batch unless they are long."""
     first, more = tasks[0], {"batched": not tasks[0].long, "journal": journal}
-    parameters, x0s, flows = zip(*((task.parameters, task.x0, task.flow) for task in tasks), strict=True)
+    parameters, x0s, flows = zip(*((task.parameters, task.x0, task.fluid) for task in tasks), strict=True)
     run = parameters, x0s, first.t_end, flows, first.settings
     assert first.simulator.stream
     return first.simulator.stream(*run, sample_interval=first.sample_interval, **more)

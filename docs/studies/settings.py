@@ -168,7 +168,7 @@ def _cost(task: Task) -> float:
     settings = task.settings
     if not isinstance(settings, ContactSettings) or settings.coordinates != "polar":
         return states.cost(task)
-    given, spent = ([task.parameters] * BATCH, [task.x0] * BATCH, task.t_end, [task.flow] * BATCH, settings), []
+    given, spent = ([task.parameters] * BATCH, [task.x0] * BATCH, task.t_end, [task.fluid] * BATCH, settings), []
     for _ in range(states.REPEATS):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of contacts that hover
