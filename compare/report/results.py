@@ -119,7 +119,7 @@ def load(directory: Path) -> Summary:
     """Read the summary; raises `StorageError` if there is none or it is of another version."""
     path = directory / SUMMARY
     if not path.exists():
-        raise StorageError(f"cannot read {path}: there is no such file; run 'dualball validate -o {directory}'")
+        raise StorageError(f"cannot read {path}: No such file or directory; run 'dualball validate -o {directory}'")
     with reading_json(path, "summary that this program reads") as content:
         if (content["schema"], content["schema_version"]) != (SCHEMA, SCHEMA_VERSION):
             raise ValueError("it is in another format; choose another directory with --output")
