@@ -114,49 +114,43 @@ class Balls:
         """Normal forces of the contacts in the last step, shape (2, runs), N and N m."""
         return _rows(self._contact[1])
 
-    def drive_all(self, fluid: Array) -> bool:
-        """Set what drives a step of all runs; do nothing and return False if a ball lands or reaches the axis."""
-        if self._compiled:
-            if not self._compiled(False, True, fluid, self.table, self.qvel, *self._contact, *self._written):
-                return False
-        elif not self._drive(fluid, self._ball, watched=False):
-            return False
-        else:
-            self.last[:] = self.qvel
-        self._contact = self._latest
-        return True
-
-    def drive(self, fluid: Array, moving: Runs, watched: bool = True) -> bool:
+    def drive(self, fluid: Array, moving: Runs | None = None, watched: bool = False) -> bool:
         """Let the margins of the `moving` runs follow the gaps and set what drives the next step.
 
-        Do nothing and return False if a ball lands in the step or reaches the axis, unless that is `watched`.
+        All runs move if None, and note their velocities, for a step that all take. Do nothing and return False if a
+        ball lands in the step or reaches the axis, unless that is `watched`.
         """
-        table = self._still
-        table[:] = self.table
-        table[_GAIN], table[_FALL] = 0.0, np.inf
-        table[_GAIN : _FALL + 1, moving] = self.table[_GAIN : _FALL + 1, moving]
+        whole, table, ball = moving is None, self.table, self._ball
+        if moving is not None:
+            table = self._still
+            table[:] = self.table
+            table[_GAIN], table[_FALL] = 0.0, np.inf
+            table[_GAIN : _FALL + 1, moving] = self.table[_GAIN : _FALL + 1, moving]
         if self._compiled:
-            return bool(self._compiled(watched, False, fluid, table, self.qvel, *self._contact, *self._written))
-        return self._drive(fluid, Ball(*self._quantities(table)), watched)
-
-    def _drive(self, fluid: Array, ball: Ball, watched: bool) -> bool:
-        """As `mjsim.compiled.drive`, without it."""
-        form, read, margins, turn = self._form, self._form.read, self._lean_margins, self._driven[0]
-        place, contact, normals = read(self._place), *(read(each) for each in self._contact)
-        velocity, last = Velocity(*read(self._velocity)), Velocity(*read(self._lean_last))
-        open_ = not watched and form.some(normals[0] * normals[1] == 0)
-        if open_ and form.some(eventful(place, velocity, last, normals, ball)):
-            return False
-        theta, h, y = place
-        margin_A, margin_B = read(margins)
-        margins[0], margins[1] = followed(margin_A, y, ball.gain), followed(margin_B, h, ball.gain)
-        turn[0], turn[3] = form.cos(theta / 2), form.sin(theta / 2)
-        self._orientation[:] = self._upright
-        _, applied, floor, wall = self._driven
-        forces, (floor[0], floor[1], wall[0], wall[1]) = corrections(
-            velocity, last, ball.R - h, form.one(fluid), contact, normals, ball
-        )
-        applied[0], applied[1], applied[2], applied[3], applied[4], applied[5] = forces
+            if not self._compiled(watched, whole, fluid, table, self.qvel, *self._contact, *self._written):
+                return False
+        else:
+            form, read, margins, turn = self._form, self._form.read, self._lean_margins, self._driven[0]
+            ball = ball if whole else Ball(*self._quantities(table))
+            place, contact, normals = read(self._place), *(read(each) for each in self._contact)
+            velocity, last = Velocity(*read(self._velocity)), Velocity(*read(self._lean_last))
+            open_ = not watched and form.some(normals[0] * normals[1] == 0)
+            if open_ and form.some(eventful(place, velocity, last, normals, ball)):
+                return False
+            theta, h, y = place
+            margin_A, margin_B = read(margins)
+            margins[0], margins[1] = followed(margin_A, y, ball.gain), followed(margin_B, h, ball.gain)
+            turn[0], turn[3] = form.cos(theta / 2), form.sin(theta / 2)
+            self._orientation[:] = self._upright
+            _, applied, floor, wall = self._driven
+            forces, (floor[0], floor[1], wall[0], wall[1]) = corrections(
+                velocity, last, ball.R - h, form.one(fluid), contact, normals, ball
+            )
+            applied[0], applied[1], applied[2], applied[3], applied[4], applied[5] = forces
+            if whole:
+                self.last[:] = self.qvel
+        if whole:
+            self._contact = self._latest
         return True
 
     def step(self, runs: Runs) -> None:
@@ -170,7 +164,7 @@ class Balls:
 
         `less`, (6, k), is taken off the forces that drive them.
         """
-        self.drive(fluid, _NONE)
+        self.drive(fluid, _NONE, watched=True)
         self.applied[:, runs] -= less
         self.engine.forward(runs)
         self._note(runs)

@@ -45,7 +45,7 @@ def drive(
     watched: bool, whole: bool, omega_0: Array, balls: Array, qvel: Array, contact: Array, normals: Array,
     last: Array, qpos: Array, margins: Array, turn: Array, applied: Array, floor: Array, wall: Array,
 ) -> bool:  # fmt: skip
-    """As `mjsim.balls.Balls._drive`, for arrays (n, runs)."""
+    """As `mjsim.balls.Balls.drive` without it, for arrays (n, runs)."""
     runs = qpos.shape[1]
     if not watched:
         for k in range(runs):

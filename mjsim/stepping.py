@@ -88,7 +88,7 @@ class Polar:
             row[:, 3 : recorder.NQ] = 1, 0, 0, 0  # as every step begins; others of the batch may have begun one since
             row[:, -1] = balls.leads
         for k, fluid in enumerate(omega_0):
-            if self._whole and balls.drive_all(fluid):
+            if self._whole and balls.drive(fluid):
                 balls.engine.step_all()  # mj_step
                 if sensors is not None:
                     sensors[k] = self._sensors
@@ -107,9 +107,9 @@ class Polar:
         self._more = np.maximum(self._more - _SHARE * (self._steps - self._counted), 0.0)
         self._counted = self._steps
         while len(runs := np.flatnonzero(left)):
-            if np.isfinite(self._passing[0, runs]).any() or not balls.drive(fluid, runs, watched=False):
+            if np.isfinite(self._passing[0, runs]).any() or not balls.drive(fluid, runs):
                 self._watch(runs, fluid)
-                balls.drive(fluid, runs)
+                balls.drive(fluid, runs, watched=True)
             passes = np.isfinite(self._passing[0, runs])
             for k in runs[passes]:
                 axis.advance(balls, k, self._parameters[k], self._passing[:, k])
