@@ -203,19 +203,6 @@ class ContactSettings:
         return self.regularisation_speed(load) * (0.0 if self.memory else 1.0)
 
     @property
-    def servo_gain(self) -> float:
-        """Share of a gap that the servo takes off a margin in one step."""
-        return self.timestep / self.servo if self.servo else 0.0
-
-    def memory_gain(self, m: float) -> float:
-        """Surface velocity per friction force, R_t/b_f, m s-1 N-1, for a ball of mass m.
-
-        With it the friction rows read ``a + R_t (f - f_last) = -b_f v``: once the force is steady nothing is left to
-        creep. The cone stays where it is, and in steady sliding the shift is parallel to the slip.
-        """
-        return self.softness / (m * self.impratio * self.b_f) if self.memory else 0.0
-
-    @property
     def midpoint(self) -> float:
         """Where in a step the forces are taken, in steps after its beginning."""
         return 0.5 if self.order == 2 else 0.0

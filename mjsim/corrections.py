@@ -60,7 +60,7 @@ class Ball(NamedTuple):
     """The time step, s."""
     memory_A: Quantity
     memory_B: Quantity
-    """R_t/b_f of the contacts, surface velocity per friction force, m s-1 N-1."""
+    """R_t/b_f of the contacts, surface velocity per friction force, m s-1 N-1, 0 without memory."""
     lag_A: Quantity
     lag_B: Quantity
     """How many steps after the middle of a step friction takes its direction by itself."""
@@ -82,10 +82,12 @@ class Ball(NamedTuple):
             QUADRATIC: (Re, 0.0, 0.0, p.C_D / 24),
         }
         inertia = p.j * p.m * p.r**2
-        memory, lag, hover = settings.memory_gain(p.m), settings.friction_lag, settings.b_f / settings.softness
+        memory = settings.softness / (p.m * settings.impratio * settings.b_f) if settings.memory else 0.0
+        gain = settings.timestep / settings.servo if settings.servo else 0.0
+        lag, hover = settings.friction_lag, settings.b_f / settings.softness
         return cls(
             p.R, p.r, p.m * p.c, *laws[p.drag], p.m, inertia, inertia * p.fluid_torque, settings.midpoint,
-            settings.servo_gain, settings.slowest_fall(p.g), settings.timestep, memory, memory, lag, lag,
+            gain, settings.slowest_fall(p.g), settings.timestep, memory, memory, lag, lag,
             p.mu * hover, p.eta * hover, p.g or NO_LIMIT,
             (settings.shifts_surfaces and settings.hover) or NO_LIMIT,
         )  # fmt: skip
@@ -183,7 +185,8 @@ def corrections(
     lag_A, lag_B = lag_A + (lag_A > 0) * less_A / 2, lag_B + (lag_B > 0) * less_B / 2
 
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
-    # that speed for the last step's friction f leaves only the change of f to creep. That is the law of `mjsim.memory`;
+    # that speed for the last step's friction f leaves only the change of f to creep: the friction rows then read
+    # a + R_t (f - f_last) = -b_f v, with the cone where it was. That is the law of `mjsim.memory`;
     # surface velocities carry it into a batch, whose steps have no halves. The friction forces follow from
     # contact = (., A_x + B_x, A_y + B_y, -r A_z, r B_z, .).
     (_, inward, upward, about_x, about_y, _), (A_normal, B_normal) = contact, normals

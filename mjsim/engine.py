@@ -231,7 +231,7 @@ def simulate(
     flows, settings = [flow or Flow.steady(p.omega_0)], settings or ContactSettings.for_problem(p)
     asked = [p], [x0], t_end, flows, settings
     run = Run(*asked, sample_interval=sample_interval, theta_0=theta_0, batched=False, progress=progress)
-    (trajectory,) = _joined(run, list(run))
+    (trajectory,) = _carried_out(run)
     if not trajectory.complete:
         raise SimulationError(f"the simulation {trajectory.header.failure}", trajectory)
     return trajectory
@@ -263,12 +263,10 @@ def simulate_many(
     run = Run(
         parameters, x0s, t_end, flows, settings, sample_interval=sample_interval, theta_0=theta_0, progress=progress
     )
-    return _joined(run, list(run))
+    return _carried_out(run)
 
 
-def _joined(run: Run, blocks: Sequence[Blocks]) -> list[Trajectory]:
-    """Trajectories of a run that has come to its end."""
-    return [
-        Trajectory.from_blocks(header, parts, events)
-        for header, parts, events in zip(run.headers, zip(*blocks, strict=True), run.events, strict=True)
-    ]
+def _carried_out(run: Run) -> list[Trajectory]:
+    """The trajectories of a run, to its end."""
+    blocks = zip(*list(run), strict=True)  # before headers and events, which say what happened
+    return [Trajectory.from_blocks(*each) for each in zip(run.headers, blocks, run.events, strict=True)]

@@ -79,7 +79,7 @@ class _Ball:
     def __init__(self, model: Any, p: Parameters, x: npt.ArrayLike, settings: ContactSettings, theta_0: float) -> None:
         self.model = copy.copy(model)  # its margins move
         self.data = mujoco.MjData(self.model)
-        self.p, self._settings, self._ball, self.theta = p, settings, Ball.of(p, settings), theta_0
+        self.p, self._ball, self.theta = p, Ball.of(p, settings), theta_0
         start = to_world(x, theta_0, p)
         self.data.qpos[:] = [*start.position, 1.0, 0.0, 0.0, 0.0]
         self.data.qvel[:] = [*start.velocity, *start.spin]
@@ -88,7 +88,7 @@ class _Ball:
 
     def step(self, omega_0: float) -> tuple[float, float]:
         """Take a step; return the gaps of A and B before it, m."""
-        data, p, gain = self.data, self.p, self._settings.servo_gain
+        data, p, gain = self.data, self.p, self._ball.gain
         x, y, z, *_ = data.qpos.tolist()
         v_x, v_y, v_z, *_ = data.qvel.tolist()
         w_x, w_y, gaps = v_x + omega_0 * y, v_y - omega_0 * x, (z - p.r, p.R - math.hypot(x, y))

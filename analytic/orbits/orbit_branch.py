@@ -19,7 +19,6 @@ from scipy.optimize import brentq
 from analytic.orbits.periodic import (
     RESTITUTION,
     Changes,
-    Loop,
     NoOrbitError,
     Orbit,
     close,
@@ -27,6 +26,7 @@ from analytic.orbits.periodic import (
     defect_jacobian,
     extent,
     lands,
+    refine,
 )
 from model import InputError, Parameters, State
 from model.arrays import Array
@@ -165,7 +165,7 @@ def _way(start: Orbit, name: str, span: tuple[float, float], sign: float, most: 
         if State.of(there.loop.x).y > 0:
             here = replace(there, loop=replace(there.loop, extent=extent(there.cycle)))
         else:
-            here = close(Loop.of(there.p, there.loop.x, there.period, there.loop.restitution))
+            here = refine(there.p, there.loop.x, there.period, there.loop.restitution)
             if (here.loop.case, here.loop.fixed) != (there.loop.case, there.loop.fixed):
                 # The section is another: the parameter alone says which way the branch goes on.
                 along = np.append(np.zeros(len(here.loop.free)), along[-1])

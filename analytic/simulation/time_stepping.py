@@ -17,7 +17,7 @@ Steps and loops over them are in `stepping`, which numba compiles where it is in
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -47,14 +47,6 @@ class Stretches(NamedTuple):
     steps: npt.NDArray[np.int64]
     sampled: npt.NDArray[np.bool_]
     """Whether the end is a sample."""
-
-    @classmethod
-    def of(cls, times: Array, flow: Flow, longest: float) -> Self:
-        """From sample to sample with steps of at most `longest` s."""
-        knots = np.union1d(times, flow.knots(times[-1]))
-        length = np.diff(knots)
-        count = np.ceil(length / longest * (1 - 1e-12)).astype(np.int64)
-        return cls(knots[:-1], length / count, count, np.isin(knots[1:], times))
 
 
 def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder) -> None:
@@ -102,11 +94,14 @@ def prepared(
     t_end = float(times[-1])
     timestep = settings.timestep or fitting_step(500, p, flow, t_end)
     time_scales.check_timestep(timestep, p, flow, t_end, partial(drag.coefficient, p=p))
+    knots = np.union1d(times, flow.knots(t_end))
+    length = np.diff(knots)
+    steps = np.ceil(length / timestep * (1 - 1e-12)).astype(np.int64)
     at = stepping.At(theta, x.y, x.h, rigid_body.velocities(x, p))
     given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution, p.fluid_torque
     return (
         stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),
-        Stretches.of(times, flow, timestep),
+        Stretches(knots[:-1], length / steps, steps, np.isin(knots[1:], times)),
         stepping.FlowArrays(flow.start, flow.value, flow.slope, flow.waves),
         stepping.Constants(drag.law(p), *map(float, given)),  # an integer would be compiled for itself
     )
