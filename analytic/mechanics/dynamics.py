@@ -63,18 +63,17 @@ def contact_forces(
     case = Case(case)
     state, fluid = _checked(case, x, p, omega_0)
     if case is Case.RR:
-        B_y, used = (best := rolling_forces.least_utilisation(state.omega_c, p, fluid)).B_y, best.utilisation
-        if np.any(stuck := (used > 1) | np.isnan(B_y)):
-            value, need = (np.extract(stuck, np.broadcast_to(a, B_y.shape))[0] for a in (state.omega_c, used))
+        best = rolling_forces.least_utilisation(state.omega_c, p, fluid)
+        if np.any(stuck := (best.utilisation > 1) | np.isnan(best.B_y)):
+            value, need = (
+                np.extract(stuck, np.broadcast_to(a, stuck.shape))[0] for a in (state.omega_c, best.utilisation)
+            )
             raise InputError(
                 f"omega_c = {value:g} rad s-1 cannot be rolled at both points: "
                 f"it takes {need:.4g} times the friction there is, the limit is 1"
             )
-        components = rolling_family(state.omega_c, p, fluid, B_y)
-    else:
-        components = forces(case, state, p, fluid)
-    shape = np.broadcast_shapes(np.shape(state.omega_c), np.shape(fluid))
-    both = np.stack([np.broadcast_to(component, shape) for component in components], axis=-1)
+    components = forces(case, state, p, fluid)
+    both = np.stack(np.broadcast_arrays(*components, state.omega_c, fluid)[:6], axis=-1)
     return both[..., :3], both[..., 3:]
 
 
@@ -144,11 +143,16 @@ def forces(
     slip_A: Direction | None = None,
     slip_B: Direction | None = None,
 ) -> Forces:
-    """The forces in every case but RR (`rolling_family`); x is eight variables, not checked.
+    """The forces in a case; x is eight variables, not checked.
 
-    Sine and cosine of the slip directions alpha, beta (8) are taken from x; give `slip_A`, `slip_B` for the limit
+    In RR those of least friction utilisation, or with B_y = 0 where none can hold it. Sine and cosine of the slip
+    directions alpha, beta (8) are taken from x; give `slip_A`, `slip_B` for the limit
     of vanishing slip in a direction (53).
     """
+    if case is Case.RR:
+        _, _, omega_c, *_ = x
+        B_y = np.nan_to_num(rolling_forces.least_utilisation(omega_c, p, omega_0).B_y)
+        return rolling_family(omega_c, p, omega_0, B_y)
     given = zip((case.A, case.B), (slip_A, slip_B), slides(x, p), strict=True)
     slips = (slip or direction(*slide) for contact, slip, slide in given if contact is Contact.S)
     return FORCES[case](x, p, omega_0, *slips)

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from analytic.mechanics import dynamics, rolling_forces
+from analytic.mechanics import dynamics
 from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import charts, transitions, two_point_rolling
 from analytic.simulation.integrator import StalledError, Stretch
@@ -168,13 +168,9 @@ class _Simulator:
 
 def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:
     """Contact forces along a path, shape (n, 6), N; in RR those of least friction utilisation."""
-    x = State.of(path.x)
-    if case is Case.RR:
-        f = dynamics.rolling_family(x.omega_c, p, omega_0, rolling_forces.least_utilisation(x.omega_c, p, omega_0).B_y)
-    else:
-        slip_A = (np.sin(path.alpha), np.cos(path.alpha)) if case.A is Contact.S else None
-        slip_B = (np.sin(path.beta), np.cos(path.beta)) if case.B is Contact.S else None
-        f = dynamics.forces(case, x, p, omega_0, slip_A, slip_B)
+    slip_A = (np.sin(path.alpha), np.cos(path.alpha)) if case.A is Contact.S else None
+    slip_B = (np.sin(path.beta), np.cos(path.beta)) if case.B is Contact.S else None
+    f = dynamics.forces(case, State.of(path.x), p, omega_0, slip_A, slip_B)
     return np.stack(np.broadcast_arrays(*f, path.time)[:6], axis=-1)
 
 

@@ -150,11 +150,7 @@ def _solution(
 ) -> StationarySolution:
     if p.c == 0:  # nothing pulls omega_c to omega_0
         family = (*family, "omega_c")
-    if case is Case.RR:
-        B_y = float(rolling_forces.least_utilisation(x.omega_c, p).B_y)
-        force = dynamics.rolling_family(x.omega_c, p, p.omega_0, 0.0 if np.isnan(B_y) else B_y)
-    else:
-        force = dynamics.forces(case, x, p, p.omega_0)
+    force = dynamics.forces(case, x, p, p.omega_0)
     zeros = len(family)
     if case is Case.NS:  # the reduced field (48), without y
         values, zeros = dynamics.eigenvalues(dynamics.jacobian(case, x, p)[1:, 1:]), zeros - 1
