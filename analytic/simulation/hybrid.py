@@ -20,7 +20,7 @@ from analytic.simulation.motion import REPORT_EVERY, Event, Fluid, Moment, Path,
 from analytic.simulation.settings import Settings
 from analytic.simulation.transitions import Shortest
 from model import Case, Contact, Flow, Parameters, State
-from model.arrays import Array
+from model.arrays import Array, Real
 from model.drag import STOKES
 
 _LEAST_JUMP = 1e-12
@@ -36,17 +36,23 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
     stuck.
     """
     t_end = float(recorder.times[-1])
-    knots = [0.0, *flow.knots(t_end).tolist(), t_end]
     simulator = _Simulator(p, settings, recorder)
-    at, case = Moment(0.0, theta_0, x0), None
-    for start, end in pairwise(knots):
+    at, case, at_once = Moment(0.0, theta_0, x0), None, 0
+    for start, end in pairwise([0.0, *flow.knots(t_end).tolist(), t_end]):
         fluid = Fluid.of(flow, start)
         step = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
         if case is None or step > _LEAST_JUMP * np.abs(flow.value).max():
             before, (case, at, impulse) = case, simulator.settle(at, fluid)
             if (before is not None and before is not case) or impulse is not NOTHING:
                 recorder.events.append(Event(start, case if before is None else before, case, impulse))
-        case, at = simulator.advance(case, at, end, fluid)
+        while at.time < end:
+            since, (guard, at) = at.time, simulator.follow(case, at, end, fluid)
+            if guard:
+                before, (case, at, impulse) = case, simulator.react(guard, case, at, fluid)
+                recorder.events.append(Event(at.time, before, case, impulse))
+            at_once = at_once + 1 if at.time - since <= 1e-14 * end else 0
+            if at_once > MAX_EVENTS_AT_ONCE:
+                raise StalledError(f"no way on from case {case.name} at state {at.x}")
 
 
 class _Simulator:
@@ -61,22 +67,6 @@ class _Simulator:
         self.still = 10 * settings.rtol * math.sqrt(p.g * p.R) / p.r
         """Slip in rad s-1 that counts as zero where the other contact has just stuck."""
 
-    def advance(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[Case, Moment]:
-        """Go on through all events before `until`."""
-        at_once = 0
-        while at.time < until:
-            start = at.time
-            known = case is Case.RR and self.p.drag == STOKES
-            guard, at = self._roll(at, until, fluid) if known else self._follow(case, at, until, fluid)
-            if guard:
-                before = case
-                case, at, impulse = self._react(guard, case, at, fluid)
-                self.recorder.events.append(Event(at.time, before, case, impulse))
-            at_once = at_once + 1 if at.time - start <= 1e-14 * until else 0
-            if at_once > MAX_EVENTS_AT_ONCE:
-                raise StalledError(f"no way on from case {case.name} at state {at.x}")
-        return case, at
-
     def settle(self, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
         """Collide if the ball moves into something it touches, then find the case."""
         x, omega_0, impulse = at.x, fluid(at.time), NOTHING
@@ -84,7 +74,7 @@ class _Simulator:
             at, impulse = transitions.collide(at, self.p, omega_0, self.settings.restitution, self.shortest)
         return *transitions.choose(at, self.p, omega_0, self.settings.leave_rolling), impulse
 
-    def _react(self, guard: str, case: Case, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
+    def react(self, guard: str, case: Case, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
         """What follows when a guard has fired."""
         x = at.x
         match guard:
@@ -115,46 +105,41 @@ class _Simulator:
         return self.settle(at._replace(x=x), fluid)
 
     def _forces_at(self, case: Case, at: Moment, fluid: Fluid) -> Forces:
-        path = Path(*(np.array([value]) for value in at))
-        return Forces(*path_forces(case, path, self.p, np.array([fluid(at.time)]))[0].tolist())
+        return Forces(*path_forces(case, at, self.p, fluid(at.time)).tolist())
 
-    def _roll(self, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
-        """RR with Stokes' drag up to its end or `until`."""
-        p = self.p
-        end = two_point_rolling.end(at, until, p, fluid, self.settings.leave_rolling)
-        stop = until if end is None else end
-        times = self.recorder.times
-        first = int(np.searchsorted(times, at.time, side="right")) if self.recorder.taken else 0
-        times = times[first : int(np.searchsorted(times, stop, side="right"))]
-        path = two_point_rolling.path(np.append(times, stop), at, p, fluid)
-        self._record(Case.RR, path, np.append(np.full(len(times), True), False), fluid)
-        return None if end is None else "RR ends", _moment(path, -1)
-
-    def _follow(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
+    def follow(self, case: Case, at: Moment, until: float, fluid: Fluid) -> tuple[str | None, Moment]:
         """One case up to the first guard or `until`; samples are recorded even if it is interrupted."""
-        motion = charts.chart(case, at, self.p, fluid, self.settings.rtol, self.settings.leave_rolling)
+        p, wanted = self.p, self.recorder.times
+        if case is Case.RR and p.drag == STOKES:
+            end = two_point_rolling.end(at, until, p, fluid, self.settings.leave_rolling)
+            stop, first = until if end is None else end, not self.recorder.taken
+            times = wanted[slice(*np.searchsorted(wanted, [-1.0 if first else at.time, stop], side="right"))]
+            path = two_point_rolling.path(np.append(times, stop), at, p, fluid)
+            self._record(case, path, np.arange(len(times) + 1) < len(times), fluid)
+            return None if end is None else "RR ends", _last(path)
+        motion = charts.chart(case, at, p, fluid, self.settings.rtol, self.settings.leave_rolling)
         lands, until = motion.landing <= until, min(until, motion.landing)
-        times, states = [at.time], [motion.start]
+        reached, states = [at.time], [motion.start]
         sampled, guard = [self.recorder.taken == 0], None
         tolerances = self.settings.rtol, self.absolute
-        stretch = Stretch(motion, at.time, until, self.recorder.times, *tolerances, fluid.steady)
+        stretch = Stretch(motion, at.time, until, wanted, *tolerances, fluid.steady)
         x, hop = at.x, math.inf
         if (x.y == 0 < x.v_y and motion.landing == math.inf) or x.h == 0 < x.v_h:  # it is just rebounding
-            dx = dynamics.newton_euler(case, x, self._forces_at(case, at, fluid), self.p, fluid(at.time))
+            dx = dynamics.newton_euler(case, x, self._forces_at(case, at, fluid), p, fluid(at.time))
             hops = ((x.y, x.v_y, dx.v_y), (x.h, x.v_h, dx.v_h))
             hop = min((2 * v / -a for gap, v, a in hops if gap == 0 < v and a < 0), default=math.inf)
         try:
             for count, step in enumerate(stretch.steps(hop / 20 if hop < until - at.time else None), 1):
-                times += [*step.sample_times, step.time]
+                reached += [*step.sample_times, step.time]
                 states += [*step.samples, step.z]
                 sampled += [True] * len(step.samples) + [False]
                 guard = step.guard
                 if count % REPORT_EVERY == 0:
                     self.recorder.reached(step.time)
         finally:
-            path = motion.path(np.array(times), np.array(states).T)
+            path = motion.path(np.array(reached), np.array(states).T)
             self._record(case, path, np.array(sampled), fluid)
-        return guard or ("A lands" if lands else None), _moment(path, -1)
+        return guard or ("A lands" if lands else None), _last(path)
 
     def _record(self, case: Case, path: Path, wanted: npt.NDArray[np.bool_], fluid: Fluid) -> None:
         if not np.any(wanted):
@@ -166,14 +151,14 @@ class _Simulator:
         self.recorder.add(path.time, path.theta, path.x, forces, case, path.work)
 
 
-def path_forces(case: Case, path: Path, p: Parameters, omega_0: Array) -> Array:
-    """Contact forces along a path, shape (n, 6), N; in RR those of least friction utilisation."""
+def path_forces(case: Case, path: Path | Moment, p: Parameters, omega_0: Real) -> Array:
+    """Contact forces along a path, shape (n, 6), or at a moment, (6,), N; in RR those of least utilisation."""
     slip_A = (np.sin(path.alpha), np.cos(path.alpha)) if case.A is Contact.S else None
     slip_B = (np.sin(path.beta), np.cos(path.beta)) if case.B is Contact.S else None
     f = dynamics.forces(case, State.of(path.x), p, omega_0, slip_A, slip_B)
     return np.stack(np.broadcast_arrays(*f, path.time)[:6], axis=-1)
 
 
-def _moment(path: Path, k: int) -> Moment:
-    at = Moment(*(column[k].tolist() for column in path))
+def _last(path: Path) -> Moment:
+    at = Moment(*(column[-1].tolist() for column in path))
     return at._replace(x=State(*at.x))
