@@ -22,12 +22,12 @@ from scipy.optimize import brentq, linear_sum_assignment
 from compare.claim import Claim, Outcome, Verdict, Witness
 from compare.judge import checks_of, outcome, verdict
 from compare.kit.engines import Engine, engine
-from compare.kit.lab import coarse_step, state_units, time_unit
+from compare.kit.lab import coarse_step, time_unit
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Records, Relation, Testimony
 from compare.kit.statistics import COVERAGE, Measured
 from model.arrays import Array
-from model.kinematics import VARIABLES
+from model.kinematics import VARIABLES, state_units
 
 CEILING, COARSEST = 300.0, 2e-2
 """A check in the limit may overlook so many times as much as one of the engine on trial, but no more than 2 %, unless

@@ -11,6 +11,7 @@ orbit. The world frame has z along the vessel's axis, up from the floor, and the
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -71,6 +72,12 @@ SLIP_XYZ = slice(VARIABLES.index("slip_x"), VARIABLES.index("slip_z") + 1)
 TURNING = slice(VARIABLES.index("omega_c"), VARIABLES.index("slip_z") + 1)
 """omega_c and the slips: all that moves in SS, where both contacts last."""
 UNITS = ("m", "m s-1", "rad s-1", "rad s-1", "rad s-1", "rad s-1", "m", "m s-1")
+
+
+def state_units(p: Parameters) -> Array:
+    """Natural sizes of the state (8,): R, sqrt(g R), sqrt(g/R), and sqrt(g R)/r for slip."""
+    speed = math.sqrt(p.g * p.R)
+    return np.array([p.R, speed, speed / p.R, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
 
 
 class Motion(NamedTuple):

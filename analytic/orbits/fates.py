@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.orbits import periodic as orbits
-from analytic.orbits.periodic import NoOrbitError, Orbit, extent, lands, scale
+from analytic.orbits.periodic import NoOrbitError, Orbit, extent, lands
 from analytic.simulation.ensemble import interval, random_starts, simulate_many
 from analytic.simulation.motion import natural_units
 from analytic.simulation.settings import Settings, fitting_step
@@ -29,7 +29,7 @@ from analytic.stationary.solutions import StationarySolution, stable_solutions
 from model import Flow, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
-from model.kinematics import VARIABLES, full_state
+from model.kinematics import VARIABLES, full_state, state_units
 from model.parameters import POSITIVE, check_number
 
 WINDOW, WINDOW_SAMPLES = 100.0, 4000
@@ -201,7 +201,7 @@ def settle(
 
 def _alike(a: Trajectory, b: Trajectory) -> bool:
     """Whether means and extremes of two windows agree, relative to the range of the motion."""
-    size = scale(a.header.parameters) * max(extent(a), STATIONARY_RANGE)
+    size = state_units(a.header.parameters) * max(extent(a), STATIONARY_RANGE)
     return all(
         bool(np.all(np.abs(of(a.x, axis=0) - of(b.x, axis=0)) <= ALIKE * size)) for of in (np.mean, np.min, np.max)
     )
@@ -210,7 +210,7 @@ def _alike(a: Trajectory, b: Trajectory) -> bool:
 def _nearest(last: Trajectory, solutions: Sequence[StationarySolution]) -> StationarySolution | None:
     """The stationary solution nearest to the last state, free variables aside; of two in one state that of its case."""
     x, case = last.x[-1], last.cases[-1]
-    size = scale(last.header.parameters)
+    size = state_units(last.header.parameters)
 
     def distance(of: StationarySolution) -> float:
         bound = [k for k, name in enumerate(VARIABLES) if name not in of.family]
@@ -227,7 +227,7 @@ def periodic(last: Trajectory) -> Fate | None:
     quarter of the window and what was a lag of up to half the window earlier.
     """
     p, size = last.header.parameters, extent(last)
-    z, n, interval = last.x / scale(p), len(last.x) // 2, float(last.time[1] - last.time[0])
+    z, n, interval = last.x / state_units(p), len(last.x) // 2, float(last.time[1] - last.time[0])
     away = np.array([np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)])
     left = int(np.argmax(away > size / 2))
     dips = np.array([k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]], dtype=int)
@@ -265,13 +265,13 @@ def lyapunov(
     active = [VARIABLES.index(name) for name in TRAITS[case].active]
     push = np.zeros(8)
     push[active] = np.random.default_rng(0).normal(size=len(active))
-    second = first + push * scale(p) * APART / np.linalg.norm(push)
+    second = first + push * state_units(p) * APART / np.linalg.norm(push)
     growth, before = [], APART
     for _ in range(math.ceil(duration / renewed)):
         runs = [run(p, each, renewed, renewed) for each in (first, second)]
         first, second = (each.x[-1] for each in runs)
         apart = second - first
-        distance = float(np.linalg.norm(apart / scale(p)))
+        distance = float(np.linalg.norm(apart / state_units(p)))
         if distance == 0:
             return -math.inf, 0.0
         growth.append(math.log(distance / before))

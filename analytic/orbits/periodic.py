@@ -20,13 +20,12 @@ import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from analytic.mechanics import dynamics
-from analytic.simulation.motion import natural_units
 from analytic.simulation.settings import Settings
 from analytic.simulation.simulator import simulate
 from model import Case, Contact, InputError, Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
-from model.kinematics import VARIABLES
+from model.kinematics import VARIABLES, state_units
 
 RETURN_RTOL = 1e-12
 """Relative tolerance of the simulation under the return map."""
@@ -95,7 +94,7 @@ class Loop:
             raise NoOrbitError(f"the ball rolls at both points all the time (period {period:g} s)")
         case, start, end = max(stretches, key=lambda each: each[2] - each[1])
         inner = np.abs(run.time - (start + end) / 2) <= (end - start) / 4
-        rates = np.abs([dynamics.rates(case, z, p, p.omega_0) for z in run.x[inner].tolist()]) / scale(p)
+        rates = np.abs([dynamics.rates(case, z, p, p.omega_0) for z in run.x[inner].tolist()]) / state_units(p)
         active = _active(case)
         at, fixed = np.unravel_index(np.argmax(rates[:, active]), (len(rates), len(active)))
         return cls(p, case, run.x[inner][at], period, active[int(fixed)], size, restitution)
@@ -119,7 +118,7 @@ class Loop:
 
     def coordinates(self, x: Array) -> Array:
         """Coordinates (..., d - 1) of states (..., 8), or of differences of states."""
-        return np.asarray(x[..., self.free] / scale(self.p)[self.free])
+        return np.asarray(x[..., self.free] / state_units(self.p)[self.free])
 
     def moved(self, by: Array, varied: str | None = None) -> Loop:
         """Moved by coordinates (d - 1,) and, if a parameter is `varied`, by its logarithm, (d,).
@@ -127,7 +126,7 @@ class Loop:
         Raises `NoOrbitError` where that leads out of the range of the parameter.
         """
         x = self.x.copy()
-        x[self.free] += by[: len(self.free)] * scale(self.p)[self.free]
+        x[self.free] += by[: len(self.free)] * state_units(self.p)[self.free]
         if self.case is Case.RN:
             x = State.of(x)._replace(slip_z=-State.of(x).v_h / self.p.r).stacked()
         moved = replace(self, x=x)
@@ -147,7 +146,7 @@ class Loop:
             return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))
 
         run = _simulated(self.p, self.x, self.period, 1, self.restitution)
-        tolerance = RETURN_RTOL * scale(self.p)
+        tolerance = RETURN_RTOL * state_units(self.p)
         if run.cases[-1] is not self.case:
             raise NoOrbitError(f"after {self.period:g} s the ball is in {run.cases[-1].name}, not in {self.case.name}")
         x, late = run.x[-1], 0.0
@@ -287,13 +286,7 @@ def defect_jacobian(loop: Loop, derivative: Array, varied: str | None = None) ->
 
 def extent(run: Trajectory) -> float:
     """Largest range of a state variable in a run, in natural units."""
-    return float((np.ptp(run.x, axis=0) / scale(run.header.parameters)).max())
-
-
-def scale(p: Parameters) -> Array:
-    """Natural size of each state variable, shape (8,)."""
-    time, speed, spin, _ = natural_units(p)
-    return np.array([p.R, speed, 1 / time, spin, spin, spin, p.R, speed])
+    return float((np.ptp(run.x, axis=0) / state_units(run.header.parameters)).max())
 
 
 def _simulated(p: Parameters, x: npt.ArrayLike, duration: float, samples: int, restitution: float) -> Trajectory:

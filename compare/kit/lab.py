@@ -16,7 +16,6 @@ from compare.kit.engines import Engine
 from compare.kit.levels import Level
 from compare.kit.tasks import Task
 from model import Flow, Parameters, Trajectory
-from model.arrays import Array
 from model.drag import STOKES
 
 
@@ -85,12 +84,6 @@ class Lab:
 def time_unit(p: Parameters) -> float:
     """sqrt(R/g), s: the time in which the ball falls by half of R."""
     return math.sqrt(p.R / p.g)
-
-
-def state_units(p: Parameters) -> Array:
-    """Natural sizes of the state (8,): R, sqrt(g R), sqrt(g/R), and sqrt(g R)/r for slip."""
-    speed = math.sqrt(p.g * p.R)
-    return np.array([p.R, speed, speed / p.R, speed / p.r, speed / p.r, speed / p.r, p.R, speed])
 
 
 def dragged_speed(p: Parameters) -> float:

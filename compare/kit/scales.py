@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from compare.kit.lab import state_units
 from compare.kit.settling import GROUPS, scale
 from compare.kit.short import slip_unit
 from model import Parameters
-from model.kinematics import VARIABLES
+from model.kinematics import VARIABLES, state_units
 
 _SETTLED = frozenset(name for group in GROUPS for name in group)
 _RATIOS = frozenset({"slope", "steepest", "filippov_share", "response", "law_in_motion"})

@@ -15,6 +15,7 @@ from analytic.orbits.periodic import NoOrbitError, Orbit
 from analytic.simulation import ensemble
 from model import Case, Events, Flow, Header, InputError, Parameters, State, Trajectory
 from model.arrays import Array
+from model.kinematics import state_units
 from model.trajectory import SAMPLE
 
 HOPPING = Parameters.named("hopping")
@@ -40,7 +41,7 @@ def test_newton_closes_the_orbit(hop: Orbit, swing: Orbit) -> None:
     for orbit in (hop, swing):
         assert orbit.steps <= 8
         run = simulate(orbit.p, orbit.loop.x, 5 * orbit.period, sample_interval=orbit.period, rtol=1e-11)
-        away = np.abs(run.x - orbit.loop.x) / orbits.scale(orbit.p)
+        away = np.abs(run.x - orbit.loop.x) / state_units(orbit.p)
         # Each period adds about the defect and the tolerance, of which every disturbance dies out.
         assert away.max() < 5 * (orbits.CLOSED + 1e-9)
         assert orbit.turn == pytest.approx((run.theta[-1] - run.theta[0]) / 5, rel=1e-8)
@@ -196,7 +197,7 @@ def slipping_by(rates: Callable[[float, Array], Array]) -> Run:
     """A simulator of a ball that slips at both points, with omega_c and slips of these rates in natural units."""
 
     def run(p: Parameters, x0: Array, duration: float, interval: float) -> Trajectory:
-        size, unit = orbits.scale(p)[2:6], (p.R / p.g) ** 0.5
+        size, unit = state_units(p)[2:6], (p.R / p.g) ** 0.5
         time = np.arange(round(duration / interval) + 1) * interval
         z = solve_ivp(rates, (0, time[-1] / unit), x0[2:6] / size, "DOP853", time / unit, rtol=1e-10, atol=1e-12).y
         block = np.zeros(len(time), SAMPLE)
@@ -218,7 +219,7 @@ def test_recurrent_motions_that_do_not_close(
     """Flows whose largest Lyapunov exponents are known."""
     monkeypatch.setattr(fates, "GROWING", 100.0)
     unit = (HOPPING.R / HOPPING.g) ** 0.5
-    start = np.concatenate([[0, 0], np.array([0.5, 1.0, 1.0, 2.0]) * orbits.scale(HOPPING)[2:6]])
+    start = np.concatenate([[0, 0], np.array([0.5, 1.0, 1.0, 2.0]) * state_units(HOPPING)[2:6]])
     (only,) = attractors(HOPPING, start, lasting=3 * fates.WINDOW * unit, run=slipping_by(rates))
     assert only.fate.kind is kind
     # The growth in a turn of a tenth of a unit scatters by about itself: over 100 units its mean by some 3 %.

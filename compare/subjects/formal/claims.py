@@ -22,11 +22,10 @@ from analytic.mechanics import dynamics
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary import slipping_branch
 from compare.claim import Claim, Text
-from compare.kit.lab import state_units
 from compare.kit.record import Check, Measurement
 from compare.kit.statistics import COVERAGE
 from model import Case, Flow, Parameters, State, drag
-from model.kinematics import TURNING, VARIABLES
+from model.kinematics import TURNING, VARIABLES, state_units
 
 FORMAL = Parameters.named("reference").replace(eta=0.43)
 """eta so little above j that the branch of SS is whole once (12) is released."""

@@ -9,13 +9,12 @@ from analytic import StationarySolution
 from analytic.mechanics import dynamics
 from compare.claim import Bearing, Claim, Text, given
 from compare.judge import theory
-from compare.kit.lab import state_units
 from compare.kit.record import Measurement
 from compare.subjects.stability.measure import natural_size
 from model import Case, Parameters, State
 from model.arrays import Array
 from model.cases import TRAITS
-from model.kinematics import VARIABLES
+from model.kinematics import VARIABLES, state_units
 
 _JACOBIAN = "analytic.stationary_solutions: eigenvalues of the exact Jacobian"
 _LEANING = "analytic.leaning_modes"

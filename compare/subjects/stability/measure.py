@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from compare.kit.engines import STUDY_SLIP
 from compare.kit.fits import exponents, matched, propagator
-from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.programme import LAWS, ONE, Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
@@ -33,7 +33,7 @@ from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.drag import QUADRATIC, STOKES
-from model.kinematics import SLIP_XYZ, VARIABLES, slip_speeds
+from model.kinematics import SLIP_XYZ, VARIABLES, slip_speeds, state_units
 
 PROTOCOL = "rates"
 RECORD = (64, 256)

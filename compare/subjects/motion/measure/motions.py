@@ -19,7 +19,7 @@ from itertools import product
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, measurement, state_of
 from compare.kit.settling import PRESSES
 from compare.kit.short import (
@@ -40,7 +40,7 @@ from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
 from model.drag import STOKES
-from model.kinematics import VARIABLES, slip_velocities
+from model.kinematics import VARIABLES, slip_velocities, state_units
 
 SEED = 53
 CENTRES = (16, 40, 64)

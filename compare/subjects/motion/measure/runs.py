@@ -21,13 +21,13 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Condition, Measurement, Missing, Records, state_of
 from compare.kit.settling import PRESSES, reading
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start, Trial, carry_out
 from model import Parameters, State
-from model.kinematics import VARIABLES
+from model.kinematics import VARIABLES, state_units
 
 STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
     "thrown": (0.4, 3.0, (60.0, 1.0, 0.5, 0.6, -0.8, 0.4, 0.6, 0.1)),

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from compare.kit.fits import straight_line, vanishing, zero_and_slope
-from compare.kit.lab import Lab, coarse_step, state_units, time_unit
+from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import begin, settle_groups
 from compare.kit.short import DOUBT, LIMIT, REFINED, lag_error, polynomials, slip_unit
@@ -29,6 +29,7 @@ from compare.subjects.slipping.measure.growth import SMOOTH, Push, without_size
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
+from model.kinematics import state_units
 
 AROUND, AROUND_BENT = (0.7, 1.3), (0.8, 1.1)
 """The second two flows, divided by the zero that the first two show; and where the law of drag bends the line."""
