@@ -47,9 +47,8 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str,
     return data(directory)
 
 
-@pytest.mark.parametrize(("workers", "batch"), [(1, 7), (2, 2)])
-def test_workers_and_batches_change_no_bit(tmp_path: Path, undisturbed, workers: int, batch: int) -> None:
-    with Campaign(tmp_path, workers, batch) as campaign:
+def test_workers_and_batches_change_no_bit(tmp_path: Path, undisturbed) -> None:
+    with Campaign(tmp_path, workers=2, batch=2) as campaign:
         assert campaign.complete(reversed(tasks())) == []
     assert data(tmp_path) == undisturbed
 

@@ -32,43 +32,37 @@ NUMBERS = SimpleNamespace(each=list, effort=lambda name: 7)
 """Stands for a lab whose tasks are their own runs."""
 
 
+def narrowed(answer, width, task=lambda v, b, care: (v, care), careful=True):
+    """The bracket in which an answer to (value, care) changes, from 0 to 1."""
+    (bracket,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), task, answer, width)], careful=careful)
+    return bracket
+
+
 def test_bisection_closes_in_on_the_change():
-    search = Search(Bracket(0.0, 1.0), lambda v, b, care: v, lambda v: v < math.pi / 10, 1e-6)
-    (bracket,) = narrow(NUMBERS, [search])
+    bracket = narrowed(lambda run: run[0] < math.pi / 10, 1e-6)
     assert bracket.low < math.pi / 10 < bracket.high <= bracket.low + 1e-6
     assert bracket.shift == 0
-    (bracket,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), search.task, lambda v: True, 0.5)], careful=False)
-    assert bracket.runs[1] is None  # an end that was never asked shows
+    assert narrowed(lambda run: True, 0.5, careful=False).runs[1] is None  # an end that was never asked shows
+    moves = narrowed(lambda run: run[0] < (0.31 if run[1] is FINER else 0.3), 1e-4)  # with the time step
+    assert moves.low < 0.3 < moves.high
+    assert moves.place.uncertainty >= moves.shift > 0
 
 
-def test_undecided_runs_are_repeated_and_else_left_open():
+def test_runs_that_are_undecided_or_break_down_leave_the_place_open():
+    """What is undecided is run again, for longer; what broke says why."""
+
     def answer(run):
         value, care = run
         if abs(value - 0.5) < 0.1:
             return value < 0.47 if care is LONGER and value < 0.47 else None
         return value < 0.5
 
-    search = Search(Bracket(0.0, 1.0), lambda v, b, care: (v, care), answer, 1e-3)
-    (bracket,) = narrow(NUMBERS, [search], careful=False)
+    bracket = narrowed(answer, 1e-3, careful=False)
     assert bracket.low < 0.47 <= 0.5 < bracket.high
     assert bracket.high - bracket.low > 0.1
-
-
-def test_a_change_that_moves_with_the_time_step_is_uncertain():
-    def task(value, bracket, care):
-        return value, 0.31 if care is FINER else 0.3
-
-    (bracket,) = narrow(NUMBERS, [Search(Bracket(0.0, 1.0), task, lambda run: run[0] < run[1], 1e-4)])
-    assert bracket.low < 0.3 < bracket.high
-    assert bracket.shift > 0
-    assert bracket.place.uncertainty >= bracket.shift
-
-
-def test_a_run_that_breaks_down_leaves_the_place_open_and_says_why():
-    search = Search(Bracket(0.0, 1.0), lambda v, b, care: v if abs(v - 0.5) > 0.1 else "broke", lambda v: v < 0.5, 1e-3)
-    (bracket,) = narrow(NUMBERS, [search])
-    assert bracket.low < 0.4 < 0.6 < bracket.high
-    assert bracket.failure == "broke"
+    broken = narrowed(lambda v: v < 0.5, 1e-3, lambda v, b, care: v if abs(v - 0.5) > 0.1 else "broke")
+    assert broken.low < 0.4 < 0.6 < broken.high
+    assert broken.failure == "broke"
 
 
 @pytest.mark.parametrize(("eta", "lost"), [(0.99, False), (1.01, True)])
@@ -158,12 +152,16 @@ def _settled(name, p, flows):
             yield measured("settled", "case", float(case), 0.0, q, name, start=start, case=case.name)
 
 
+def _thick(lab):
+    """Thresholds of a set without fold."""
+    sets_of_one = {name: p for name, p in sets(Level.QUICK).items() if name == "thick-fluid"}
+    known = (row for name, p in sets_of_one.items() for row in _settled(name, p, (0.6, 1.4, 2.5)))
+    return Records.of(thresholds.measure(lab, sets_of_one, Records(tuple(known))))
+
+
 def test_protocol_on_a_set_without_fold(lab):
     """No flow of the settled states is beyond the end of slipping."""
-    name = "thick-fluid"
-    p = sets(Level.QUICK)[name]
-    known = Records(tuple(_settled(name, p, (0.6, 1.4, 2.5))))
-    records = Records.of(thresholds.measure(lab, {name: p}, known))
+    records = _thick(lab)
     kinds = {(m.quantity, m.conditions.get("by")) for m in records.measurements}
     assert len(kinds) == 7
     assert {quantity for quantity, _ in kinds} == {"omega_01", "omega_02", "lifts", "folds"}
@@ -177,10 +175,8 @@ def test_protocol_on_a_set_without_fold(lab):
 
 
 def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(lab, monkeypatch):
-    p = sets(Level.QUICK)["thick-fluid"]
-    known = Records(tuple(_settled("thick-fluid", p, (0.6, 1.4, 2.5))))
     monkeypatch.setattr(thresholds, "extrapolated", lambda *what: None)
-    records = Records.of(thresholds.measure(lab, {"thick-fluid": p}, known))
+    records = _thick(lab)
     assert any("points to no flow at which it ends" in each.reason for each in records.missing)
     assert [m.value for m in records.select("thresholds", "folds")] == [1.0]  # an end is seen, and no smooth one
 

@@ -82,6 +82,8 @@ def test_errors_order_creep_and_cost():
     assert found.lost == 0
     assert found.cost >= 0
     assert run(BY_NAME["growing-pull"], Exact()).skipped == "no forces"
+    # Steps between which samples lie.
+    assert run(BY_NAME["sphere-rolls-down"], "compare.bench.adapters.mujoco_free", [3e-3]).passed
 
 
 @pytest.mark.parametrize(
@@ -108,10 +110,6 @@ def test_a_version_that_broke_is_named(tmp_path, monkeypatch):
     found = run(STOPS, "old")
     assert found.failure.startswith("RuntimeError: gone (numpy ")
     assert found.failure.endswith("known to work: 0.1)")
-
-
-def test_steps_between_which_samples_lie():
-    assert run(BY_NAME["sphere-rolls-down"], "compare.bench.adapters.mujoco_free", [3e-3]).passed
 
 
 def test_the_league_of_theory_alone(tmp_path, capsys):
