@@ -176,17 +176,6 @@ def test_a_jump_of_the_flow_ends_rolling_at_once():
     assert run.events.from_case[0] == Case.RR
 
 
-def test_a_ball_lifts_off_the_floor_and_rides_the_wall():
-    """Beyond the tip of the cone at omega_03 a rough wall carries the ball: NR or SR take over, A_y never negative."""
-    p = Parameters.named("high-wall-friction").replace(omega_0=25.0)
-    run = simulate(p, [0, 0, 12.0, 0, 0, 0], 20.0, sample_interval=0.05)
-    assert Case.RR in run.cases
-    assert run.cases[-1] in (Case.NR, Case.SR)
-    assert run.omega_c[-1] == pytest.approx(25.0, abs=25 * math.exp(-(20 - 2) / (1 + 2 * p.j)))
-    assert run.force_A[:, 1].min() >= -RTOL * p.m * p.g
-    assert balance(run) < 10 * RTOL
-
-
 def test_near_the_axis_is_an_ordinary_place():
     """A flight that passes 1e-7 m from the axis is a straight line (no drag), though omega_c is huge there."""
     p = P.replace(c=0.0)

@@ -136,7 +136,7 @@ def test_the_set_as_files(tmp_path, capsys):
     with h5py.File(tmp_path / "set" / "cases.h5") as file:
         for case in cases():
             data = json.loads((tmp_path / "set" / f"{case.name}.json").read_text())
-            assert np.array_equal(data["exact"], case.exact)
+            assert (data["version"], data["exact"]) == (VERSION, case.exact.tolist())
             assert np.array_equal(file[case.name]["exact"], case.exact)
             assert file[case.name]["contacts"].asstr()[:].tolist() == list(case.contacts)
     assert cli.main(["cases", "lands"]) == 0

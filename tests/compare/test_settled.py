@@ -194,6 +194,3 @@ class TestPlane:
         assert len(masks) + sum(isinstance(row, Missing) for row in rows) >= 2
         for m in masks:
             assert int(m.value) & (1 << Case.NR | 1 << Case.NS)  # what starts on the wall stays or sinks
-
-    def test_sr_counts_as_nr(self) -> None:
-        assert settling.family(Case.SR) is Case.NR

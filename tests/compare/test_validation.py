@@ -14,7 +14,6 @@ from compare import validation
 from compare.claim import Bearing, Claim, Outcome, Verdict
 from compare.commands import cli
 from compare.kit import programme
-from compare.kit.campaign import Campaign
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
@@ -74,9 +73,14 @@ def run(directory: Path, **how: object) -> dict[str, Outcome]:
     return {verdict.claim.id: verdict.outcome for verdict in verdicts}
 
 
-def test_one_failure_takes_its_own_claim_only(tmp_path: Path, counted: list[str]) -> None:
-    assert run(tmp_path) == {"of-round": "confirmed", "of-broken": "error", "of-after": "not run"}
+def test_one_failure_takes_its_own_claim_only_and_a_set_that_never_settles_is_named(
+    tmp_path: Path, counted: list[str]
+) -> None:
+    verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=SETS, workers=0)
+    assert [verdict.outcome for verdict in verdicts] == ["confirmed", "error", "not run"]
     assert (tmp_path / results.REPORT).exists()
+    assert [*map(str, verdicts[0].missing)] == [f"undamped: {UNDAMPED}"]
+    assert {check.measurement.set for check in verdicts[0].checks} == {"mine"}
 
 
 def test_an_engine_that_is_named_is_heard_alone(tmp_path: Path, counted: list[str]) -> None:
@@ -128,75 +132,52 @@ def test_verdicts_are_announced_as_they_come(
     assert seen[0] != "of-waiting"
 
 
-def test_a_set_that_never_settles_is_named(tmp_path: Path, counted: list[str]) -> None:
-    verdicts = validation.validate(tmp_path, level=Level.QUICK, sets=SETS, workers=0)
-    assert [*map(str, verdicts[0].missing)] == [f"undamped: {UNDAMPED}"]
-    assert {check.measurement.set for check in verdicts[0].checks} == {"mine"}
-
-
-def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path: Path) -> None:
+def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path: Path, lab: Lab) -> None:
     seen: list[str] = []
 
     def measure(lab: Lab, sets: Mapping[str, Parameters], before: Records) -> Rows:
         seen.extend(sets)
         yield from ()
 
-    with Campaign(tmp_path / "runs", workers=0) as campaign:
-        lab = Lab(campaign, MUJOCO, Level.QUICK)
-        named = {name: Parameters.named(name) for name in ("air", "steel-in-water")}
-        for waits in (True, False):
-            protocol = Protocol(f"waits-{waits}", measure, waits=waits)
-            missing = programme.carry_out(protocol, lab, named, Records(), tmp_path / "kept").missing
-            assert [m.set for m in missing] == ["air"] * waits
-            assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in missing)
+    named = {name: Parameters.named(name) for name in ("air", "steel-in-water")}
+    for waits in (True, False):
+        protocol = Protocol(f"waits-{waits}", measure, waits=waits)
+        missing = programme.carry_out(protocol, lab, named, Records(), tmp_path).missing
+        assert [m.set for m in missing] == ["air"] * waits
+        assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in missing)
     assert seen == ["steel-in-water", "air", "steel-in-water"]
 
 
-def test_another_engine_may_measure(tmp_path: Path) -> None:
-    """Its measurements name it, whoever is on trial."""
-    with Campaign(tmp_path / "runs", workers=0) as campaign:
-        lab = Lab(campaign, MUJOCO, Level.QUICK)
-        named = {"mine": SETS["mine"]}
-        for name, engine in (("on trial", None), ("other", EVENT)):
-            protocol = Protocol(name, going_round, engine=engine)
-            (row,) = programme.carry_out(protocol, lab, named, Records(), tmp_path / "kept").measurements
-            assert row.engine == (engine or MUJOCO).name
+def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(
+    tmp_path: Path, lab: Lab
+) -> None:
+    for name, engine in (("on trial", None), ("other", EVENT)):
+        protocol = Protocol(name, going_round, engine=engine)
+        (row,) = programme.carry_out(protocol, lab, {"mine": SETS["mine"]}, Records(), tmp_path).measurements
+        assert row.engine == (engine or MUJOCO).name
+    for name, count in (("mine", 1), ("reference", 0)):
+        protocol = Protocol(f"of-{name}", lambda lab, sets, records: (), alone="it is that of the reference")
+        missing = programme.carry_out(protocol, lab, {name: SETS["mine"]}, Records(), tmp_path).missing
+        assert missing == (Missing(f"of-{name}", name, "it is that of the reference", 0),) * count
 
 
-def test_what_only_the_reference_shows_is_missing_without_it(tmp_path: Path) -> None:
-    with Campaign(tmp_path / "runs", workers=0) as campaign:
-        lab = Lab(campaign, MUJOCO, Level.QUICK)
-        for name, count in (("mine", 1), ("reference", 0)):
-            protocol = Protocol(f"of-{name}", lambda lab, sets, records: (), alone="it is that of the reference")
-            missing = programme.carry_out(protocol, lab, {name: SETS["mine"]}, Records(), tmp_path / "kept").missing
-            assert missing == (Missing(f"of-{name}", name, "it is that of the reference", 0),) * count
-
-
-def test_other_sets_are_kept_apart(tmp_path: Path, counted: list[str]) -> None:
-    run(tmp_path)
-    validation.validate(tmp_path, level=Level.QUICK, sets={"mine": SETS["mine"].replace(mu=0.3)}, workers=0)
-    assert counted.count("round") == 2
-    assert len(list(tmp_path.glob("measurements/*/round.h5"))) == 2
-
-
-def test_stored_measurements_are_judged_again(tmp_path: Path, counted: list[str]) -> None:
+def test_stored_measurements_are_judged_again_those_of_other_sets_apart(tmp_path: Path, counted: list[str]) -> None:
+    """A file that was touched, or is gone, is named."""
     run(tmp_path)
     (tmp_path / results.REPORT).unlink()
     verdicts = validation.judge_stored(tmp_path, ["of-round"])
     assert [verdict.outcome for verdict in verdicts] == [Outcome.CONFIRMED]
     assert (tmp_path / results.REPORT).exists()
     assert counted == ["round", "broken", "after"]
-
-
-def test_a_file_that_was_touched_is_named(tmp_path: Path, counted: list[str]) -> None:
-    run(tmp_path)
     (path,) = tmp_path.glob("measurements/*/round.h5")
-    path.write_bytes(path.read_bytes()[:-100])
-    with pytest.raises(StorageError, match=r"round\.h5"):
-        validation.judge_stored(tmp_path)
-    path.unlink()
-    with pytest.raises(StorageError, match=r"round\.h5"):
-        validation.judge_stored(tmp_path)
+    for spoil in (lambda: path.write_bytes(path.read_bytes()[:-100]), path.unlink):
+        spoil()
+        with pytest.raises(StorageError, match=r"round\.h5"):
+            validation.judge_stored(tmp_path)
+    run(tmp_path)
+    validation.validate(tmp_path, level=Level.QUICK, sets={"mine": SETS["mine"].replace(mu=0.3)}, workers=0)
+    assert counted.count("round") == 3
+    assert len(list(tmp_path.glob("measurements/*/round.h5"))) == 2
 
 
 @pytest.mark.parametrize("command", ["validate", "judge"])

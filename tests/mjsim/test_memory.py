@@ -31,6 +31,15 @@ def scene(slope=0.0, mu=0.6, cone="elliptic", boxes=1, geom=BOX, option="", fric
     return model, mujoco.MjData(model)
 
 
+def creep(model):
+    """How far bodies move in 500 steps after 2500, m."""
+    data, stepper = mujoco.MjData(model), FrictionMemory(model)
+    stepper.step(data, 2500)
+    place = data.xpos.copy()
+    stepper.step(data, 500)
+    return np.abs(data.xpos - place).max()
+
+
 @CONES
 @pytest.mark.parametrize(
     ("option", "more"),
@@ -49,12 +58,7 @@ def test_nothing_creeps(cone, option, more):
 
     What is left is the solver's: with its default tolerance, 1e-8, about 1e-12 m/s, with implicit integrators 1e-10.
     """
-    model, data = scene(np.radians(10), cone=cone, option=f'tolerance="1e-14" {option}', **more)
-    stepper = FrictionMemory(model)
-    stepper.step(data, 2500)
-    place = data.xpos.copy()
-    stepper.step(data, 500)
-    assert np.abs(data.xpos - place).max() < 1e-12  # in a second
+    assert creep(scene(np.radians(10), cone=cone, option=f'tolerance="1e-14" {option}', **more)[0]) < 1e-12
 
 
 @CONES
@@ -67,17 +71,6 @@ def test_breaks_away_at_the_limit(cone):
         if share > 0.97 and data.qvel[0] > 1e-5:
             break
     assert share == pytest.approx(1, abs=5e-3)
-
-
-@CONES
-def test_fast_sliding_is_the_engines_own(cone):
-    model, data = scene(np.radians(30), mu=0.3, cone=cone)
-    mujoco.mj_step(model, data, 100)
-    plain = mujoco.MjData(model)
-    mujoco.mj_copyData(plain, model, data)
-    FrictionMemory(model).step(data, 400)
-    mujoco.mj_step(model, plain, 400)
-    assert data.qpos == pytest.approx(plain.qpos, rel=1e-12)
 
 
 @CONES
@@ -143,13 +136,22 @@ def test_a_state_that_mujoco_resets_is_forgotten(array, value, tmp_path, monkeyp
 
 
 @CONES
-@pytest.mark.parametrize(("condim", "solref"), [(1, (0.02, 1)), (3, (-1000, 0))])
-def test_contacts_without_friction_or_damping_are_left_alone(cone, condim, solref):
-    model, data = scene(0.1, cone=cone, condim=condim, geom=BALL)
+@pytest.mark.parametrize(
+    ("given", "solref", "begin"),
+    [
+        ({"slope": np.radians(30), "mu": 0.3}, (0.02, 1), 100),
+        ({"slope": 0.1, "condim": 1, "geom": BALL}, (0.02, 1), 0),
+        ({"slope": 0.1, "geom": BALL}, (-1000, 0), 0),
+    ],
+)
+def test_fast_sliding_and_contacts_without_friction_or_damping_are_the_engines_own(cone, given, solref, begin):
+    model, data = scene(cone=cone, **given)
     model.geom_solref[:] = solref
+    mujoco.mj_step(model, data, begin)
     plain = mujoco.MjData(model)
-    FrictionMemory(model).step(data, 300)
-    mujoco.mj_step(model, plain, 300)
+    mujoco.mj_copyData(plain, model, data)
+    FrictionMemory(model).step(data, 400)
+    mujoco.mj_step(model, plain, 400)
     assert data.qpos == pytest.approx(plain.qpos, rel=1e-12)
 
 
@@ -207,13 +209,7 @@ def apart(data, stepper, steps):
 
 @pytest.mark.parametrize("name", [path.name for path in SCENES.glob("*.xml")])
 def test_scenes_of_the_page_hold(name):
-    model = mujoco.MjModel.from_xml_path(str(SCENES / name))
-    data = mujoco.MjData(model)
-    stepper = FrictionMemory(model)
-    stepper.step(data, 2500)
-    place = data.xpos.copy()
-    stepper.step(data, 500)
-    assert np.abs(data.xpos - place).max() < 1e-12
+    assert creep(mujoco.MjModel.from_xml_path(str(SCENES / name))) < 1e-12
 
 
 def test_forces_turn_with_a_hand():

@@ -1,7 +1,6 @@
 import dataclasses
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -136,24 +135,6 @@ def test_no_directory_to_write_to(tmp_path: Path) -> None:
         storage.save(make(), tmp_path / "absent" / "run.h5")
     with pytest.raises(StorageError, match=r"^cannot read .*: there is no such file$"):
         storage.load(tmp_path / "absent.h5")
-
-
-def test_a_full_disk_is_one_line_and_leaves_no_file(tmp_path: Path) -> None:
-    """A limit on the size of files, in a process of its own, plays the disk that is full."""
-    program = f"""
-import resource, sys
-sys.path.insert(0, {str(Path(__file__).parent)!r})
-import test_storage
-resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
-try:
-    test_storage.storage.save(test_storage.make(5000), {str(tmp_path / "run.h5")!r})
-except test_storage.StorageError as error:
-    print(error)
-"""
-    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
-    assert answer.stdout == f"cannot write {tmp_path / 'run.h5'}: File too large\n"
-    assert answer.stderr == ""
-    assert list(tmp_path.iterdir()) == []
 
 
 def edit(path: Path, change) -> None:
