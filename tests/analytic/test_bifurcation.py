@@ -6,13 +6,7 @@ import sympy as sp
 
 from analytic import stationary_solutions, thresholds
 from analytic.bifurcation import diagram
-from analytic.bifurcation.diagram import (
-    Exists,
-    case_map,
-    double_points,
-    number_of_folds,
-    threshold_curves,
-)
+from analytic.bifurcation.diagram import Exists, case_map, double_points, number_of_folds, threshold_curves
 from analytic.stationary import slipping_branch as sb
 from model import Case, InputError, Parameters
 

@@ -10,13 +10,7 @@ from hypothesis import strategies as st
 
 from analytic import contact_forces
 from analytic.mechanics.contact_problem import Closed, NotConvergedError, solve
-from analytic.mechanics.rigid_body import (
-    energy,
-    slip_at_A,
-    slip_at_B,
-    smooth_rates,
-    velocities,
-)
+from analytic.mechanics.rigid_body import energy, slip_at_A, slip_at_B, smooth_rates, velocities
 from model import Case, Parameters
 
 P = Parameters.named("reference")
