@@ -72,6 +72,8 @@ def test_order_and_existence_of_the_thresholds() -> None:
     assert thresholds(P.replace(mu=0.0)).omega_01 == 0
     assert thresholds(P.replace(mu=0.0)).eta_cr == np.inf
     assert thresholds(P.replace(c=0.0)).eta_cr == 0
+    assert thresholds(P.replace(c=diagram.critical_drag(P))).eta_cr == pytest.approx(P.eta, rel=8 * EPS)
+    assert diagram.critical_drag(P.replace(drag="quadratic", nu_f=1e-5)) == np.inf
 
 
 @pytest.mark.parametrize(

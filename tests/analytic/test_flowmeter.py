@@ -164,6 +164,8 @@ def test_what_there_is_not() -> None:
         response.ramp_coefficient(P.replace(eta=0.02))
     with pytest.raises(InputError, match="case SS has no stable"):
         response.transfer(P, Case.SS, 1.0)
+    with pytest.raises(InputError, match="at one rate with Stokes' drag only"):
+        response.rolling_rate(PULSATING["wake"])
 
 
 # --- slip under pulsation against the event-driven simulator, and its limits in closed form ------------------
@@ -198,6 +200,25 @@ def test_onset(p: Parameters, pace: float) -> None:
     onset = pulsation.slip_onset(p, frequency)
     assert not slips(p, 0.9999 * onset, frequency)
     assert slips(p, 1.0003 * onset, frequency)  # the simulator looks 256 times a period
+
+
+@pytest.mark.parametrize("p", PULSATING.values(), ids=PULSATING)
+def test_slow_and_fast_pulsations_have_the_limits_in_closed_form(p: Parameters) -> None:
+    rate = rolling_rate(p) / (2 * math.pi)
+    assert pulsation.slip_onset(p, 1e-4 * rate) == pytest.approx(pulsation.slow_onset(p), rel=1e-3)
+    assert pulsation.slip_onset(p, 1e4 * rate) == pytest.approx(pulsation.fast_onset(p), rel=1e-5)
+
+
+def test_the_mean_of_a_pulsation_is_that_of_the_thirtieth_period() -> None:
+    p = PULSATING["slips at both"]
+    frequency = rolling_rate(p) / math.pi
+    amplitude = 1.3 * pulsation.slip_onset(p, frequency)
+    flow = Flow.sine(p.omega_0, amplitude, frequency)
+    run = simulate(p, [0, 0, p.omega_0, 0, 0, 0], 30 / frequency, flow, sample_interval=1 / frequency)
+    shift = (run.theta[-1] - run.theta[-2]) * frequency - p.omega_0
+    assert shift < -0.1
+    assert pulsation.mean_error(p, amplitude, frequency) == pytest.approx(shift, rel=1e-5)
+    assert pulsation.mean_error(p, 0.7 * amplitude, frequency) == 0  # rolls on
 
 
 def test_forces_may_allow_more_on_a_rough_floor() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from analytic import vector_field
 from analytic.mechanics import dynamics
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
@@ -70,6 +71,17 @@ def test_from_newton_and_euler(side: int) -> None:
         assert equal(gamma, side * rate), outer
 
 
+@pytest.mark.parametrize(("outer", "name"), [(Case.RS, "slip_y"), (Case.SR, "slip_x")])
+def test_69_rolling_is_a_mixture_of_both_directions_of_slip(outer: Case, name: str) -> None:
+    p, x = P.replace(omega_0=20.0), State(omega_c=9.0)
+    minus, plus = (np.array(vector_field(outer, x._replace(**{name: side * 1e-9}), p)) for side in (-1, 1))
+    share = slip_bounds.filippov_share(outer, 9.0, p)
+    assert 0 < share < 1
+    np.testing.assert_allclose(share * minus + (1 - share) * plus, vector_field(Case.RR, x, p), rtol=1e-12, atol=1e-7)
+    with pytest.raises(InputError, match="RR divides the states of RS and SR only"):
+        slip_bounds.filippov_share(Case.SS, 9.0, p)
+
+
 def states_of_nr(p: Parameters, count: int) -> np.ndarray:
     rng = np.random.default_rng(7)
     unit = np.sqrt(p.g / p.R)
@@ -88,6 +100,8 @@ def test_56_at_any_state() -> None:
             orbit, spin = abs(State.of(x).omega_c), abs(State.of(x).slip_x)
             scale = np.abs(slip_bounds.gamma_nr(beta, x, p)).max() + p.g / p.r + orbit * (spin + p.R / p.r * orbit)
             assert np.all(np.abs(slip_bounds.gamma_nr(beta, x, p) - growth) <= 1e-12 * scale / p.j)
+            steepest = slip_bounds.gamma_nr(slip_bounds.steepest_nr(x, p), x, p)  # (58)
+            assert np.all(slip_bounds.gamma_nr(np.linspace(-np.pi, np.pi, 99), x, p) <= steepest + 1e-12 * scale / p.j)
     x, beta = states_of_nr(P, 5), np.linspace(0, 6, 7)
     values = slip_bounds.gamma_nr(beta[:, None], x, P)
     assert values.shape == (7, 5)

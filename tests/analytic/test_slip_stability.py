@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize
 
-from analytic import stationary_solutions, thresholds, vector_field
+from analytic import contact_forces, stationary_solutions, thresholds, vector_field
 from analytic.mechanics import dynamics, rolling_forces
 from analytic.slipping import slip_stability as slip
 from model import Case, InputError, Parameters, State
@@ -176,6 +176,26 @@ def test_a_perturbed_ball_returns_all_the_same() -> None:
     # The slip decays at some hundred rad/s^2: microseconds. Steps of a hundredth resolve it before it stiffens.
     run = solve_ivp(field, (0, 2e-5), start, events=gone, max_step=2e-8)
     assert run.status == 1
+
+
+@pytest.mark.parametrize(
+    ("inner", "outer", "x"),
+    [
+        (Case.SR, Case.NR, State(omega_c=9.0, slip_x=-6.0)),
+        (Case.SS, Case.NS, State(omega_c=9.0, slip_x=-20.0, slip_y=4.0, slip_z=22.0)),
+    ],
+)
+def test_the_ball_lifts_where_the_floor_would_have_to_pull(inner: Case, outer: Case, x: State) -> None:
+    p = P.replace(omega_0=12.0)
+    onset = slip.lift_onset(inner, outer, x, p)
+    for factor, lifts in ((0.999, False), (1.001, True)):
+        faster = factor * onset / x.omega_c
+        spin = x.slip_x * (faster if inner is Case.SR else 1.0)
+        there, q = x._replace(omega_c=factor * onset, slip_x=spin), p.replace(omega_0=p.omega_0 * faster)
+        assert (
+            (contact_forces(inner, there, q)[0][1] < 0) == (slip.lift_acceleration(inner, outer, there, q) > 0) == lifts
+        )
+    assert np.isnan(slip.lift_onset(Case.RS, Case.NS, State(omega_c=9.0, slip_y=4.0), p))
 
 
 # --- arrows -----------------------------------------------------------------------------------------------------

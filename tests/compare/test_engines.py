@@ -19,6 +19,7 @@ from model import InputError, Parameters, State
 from model.drag import LAWS
 from model.kinematics import Motion as World
 from model.kinematics import from_world, to_world
+from tests.drag_laws import resistance
 
 # Drake loads IPython, which leaves files open.
 pytestmark = [
@@ -105,12 +106,7 @@ def test_free_flight_obeys_newton_and_the_law_of_drag(name, law):
 
     def motion(_, now):
         w = now[3:] - p.omega_0 * np.array([-now[1], now[0], 0.0])
-        reynolds = 2 * p.r * np.linalg.norm(w) / p.nu_f
-        stokes, newton = 1.0, reynolds / 24
-        factor = {"stokes": stokes, "quadratic": p.C_D * newton}.get(law)
-        if factor is None:
-            factor = max(1 + 0.15 * reynolds**0.687, 0.44 * newton) if reynolds < 990 else 0.44 * newton
-        return np.concatenate([now[3:], -p.c * factor * w - [0.0, 0.0, p.g]])
+        return np.concatenate([now[3:], -resistance(np.linalg.norm(w), p) * w - [0.0, 0.0, p.g]])
 
     ended = solve_ivp(motion, (0, lasts), np.concatenate([begin.position, begin.velocity]), rtol=1e-9, atol=1e-12)
     truth, theta = from_world(World(ended.y[:3, -1], ended.y[3:, -1], begin.spin), p)
