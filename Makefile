@@ -4,8 +4,8 @@
 # make test-all   the slow tests, too
 # make docs       build the documentation, run its notebooks: docs/_build/html/index.html
 # make wheel      build sdist and wheel, and try the wheel in an empty environment
-# make check      what CI runs: lint, types, import contracts, a quick validation judged by wrong theories, a small league,
-#                 tests, docs, wheel
+# make check      what CI runs: lint, types, import contracts, docs and wheel, two at a time; a quick validation judged by
+#                 wrong theories, a small league, tests
 # make league     physics engines on exact contact cases: those that have a wheel, Siconos where the system has it
 # make help       this list
 # make lock       resolve the dependencies anew (needs uv)
@@ -50,7 +50,9 @@ docs: $(VENV)/installed-dev
 wheel: $(VENV)/installed-dev
 	.ci/wheel $(VENV)
 
-check: lint verdicts league test docs wheel
+check:
+	$(MAKE) -j 2 lint docs wheel  # a processor each
+	$(MAKE) verdicts league test
 
 league: $(VENV)/installed-engines
 	$(BIN)/dualball league --quick --quiet -o $(RESULTS)
