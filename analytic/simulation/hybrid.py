@@ -16,9 +16,8 @@ from analytic.mechanics import dynamics
 from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import charts, transitions, two_point_rolling
 from analytic.simulation.integrator import StalledError, Stretch
-from analytic.simulation.motion import REPORT_EVERY, Event, Fluid, Moment, Path, Recorder, natural_units
+from analytic.simulation.motion import REPORT_EVERY, Event, Fluid, Moment, Path, Recorder
 from analytic.simulation.settings import Settings
-from analytic.simulation.transitions import Shortest
 from model import Case, Contact, Flow, Parameters, State
 from model.arrays import Array, Real
 from model.drag import STOKES
@@ -58,12 +57,6 @@ def run(x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings
 class _Simulator:
     def __init__(self, p: Parameters, settings: Settings, recorder: Recorder) -> None:
         self.p, self.settings, self.recorder = p, settings, recorder
-        self.absolute = settings.rtol / 1e3
-        """Absolute tolerance in natural units."""
-        time, *_ = natural_units(p)
-        # A hop that lasts T rises by g T^2/8, well above the tolerance of lengths where it is integrated.
-        integrated = math.sqrt(8 * self.absolute) * time
-        self.shortest = Shortest(settings.rtol * time if p.drag == STOKES else integrated, integrated)
         self.still = 10 * settings.rtol * math.sqrt(p.g * p.R) / p.r
         """Slip in rad s-1 that counts as zero where the other contact has just stuck."""
 
@@ -71,7 +64,7 @@ class _Simulator:
         """Collide if the ball moves into something it touches, then find the case."""
         x, omega_0, impulse = at.x, fluid(at.time), NOTHING
         if (x.y == 0 and x.v_y < 0) or (x.h == 0 and x.v_h < 0):
-            at, impulse = transitions.collide(at, self.p, omega_0, self.settings.restitution, self.shortest)
+            at, impulse = transitions.collide(at, self.p, omega_0, self.settings.restitution, self.settings.rtol)
         return *transitions.choose(at, self.p, omega_0, self.settings.leave_rolling), impulse
 
     def react(self, guard: str, case: Case, at: Moment, fluid: Fluid) -> tuple[Case, Moment, Forces]:
@@ -121,8 +114,7 @@ class _Simulator:
         lands, until = motion.landing <= until, min(until, motion.landing)
         reached, states = [at.time], [motion.start]
         sampled, guard = [self.recorder.taken == 0], None
-        tolerances = self.settings.rtol, self.absolute
-        stretch = Stretch(motion, at.time, until, wanted, *tolerances, fluid.steady)
+        stretch = Stretch(motion, at.time, until, wanted, self.settings.rtol, not (fluid.slope or fluid.waves))
         x, hop = at.x, math.inf
         if (x.y == 0 < x.v_y and motion.landing == math.inf) or x.h == 0 < x.v_h:  # it is just rebounding
             dx = dynamics.newton_euler(case, x, self._forces_at(case, at, fluid), p, fluid(at.time))

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import BDF, LSODA
 from scipy.optimize import brentq
 
-from analytic.simulation.motion import GAPS, Chart
+from analytic.simulation.motion import FINER, GAPS, Chart
 from model.arrays import Array
 
 ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
@@ -53,19 +53,17 @@ class Stretch:
     ----------
     motion, start, until : the case, and times in s
     times : when to sample, s, outside the stretch, too
-    relative, absolute : tolerances, the second in natural units
+    relative : tolerance; the absolute one in natural units is `FINER`
     steady : whether the flow stays what it is
 
-    A guard that starts at zero, where round-off mustn't end the case, has to rise above `absolute` first, or to fall
-    below -`relative`; a gap is armed by any height.
+    A guard that starts at zero, where round-off mustn't end the case, has to rise above the absolute tolerance first,
+    or to fall below -`relative`; a gap is armed by any height.
     """
 
-    def __init__(
-        self, motion: Chart, start: float, until: float, times: Array, relative: float, absolute: float, steady: bool
-    ) -> None:
+    def __init__(self, motion: Chart, start: float, until: float, times: Array, relative: float, steady: bool) -> None:
         self.motion, self.start, self.until, self.times = motion, start, until, times
-        self.relative, self.absolute, self.steady = relative, absolute, steady
-        self._arm = [0.0 if name in GAPS else absolute for name in motion.ends]
+        self.relative, self.absolute, self.steady = relative, relative / FINER, steady
+        self._arm = [0.0 if name in GAPS else self.absolute for name in motion.ends]
         values = motion.guards(start, motion.start)
         self._level = [0.0 if value > arm else -relative for value, arm in zip(values, self._arm, strict=True)]
         self._opens = any(gap == 0 for gap, name in zip(values, motion.ends, strict=True) if name in GAPS)

@@ -18,6 +18,8 @@ from model.trajectory import samples
 
 GAPS = ("A lands", "B lands")
 """Names of the guards that are distances."""
+FINER = 1e3
+"""Relative tolerance of an integrator divided by the absolute one in natural units."""
 REPORT_EVERY = 1000
 """Steps after which a simulator notes how far it is, even if there is no sample to take."""
 
@@ -38,11 +40,6 @@ class Fluid:
         for amplitude, omega, phase in self.waves:
             omega_0 = omega_0 + amplitude * sin(omega * t + phase)
         return omega_0
-
-    @property
-    def steady(self) -> bool:
-        """Whether omega_0 stays what it is up to the next knot."""
-        return not self.slope and not self.waves
 
     @classmethod
     def of(cls, flow: Flow, start: float) -> Self:

@@ -9,14 +9,14 @@ the accelerations.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from analytic.mechanics import contact_problem, dynamics, rigid_body, rolling_forces
 from analytic.mechanics.contact_problem import Closed, NotConvergedError
 from analytic.mechanics.rigid_body import NOTHING, Forces
 from analytic.simulation import two_point_rolling
-from analytic.simulation.motion import Moment
+from analytic.simulation.motion import FINER, Moment
 from model import Case, Contact, Parameters
+from model.drag import STOKES
 
 LEAST_ACCELERATION = 1e-9
 """Acceleration in units of g below which a contact point is at rest, well above what the contact problem leaves."""
@@ -97,21 +97,14 @@ def _contact(
     return (Contact.S, slip_rate) if math.hypot(*slip_rate) > still else (Contact.R, (0.0, 0.0))
 
 
-class Shortest(NamedTuple):
-    """Hops that last no longer count as contact, s."""
-
-    on_floor: float
-    """Of a ball that touches the floor only, whose hops are known in closed form."""
-    elsewhere: float
-
-
-def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, shortest: Shortest) -> tuple[Moment, Forces]:
+def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, rtol: float) -> tuple[Moment, Forces]:
     """The moment after an impact, and its impulses: all contacts that touch at once, by Newton's restitution.
 
     Friction opposes the slip that is left. A single contact of a sphere obeys p_n = (1+e) m |v_n| and
     p_t = min(friction p_n, m_t |slip|) against the slip; two contacts are solved together, without a rebound if
-    friction locks the ball (`contact_problem`). Bounces accumulate: a rebound whose hops would come to rest within
-    `shortest` (by the geometric series 2 v_n/a/(1 - e)) stays in contact.
+    friction locks the ball (`contact_problem`). Bounces accumulate: a rebound whose hops would come to rest (by the
+    geometric series 2 v_n/a/(1 - e)) within rtol sqrt(R/g) where they are known, of a ball that touches the floor only,
+    and elsewhere as soon as the tolerance `rtol` of the integrator resolves their height, stays in contact.
     """
     x, before = at.x, rigid_body.velocities(at.x, p)
     A = Closed(max(0.0, -restitution * x.v_y)) if x.y == 0 else None
@@ -129,9 +122,11 @@ def collide(at: Moment, p: Parameters, omega_0: float, restitution: float, short
     free = rigid_body.smooth_rates(u, x.h, omega_0, p)
     on_B, _ = contact_problem.solve(free, None, Closed() if B and u.v_h <= 0 else None, p)
     on_A, _ = contact_problem.solve(free, Closed() if A and u.v_y <= 0 else None, None, p)
-    if A and 2 * v_y <= (shortest.elsewhere if B else shortest.on_floor) * -on_B.v_y * (1 - restitution):
+    # A hop that lasts T rises by g T^2/8, well above the tolerance of lengths.
+    unit, integrated = math.sqrt(p.R / p.g), math.sqrt(8 * rtol / FINER * p.R / p.g)
+    if A and 2 * v_y <= (integrated if B or p.drag != STOKES else rtol * unit) * -on_B.v_y * (1 - restitution):
         v_y = 0.0
-    if B and 2 * v_h <= shortest.elsewhere * -on_A.v_h * (1 - restitution):
+    if B and 2 * v_h <= integrated * -on_A.v_h * (1 - restitution):
         v_h = 0.0
     y = rigid_body.state(x.y, x.h, u._replace(v_h=v_h, v_y=v_y), p)
     still = AT_REST * math.hypot(*before[:3], *(p.r * o for o in before[3:]))
