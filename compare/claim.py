@@ -99,8 +99,10 @@ class Claim:
     """Section of the report, set by the `catalogue`."""
 
     def __post_init__(self) -> None:
-        if (self.algebra is not None) != (self.text is Text.FORMAL) or bool(self.bearings) == bool(self.algebra):
+        if bool(self.bearings) == bool(self.algebra):
             raise ValueError(f"claim {self.id}: measurements bear on it, or it is formal only and has its algebra")
+        if self.algebra:
+            object.__setattr__(self, "text", Text.FORMAL)
 
     @property
     def protocols(self) -> frozenset[str]:

@@ -21,7 +21,7 @@ from analytic.flowmeter import design, pulsation, real_fluid, response
 from analytic.mechanics import dynamics
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary import slipping_branch
-from compare.claim import Claim, Text
+from compare.claim import Claim
 from compare.kit.record import Check, Measurement
 from compare.kit.statistics import COVERAGE
 from model import Case, Flow, Parameters, State, drag
@@ -31,8 +31,6 @@ FORMAL = Parameters.named("reference").replace(eta=0.43)
 """eta so little above j that the branch of SS is whole once (12) is released."""
 ROUND_OFF = 1e-12
 """Relative: some thousand operations, each to the last digit."""
-POINTS = 4001
-"""Along the branch, where its turning point is looked for."""
 
 
 def _figure_12() -> Iterator[Check]:
@@ -54,7 +52,7 @@ def _figure_12() -> Iterator[Check]:
         return float(np.linalg.det(dynamics.jacobian(Case.SR, state.x, q)))
 
     exchange = brentq(determinant, 0.8 * t.omega_03, 1.2 * t.omega_03, rtol=1e-14)
-    along = slipping_branch.states(np.linspace(-8.0, 8.0, POINTS), p)[1]
+    along = slipping_branch.states(np.linspace(-8.0, 8.0, 4001), p)[1]
     k = int(np.argmax(along))
     # The maximum lies between the neighbours of the largest value, which is lower by no more than they are.
     spacing = float(along[k] - min(along[k - 1], along[k + 1]))
@@ -94,16 +92,16 @@ def _pulling() -> Iterator[Check]:
 def _on_all_sides() -> Iterator[Check]:
     """Signs of gamma of a slip at A out of RR, on either side and of any other direction, over a grid with eta > j."""
     grid = [FORMAL.replace(mu=mu, eta=eta) for mu in np.geomspace(0.05, 3.0, 7) for eta in np.geomspace(0.42, 3.0, 7)]
-    wrong = {"(73): flows above ω₀₃ at which slip dies out on a side": 0, "(73): flows below at which it grows": 0}
+    above = below = 0
     for p, side, flow in product(grid, (1.0, -1.0), (0.7, 0.99, 1.01, 1.4)):
         omega = flow * analytic.thresholds(p).omega_03
         q, n = p.replace(omega_0=omega), np.array([side])
         grows = bool(slip_stability.gamma(Case.RR, Case.SR, State(omega_c=omega).stacked(), n, q) > 0)
         stated = bool(slip_bounds.rr_to_sr(q, omega, int(side)).gamma(omega) > 0)
-        above, below = wrong
-        wrong[above if flow > 1 else below] += (grows != (flow > 1)) + (stated != grows)
-    for what, count in wrong.items():
-        yield _check("law", what, count, 0.0)
+        wrong = (grows != (flow > 1)) + (stated != grows)
+        above, below = (above + wrong, below) if flow > 1 else (above, below + wrong)
+    yield _check("law", "(73): flows above ω₀₃ at which slip dies out on a side", above, 0.0)
+    yield _check("law", "(73): flows below at which it grows", below, 0.0)
 
 
 def _sliding() -> Iterator[Check]:
@@ -277,7 +275,6 @@ CLAIMS = (
         "Fig. 12",
         "With (12) released all bifurcations of Table 5 appear for η > j as well.",
         algebra=_figure_12,
-        text=Text.FORMAL,
         reason="The floor would have to pull: no ball and no engine does this.",
     ),
     Claim(
@@ -285,7 +282,6 @@ CLAIMS = (
         "(82), (83), end of section 4.3",
         "(83) is a bound for η > 1 only, and contradicts (12) there; (82) contradicts (12) unless η < j.",
         algebra=_pulling,
-        text=Text.FORMAL,
         reason="At (83) the wall would have to pull, and at (82) for η > j the floor.",
     ),
     Claim(
@@ -294,7 +290,6 @@ CLAIMS = (
         "For η > j and ω₀ > ω₀₃ slip at the floor grows out of rolling at both points on either side, up to ω₀₁ and "
         "beyond: RR is unstable to SR from all directions; below, it dies out on either.",
         algebra=_on_all_sides,
-        text=Text.FORMAL,
         reason="The floor would have to pull: a ball lifts off there.",
     ),
     Claim(
@@ -302,7 +297,6 @@ CLAIMS = (
         "after (69)",
         "0 < δ < 1 exactly where slip at the wall dies out on either side, (64).",
         algebra=_sliding,
-        text=Text.FORMAL,
         reason="Where it does not, no ball rolls at both points: δ is measured in between, by eq-69.",
     ),
     Claim(
@@ -310,7 +304,6 @@ CLAIMS = (
         "(84)-(86)",
         "A design's sensitivities are the logarithmic derivatives of thresholds by friction, inertia, size, gravity.",
         algebra=_slopes,
-        text=Text.FORMAL,
         reason="Derivatives of the closed forms, which thresholds themselves are measured against.",
     ),
     Claim(
@@ -318,7 +311,6 @@ CLAIMS = (
         "(88), docs/theory.md, 11",
         "A flow that rises slowly at a rate ρ passes the fold by K ρ^(2/3) before the ball lifts off.",
         algebra=_past_the_fold,
-        text=Text.FORMAL,
         reason="A limit: at rates that an engine can be asked for, terms ρ ln ρ and ρ are 1 to 30 % of it (ramp-fold).",
     ),
     Claim(
@@ -326,7 +318,6 @@ CLAIMS = (
         "extension",
         "A fluid with inertia shifts ω₀₁ and ω₀₂ as if mass, inertia and gravity were others; ω₀₃ stays.",
         algebra=_with_inertia,
-        text=Text.FORMAL,
         reason="The paper and all simulators leave added mass and the pressure of the swirl out.",
     ),
     Claim(
@@ -335,7 +326,6 @@ CLAIMS = (
         "The amplitude at which a pulsation makes the ball slip tends to a limit as the pulsation becomes slow, and to "
         "another as it becomes fast.",
         algebra=_pulsating,
-        text=Text.FORMAL,
         reason="So slow or so fast, no engine could follow it; frequencies in between are measured (pulsation-slip).",
     ),
     Claim(
@@ -343,7 +333,6 @@ CLAIMS = (
         "Definitions 1-3",
         "The event-driven simulation and time stepping, extrapolated to no step, end in the same state.",
         algebra=_both_ways,
-        text=Text.FORMAL,
         reason="Two ways to compute theory's motions; motion and runs hold the first against MuJoCo.",
     ),
     Claim(
@@ -351,7 +340,6 @@ CLAIMS = (
         "extension",
         "A fluid that resists the ball's spin leaves less of the friction for rolling, by a known share.",
         algebra=_with_torque,
-        text=Text.FORMAL,
         reason="Of engines only the lag is measured (fluid-torque).",
     ),
     Claim(
@@ -360,7 +348,6 @@ CLAIMS = (
         "The flowmeter with the longest range has η = j, whatever the friction of the floor; among equals a design "
         "takes the quickest ball, the smallest.",
         algebra=_best,
-        text=Text.FORMAL,
         reason="A search over closed forms.",
     ),
 )

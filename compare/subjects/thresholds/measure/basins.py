@@ -36,18 +36,9 @@ DRAG = 1.25
 """Drag c, s-1: states settle within seconds, and slipping still lasts beyond the flow at which the wall can carry."""
 FIGURES = ("fig-7", "fig-8")
 """mu as it is, and mu = eta."""
-ETA, OMEGA = (0.02, 0.8), (0.45, 3.6)
-"""Ranges of eta and of omega_0 sqrt(R/g)."""
 
 CLOSING = (0.1, 0.17, 0.26, 0.38)
 """Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
-FIRST, NEXT = 3e-4, 2.5e-6
-"""Widths of the last brackets on the first line and on the others, in parts of the distance of the attractors."""
-HALF_LENGTH = 5e-3
-"""Half the length of a later line, in those parts; after each line that missed the border four times as much."""
-TOGETHER = 2e-3
-"""The distance up to which two runs count as being together, in those parts."""
-SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
 
 
 def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -60,7 +51,7 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
         chosen = [(figure, u) for figure in FIGURES for u in points[figure]]
         starts = []
         for figure, u in chosen:
-            eta, flow = (low + float(part) * (high - low) for part, (low, high) in zip(u, (ETA, OMEGA), strict=True))
+            eta, flow = (np.array([0.02, 0.45]) + u * np.array([0.78, 3.15])).tolist()
             p = plane.replace(eta=eta, omega_0=flow / time_unit(plane))
             p = p.replace(mu=eta) if figure == "fig-8" else p
             starts.append([begin(figure, p, how) for how in ("rest", "half as fast", "with the fluid", "on the wall")])
@@ -138,11 +129,13 @@ def borders(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
 
     At the quick level the edge is followed to where it begins for the set with most drag alone, which settles soonest.
     """
-    yield from (Missing("edge", name, SWINGS_ON) for name, p in sets.items() if p.drag == QUADRATIC)
     limits: dict[str, tuple[float, float]] = {}
-    for name in (name for name, p in sets.items() if p.drag != QUADRATIC):
+    for name, p in sets.items():
         holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
-        if holds and folds:
+        if p.drag == QUADRATIC:
+            why = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
+            yield Missing("edge", name, why)
+        elif holds and folds:
             limits[name] = holds.value, folds.value
         else:
             yield Missing("edge", name, "at no flow are a slipping ball and a lifted one both settled")
@@ -200,10 +193,13 @@ def _grounded(x: Array) -> Array:
 
 
 def _search(lab: Lab, edge: Edge) -> Search:
-    """On which part of the line the border is, first between the attractors."""
+    """On which part of the line the border is, first between the attractors.
+
+    Later lines are a hundredth as long, and four times as long after each that missed the border.
+    """
     t_end, step = lasting(edge.p, lab.effort("edge.time")), coarse_step(edge.p)
-    reach = HALF_LENGTH * 4.0**edge.missed
-    around, width = (Bracket(-reach, reach), NEXT) if edge.bracket else (Bracket(0.0, 1.0), FIRST)
+    reach = 5e-3 * 4.0**edge.missed
+    around, width = (Bracket(-reach, reach), 2.5e-6) if edge.bracket else (Bracket(0.0, 1.0), 3e-4)
 
     def task(s: float, bracket: Bracket, care: Care) -> Task:
         return lab.task(edge.p, edge.centre + s * edge.line, t_end, step, samples=round(t_end / (8 * step)))
@@ -221,12 +217,15 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool:
 
 
 def _onward(edge: Edge) -> Edge:
-    """A line through the mean of the time in which the last two runs have stayed together, the way they part."""
+    """A line through the mean of the time in which the last two runs have stayed together, the way they part.
+
+    Together they are within 2e-3 of the distance of the attractors.
+    """
     if edge.bracket is None:
         return edge
     low, high = (run.x for run in edge.bracket.runs if run is not None)
     along = np.abs((high - low) @ edge.line / float(edge.line @ edge.line))
-    together = int(np.argmax(along > TOGETHER)) or len(along)
+    together = int(np.argmax(along > 2e-3)) or len(along)
     length = max(together - together // 4, 1)
     weights = taper(length)
     mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
