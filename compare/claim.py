@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
+from typing import Any
 
 from compare.kit.levels import Level
 from compare.kit.quantities import quantity
@@ -108,6 +109,11 @@ class Claim:
     def protocols(self) -> frozenset[str]:
         """The protocols that it needs."""
         return frozenset(bearing.protocol for bearing in self.bearings)
+
+
+def claim(id: str, source: str, statement: str, *bearings: Bearing, **more: Any) -> Claim:
+    """A claim on which measurements bear, and what more there is to say of it."""
+    return Claim(id, source, statement, bearings, **more)
 
 
 @dataclass(frozen=True, kw_only=True)

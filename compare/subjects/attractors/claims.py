@@ -12,7 +12,7 @@ from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import Orbit
-from compare.claim import Bearing, Claim
+from compare.claim import Bearing, claim
 from compare.judge import simulated, theory
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, state
@@ -78,72 +78,70 @@ def _only(m: Measurement) -> float:
 _HOP = "orbit_period", "orbit_omega_c", "orbit_height"
 _RULE = "analytic.simulate, which leaves rolling by Definitions 1-3"
 CLAIMS = (
-    Claim(
+    claim(
         "choice",
         "Definitions 1-3",
         "For μ > 1, where forces allow rolling and slipping both, the ball slips as soon as slip grows.",
-        (
-            *(Bearing("choice", quantity, _after_rest, by=_RULE) for quantity in ("case", "omega_c")),
-            *(Bearing("choice", quantity, _only, by="analytic.stable_solutions") for quantity in ("case", "omega_c")),
-        ),
+        *(Bearing("choice", quantity, _after_rest, by=_RULE) for quantity in ("case", "omega_c")),
+        *(Bearing("choice", quantity, _only, by="analytic.stable_solutions") for quantity in ("case", "omega_c")),
     ),
-    Claim(
+    claim(
         "hopping",
         _PERIODIC,
         "A periodic attractor exists: a ball hops on the floor for ever, rolling and slipping on the wall. The engine "
         "and Moreau-Jean time stepping come to the closed orbit of the event-driven simulation.",
-        (*_orbiting("recurrent", *_HOP), *_orbiting("stepped", *_HOP)),
+        *_orbiting("recurrent", *_HOP),
+        *_orbiting("stepped", *_HOP),
     ),
-    Claim(
+    claim(
         "hopping-multiplier",
         _PERIODIC,
         "Disturbances of the hopping shrink from hop to hop by its largest Floquet multiplier.",
-        _orbiting("recurrent", "orbit_multiplier"),
+        *_orbiting("recurrent", "orbit_multiplier"),
         level=Level.DEFAULT,
     ),
-    Claim(
+    claim(
         "swing",
         _PERIODIC,
         "Between the Hopf points of SS the ball swings for ever and slips all the time (very rough floor).",
-        _orbiting("swing", "swing_period", "swing_omega_c", "swing_size"),
+        *_orbiting("swing", "swing_period", "swing_omega_c", "swing_size"),
         level=Level.DEFAULT,
     ),
-    Claim(
+    claim(
         "calm",
         _PERIODIC,
         "In strong drag, κ > 2, no ball was found that hops on.",
-        (Bearing("calm", "hops", _hops, by="analytic.simulate"),),
+        Bearing("calm", "hops", _hops, by="analytic.simulate"),
         level=Level.DEFAULT,
     ),
-    Claim(
+    claim(
         "hopping-birth",
         f"{_PERIODIC}, (85)",
         "Hopping begins with hops of no height at ω₀₂, where the wall begins to carry the ball.",
-        (
-            Bearing(
-                "recurrent",
-                "orbit_birth",
-                lambda m: analytic.thresholds(m.parameters).omega_02,
-                by="analytic.thresholds: omega_02",
-            ),
+        Bearing(
+            "recurrent",
+            "orbit_birth",
+            lambda m: analytic.thresholds(m.parameters).omega_02,
+            by="analytic.thresholds: omega_02",
         ),
         level=Level.DEFAULT,
     ),
-    Claim(
+    claim(
         "hopping-rebound",
         _PERIODIC,
         "A ball that rebounds hops on, too, lower and lower, up to a coefficient of restitution of 0.536, where a pair "
         "of Floquet multipliers leaves the unit circle; beyond, the hops end. By continuation and time stepping: "
         "MuJoCo's contacts have no such coefficient.",
-        (Bearing("rebounding", "hops", _hops_on, by="analytic.orbits.periodic.refine"),),
+        Bearing("rebounding", "hops", _hops_on, by="analytic.orbits.periodic.refine"),
         level=Level.DEFAULT,
         reason="Impacts are not in the paper: Newton's law of restitution and Coulomb's, at floor and wall at once.",
     ),
-    Claim(
+    claim(
         "hopping-death",
         _PERIODIC,
         "Along rougher walls hopping ends where a pair of Floquet multipliers leaves the unit circle.",
-        (*_orbiting("followed", "orbit_death"), Bearing("followed", "hops", _hops, by="analytic.simulate")),
+        *_orbiting("followed", "orbit_death"),
+        Bearing("followed", "hops", _hops, by="analytic.simulate"),
         level=Level.DEFAULT,
     ),
 )

@@ -10,7 +10,7 @@ import numpy as np
 
 import analytic
 from analytic.flowmeter import design
-from compare.claim import Bearing, Claim, Text, every, given
+from compare.claim import Bearing, Text, claim, every, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, Relation, state
 from compare.kit.settling import family
@@ -146,99 +146,92 @@ def _between(m: Measurement) -> float:
 
 
 CLAIMS = (
-    Claim(
+    claim(
         "slope-rolling",
         "Section 5.3",
         "Rolling at both points, or carried by the wall alone, the ball reads the flow: dω_c/dω₀ = 1.",
-        _slope("neighbours", _local, "characteristic_slope", Case.RR, Case.NR),
+        *_slope("neighbours", _local, "characteristic_slope", Case.RR, Case.NR),
     ),
-    Claim(
+    claim(
         "slope-slipping",
         "Section 5.3, (38), (41)",
         "While the ball slips at both points its reading rises by (38), (41), at first hardly at all.",
-        _slope("neighbours", _local, "characteristic_slope", Case.SS),
+        *_slope("neighbours", _local, "characteristic_slope", Case.SS),
     ),
-    Claim(
+    claim(
         "slope-jump",
         "Section 5.3",
         "At ω₀₁ the slope of the characteristic curve jumps: from 1 to 0, as the equations have it.",
-        _slope("jump", lambda m: analytic.slope_jump(m.parameters), "slope_jump", Case.SS),
+        *_slope("jump", lambda m: analytic.slope_jump(m.parameters), "slope_jump", Case.SS),
     ),
-    Claim(
+    claim(
         "slope-mean",
         "Section 5.3",
         "Between ω₀₁ and ω₀₂ the slope is small: what is measured on average from end to end is what theory says, "
         "a few hundredths for the reference.",
-        _slope("mean", lambda m: analytic.mean_slope(m.parameters), "mean_slope", Case.SS),
+        *_slope("mean", lambda m: analytic.mean_slope(m.parameters), "mean_slope", Case.SS),
     ),
-    Claim(
+    claim(
         "operating-range",
         "Section 5.3",
         "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, from rest the ball "
         "slips (η < j), and on the wall it stays (η > j).",
-        (
-            # Slipping on the floor no ball sinks.
-            Bearing("settled", "case", _only_rolling, when=every(from_floor, _stays, slips_first)),
-            Bearing("settled", "case", _only_rolling, when=every(_stays, lifts_first)),
-            Bearing("settled", "omega_c", _reads_flow, when=_stays),
-        ),
+        # Slipping on the floor no ball sinks.
+        Bearing("settled", "case", _only_rolling, when=every(from_floor, _stays, slips_first)),
+        Bearing("settled", "case", _only_rolling, when=every(_stays, lifts_first)),
+        Bearing("settled", "omega_c", _reads_flow, when=_stays),
     ),
-    Claim(
+    claim(
         "unloading-limit",
         "Section 5.3, (85)",
         "The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and sinks.",
-        (
-            Bearing(
-                "settled",
-                "case",
-                lambda m: Case.NR if m.parameters.omega_0 > analytic.unloading_limit(m.parameters) else Case.NS,
-                when=given(start="on the wall"),
-            ),
-            Bearing(
-                "thresholds",
-                "omega_02",
-                lambda m: analytic.unloading_limit(m.parameters),
-                when=given(side="from above"),
-                by="analytic.unloading_limit",
-            ),
+        Bearing(
+            "settled",
+            "case",
+            lambda m: Case.NR if m.parameters.omega_0 > analytic.unloading_limit(m.parameters) else Case.NS,
+            when=given(start="on the wall"),
+        ),
+        Bearing(
+            "thresholds",
+            "omega_02",
+            lambda m: analytic.unloading_limit(m.parameters),
+            when=given(side="from above"),
+            by="analytic.unloading_limit",
         ),
     ),
-    Claim(
+    claim(
         "fig-13-left",
         "Fig. 13, left",
         "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in between.",
-        (
-            Bearing("hysteresis", "case", lambda m: float(_branch(m)), by="analytic.stable_solutions"),
-            Bearing("hysteresis", "omega_c", _reading, by="(32), (38), (46)"),
-        ),
+        Bearing("hysteresis", "case", lambda m: float(_branch(m)), by="analytic.stable_solutions"),
+        Bearing("hysteresis", "omega_c", _reading, by="(32), (38), (46)"),
         text=Text.CORRECTED,
         reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that is above ω₀₄.",
     ),
-    Claim(
+    claim(
         "fig-13-right",
         "Fig. 13, right; section 5.3",
         "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and ends slipping or "
         "rolling at both points.",
-        (
-            *_ends(UNLOADED),
-            *(
-                Bearing("unloading", quantity, _at_event, by=_SIMULATED)
-                for quantity in ("time", "landing_speed", "landing_impulse")
-            ),
+        *_ends(UNLOADED),
+        *(
+            Bearing("unloading", quantity, _at_event, by=_SIMULATED)
+            for quantity in ("time", "landing_speed", "landing_impulse")
         ),
     ),
-    Claim(
+    claim(
         "push",
         "section 5.3",
         "A small push lifts the ball from SR to NR, where it stays off the floor.",
-        (*_ends(UPWARDS, BY_SPIN), Bearing("unloading", "lift", _at_event, by=_SIMULATED)),
+        *_ends(UPWARDS, BY_SPIN),
+        Bearing("unloading", "lift", _at_event, by=_SIMULATED),
     ),
-    Claim(
+    claim(
         "design-limit",
         "extension",
         "The operating range of a meter ends where its design says; with friction off by up to 5 %, not below the "
         "design's worst limit and within the spread of its thresholds.",
-        tuple(
+        *(
             Bearing(
                 "thresholds",
                 end,
@@ -251,24 +244,22 @@ CLAIMS = (
             for relation in (Relation.EQUAL, Relation.AT_LEAST, Relation.AT_MOST)
         ),
     ),
-    Claim(
+    claim(
         "design-reading",
         "extension, Fig. 13",
         "A meter reads the lowest of a design's readings while the flow rises, the highest while it falls.",
-        (Bearing("hysteresis", "omega_c", _between, by="analytic.flowmeter.design.readings"),),
+        Bearing("hysteresis", "omega_c", _between, by="analytic.flowmeter.design.readings"),
     ),
-    Claim(
+    claim(
         "time-constants",
         "Prop. 1, section 5.2",
         "The slowest disturbance of rolling dies out with the response time of a design.",
-        (
-            Bearing(
-                "rates",
-                "slowest_decay",
-                lambda m: 1 / design.response_time(m.parameters),
-                when=every(given(case="RR"), lambda m: m.parameters.drag != QUADRATIC),
-                by="analytic.flowmeter.design.response_time",
-            ),
+        Bearing(
+            "rates",
+            "slowest_decay",
+            lambda m: 1 / design.response_time(m.parameters),
+            when=every(given(case="RR"), lambda m: m.parameters.drag != QUADRATIC),
+            by="analytic.flowmeter.design.response_time",
         ),
     ),
 )

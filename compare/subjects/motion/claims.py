@@ -9,7 +9,7 @@ from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
-from compare.claim import Bearing, Claim, Text, given
+from compare.claim import Bearing, Text, claim, given
 from compare.judge import RTOL, simulated, theory
 from compare.kit.record import Condition, Measurement, state
 from compare.kit.settling import forces
@@ -76,112 +76,102 @@ def _either(m: Measurement) -> float:
 
 
 LAWS = (
-    Claim(
+    claim(
         "table-3",
         "Table 3, (12)-(17)",
         "A contact that rolls doesn't slip, and one that is closed has no gap; where it slips, friction is mu or eta "
         "times the normal force and opposes the slip. (That contacts press, and that friction stays within its limit, "
         "(12) and (13), is built into any solver of friction cones: it is not counted.)",
-        (
-            Bearing("laws", "law_in_motion", lambda m: 0.0, by="Table 3, (14)-(17)"),
-            *(
-                Bearing("laws", "friction_ratio", coefficient, when=given(contact=contact), by="(14), (15)")
-                for contact, coefficient in (("A", lambda m: m.parameters.mu), ("B", lambda m: m.parameters.eta))
-            ),
+        Bearing("laws", "law_in_motion", lambda m: 0.0, by="Table 3, (14)-(17)"),
+        *(
+            Bearing("laws", "friction_ratio", coefficient, when=given(contact=contact), by="(14), (15)")
+            for contact, coefficient in (("A", lambda m: m.parameters.mu), ("B", lambda m: m.parameters.eta))
         ),
     ),
-    Claim(
+    claim(
         "table-4",
         "Table 4, (22)",
         "A ball that is pushed a little out of a stationary motion has as many ways to move as the domain of its case "
         "has dimensions.",
-        (Bearing("rates", "modes", lambda m: _DIMENSIONS[m.conditions["case"]], by="Table 4"),),
+        Bearing("rates", "modes", lambda m: _DIMENSIONS[m.conditions["case"]], by="Table 4"),
     ),
-    Claim(
+    claim(
         "eq-10",
         "(9), (10)",
         "A ball sinks freely at the speed at which Stokes' drag balances its weight less buoyancy.",
-        (Bearing("laws", "v_y", _sinking, by="analytic.mechanics.drag.sinking_speed"),),
+        Bearing("laws", "v_y", _sinking, by="analytic.mechanics.drag.sinking_speed"),
         text=Text.CORRECTED,
         reason="Table 1 gives the unit of m·c as kg m/s; it is kg/s.",
     ),
-    Claim(
+    claim(
         "cases",
         "Fig. 2, Table 3",
         "Slip speeds and normal forces tell all nine kinematic cases apart; the ball passes through them as the "
         "equations of motion say.",
-        (Bearing("motions", "case", _either, by=_RUN),),
+        Bearing("motions", "case", _either, by=_RUN),
     ),
-    Claim(
+    claim(
         "flight",
         "extension, (9), (20)",
         "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and keeps its spin.",
-        _ends("thrown"),
+        *_ends("thrown"),
         reason=_OWN,
     ),
-    Claim(
+    claim(
         "opening",
         "(12), section 1.1",
         "A wall contact that carries nothing, or less than friction at the floor takes from it, opens, and the ball "
         "leaves the wall as the equations say.",
-        _ends("pulled off"),
+        *_ends("pulled off"),
     ),
-    Claim(
+    claim(
         "sliding",
         "(20), (23)-(29)",
         "A ball that slips or rolls at one contact or both moves on from case to case as the equations say.",
-        _ends("slips", "rolls", "sinks"),
+        *_ends("slips", "rolls", "sinks"),
     ),
-    Claim(
+    claim(
         "smooth-wall",
         "Prop. 2, Definitions 1-3",
         "Along a wall without friction a ball goes round with the fluid, rolls on the floor and spins about its axis, "
         "as long as slip at the floor dies out; faster, it slips.",
-        (
-            Bearing(
-                "runs",
-                "case",
-                lambda m: Case.RS if _holds(Case.RS, m) else Case.SS,
-                when=given(start="smooth wall"),
-                by=_HOLDS,
-            ),
+        Bearing(
+            "runs",
+            "case",
+            lambda m: Case.RS if _holds(Case.RS, m) else Case.SS,
+            when=given(start="smooth wall"),
+            by=_HOLDS,
         ),
     ),
-    Claim(
+    claim(
         "definition-1-2",
         "Definitions 1 and 2, (82)",
         "On a floor so rough, μ > 1, that forces would allow a ball to jam between floor and wall and roll on beyond "
         "ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
         # Where slip lasts, theory's motion ends slipping at both points, or lifted.
-        (
-            Bearing(
-                "runs",
-                "case",
-                lambda m: Case.RR if _holds(Case.RR, m) else _last(m),
-                when=given(start="rough floor"),
-                by=_HOLDS,
-            ),
+        Bearing(
+            "runs",
+            "case",
+            lambda m: Case.RR if _holds(Case.RR, m) else _last(m),
+            when=given(start="rough floor"),
+            by=_HOLDS,
         ),
     ),
-    Claim(
+    claim(
         "fluid-torque",
         "extension",
         "A fluid that brakes the spin of a ball makes it roll slower than the fluid goes round, at first order in the "
         "torque.",
-        (
-            Bearing("torque", "case", _braked_rolls, by=_TORQUE),
-            Bearing("torque", "omega_c", lambda m: real_fluid.rolling(m.parameters).omega_c, by=_TORQUE),
-        ),
+        Bearing("torque", "case", _braked_rolls, by=_TORQUE),
+        Bearing("torque", "omega_c", lambda m: real_fluid.rolling(m.parameters).omega_c, by=_TORQUE),
         reason="The paper leaves the torque out; so does all else here, unless parameters give it.",
     ),
-    Claim(
+    claim(
         "impacts",
         "extension",
         "A ball that lands does not rebound, and friction takes its share of the impulse.",
-        (
-            Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
-            *(Bearing("impacts", f"after_{name}", _end, by=_RUN) for name in NAMES),
-        ),
+        Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
+        *(Bearing("impacts", f"after_{name}", _end, by=_RUN) for name in NAMES),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
     ),
 )
@@ -222,11 +212,11 @@ def _moving(case: Case) -> Iterator[Bearing]:
 
 
 EQUATIONS = tuple(
-    Claim(
+    claim(
         f"motion-{case.name}",
         _SOURCES.get(case, "(20)"),
         f"In case {case.name} the accelerations and contact forces are those of the equations of motion.",
-        tuple(_moving(case)),
+        *(_moving(case)),
         text=Text.CORRECTED if case in _CORRECTED else Text.PRINTED,
         reason=_CORRECTED.get(case, "" if case in _SOURCES else _OWN),
     )

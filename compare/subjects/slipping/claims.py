@@ -10,7 +10,7 @@ import numpy as np
 import analytic
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
-from compare.claim import Bearing, Claim, Outcome, Text, When, every, given
+from compare.claim import Bearing, Outcome, Text, When, claim, every, given
 from compare.judge import simulated
 from compare.kit.record import Measurement, Relation, state
 from model import Case
@@ -109,142 +109,132 @@ def _on_the_wall(m: Measurement) -> float:
 CLAIMS = (
     *(
         # Slips at random or dragged; not in the direction that bears on the extrema alone.
-        Claim(
+        claim(
             f"slip-{arrow[0].name}-{arrow[1].name}",
             "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
             f"A slight slip out of {arrow[0].name} in any direction of {arrow[1].name} grows at the rate γ while the "
             "forces admit it; else the ball passes into another case, as the equations of motion say.",
-            (
-                *(
-                    Bearing("growth", "gamma", gamma, when=_along(arrow, "", "dragged"), by=by)
-                    for gamma, by in ((_gamma, "slip_stability.gamma"), (_gamma_nr, "slip_bounds.gamma_nr"))
-                    if gamma is _gamma or arrow == _NR_NS
-                ),
-                *(
-                    Bearing(protocol, "case", _followed, when=_along(arrow, *by), by="analytic.simulate")
-                    for protocol, by in (
-                        ("growth", ("", "dragged", "sideways")),  # at rest RS and RN look the same
-                        ("bounds", ("held", "stationary")),
-                    )
-                ),
+            *(
+                Bearing("growth", "gamma", gamma, when=_along(arrow, "", "dragged"), by=by)
+                for gamma, by in ((_gamma, "slip_stability.gamma"), (_gamma_nr, "slip_bounds.gamma_nr"))
+                if gamma is _gamma or arrow == _NR_NS
+            ),
+            *(
+                Bearing(protocol, "case", _followed, when=_along(arrow, *by), by="analytic.simulate")
+                for protocol, by in (
+                    ("growth", ("", "dragged", "sideways")),  # at rest RS and RN look the same
+                    ("bounds", ("held", "stationary")),
+                )
             ),
         )
         for arrow in slip_stability.SLIP_ARROWS
     ),
-    Claim(
+    claim(
         "eq-58",
         "(58)",
         "Out of rolling on the wall alone, slip grows the most along β₁, whatever the state.",
-        (Bearing("steepest", "steepest", _steepest, by="slip_bounds.steepest_nr"),),
+        Bearing("steepest", "steepest", _steepest, by="slip_bounds.steepest_nr"),
     ),
-    Claim(
+    claim(
         "eq-13-gamma",
         "3.2, last paragraph",
         "On the wall alone slip in a direction grows in proportion to the friction that rolling needs in it, less "
         "what Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
-        (Bearing("growth", "gamma", _lacking, when=_along(_NR_NS, "", "dragged"), by="analytic.contact_forces, (13)"),),
+        Bearing("growth", "gamma", _lacking, when=_along(_NR_NS, "", "dragged"), by="analytic.contact_forces, (13)"),
     ),
-    Claim(
+    claim(
         "eq-61",
         "(60), (61)",
         "Rolling on the wall alone is stable with respect to slipping above ω₀₂.",
-        _bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
+        *_bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
     ),
-    Claim(
+    claim(
         "eq-66",
         "(66)",
         "A ball that lags behind the fluid begins to slip at the wall where (66) says.",
-        _bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, m.at("omega_c"), round(m.at("n_y")))),
+        *_bound(_RR_RS, "held", lambda m: slip_bounds.rr_to_rs(m.parameters, m.at("omega_c"), round(m.at("n_y")))),
         text=Text.CORRECTED,
         reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
     ),
-    Claim(
+    claim(
         "eq-67",
         "(67)",
         "Going round with the fluid, the ball never begins to slip at the wall alone, but at ω₀ = 0.",
-        _bound(_RR_RS, "stationary", lambda m: slip_bounds.rr_to_rs_stationary(m.parameters), from_rest=True),
+        *_bound(_RR_RS, "stationary", lambda m: slip_bounds.rr_to_rs_stationary(m.parameters), from_rest=True),
     ),
-    Claim(
+    claim(
         "eq-73",
         "(73)",
         "A ball that lags behind the fluid begins to slip at the floor where (73) says.",
-        _bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, m.at("omega_c"), round(m.at("n_x")))),
+        *_bound(_RR_SR, "held", lambda m: slip_bounds.rr_to_sr(m.parameters, m.at("omega_c"), round(m.at("n_x")))),
     ),
-    Claim(
+    claim(
         "eq-74",
         "(74)",
         "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, it lifts (η > j).",
-        (
-            *_bound(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
-            _neutral("omega_03", Case.RR, "loss of the floor"),
-        ),
+        *_bound(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
+        _neutral("omega_03", Case.RR, "loss of the floor"),
     ),
-    Claim(
+    claim(
         "eq-82",
         "(82)",
         "Slip at both points at once, with directions (0, 0), grows above ω₀₁ and dies out below.",
-        _bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
+        *_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
     ),
-    Claim(
+    claim(
         "eq-83",
         "(83)",
         "Slip at both points with directions (π, π) dies out: (83) has no bound for η < 1.",
-        _bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, -1), side=-1, from_rest=True),
+        *_bound(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, -1), side=-1, from_rest=True),
     ),
-    Claim(
+    claim(
         "fig-4-5",
         "Figs. 4 and 5",
         "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below, the ball keeps slipping.",
-        (
-            *_bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
-            Bearing("settled", "case", _on_the_wall, when=given(start="on the wall"), by="slip_stability.stability"),
-        ),
+        *_bound(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
+        Bearing("settled", "case", _on_the_wall, when=given(start="on the wall"), by="slip_stability.stability"),
     ),
-    Claim(
+    claim(
         "eq-69",
         "(69)",
         "Rolling at both points is the convex combination of slipping to either side that doesn't slip.",
-        (Bearing("growth", "filippov_share", _share, by="slip_bounds.filippov_share"),),
+        Bearing("growth", "filippov_share", _share, by="slip_bounds.filippov_share"),
     ),
-    Claim(
+    claim(
         "definition-3",
         "Definitions 1-3, (67)",
         "Rolling is stable with respect to slipping up to a flow at which it is neutral, and unstable beyond (on the "
         "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
-        (
-            Bearing("growth", "gamma", _gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"),
-            _neutral("omega_01", Case.RR, "onset of slip"),
-            _neutral("omega_02", Case.NR, "onset of sliding on the wall"),
-            _neutral("omega_03", Case.RR, "loss of the floor"),
-        ),
+        Bearing("growth", "gamma", _gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"),
+        _neutral("omega_01", Case.RR, "onset of slip"),
+        _neutral("omega_02", Case.NR, "onset of sliding on the wall"),
+        _neutral("omega_03", Case.RR, "loss of the floor"),
     ),
-    Claim(
+    claim(
         "extrema",
         "after (80)",
         "(α, β) = (0, 0) and (π, π) are the global extrema of γ.",
-        (
-            Bearing(
-                "growth",
-                "gamma",
-                _greatest_as_printed,
-                when=_along(_RR_SS, "sideways"),
-                relation=Relation.AT_MOST,
-                by="slip_stability.gamma at (0, 0), (π, π)",
-            ),
+        Bearing(
+            "growth",
+            "gamma",
+            _greatest_as_printed,
+            when=_along(_RR_SS, "sideways"),
+            relation=Relation.AT_MOST,
+            by="slip_stability.gamma at (0, 0), (π, π)",
         ),
         expected=Outcome.REFUTED,
         reason="False for the Euclidean normal (75): γ is larger along other directions. With kinetic energy as the "
         "inner product it is true.",
     ),
     *(
-        Claim(
+        claim(
             f"lift-{inner.name}-{outer.name}",
             "Fig. 6, dotted",
             f"Out of {inner.name} the ball never lifts off the floor, whatever its orbit."
             if inner is Case.RS
             else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in {outer.name}, would "
             "accelerate it upwards.",
-            tuple(
+            *(
                 Bearing("lift", quantity, predict, when=given(inner=inner.name), by="slip_stability: lift")
                 for quantity, predict in (
                     ("lifts", lambda m: slip_stability.lift_acceleration(*_arrow(m), _x(m), m.parameters) > 0),

@@ -7,7 +7,7 @@ import numpy as np
 import analytic
 from analytic import StationarySolution
 from analytic.mechanics import dynamics
-from compare.claim import Bearing, Claim, Text, given
+from compare.claim import Bearing, Text, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement
 from compare.subjects.stability.measure import natural_size
@@ -102,51 +102,49 @@ def _slowest(m: Measurement) -> float:
 
 
 CLAIMS = (
-    Claim(
+    claim(
         "prop-1-rate",
         "Prop. 1, (23)",
         "Rolling at both points, ω_c approaches the flow with the one rate c/(1 + 2j).",
-        _bearings(Case.RR),
+        *_bearings(Case.RR),
     ),
-    Claim(
+    claim(
         "prop-2",
         "Prop. 2, (24), (33)",
         "In a fluid at rest a ball that spins next to the wall keeps its spin, whatever it is (a zero eigenvalue); "
         "going round dies out at the rate c/(1 + j).",
-        _bearings(Case.RS),
+        *_bearings(Case.RS),
     ),
-    Claim(
+    claim(
         "prop-3-rate",
         "Prop. 3, (25), (35)",
         "In SR a load on the floor dies out above ω₀₃ = √(g/jR) and grows "
         "below, at the rates of the eigenvalues of f_SR.",
-        (
-            *_bearings(Case.SR),
-            Bearing("rates", "decay_rate", _slowest, when=given(case="SR", mode=1), size=_size, by=_LEANING),
-        ),
+        *_bearings(Case.SR),
+        Bearing("rates", "decay_rate", _slowest, when=given(case="SR", mode=1), size=_size, by=_LEANING),
         text=Text.CORRECTED,
         reason="With A_y = 0 the state is on the border to NR: the eigenvalues show on the side where the ball leans "
         "on the floor; on the other it lifts off, and its height is then free. (35) needs ω₀ ≥ √(g/(ηR)), not ≤.",
     ),
-    Claim(
+    claim(
         "prop-4-rate",
         "Prop. 4, section 5.2",
         "Disturbances of slipping at both points die out, with the four eigenvalues of f_SS.",
-        _bearings(Case.SS),
+        *_bearings(Case.SS),
     ),
-    Claim(
+    claim(
         "prop-5-rate",
         "Prop. 5, (27), (46)",
         "Carried by the wall alone the ball keeps any height (a zero eigenvalue); it swings about it with a pair "
         "of eigenvalues, and ω_c dies out at c/(1 + j).",
-        _bearings(Case.NR),
+        *_bearings(Case.NR),
     ),
-    Claim(
+    claim(
         "prop-6-rate",
         "Prop. 6, (28), (48), (49)",
         "The ball that sinks along the wall has a pair of eigenvalues ± iω₀, which never dies out, a zero for the "
         "cyclic y, and else decay only.",
-        _bearings(Case.NS),
+        *_bearings(Case.NS),
     ),
 )
 SECTIONS = {"Stability": CLAIMS}

@@ -9,7 +9,7 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
-from compare.claim import Bearing, Claim, Text, When, every, given
+from compare.claim import Bearing, Text, When, claim, every, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
@@ -133,128 +133,127 @@ _LEANS = every(_LIFTED, from_floor)
 _STATE = (*MOTION, *FORCES)
 
 CLAIMS = (
-    Claim(
+    claim(
         "prop-1",
         "Prop. 1, (30)-(32)",
         "Rolling at both points, the ball goes round exactly with the fluid: ω_c = ω₀, no slip; of its forces "
         "(31) fixes A_z = B_z = 0 and three sums. It does so at every flow below ω₀₁ (η < j) or ω₀₃ (η > j).",
-        (*bearings((*MOTION, *SUMS), _ROLLS, "(31), (32)"), _cases(_ROLLS), _with_fluid()),
+        *bearings((*MOTION, *SUMS), _ROLLS, "(31), (32)"),
+        _cases(_ROLLS),
+        _with_fluid(),
     ),
-    Claim(
+    claim(
         "prop-1-rough",
         "Prop. 1, (83), (86)",
         "With η > j the ball rolls at both points up to ω₀₃ = √(g/jR), beyond ω₀₂.",
-        (*bearings(("omega_c",), every(lifts_first, _ROLLS), "(32)"), _with_fluid(lifts_first)),
+        *bearings(("omega_c",), every(lifts_first, _ROLLS), "(32)"),
+        _with_fluid(lifts_first),
     ),
-    Claim(
+    claim(
         "prop-2-forces",
         "Prop. 2, (33), (34)",
         "In a fluid at rest the ball spins on the spot; the floor carries its weight and nothing else acts.",
-        bearings(("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS),
+        *bearings(("omega_c", "slip_x", "slip_z", "v_y", *FORCES), is_in(Case.RS), "(33), (34)", Case.RS),
     ),
-    Claim(
+    claim(
         "prop-3-5",
         "Props. 3 and 5, (35), (36), (46), (47)",
         "Carried by the wall alone the ball keeps ω_c = ω₀ and spins on it, ω̃_x = g/(jω₀r) - ω₀R/r, at any height; "
         "B_x = mRω₀², B_y = mg. Where it touches a floor that carries nothing, SR has the same state as NR.",
-        (*bearings(_STATE, _LIFTED, "(46), (47)"), *bearings(_STATE, _LEANS, "(35), (36)", Case.SR), _cases(_LIFTED)),
+        *bearings(_STATE, _LIFTED, "(46), (47)"),
+        *bearings(_STATE, _LEANS, "(35), (36)", Case.SR),
+        _cases(_LIFTED),
         text=Text.CORRECTED,
         reason="(35) is printed with ≤; the wall carries the ball at fast flows, ω₀ ≥ √(g/(ηR)), as (46) has it.",
     ),
-    Claim(
+    claim(
         "prop-4",
         "Prop. 4, (37)-(42)",
         "Above ω₀₁ the ball slips at both points and lags behind the fluid, by (38)-(41); "
         "its contact forces are (42)-(44).",
-        (*bearings(_STATE, _SLIPS, "(37)-(44)"), _cases(_SLIPS)),
+        *bearings(_STATE, _SLIPS, "(37)-(44)"),
+        _cases(_SLIPS),
     ),
-    Claim(
+    claim(
         "eq-40",
         "(40), (44)",
         "A ball that has settled slipping at both points slips inwards at the floor and up the wall, cos α > 0, and "
         "backwards, sin α < 0: there is no such motion with cos α < 0.",
-        tuple(
+        *(
             Bearing("settled", slip, lambda m: 0.0, when=_SLIPS, relation=relation, by="(40)")
             for slip, relation in (("slip_z", Relation.AT_LEAST), ("slip_x", Relation.AT_MOST))
         ),
     ),
-    Claim(
+    claim(
         "eq-42",
         "(42), (43)",
         "Slipping at both points, the normal forces at floor and wall are the closed forms in α, and friction holds "
         "the ball back along its orbit.",
-        tuple(
+        *(
             Bearing("settled", force, _along_branch, when=_SLIPS, by="slipping_branch.branch")
             for force in ("force_Ay", "force_Bx", "force_Az")
         ),
     ),
-    Claim(
+    claim(
         "prop-6",
         "Prop. 6, (49), (50)",
         "Below ω₀₂ a ball high up on the wall slips and sinks at the constant speed (g - ηRω₀²)/c, going round "
         "with the fluid; B_x = mRω₀², B_y = ηmRω₀².",
-        (*bearings(_STATE, _SINKS, "(49), (50)"), _cases(_SINKS)),
+        *bearings(_STATE, _SINKS, "(49), (50)"),
+        _cases(_SINKS),
         text=Text.CORRECTED,
         reason="(49) lost a row: the second of its five is ω_c = ω₀.",
     ),
 )
 
 DIAGRAMS = (
-    Claim(
+    claim(
         "fig-9",
         "Fig. 9",
         "Off the floor, the spin on the wall rises with ω₀ up to ω₀₂ (NS) and falls above (NR).",
-        bearings(("wall_spin",), is_in(Case.NS, Case.NR), "(91)"),
+        *bearings(("wall_spin",), is_in(Case.NS, Case.NR), "(91)"),
     ),
-    Claim(
+    claim(
         "fig-10",
         "Fig. 10",
         "For η < j the spins on the wall of the ball that rolls, slips, or is carried by the wall lie on the curves "
         "of Fig. 10.",
-        (
-            *bearings(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
-            *bearings(("wall_spin",), every(slips_first, _LEANS), "(91)", Case.SR),
-        ),
+        *bearings(("wall_spin",), every(slips_first, is_in(Case.RR, Case.SS)), "(91)"),
+        *bearings(("wall_spin",), every(slips_first, _LEANS), "(91)", Case.SR),
     ),
-    Claim(
+    claim(
         "fig-11",
         "Fig. 11",
         "For η > j rolling ends at ω₀₃, where it meets SR, whose spin on the wall falls like 1/ω₀.",
-        (
-            *bearings(("wall_spin",), every(lifts_first, _ROLLS), "(91)"),
-            *bearings(("wall_spin",), every(lifts_first, _LEANS), "(91)", Case.SR),
-            _with_fluid(lifts_first),
-        ),
+        *bearings(("wall_spin",), every(lifts_first, _ROLLS), "(91)"),
+        *bearings(("wall_spin",), every(lifts_first, _LEANS), "(91)", Case.SR),
+        _with_fluid(lifts_first),
     ),
     *(
-        Claim(
+        claim(
             figure,
             f"Fig. {figure[-1]}",
             f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball settles in every case "
             "whose stationary state attracts, or sinks, and in no other (SR on an unloaded floor counts as NR).",
-            (Bearing("plane", "cases", _lasting, when=given(figure=figure), by="analytic.stable_solutions"),),
+            Bearing("plane", "cases", _lasting, when=given(figure=figure), by="analytic.stable_solutions"),
         )
         for figure, axis in (("fig-7", "η"), ("fig-8", "μ = η"))
     ),
-    Claim(
+    claim(
         "regions",
         "Figs. 7 and 8, (84)-(90)",
         "In every region of Figs. 7 and 8 the stationary states of its label exist: balls settle in the attracting "
         "ones and in NS, SS beyond the fold divides two basins, and in SR a ball leans on the floor.",
-        (
-            Bearing("plane", "cases", _in_region, by="analytic.bifurcation.diagram.case_map"),
-            Bearing("edge", "edge_omega_c", _dividing, by="case_map, analytic.solution"),
-            Bearing("rates", "modes", _leaning, when=given(case="SR"), by="case_map"),
-        ),
+        Bearing("plane", "cases", _in_region, by="analytic.bifurcation.diagram.case_map"),
+        Bearing("edge", "edge_omega_c", _dividing, by="case_map, analytic.solution"),
+        Bearing("rates", "modes", _leaning, when=given(case="SR"), by="case_map"),
     ),
-    Claim(
+    claim(
         "double-points",
         "Figs. 7 and 8, black dots",
         "The fold is born at η_cr, where ω₀₂ and ω₀₄ meet; at η = j rolling ends at ω₀₃ = √(g/(jR)), where all meet.",
-        (
-            Bearing("birth", "critical_drag", _born, by="analytic.bifurcation.diagram.double_points"),
-            Bearing("thresholds", "omega_03", _all_meet, by="analytic.bifurcation.diagram.double_points"),
-        ),
+        Bearing("birth", "critical_drag", _born, by="analytic.bifurcation.diagram.double_points"),
+        Bearing("thresholds", "omega_03", _all_meet, by="analytic.bifurcation.diagram.double_points"),
     ),
 )
 SECTIONS = {"Stationary states": CLAIMS, "Bifurcations": DIAGRAMS}

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import rolling_forces
-from compare.claim import Bearing, Claim, When, given
+from compare.claim import Bearing, When, claim, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.settled import number
@@ -57,17 +57,17 @@ def _ends(name: str, p: Parameters) -> float:
 
 
 CLAIMS = (
-    Claim(
+    claim(
         "table-5-P3",
         "Table 5, P3",
         "At ω₀₁ two-point rolling gives way to slipping at both points, whose slip begins at zero.",
-        (_at("omega_01"),),
+        _at("omega_01"),
     ),
-    Claim(
+    claim(
         "rolling-holds",
         "(12), (13), (22)",
         "Rolling at both points goes on just as long as forces within both friction cones admit it, for μ < 1.",
-        tuple(
+        *(
             Bearing(
                 "thresholds",
                 quantity,
@@ -79,74 +79,66 @@ CLAIMS = (
             for quantity in ("omega_01", "omega_03")
         ),
     ),
-    Claim(
+    claim(
         "table-5-P2",
         "Table 5, P2",
         "At ω₀₂ the sinking state (NS) and the state carried by the wall (NR) meet.",
-        (_at("omega_02"),),
+        _at("omega_02"),
     ),
-    Claim(
+    claim(
         "table-5-NF2",
         "Table 5, NF2",
         "At ω₀₂ the unstable state of slipping at both points merges with the state carried by the wall.",
-        (_at("omega_02", protocol="edge"),),
+        _at("omega_02", protocol="edge"),
     ),
-    Claim(
+    claim(
         "table-5-NT1",
         "Table 5, NT1",
         "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in it; above, it "
         "leaves it.",
-        (
-            _at("omega_03"),
-            Bearing("thresholds", "lifts", lambda m: math.isnan(_known(m).omega_01), by=f"{_BY}: omega_01"),
-        ),
+        _at("omega_03"),
+        Bearing("thresholds", "lifts", lambda m: math.isnan(_known(m).omega_01), by=f"{_BY}: omega_01"),
     ),
-    Claim(
+    claim(
         "table-5-F",
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
-        (
-            _at("omega_04"),
-            Bearing("thresholds", "folds", lambda m: math.isfinite(_known(m).omega_04), by=f"{_BY}: omega_04"),
-        ),
+        _at("omega_04"),
+        Bearing("thresholds", "folds", lambda m: math.isfinite(_known(m).omega_04), by=f"{_BY}: omega_04"),
     ),
-    Claim(
+    claim(
         "sub-branches",
         "Prop. 7, (87)-(90), Fig. 10",
         "Between ω₀₂ and ω₀₄ an unstable state of slipping at both points divides two attractors.",
-        tuple(_edge(name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "wall_spin")),
+        *(_edge(name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "wall_spin")),
     ),
-    Claim(
+    claim(
         "eta-critical",
         "(87), Fig. 7",
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the state carried by "
         "the wall at ω₀₂, without a jump.",
-        (
-            Bearing("thresholds", "folds", lambda m: m.parameters.eta > _known(m).eta_cr, by=f"{_BY}: eta_cr"),
-            Bearing(
-                "birth", "critical_drag", lambda m: bifurcation.critical_drag(m.parameters), by="diagram.critical_drag"
-            ),
-            _at("omega_02", given(by=SLIPPING)),
+        Bearing("thresholds", "folds", lambda m: m.parameters.eta > _known(m).eta_cr, by=f"{_BY}: eta_cr"),
+        Bearing(
+            "birth", "critical_drag", lambda m: bifurcation.critical_drag(m.parameters), by="diagram.critical_drag"
         ),
+        _at("omega_02", given(by=SLIPPING)),
     ),
-    Claim(
+    claim(
         "one-fold",
         "after Prop. 7",
         "There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
-        (
-            Bearing(
-                "thresholds",
-                "omega_04",
-                lambda m: max(_known(m).omega_01, _known(m).omega_02),
-                relation=Relation.AT_LEAST,
-                by=f"{_BY}: omega_01, omega_02",
-            ),
-            Bearing(
-                "thresholds",
-                "folds",
-                lambda m: bifurcation.number_of_folds(m.parameters),
-                by="diagram.number_of_folds",
-            ),
+        Bearing(
+            "thresholds",
+            "omega_04",
+            lambda m: max(_known(m).omega_01, _known(m).omega_02),
+            relation=Relation.AT_LEAST,
+            by=f"{_BY}: omega_01, omega_02",
+        ),
+        Bearing(
+            "thresholds",
+            "folds",
+            lambda m: bifurcation.number_of_folds(m.parameters),
+            by="diagram.number_of_folds",
         ),
     ),
 )

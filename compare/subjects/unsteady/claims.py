@@ -7,7 +7,7 @@ import math
 
 import analytic
 from analytic.flowmeter import pulsation, response
-from compare.claim import Bearing, Claim, given
+from compare.claim import Bearing, claim, given
 from compare.judge import simulated, theory
 from compare.kit.record import Measurement, Relation, state
 from compare.settled import lifts_first, slips_first
@@ -53,83 +53,76 @@ def _ramp_end(m: Measurement) -> float:
 
 
 CLAIMS = (
-    Claim(
+    claim(
         "pulsation-lag",
         "(23)",
         "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag alone accelerates it "
         "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c.",
-        (
-            Bearing(
-                "pulsation", "gain", lambda m: abs(_ratio(m)), by=f"{_BY}.response.transfer, pulsation.first_harmonic"
-            ),
-            Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_ratio(m)), by="the same"),
-            Bearing("unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE),
-        ),
+        Bearing("pulsation", "gain", lambda m: abs(_ratio(m)), by=f"{_BY}.response.transfer, pulsation.first_harmonic"),
+        Bearing("pulsation", "phase_lag", lambda m: -cmath.phase(_ratio(m)), by="the same"),
+        Bearing("unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE),
     ),
-    Claim(
+    claim(
         "pulsation-slip",
         "(23), (66), (67), (73), (82)",
         "In a pulsating flow a rolling ball begins to slip once rolling needs more friction than floor and wall can "
         "give: not below the amplitude at which slip first lasts, and not above the one up to which forces allow "
         "rolling. Mostly the two are the same; in between Coulomb's law allows both.",
-        (_slips("slip-stability", Relation.AT_LEAST), _slips("infeasible", Relation.AT_MOST)),
+        _slips("slip-stability", Relation.AT_LEAST),
+        _slips("infeasible", Relation.AT_MOST),
     ),
-    Claim(
+    claim(
         "pulsation-limits",
         "(66), (67), (82)",
         "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃; in a fast one ω_c hardly changes, "
         "and the ball slips when the drag of the fluid alone is too strong. No pulsation needs a larger amplitude "
         "than a fast one.",
-        (
-            *(
-                Bearing(
-                    "thresholds",
-                    end,
-                    # The greatest flow at which the ball slips in a very slow pulsation about four fifths of it.
-                    lambda m: (
-                        0.8 * m.parameters.omega_0
-                        + pulsation.slow_onset(m.parameters.replace(omega_0=0.8 * m.parameters.omega_0))
-                    ),
-                    when=first,
-                    by=f"{_BY}.pulsation.slow_onset",
-                )
-                for end, first in (("omega_01", slips_first), ("omega_03", lifts_first))
-            ),
+        *(
             Bearing(
-                "bounds",
-                "gamma_zero",
-                lambda m: _at(m, "omega_c") + pulsation.fast_onset(m.parameters.replace(omega_0=_at(m, "omega_c"))),
-                when=given(inner="RR", outer="RS", by="held"),
-                by=f"{_BY}.pulsation.fast_onset",
-            ),
-            Bearing(
-                "pulsation",
-                "slip_amplitude",
-                # On rough floors rolling goes on while forces admit it, beyond the first slip that could last.
-                lambda m: theory(pulsation.slip_onset, m.parameters, 1e5 * m.parameters.c, "infeasible"),
-                relation=Relation.AT_MOST,
-                by=f"{_BY}.pulsation.slip_onset, infeasible, at a frequency of 1e5 c",
-            ),
+                "thresholds",
+                end,
+                # The greatest flow at which the ball slips in a very slow pulsation about four fifths of it.
+                lambda m: (
+                    0.8 * m.parameters.omega_0
+                    + pulsation.slow_onset(m.parameters.replace(omega_0=0.8 * m.parameters.omega_0))
+                ),
+                when=first,
+                by=f"{_BY}.pulsation.slow_onset",
+            )
+            for end, first in (("omega_01", slips_first), ("omega_03", lifts_first))
+        ),
+        Bearing(
+            "bounds",
+            "gamma_zero",
+            lambda m: _at(m, "omega_c") + pulsation.fast_onset(m.parameters.replace(omega_0=_at(m, "omega_c"))),
+            when=given(inner="RR", outer="RS", by="held"),
+            by=f"{_BY}.pulsation.fast_onset",
+        ),
+        Bearing(
+            "pulsation",
+            "slip_amplitude",
+            # On rough floors rolling goes on while forces admit it, beyond the first slip that could last.
+            lambda m: theory(pulsation.slip_onset, m.parameters, 1e5 * m.parameters.c, "infeasible"),
+            relation=Relation.AT_MOST,
+            by=f"{_BY}.pulsation.slip_onset, infeasible, at a frequency of 1e5 c",
         ),
     ),
-    Claim(
+    claim(
         "pulsation-mean",
         "(23), (26), Definitions 1-3",
         "A pulsation that makes the ball slip makes its mean reading low.",
-        (
-            Bearing(
-                "pulsation",
-                "mean_error",
-                lambda m: theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m)),
-                by=f"{_BY}.pulsation.mean_error",
-            ),
+        Bearing(
+            "pulsation",
+            "mean_error",
+            lambda m: theory(pulsation.mean_error, m.parameters, _at(m, "amplitude"), _at(m)),
+            by=f"{_BY}.pulsation.mean_error",
         ),
     ),
-    Claim(
+    claim(
         "jump-slipping",
         "(26), (38)-(42)",
         "After a jump of the flow a ball that slips at both points overshoots its new reading and rings.",
-        tuple(
+        *(
             Bearing(
                 "unsteady",
                 quantity,
@@ -139,18 +132,16 @@ CLAIMS = (
             for k, quantity in enumerate(("jump_peak", "jump_height"))
         ),
     ),
-    Claim(
+    claim(
         "ramp-fold",
         "(26), (88)",
         "A flow that rises steadily keeps the ball slipping beyond the fold, before it catches up.",
-        (
-            Bearing(
-                "unsteady",
-                "ramp_end",
-                _ramp_end,
-                size=lambda m: abs(_ramp_end(m) - analytic.thresholds(m.parameters).omega_04),
-                by="analytic.simulate",
-            ),
+        Bearing(
+            "unsteady",
+            "ramp_end",
+            _ramp_end,
+            size=lambda m: abs(_ramp_end(m) - analytic.thresholds(m.parameters).omega_04),
+            by="analytic.simulate",
         ),
     ),
 )
