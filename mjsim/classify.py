@@ -40,22 +40,15 @@ _CARRIED = "_latest", "_shown", "_now", "_begin"
 
 
 class Regularised(Protocol):
-    """What the classifier needs of an engine's settings."""
+    """What the classifier needs of an engine's settings, see `ContactSettings`."""
 
     @property
-    def timestep(self) -> float:
-        """s"""
-
+    def timestep(self) -> float: ...
     @property
-    def rolls(self) -> float:
-        """Share of `regularisation_speed` below which a contact rolls; from three times that on it slips."""
-
+    def rolls(self) -> float: ...
     @property
-    def midpoint(self) -> float:
-        """Where in a step forces are taken, in steps after its beginning."""
-
-    def regularisation_speed(self, load: npt.ArrayLike) -> Array:
-        """Slip speed, m s-1, up to which friction is less than Coulomb's, for the latter over mass in m s-2."""
+    def midpoint(self) -> float: ...
+    def regularisation_speed(self, load: npt.ArrayLike) -> Array: ...
 
 
 class Contacts(NamedTuple):
