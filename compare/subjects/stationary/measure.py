@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 
 from compare.kit.lab import Lab, time_unit
 from compare.kit.programme import FOUR, ONE, Protocol
@@ -20,8 +21,6 @@ from model import Parameters, State
 from model.drag import QUADRATIC
 
 PROTOCOL = "settled"
-LIVELY = 10.0
-"""Least duration of a round, in units of the time in which the fluid would stop a free ball, for values to count."""
 
 
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
@@ -32,8 +31,8 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     """
     sharp, starts = lab.effort("settled.sharp"), []
     for name, p in sets.items():
-        for q in _flows(lab, p):
-            starts += [begin(name, q, how) for how in lab.effort("settled.starts")]
+        for flow, how in product(lab.effort("settled.flows"), lab.effort("settled.starts")):
+            starts.append(begin(name, p.replace(omega_0=flow / time_unit(p)), how))
         spinning = State(slip_y=SPIN / time_unit(p) * p.R / p.r)
         starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
     ended = settle(lab, starts, sharp=sharp)
@@ -52,7 +51,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             _, v_y, omega_c, *_ = state.mean.tolist()
             Re = 2 * p.r / p.nu_f * math.hypot(v_y, p.R * (omega_c - p.omega_0))
             rate *= p.C_D / 24 * Re
-        if rate * duration(p) < LIVELY:
+        if rate * duration(p) < 10:  # a round lasts too few of the times in which the fluid would stop a free ball
             why = f"{named}: quadratic drag fades with the lag, so that a small lag hardly dies out"
             without[key] = Missing(PROTOCOL, state.start.set, why, len(state.values))
         else:
@@ -79,11 +78,6 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
                 for n, size in sizes.items():
                     uncertainty = math.hypot(fine.values[n].uncertainty, max(changes) * size)
                     yield _record(lab, fine, n, Measured(fine.values[n].value, uncertainty))
-
-
-def _flows(lab: Lab, p: Parameters) -> list[Parameters]:
-    """A set at the flows of a level."""
-    return [p.replace(omega_0=flow / time_unit(p)) for flow in lab.effort("settled.flows")]
 
 
 def _unsettled(each: Settled, rows: int) -> Missing:

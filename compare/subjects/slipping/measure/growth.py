@@ -39,7 +39,6 @@ from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ
 
-SEED, FAN_SEED = 61, 58
 PUSHES = {
     (Case.RR, Case.RS): 1,
     (Case.RR, Case.SR): 1,
@@ -65,23 +64,15 @@ AT_START = slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]) / slope_erro
 )
 """Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a window."""
 SMOOTH = "without friction at both contacts there is nothing that rolls"
-SINKING = 0.5
-"""Speed at which a ball sinks divided by `dragged_speed`; the fluid also pulls along the wall at `dragged_speed`."""
-SIDEWAYS = np.array([0.3, 1.0, 0.3]) / np.linalg.norm([0.3, 1.0, 0.3])
-"""A direction of slip that is almost that of the wall's contact alone."""
-DIRECTIONS = 8
-DRAGGED = (0.5, 3.0)
-"""Least and largest pull of the fluid along the orbit divided by the weight, either way: it turns the direction."""
-AHEAD = 3.0
-"""Largest angle of the greatest growth from the vertical, rad: one near pi may come out on either side of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Push:
     """A start that rolls, and the slip that it is given.
 
-    The start's name: ``sideways`` for the direction `SIDEWAYS`, ``dragged`` where the fluid pulls hard, ``rest`` in a
-    fluid at rest, empty for a direction at random, ``held`` and ``stationary`` for `bounds`.
+    The start's name: ``sideways`` for a direction that is almost that of the wall's contact alone, ``dragged`` where
+    the fluid pulls hard, ``rest`` in a fluid at rest, empty for a direction at random, ``held`` and ``stationary`` for
+    `bounds`.
     """
 
     start: Start
@@ -199,14 +190,15 @@ def without_size(rates: Array) -> Array:
 
 def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
     """Pushes out of every state of a set; two of them where one contact alone slips, to either side."""
-    rng = np.random.default_rng([SEED, *name.encode()])
+    rng = np.random.default_rng([61, *name.encode()])
     slow = 0.4 / time_unit(p) * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
     going = Start(name, p.replace(omega_0=slow), "sideways", State(omega_c=slow).stacked())
-    yield [Push(going, Case.RR, Case.SS, SIDEWAYS)]
+    yield [Push(going, Case.RR, Case.SS, np.array([0.3, 1.0, 0.3]) / np.linalg.norm([0.3, 1.0, 0.3]))]
     still = Start(name, p.replace(omega_0=0.0), "rest", np.zeros(8))
     for side in (1, -1):
         yield [Push(still, Case.RR, Case.RS, np.array([0.0, side, 0.0]))]
-        sinking = State.of(random_state(Case.NR, p, rng))._replace(v_y=-SINKING * dragged_speed(p))
+        # It sinks half as fast as the fluid pulls it along the wall.
+        sinking = State.of(random_state(Case.NR, p, rng))._replace(v_y=-0.5 * dragged_speed(p))
         dragged = p.replace(omega_0=sinking.omega_c + dragged_speed(p) / p.R)
         start = Start(name, dragged, "dragged", sinking.stacked())
         yield [Push(start, Case.NR, Case.NS, np.array([0.0, 0.8 * side, 0.6]))]
@@ -245,12 +237,13 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     yield from (Missing("steepest", name, why) for name in sets if name not in rough)
     fans = []  # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
     for name, p in rough.items():
-        rng = np.random.default_rng([FAN_SEED, *name.encode()])
+        rng = np.random.default_rng([58, *name.encode()])
         for _ in range(lab.effort("steepest.states")):
             x = random_state(Case.NR, p, rng)
-            pull = rng.choice([-1, 1]) * rng.uniform(*DRAGGED)
+            # The fluid pulls along the orbit, by half the weight to three times it: that turns the direction.
+            pull = rng.choice([-1, 1]) * rng.uniform(0.5, 3.0)
             start = Start(name, p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R), "", x)
-            angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+            angles = np.linspace(0.0, 2 * np.pi, 8, endpoint=False)
             fans.append([Push(start, Case.NR, Case.NS, np.array([0.0, np.sin(b), np.cos(b)])) for b in angles])
     runs = lab.groups([push.tasks(lab) for fan in fans for push in fan])
     for fan in fans:
@@ -260,16 +253,13 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
                 why = f"the run {got}"
             elif value := growth(push, got):
                 grown.append(value)
-        angle = math.nan
-        if len(grown) == DIRECTIONS:
-            harmonics = np.fft.rfft([g.value for g in grown]) * 2 / DIRECTIONS
-            angle = float(-np.angle(harmonics[1]))
-        if not abs(angle) < AHEAD:
-            yield Missing("steepest", fan[0].start.set, why)
-            continue
-        scatter = np.sqrt(2.0 / DIRECTIONS) * max(g.uncertainty for g in grown)
-        others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
-        beta = Measured(angle, float(np.hypot(scatter, others) / np.abs(harmonics[1])))
         start, tasks = fan[0].start, [task for push in fan for task in push.tasks(lab)]
-        row = measurement(lab, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
-        yield row
+        harmonics = np.fft.rfft([g.value for g in grown] if len(grown) == len(fan) else [0.0]) * 2 / len(fan)
+        # An angle near pi may come out on either side of it.
+        if len(harmonics) > 1 and abs(angle := float(-np.angle(harmonics[1]))) < 3:
+            scatter = np.sqrt(2.0 / len(fan)) * max(g.uncertainty for g in grown)
+            others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
+            beta = Measured(angle, float(np.hypot(scatter, others) / np.abs(harmonics[1])))
+            yield measurement(lab, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
+        else:
+            yield Missing("steepest", start.set, why)
