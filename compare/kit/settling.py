@@ -16,7 +16,7 @@ import numpy as np
 from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.statistics import COVERAGE, Measured, settled_case, tail
+from compare.kit.statistics import COVERAGE, Measured, settled_case, steady_mean, tail
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
 from model import Case, Contact, Parameters, State, Trajectory
@@ -34,8 +34,6 @@ LONGEST = 2.0
 SHORT = (1 / 64, 1 / 8)
 """Rounds before those where the law isn't Stokes': other drag laws are stronger, so balls settle sooner. The drift
 limit of such a round is reduced in proportion to its length."""
-TAPER = 8
-"""Exponent of the sine that the window is: m periods within it leave about (TAPER/2)!^2/(pi m^(TAPER+1)) of one."""
 STEPS_A_SAMPLE = 8
 """A coarse time step is a twentieth of sqrt(R/g) or so, and the ball goes round in more than that."""
 SOLVED = 1e-12
@@ -248,23 +246,3 @@ def settles(run: Trajectory) -> bool | None:
     middle, last = (abs(float(run.omega_c[k] - run.omega_c[k - 10])) for k in (-51, -1))
     slowing = last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0  # round-off: at rest
     return False if slowing > 1 else True if slowing < 0.2 else None
-
-
-def taper(length: int) -> Array:
-    """The tapered window (n,)."""
-    return np.asarray(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER)
-
-
-def steady_mean(values: Array, length: int) -> tuple[Array, Array]:
-    """Mean of rows (k, n) over their last `length` samples, tapered, and how far it may be from its limit; both (k,).
-
-    From three windows, each a quarter of its length later than the one before: what is left of an approach by a
-    constant ratio, plus the last change itself.
-    """
-    weights = taper(length)
-    weights /= weights.sum()
-    n, shift = values.shape[1], length // 4
-    first, second, last = (values[:, n - length - k * shift : n - k * shift] @ weights for k in (2, 1, 0))
-    before, after = np.abs(second - first), np.abs(last - second)
-    ratio = np.minimum(np.divide(after, before, out=np.zeros_like(after), where=before > 0), 0.9)
-    return last, after / (1 - ratio)

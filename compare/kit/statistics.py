@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from model import Case, InputError, Trajectory
+from model import Case, Trajectory
 from model.arrays import Array
 
 COVERAGE = 3.0
 """Standard uncertainties in a tolerance."""
+TAPER = 8
+"""Exponent of the sine that the window is: m periods within it leave about (TAPER/2)!^2/(pi m^(TAPER+1)) of one."""
 
 
 @dataclass(frozen=True)
@@ -45,38 +47,24 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def window_mean(time: npt.ArrayLike, values: npt.ArrayLike) -> Measured:
-    """Mean of samples (n,) at equally spaced times (n,) of a run that has settled or nearly so.
+def taper(length: int) -> Array:
+    """The tapered window (n,)."""
+    return np.asarray(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** TAPER)
 
-    Three causes of uncertainty are added in quadrature: scatter, with the number of independent samples from the
-    autocorrelation; the rest of an exponential approach, from the means of three thirds (Aitken); and the rounding
-    of the samples themselves. Raises `InputError` for fewer than 6 samples or values that are not finite.
+
+def steady_mean(values: Array, length: int) -> tuple[Array, Array]:
+    """Mean of rows (k, n) over their last `length` samples, tapered, and how far it may be from its limit; both (k,).
+
+    From three windows, each a quarter of its length later than the one before: what is left of an approach by a
+    constant ratio, plus the last change itself.
     """
-    t, v = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
-    if t.shape != v.shape or t.ndim != 1 or len(v) < 6:
-        raise InputError(f"a window mean needs two equal rows of 6 samples or more, not shapes {t.shape} and {v.shape}")
-    if not np.all(np.isfinite(v)):
-        raise InputError("a window mean needs finite samples")
-    scatter = float(v.std(ddof=1)) / math.sqrt(len(v) / correlation_length(v))
-    first, second, third = (float(part.mean()) for part in np.array_split(v, 3))
-    ratio = abs(third - second) / abs(second - first) if second != first else 0.0
-    # Thirds that come together by less than a twentieth say only that nothing has settled.
-    approach = abs(third - first) / 2 + abs(third - second) * ratio / (1 - min(ratio, 0.95))
-    rounding = float(np.finfo(float).eps * np.abs(v).max())
-    return Measured(float(v.mean()), math.sqrt(scatter**2 + approach**2 + rounding**2))
-
-
-def correlation_length(values: Array) -> float:
-    """Samples per independent sample, 1 + 2 sum rho_k >= 1, summed while pairs of rho_k are positive (Geyer 1992)."""
-    v = values - values.mean()
-    variance = float(v @ v)
-    if variance <= (np.finfo(float).eps * np.abs(values).max()) ** 2 * len(v):
-        return 1.0
-    spectrum = np.abs(np.fft.rfft(v, 2 * len(v))) ** 2
-    rho = np.fft.irfft(spectrum)[: len(v)] / variance
-    pairs = rho[: len(rho) // 2 * 2].reshape(-1, 2).sum(axis=1)
-    last = int(np.argmax(pairs <= 0)) if np.any(pairs <= 0) else len(pairs)
-    return float(min(max(1.0, 2 * pairs[:last].sum() - 1), len(v)))
+    weights = taper(length)
+    weights /= weights.sum()
+    n, shift = values.shape[1], length // 4
+    first, second, last = (values[:, n - length - k * shift : n - k * shift] @ weights for k in (2, 1, 0))
+    before, after = np.abs(second - first), np.abs(last - second)
+    ratio = np.minimum(np.divide(after, before, out=np.zeros_like(after), where=before > 0), 0.9)
+    return last, after / (1 - ratio)
 
 
 def tail(run: Trajectory, share: float = 0.1) -> slice:

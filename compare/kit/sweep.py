@@ -22,7 +22,7 @@ from rich.table import Table
 
 import analytic
 from compare.kit import pages
-from compare.kit.statistics import settled_case, tail, window_mean
+from compare.kit.statistics import settled_case, steady_mean, tail
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.arrays import Array
 from model.files import WholeFile, check_writable, column, dataset, reading, write_columns
@@ -33,6 +33,8 @@ from model.trajectory import CONVENTIONS, attributes, columns
 SCHEMA, SCHEMA_VERSION = "dualball-collection", 1
 MOST = 100_000
 """Most runs of a sweep."""
+FEWEST = 6
+"""Samples of a last part below which it has no mean."""
 NAMED = 5
 """Most files that can't be gathered, and most runs of a file, that are named one by one."""
 FIELDS = {field.name: field.metadata["unit"] for field in Parameters.quantities()}
@@ -173,7 +175,7 @@ def _attributes() -> dict[str, dict[str, Any]]:
     for name in VARIABLES:
         units, meaning = (stored[name][key] for key in ("units", "long_name"))
         about[name] = {"units": units, "long_name": f"{meaning}, mean"}
-        about[f"{name}_uncertainty"] = {"units": units, "long_name": f"{meaning}, standard uncertainty of the mean"}
+        about[f"{name}_uncertainty"] = {"units": units, "long_name": f"{meaning}, uncertainty of the mean"}
         about[f"{name}_theory"] = {"units": units, "long_name": f"{meaning}, stationary solution of the case"}
     about["case"] = attributes(stored["case"])  # -1: none prevails
     return about
@@ -235,7 +237,7 @@ def table(about: dict[str, Any]) -> Table:
 
 
 def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
-    """A run's parameters, and mean, standard uncertainty and prevailing case over its last part, beside theory.
+    """A run's parameters, and mean, its uncertainty by drift, and prevailing case over its last part, beside theory.
 
     Those are nan, and the case -1, for a run too short for them; theory, the stable stationary solution of the case, is
     nan where there is none, where it is free, and in unsteady flow.
@@ -244,12 +246,10 @@ def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
     row |= dataclasses.asdict(trajectory.header.parameters)
     row["duration"] = float(trajectory.time[-1]) if len(trajectory.time) else 0.0
     row["failure"] = trajectory.header.failure
-    last = tail(trajectory)
-    for variable in VARIABLES:
-        row |= dict.fromkeys((variable, f"{variable}_uncertainty"), math.nan)
-        with suppress(InputError):  # too few samples for a mean
-            mean = window_mean(trajectory.time[last], getattr(trajectory, variable)[last])
-            row |= {variable: mean.value, f"{variable}_uncertainty": mean.uncertainty}
+    length = len(trajectory.time[tail(trajectory)])
+    means, drifts = steady_mean(trajectory.x.T, length) if length >= FEWEST else np.full((2, len(VARIABLES)), math.nan)
+    for variable, mean, drift in zip(VARIABLES, means.tolist(), drifts.tolist(), strict=True):
+        row |= {variable: mean, f"{variable}_uncertainty": drift}
     row |= dict.fromkeys((f"{name}_theory" for name in VARIABLES), math.nan)
     case = int(settled_case(trajectory)) if len(trajectory.case) else -1
     if case >= 0 and trajectory.header.flow.is_steady:

@@ -10,7 +10,7 @@ import pytest
 import analytic
 from compare.claim import Outcome
 from compare.judge import judge
-from compare.kit import levels, settling
+from compare.kit import levels, settling, statistics
 from compare.kit.lab import Lab, time_unit
 from compare.kit.levels import EFFORT, Level
 from compare.kit.record import Measurement, Missing, Records
@@ -98,12 +98,12 @@ class TestSettled:
 def test_a_steady_mean_is_as_sure_as_it_says_and_passes_over_oscillations() -> None:
     t = np.arange(1000) / 1000
     for rate in (3.0, 10.0, 30.0):
-        means, uncertain = settling.steady_mean(np.array([2.0 + np.exp(-rate * t)]), 500)
+        means, uncertain = statistics.steady_mean(np.array([2.0 + np.exp(-rate * t)]), 500)
         assert abs(means[0] - 2.0) <= 3 * uncertain[0]
     for turns in (20.3, 31.7, 47.1):
-        means, _ = settling.steady_mean(np.array([2.0 + np.sin(2 * np.pi * turns * t + 1.0)]), 500)
+        means, _ = statistics.steady_mean(np.array([2.0 + np.sin(2 * np.pi * turns * t + 1.0)]), 500)
         # (TAPER/2)!^2/(pi m^(TAPER+1)) for m periods in the window.
-        assert abs(means[0] - 2.0) <= 24**2 / (np.pi * (turns / 2 - 4) ** (settling.TAPER + 1))
+        assert abs(means[0] - 2.0) <= 24**2 / (np.pi * (turns / 2 - 4) ** (statistics.TAPER + 1))
 
 
 def _outcomes(records: Records) -> dict[str, Outcome]:

@@ -24,8 +24,8 @@ from compare.kit.fits import vanishing
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.levels import Level
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement
-from compare.kit.settling import LOOSE, begin, family, lasting, settle_groups, taper
-from compare.kit.statistics import Measured, tail
+from compare.kit.settling import LOOSE, begin, family, lasting, settle_groups
+from compare.kit.statistics import Measured, tail, taper
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
