@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 
 from compare.kit.engines import ENGINES
 from compare.kit.lab import coarse_step
-from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Measurement
 from compare.kit.statistics import COVERAGE
@@ -76,13 +75,7 @@ def symbol(name: str) -> str:
     return re.sub(r"(\w)(\u0303?)_(\w+?)(⁰?)(?!\w)", typeset, QUANTITIES[name].symbol)
 
 
-def label(name: str, unit: str = "") -> str:
-    """The label of an axis: symbol of a quantity and unit, its own if no other is given."""
-    unit = unit or readable(QUANTITIES[name].unit)
-    return f"{symbol(name)} ({unit})" if unit else symbol(name)
-
-
-OMEGA_0, OMEGA_C, OMEGA_X = "$ω_0$ (rad/s)", label("omega_c"), label("wall_spin")
+OMEGA_0, OMEGA_C, OMEGA_X = (f"{name} (rad/s)" for name in ("$ω_0$", symbol("omega_c"), symbol("wall_spin")))
 
 
 def named(p: Parameters, *names: str) -> str:
@@ -93,9 +86,9 @@ def named(p: Parameters, *names: str) -> str:
     return ", ".join(values)
 
 
-def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = (), names: Sequence[str] = ()) -> str:
-    """Sentences, the parameters (those of `names`, see `named`), and what the marks of measured states are."""
-    return " ".join(filter(None, (*sentences, f"{named(p, *names)}."))) + marks(states)
+def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = ()) -> str:
+    """Sentences, the parameters, and what the marks of measured states are."""
+    return " ".join(filter(None, (*sentences, f"{named(p)}."))) + marks(states)
 
 
 def marks(states: Sequence[Measurement]) -> str:
@@ -232,15 +225,10 @@ def ground(
                 axes.text(x.mean(), 1.02, case.name, transform=axes.get_xaxis_transform(), ha="center", fontsize=8)
 
 
-def deviations(
-    axes: Axes,
-    rows: Iterable[Measurement],
-    predicted: Callable[[Measurement], float],
-    x: Callable[[Measurement], float] = omega_0,
-) -> None:
+def deviations(axes: Axes, rows: Iterable[Measurement], predicted: Callable[[Measurement], float]) -> None:
     """A panel of relative deviations of measured values from predicted ones, by engine, on a logarithmic axis."""
     for engine, own in by_engine(rows, lambda m: m.engine).items():
         off = [max(abs(m.value / predicted(m) - 1), LEAST) for m in own]
-        axes.plot([x(m) for m in own], off, ls="none", ms=5, **mark_of(engine))
+        axes.plot(list(map(omega_0, own)), off, ls="none", ms=5, **mark_of(engine))
     axes.set(yscale="log", ylim=(LEAST / 10, 10), ylabel="relative deviation")
     axes.grid(alpha=0.25)
