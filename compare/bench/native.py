@@ -15,11 +15,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from compare.bench import forecast
 from compare.bench.adapters.mujoco_free import pairs
 from compare.bench.case import Case
 from compare.bench.contact_law import impedance, reference
 from mjsim import ContactSettings, scene
-from model import InputError, Parameters, StorageError
+from model import InputError, Parameters
 from model.parameters import NOT_NEGATIVE, POSITIVE, check_choice, check_number
 
 _NUMBERS = ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations")
@@ -141,12 +142,7 @@ def read(path: Path) -> Native:
     InputError
         If it is no MJCF, or lacks a ball or anything for it to pair.
     """
-    if not path.is_file():
-        raise StorageError(f"cannot read {path}: {'it is a directory' if path.is_dir() else 'there is no such file'}")
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise InputError(f"{path} is not valid MJCF: {' '.join(str(error).split())}") from error
+    model, _ = forecast.load(path)
     moves = model.body_weldid[model.geom_bodyid] > 0
     spheres = np.flatnonzero(moves & (model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE)).tolist()
     named = [geom for geom in spheres if model.geom(geom).name == "ball"]
