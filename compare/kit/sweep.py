@@ -1,6 +1,6 @@
 """Sweeps: the parameter sets that axes span, and what many runs settled to, in one file.
 
-`collect` writes one row a run: its parameters, and the mean, uncertainty and case over the last part of the run. The
+`collect` writes one row a run: its parameters, the mean over its last quarter, how sure that is, and its last case. The
 file opens in xarray with the dimension ``run``, along which the parameters that vary are coordinates.
 """
 
@@ -22,7 +22,7 @@ from rich.table import Table
 
 import analytic
 from compare.kit import pages
-from compare.kit.statistics import settled_case, steady_mean, tail
+from compare.kit.statistics import settled_case, steady_mean
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage
 from model.arrays import Array
 from model.files import WholeFile, check_writable, column, dataset, reading, write_columns
@@ -34,7 +34,7 @@ SCHEMA, SCHEMA_VERSION = "dualball-collection", 1
 MOST = 100_000
 """Most runs of a sweep."""
 FEWEST = 6
-"""Samples of a last part below which it has no mean."""
+"""Samples of the last quarter of a run below which it has no mean."""
 NAMED = 5
 """Most files that can't be gathered, and most runs of a file, that are named one by one."""
 FIELDS = {field.name: field.metadata["unit"] for field in Parameters.quantities()}
@@ -237,7 +237,7 @@ def table(about: dict[str, Any]) -> Table:
 
 
 def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
-    """A run's parameters, and mean, its uncertainty by drift, and prevailing case over its last part, beside theory.
+    """A run's parameters, mean over its last quarter with its uncertainty by drift, and last case, beside theory.
 
     Those are nan, and the case -1, for a run too short for them; theory, the stable stationary solution of the case, is
     nan where there is none, where it is free, and in unsteady flow.
@@ -246,7 +246,7 @@ def _row(trajectory: Trajectory, name: Path) -> dict[str, Any]:
     row |= dataclasses.asdict(trajectory.header.parameters)
     row["duration"] = float(trajectory.time[-1]) if len(trajectory.time) else 0.0
     row["failure"] = trajectory.header.failure
-    length = len(trajectory.time[tail(trajectory)])
+    length = len(trajectory.time) // 4
     means, drifts = steady_mean(trajectory.x.T, length) if length >= FEWEST else np.full((2, len(VARIABLES)), math.nan)
     for variable, mean, drift in zip(VARIABLES, means.tolist(), drifts.tolist(), strict=True):
         row |= {variable: mean, f"{variable}_uncertainty": drift}
