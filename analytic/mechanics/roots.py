@@ -13,18 +13,19 @@ from model.arrays import Array, Real
 def bisected(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
     """Where f (arrays of any shape, element by element) changes sign between start and end, to the last digit.
 
-    f must have different signs there; elements where it hasn't, or is nan, yield some number in between. Halving takes
-    no longer than the root finders of scipy on these small problems, and loading those takes half a second.
+    nan where it has one sign at both. Halving takes no longer than the root finders of scipy on these small problems,
+    and loading those takes half a second.
     """
     low, high = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     rises = np.asarray(f(low)) < 0
+    changes = (np.asarray(f(high)) < 0) != rises
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
         if np.all((middle == low) | (middle == high)):
             break
         before = (np.asarray(f(middle)) < 0) == rises
         low, high = np.where(before, middle, low), np.where(before, high, middle)
-    return high
+    return np.where(changes, high, np.nan)
 
 
 _HALVINGS = 200

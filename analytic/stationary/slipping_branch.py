@@ -148,15 +148,8 @@ def points_at(p: Parameters) -> list[float]:
     turning = float(fold(p))
     parts = [(-END, END)] if np.isnan(turning) else [(-END, turning), (turning, END)]
 
-    def excess(s: Array) -> Array:
-        return branch(s, p).Omega_0 - p.Omega_0
-
-    places = []
-    for part in parts:
-        low, high = (float(excess(np.asarray(end))) for end in part)
-        if low * high < 0:
-            places.append(float(roots.bisected(excess, *part)))
-    return places
+    places = [float(roots.bisected(lambda s: branch(s, p).Omega_0 - p.Omega_0, *part)) for part in parts]
+    return [s for s in places if not np.isnan(s)]
 
 
 def _friction(p: Parameters, mu: npt.ArrayLike | None, eta: npt.ArrayLike | None) -> tuple[Array, Array]:
