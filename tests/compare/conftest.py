@@ -1,7 +1,5 @@
 """Shared by the tests of `compare`."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 

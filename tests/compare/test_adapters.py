@@ -1,7 +1,5 @@
 """Adapters of other engines with a free body, as far as they are installed."""
 
-from __future__ import annotations
-
 import importlib
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The command of attractors, and how hops are measured."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

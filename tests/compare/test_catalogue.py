@@ -1,7 +1,5 @@
 """Claims and protocols fit together."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 from compare.catalogue import CLAIMS, PROTOCOLS

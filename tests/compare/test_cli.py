@@ -1,7 +1,5 @@
 """The command line: right answers for right questions, one clear line for the others."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """Collections: varied parameters as coordinates, and what can't be gathered is named."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

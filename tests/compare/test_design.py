@@ -1,7 +1,5 @@
 """``dualball design``: its answers as data and as a page, and one clear line for what can't be asked."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -118,8 +116,3 @@ def test_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], changes: di
     assert captured.err.count("\n") == 1
     assert captured.err.startswith(f"dualball: error: {path}: ")
     assert message in captured.err
-
-
-def test_no_place_for_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["design", written(tmp_path), "-o", str(tmp_path / "absent" / "page.html")]) == 2
-    assert "there is no directory" in capsys.readouterr().err

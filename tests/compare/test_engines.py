@@ -1,7 +1,5 @@
 """Engines of the extra ``engines``: the same task in, the same trajectory out."""
 
-from __future__ import annotations
-
 import json
 import math
 import sys

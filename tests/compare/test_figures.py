@@ -1,7 +1,5 @@
 """Figures: each draws from made-up results without any simulation, says its parameters, and puts points on curves."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import io

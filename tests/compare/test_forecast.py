@@ -1,7 +1,5 @@
 """The forecast of contacts stands beside what MuJoCo does in twenty small scenes, and its advice does what it says."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -1,7 +1,5 @@
 """Damaged files: one clear line or the right result, never a traceback, a wrong number or a file elsewhere."""
 
-from __future__ import annotations
-
 import shutil
 import tomllib
 from collections.abc import Callable, Iterator

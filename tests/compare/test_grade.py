@@ -1,7 +1,5 @@
 """The score card: good settings score, bad ones don't, theory predicts creep, and bad files are refused by name."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What holds at every instant: deviations are noticed one by one, and the drag is that of Stokes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

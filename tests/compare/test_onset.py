@@ -1,7 +1,5 @@
 """Thresholds: bisection and extrapolation on functions with known answers, the protocol on one set, and the claims."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

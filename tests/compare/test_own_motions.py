@@ -1,7 +1,5 @@
 """Assertions for one's own motions, and two motions side by side."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

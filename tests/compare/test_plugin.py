@@ -1,7 +1,5 @@
 """The plugin for pytest, in runs of its own."""
 
-from __future__ import annotations
-
 import pytest
 
 import analytic  # noqa: F401  runs in this process leave it loaded

@@ -1,7 +1,5 @@
 """Unsteady flow: both protocols on one set, and the claims."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

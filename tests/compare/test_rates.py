@@ -1,7 +1,5 @@
 """Whole spectra from pushes: exact on linear motions, honest on bent ones, and judged."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm

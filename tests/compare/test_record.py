@@ -1,7 +1,5 @@
 """Measurements come back from their files as they were, and a file that was touched is refused by name."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

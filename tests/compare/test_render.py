@@ -1,7 +1,5 @@
 """Pictures of runs: they show the case and the ball where it is, and say clearly what can't be shown."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path

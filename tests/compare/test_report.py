@@ -1,7 +1,5 @@
 """The report page: what it says, what it shows where results are missing, and how it behaves in a real browser."""
 
-from __future__ import annotations
-
 import base64
 import dataclasses
 import html
@@ -22,7 +20,6 @@ from matplotlib.figure import Figure
 from compare.claim import Bearing, Claim, Outcome, Text, Verdict
 from compare.commands import validate
 from compare.gallery import FIGURES
-from compare.kit import record
 from compare.kit.drawing import Drawing, GapError, Material
 from compare.kit.levels import Level
 from compare.kit.pages import readable
@@ -221,16 +218,6 @@ def test_summary_is_read_back(page: Path, directory: Path) -> None:
     assert results.described(VERDICTS[1])["checks"][0]["conditions"]["y"] == 0.02
     assert summary.verdicts["broken"]["worst"] is None
     assert "NaN" not in (directory / results.SUMMARY).read_text("utf-8")
-
-
-def test_measurements_are_found_again(tmp_path: Path) -> None:
-    kept = tmp_path / "measurements" / "settled.h5"
-    kept.parent.mkdir()
-    known = Records(tuple(check.measurement for check in checks(3)))
-    record.save(known, kept, {})
-    results.save(Summary.of(tmp_path, [], Level.FULL, {"mujoco": {1: [kept]}}), tmp_path)
-    again = results.testimony(results.load(tmp_path).files(tmp_path))["mujoco"][1]
-    assert [m.value for m in again.measurements] == [m.value for m in known.measurements]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Searches cover their box evenly; basins are those of theory; both go on where they stopped."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

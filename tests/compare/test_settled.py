@@ -1,7 +1,5 @@
 """Protocols of stationary states on one set, with so much drag that everything settles at once, and their claims."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

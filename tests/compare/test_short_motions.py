@@ -1,7 +1,5 @@
 """The protocols of short motions on one set: blind, and sharp enough to notice a theory that is slightly wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import cache
 from types import SimpleNamespace

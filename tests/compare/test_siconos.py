@@ -1,7 +1,5 @@
 """Siconos in a process of its own: what becomes of a process that can't be had, ends, hangs or gives no numbers."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

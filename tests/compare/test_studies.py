@@ -1,7 +1,5 @@
 """What writes tables and figures of pages: each has its place, and its numbers hold together."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

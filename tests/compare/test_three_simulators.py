@@ -1,7 +1,5 @@
 """Event-driven simulation, time stepping and MuJoCo beside each other, at random sets of parameters and starts."""
 
-from __future__ import annotations
-
 import os
 import warnings
 from concurrent.futures import ProcessPoolExecutor

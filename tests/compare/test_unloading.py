@@ -1,7 +1,5 @@
 """Unloading and pushes: numbers read off theory's own runs, and the claims."""
 
-from __future__ import annotations
-
 import pytest
 
 import analytic

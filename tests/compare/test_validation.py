@@ -1,7 +1,5 @@
 """The main job on protocols that cost nothing: what is measured, kept, judged, and what one failure takes with it."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import threading

@@ -1,7 +1,5 @@
 """The viewer's loop, with a window and a clock that are not there: it is the study's own."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 
 import numpy as np

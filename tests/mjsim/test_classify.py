@@ -59,9 +59,7 @@ def test_between_the_bands_a_contact_is_what_it_was() -> None:
     assert [Case(c).name for c in classified(steps, [100])[0][[0, 7, 14]]] == ["RR", "SS", "SS"]
     steps.speed[10:, 0, 0] = 0.5 * band
     assert Case(classified(steps, [100])[0][14]).name == "RS"
-
-
-def test_creep_that_a_rolling_contact_shares_is_no_slip() -> None:
+    # Creep that a rolling contact shares is no slip.
     steps = made([Case.SR] * 5)
     steps.speed[..., 1] = steps.speed[..., 0] / 2
     assert Case(classified(steps, [100])[0][2]).name == "RR"

@@ -1,7 +1,5 @@
 """Friction that holds: what Coulomb's law says exactly of one body, on any MuJoCo model."""
 
-from __future__ import annotations
-
 import threading
 from pathlib import Path
 from types import SimpleNamespace

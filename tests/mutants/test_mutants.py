@@ -1,7 +1,5 @@
 """Wrong theories are believed everywhere for a while, and forgotten without a trace."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 import itertools
