@@ -11,7 +11,8 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 
-from analytic import Settings, simulate
+from analytic import Settings, simulate, thresholds
+from analytic.simulation.simulator import slip_perturbation
 from model import Case, Contact, InputError, Parameters
 
 P = Parameters.named("reference")
@@ -219,3 +220,10 @@ def test_interruption_keeps_what_there_is(method, monkeypatch):
     assert run.header.failure.startswith("interrupted at t = ")
     assert 0 < len(run.time) < 4001
     assert np.all(np.diff(run.time) > 0)
+
+
+@pytest.mark.parametrize(("flow", "grows"), [(1.2, False), (0.8, True)])
+def test_slip_on_the_wall_grows_below_omega_02_only(flow, grows):
+    p = P.replace(omega_0=flow * thresholds(P).omega_02)
+    slip = slip_perturbation(p, 1.0, 0.3, 0.05).slip_speed_B
+    assert (slip[-1] > slip[0]) == grows
