@@ -172,8 +172,8 @@ def _limit(there: Sequence[Step]) -> tuple[Check, float] | None:
     last = there[-1][1]
     m, scale = last.measurement, last.scale or 1.0
     wanted = quantity(m.quantity).resolves
-    if wanted == 0 or math.isnan(last.predicted):
-        return last, math.nan  # what is counted has no limit but what the finest step says
+    if wanted == 0 or (math.isnan(last.predicted) and len(there) >= LEAST):
+        return last, math.nan  # what is counted, or unknown to theory, has no limit but what the finest step says
     errors = np.array([(each.measurement.value - each.predicted) / (each.scale or 1.0) for _, each in there])
     own = np.array([each.measurement.uncertainty / (each.scale or 1.0) for _, each in there])
     if len(there) < LEAST or not np.all(np.isfinite(errors)):
@@ -191,14 +191,14 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
 
     Steps are in natural units, sqrt(R/g) or the time in which the fluid turns by a radian, whichever is the shorter.
 
-    `own` (n,) are standard uncertainties of the errors that have nothing to do with the step. Where the last two errors
-    differ by no more than these, the last is the limit, and the order nan; at worst they go on so to no step.
+    `own` (n,) are standard uncertainties of the errors that have nothing to do with the step. Where the last three
+    errors differ by no more than these, the last is the limit, and the order nan; at worst they go on so to no step.
 
     The uncertainty covers the truth where the leading term is at least a third of what the next one would be with a
     step of a natural time unit. Of random series whose leading term may vanish by chance it misses one in a hundred.
     """
     change = abs(float(errors[-1] - errors[-2]))
-    if change <= COVERAGE * math.hypot(own[-1], own[-2]):
+    if max(change, float(np.ptp(errors[-3:]))) <= COVERAGE * math.hypot(*np.sort(own[-3:])[1:]):
         further = change * float(steps[-1] / (steps[-2] - steps[-1]))
         return Measured(float(errors[-1]), math.hypot(further, float(own[-1]))), math.nan
     h, (coarse, middle, fine) = steps[-3:], errors[-3:]
@@ -224,7 +224,7 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Measured, flo
             before = value
         return min(found, key=lambda each: each.uncertainty)
 
-    low, high = 0.2, 6.0
+    low, high = 0.2, 2.5  # an engine of order 1 or 2 shows others where terms of several orders cancel
     order = float(brentq(misfit, low, high)) if misfit(low) * misfit(high) < 0 else math.nan
     first = limit(1)
     if math.isnan(order):  # the changes fall as no power of the step

@@ -111,7 +111,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             all_said = *brackets[k].said, *zip(values[k][1:-1], answers[inside], strict=True)
             new = Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by, said=all_said)
             before[k], brackets[k] = brackets[k], new
-        todo = [k for k in todo if brackets[k].high - brackets[k].low < (before[k].high - before[k].low) / 2]
+        todo = [k for k in todo if brackets[k].high - brackets[k].low < 0.51 * (before[k].high - before[k].low)]
     if careful:
         asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in (b.low, b.high)]
         _, runs, answers = ask(asked, FINER)

@@ -38,6 +38,11 @@ class Lab:
         """Whether the engine is heard beside the one on trial, or in its place, with time steps of its own."""
         return self.engine.refine != (1,)
 
+    @property
+    def halves(self) -> tuple[int, int]:
+        """What the time step of a pair of runs is divided by; the same run twice where several steps have a limit."""
+        return (2, 2) if self.beside else (1, 2)
+
     def task(
         self,
         p: Parameters,
@@ -65,8 +70,11 @@ class Lab:
         )
 
     def pair(self, p: Parameters, x0: npt.ArrayLike, steps: int, step: float) -> list[Task]:
-        """A run of so many steps of so many s, and one with twice as many of half; each step is a sample."""
-        return [self.task(p, x0, steps * step, step / times, samples=steps * times) for times in (1, 2)]
+        """A run of so many steps of so many s, and one with twice as many of half; each step is a sample.
+
+        The same run twice by an engine with several time steps.
+        """
+        return [self.task(p, x0, steps * step, step / times, samples=steps * times) for times in self.halves]
 
     def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory] | str]:
         """The trajectories of each group, or why one failed: carried out together, not held in memory together."""

@@ -18,16 +18,20 @@ _FLOWS = (
     *(0.43, 0.51, 0.62, 0.75, 0.9, 1.02, 1.13, 1.26, 1.4, 1.53),
     *(1.7, 1.87, 2.05, 2.27, 2.5, 2.78, 3.1, 3.43, 3.8, 4.2),
 )
+_FEW = (0.62, 1.4, 1.7, 2.5, 4.2)
+"""Chosen with results in sight, so that on the sets of quick they bracket every threshold."""
+_STARTS = "rest", "with the fluid", "on the wall"
 EFFORT: dict[str, tuple[Any, Any, Any]] = {
     # quick, default, full
     # settling: lengths of successive rounds, in units of `settling.SPAN`. The later ones are longer, because a ball on
     # the wall that goes on from its mean swings again, if less, and that has to die out, too.
     "settling.rounds": ((1.0, 2.0, 2.0),) * 3,
-    # settled: flows omega_0 sqrt(R/g), and the share of the drift limit down to which a state goes on. The five flows
-    # of quick were chosen with results in sight, so that on the sets of quick they bracket every threshold.
-    "settled.flows": ((0.62, 1.4, 1.7, 2.5, 4.2), _FLOWS, _FLOWS),
-    "settled.starts": (("rest", "with the fluid", "on the wall"),) * 3,
+    "settling.steps": (2048,) * 3,  # a round is a multiple of so many coarse time steps
+    # settled: flows omega_0 sqrt(R/g) for every kind of start, and the share of the drift limit down to which a state
+    # goes on, and the multiple of it up to which it counts.
+    "settled.starts": (dict.fromkeys(_STARTS, _FEW), dict.fromkeys(_STARTS, _FLOWS), dict.fromkeys(_STARTS, _FLOWS)),
     "settled.sharp": (1.0, 0.1, 0.1),
+    "settled.loose": (1.0, 1.0, 1.0),
     # flows inside a bracket in each round, by which it shrinks to an eighth
     "brackets.sections": (7, 7, 7),
     # thresholds: relative widths of the last brackets, of those about a fold, and the factor on the settling tolerance
@@ -41,17 +45,20 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
     "edge.time": (20.0, 60.0, 60.0),
     # plane: points spread evenly over each plane, and added in each round
     "plane.spread": (8, 160, 600),
+    "plane.rounds": ((1.0, 2.0, 2.0),) * 3,  # as settling.rounds, in units of half of it
     "plane.added": ((4,), (60, 60, 60), (200,) * 5),
     # hysteresis: how long each level of the loop is held in units of 1/c, parts of a gap in which a case changes
     "hysteresis.hold": (40.0, 60.0, 100.0),
     "hysteresis.parts": (2, 4, 8),
     # slope: slipping states of a set at which it is measured, at most
     "slope.slipping": (2, 20, 20),
-    # unsteady: rates of the ramps, in units of c times the range of flows in which the ball slips
+    # unsteady: time after a jump in units of 1/c; rates of the ramps, in units of c times the range of flows in which the ball slips
+    "unsteady.lasts": (48.0,) * 3,
     "unsteady.rates": ((1e-2,), (2.5e-3, 5e-3, 1e-2), (1.25e-3, 2.5e-3, 5e-3, 1e-2)),
     # pulsation
     "pulsation.octaves": ((3, 6), (0, 1, 3, 4, 6, 7), tuple(range(8))),  # of the frequencies, above c/(4 pi)
     "pulsation.steps": (512, 1024, 2048),  # least number of time steps in a period
+    "pulsation.samples": (256, 256, 256),  # in a period
     "pulsation.width": (1e-3, 2.5e-4, 1.2e-4),  # relative width to which the onset of slip is bracketed
     # unloading
     "unloading.refine": ((16, 32), (32, 64), (64, 128)),  # time steps in a coarse one where the ball lands
@@ -80,13 +87,27 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
 
 BESIDE: dict[str, Any] = {
     # engines beside the one on trial measure as much as the quick level at every level, but for this
-    "settled.flows": (0.62, 1.7, 4.2),
-    "settled.starts": ("with the fluid", "on the wall"),
-    "settling.rounds": (0.5,),
-    "brackets.sections": 3,
+    "settled.starts": {"with the fluid": (0.62, 1.7), "on the wall": (1.7, 4.2)},
+    "settled.loose": 30.0,
+    "settling.rounds": (0.3, 0.3),
+    "settling.steps": 512,
+    "brackets.sections": 1,
     "thresholds.width": 5e-4,
-    "thresholds.loose": 1e3,
-    "thresholds.rounds": (0.4, 0.2),
+    "thresholds.loose": 1e5,
+    "thresholds.rounds": (0.3,),
+    "plane.rounds": (1.0, 2.0),
+    "hysteresis.hold": 15.0,
+    "hysteresis.parts": 1,
+    "unsteady.lasts": 16.0,
+    "unsteady.rates": (4e-2,),
+    "pulsation.octaves": (3,),
+    "pulsation.steps": 256,
+    "pulsation.samples": 512,
+    "pulsation.width": 2e-3,
+    "rates.refined": (16, 16),
+    "rates.more": 0.5,
+    "laws.refined": (4, 4),
+    "field.starts": 2,
 }
 
 

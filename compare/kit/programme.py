@@ -155,10 +155,11 @@ def run(
     The sets are those `chosen`, or each protocol's own. Raises `StorageError` where files can't be read or written.
     """
     known = {called(protocol.name, lab): (protocol, lab) for protocol, lab in jobs}
-    needs = {name: [called(other, lab) for other in protocol.needs] for name, (protocol, lab) in known.items()}
-    for name, (protocol, _) in known.items():
-        if name != protocol.name and protocol.follows:
-            needs[name].append(protocol.name)
+    needs = {
+        name: [other if other in known else called(other, lab) for other in protocol.needs]
+        + [protocol.name] * (protocol.follows and name != protocol.name)
+        for name, (protocol, lab) in known.items()
+    }
     order = TopologicalSorter({name: [each for each in those if each in known] for name, those in needs.items()})
     order.prepare()
     found: dict[str, Records] = {}

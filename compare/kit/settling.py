@@ -148,7 +148,7 @@ def settle(
     while todo:
         tasks = {}
         for n, start in todo.items():
-            step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0))
+            step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0), lab.effort("settling.steps"))
             samples = round(t_end / (STEPS_A_SAMPLE * step))
             tasks[n] = lab.task(start.p, start.x0, t_end, step / refine, samples=samples)
         todo = {}
@@ -174,12 +174,12 @@ def settle_groups(lab: Lab, groups: Sequence[Sequence[Start]], **how: Any) -> li
     return [[next(states) for _ in group] for group in groups]
 
 
-def duration(p: Parameters, span: float = SPAN) -> float:
+def duration(p: Parameters, span: float = SPAN, steps: int = 2048) -> float:
     """Length of a round, s: at least 8 turns of the fluid, in whose rhythm a slipping ball on the wall swings.
 
-    A whole multiple of 2048 coarse time steps, so that sets of about the same drag share a batch.
+    A whole multiple of so many coarse time steps, so that sets of about the same drag share a batch.
     """
-    unit = 2048 * coarse_step(p)
+    unit = steps * coarse_step(p)
     turns = 8 * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
     return unit * math.ceil(max(span / p.c, turns) / unit)
 

@@ -173,7 +173,7 @@ def hysteresis(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> It
             held = slice(k * count, (k + 1) * count)
             p = task.parameters.replace(omega_0=omega_0)
             part = replace(run, **{column: getattr(run, column)[held] for column in columns(Trajectory)})
-            ended = judged(Start(name, p, side, part.x[0]), task, part)
+            ended = judged(Start(name, p, side, part.x[0]), task, part, lab.effort("settled.loose"))
             if ended.failure:
                 where = f"level {k + 1} ({side}, omega_0 = {omega_0:.4g} rad/s)"
                 yield Missing("hysteresis", name, f"{where}: {ended.failure}")
@@ -307,7 +307,7 @@ def first_top(run: Trajectory) -> Measured:
 
 
 PROTOCOLS = (
-    Protocol("hysteresis", hysteresis, ("settled",), quick=ONE),
+    Protocol("hysteresis", hysteresis, ("settled",), quick=ONE, plain=ONE, steps=4),
     Protocol(
         "unloading",
         unloading,

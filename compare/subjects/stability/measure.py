@@ -129,7 +129,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             yield from _rows(lab, state, answers, values, sure, step, own[-count:])
 
 
-def chosen(records: Records, name: str, p: Parameters, more: int) -> Iterator[Pushed | Missing]:
+def chosen(records: Records, name: str, p: Parameters, more: float) -> Iterator[Pushed | Missing]:
     """The states of a set that are pushed: spinning on the spot next to the wall, and so many settled ones of a case.
 
     Where there are fewer that can be pushed, the rest is missing.
@@ -168,9 +168,10 @@ def chosen(records: Records, name: str, p: Parameters, more: int) -> Iterator[Pu
                 alike.append(Pushed(Start(name, q, "settled", x.stacked()), case))
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
-        places = {int((k + 0.5) * len(alike) / (more * most)) for k in range(more * most)} if alike else set()
+        count = math.ceil(more * most)
+        places = {int((k + 0.5) * len(alike) / count) for k in range(count)} if alike else set()
         yield from (alike[k] for k in sorted(places))
-        if (lacking := min(more * most, len(of)) - len(places)) > 0 or not of:
+        if (lacking := min(count, len(of)) - len(places)) > 0 or not of:
             why = f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a push"
             yield Missing(PROTOCOL, name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from itertools import product
 
 from compare.kit.lab import Lab, time_unit
 from compare.kit.programme import FOUR, ONE, Protocol
@@ -31,11 +30,11 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     """
     sharp, starts = lab.effort("settled.sharp"), []
     for name, p in sets.items():
-        for flow, how in product(lab.effort("settled.flows"), lab.effort("settled.starts")):
-            starts.append(begin(name, p.replace(omega_0=flow / time_unit(p)), how))
+        for how, flows in lab.effort("settled.starts").items():
+            starts += [begin(name, p.replace(omega_0=flow / time_unit(p)), how) for flow in flows]
         spinning = State(slip_y=SPIN / time_unit(p) * p.R / p.r)
         starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
-    ended = settle(lab, starts, sharp=sharp)
+    ended = settle(lab, starts, sharp=sharp, loose=lab.effort("settled.loose"))
     groups: dict[tuple[str, float, int], list[Settled]] = {}
     without: dict[tuple[str, float, int], Missing] = {}
     for state in ended:

@@ -22,7 +22,7 @@ import numpy as np
 
 from compare.kit.brackets import Bracket, Care, Search, narrow
 from compare.kit.lab import Lab, coarse_step
-from compare.kit.programme import LAWS, Protocol
+from compare.kit.programme import LAWS, ONE, Protocol
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of, sure_enough
 from compare.kit.settling import lasting, settle
 from compare.kit.statistics import Measured, peaks, top
@@ -36,8 +36,8 @@ RAISE = 1.5
 """Factor by which the amplitude is raised at a time where the law of drag isn't Stokes'."""
 PERIODS, ROUNDS = 3, 5
 """Periods in a run, and successive runs until it is settled, the last with half the step."""
-SAMPLES, LASTS = 256, 5
-"""Samples in a period, and how many of them slip must last to count: friction may be full for a moment before."""
+LASTS = 5
+"""Samples for which slip must last to count: friction may be full for a moment before."""
 PHASES = 8
 """Phases of a period at which the motion is started anew from its state."""
 JUMP = 1e-3
@@ -110,9 +110,14 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
             yield Missing("pulsation", name, "no flow was measured at which two-point rolling ends by slipping")
             continue
         q = p.replace(omega_0=0.85 * end)
-        room, lowest = end - q.omega_0, 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
+        # Where friction creeps, slip counts as such later.
+        room, reach, lowest = (
+            end - q.omega_0,
+            1.5 if lab.beside else 1.1,
+            2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi))),
+        )
         octaves = lab.effort("pulsation.octaves")
-        small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, 1.1 * room) for n in octaves]
+        small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach * room) for n in octaves]
     followed = _followed(lab, small)
     for each in followed:
         if each.failure:
@@ -123,10 +128,11 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
         for quantity, value in own.items():
             yield each.row(lab, quantity, value, each.tasks, amplitude=each.amplitude)
     rolling, slipping = _raised(lab, [each for each in followed if not each.failure]), []
+    samples = lab.effort("pulsation.samples")
     for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
         at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
         # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
-        unseen = (math.pi * LASTS / SAMPLES) ** 2 / 2 * place.value
+        unseen = (math.pi * LASTS / samples) ** 2 / 2 * place.value
         onset = Measured(place.value, math.hypot(place.uncertainty, unseen))
         if low is None or high is None:
             yield Missing("pulsation", each.set, f"in {at} there is slip at no amplitude, or at all")
@@ -159,7 +165,7 @@ def _rounds(
         list[list[tuple[Task, Trajectory, float]] | str]([[]] * len(driven)),
     )
     for n in range(ROUNDS):
-        times = refine * (2 if n == ROUNDS - 1 else 1)
+        times = refine * (2 if n == ROUNDS - 1 and not lab.beside else 1)
         todo = [(k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)]
         tasks = [each.task(lab, a, states[k], PERIODS, times, samples) for k, each, a, _ in todo]
         for (k, each, a, before), task, run in zip(todo, tasks, lab.each(tasks), strict=True):
@@ -175,8 +181,9 @@ def _rounds(
 
 def _followed(lab: Lab, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """How balls follow pulsations of their own amplitudes."""
-    followed, last = [], slice(-2 * SAMPLES, None)
-    rounds = _rounds(lab, [(each, each.amplitude) for each in pulsations], 2, SAMPLES, slips=False)
+    followed, samples = [], lab.effort("pulsation.samples")
+    last = slice(-2 * samples, None)
+    rounds = _rounds(lab, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False)
     for each, seen in zip(pulsations, rounds, strict=True):
         if isinstance(seen, str):
             followed.append(replace(each, failure=seen))
@@ -211,8 +218,8 @@ def _search(lab: Lab, each: Pulsation) -> Search:
     """For the amplitude at which slip begins, in runs of one period and a half of which the first sixth is left out."""
 
     def task(amplitude: float, bracket: Bracket, care: Care) -> Task:
-        x = each.start(amplitude)
-        return each.task(lab, amplitude, x, 1.5 * care.time, 2 * care.refine, SAMPLES, largest=begin.high)
+        x, samples = each.start(amplitude), lab.effort("pulsation.samples")
+        return each.task(lab, amplitude, x, 1.5 * care.time, 2 * care.refine, samples, largest=begin.high)
 
     if each.p.drag == STOKES:
         # Slip may begin from about half the largest amplitude on: the width is taken relative to that.
@@ -276,9 +283,21 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
 
     def jump(set: str, p: Parameters, case: Case, x0: State, size: float) -> None:
         sides, known = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1)), {"case": case.name}
-        t_end = lasting(p, 48.0)
+        t_end = lasting(p, lab.effort("unsteady.lasts"))
         samples = max(4000, round(t_end / (4 * coarse_step(p))))  # drag may be weak, and peaks come soon
-        motion = Trial(set, p, case.name, x0.stacked(), t_end, (2, 4), samples, _jumped, None, sides, known)
+        motion = Trial(
+            set,
+            p,
+            case.name,
+            x0.stacked(),
+            t_end,
+            (1, 2) if lab.beside else (2, 4),
+            samples,
+            _jumped,
+            None,
+            sides,
+            known,
+        )
         trials.append(motion)
 
     for name, p in sets.items():
@@ -360,6 +379,8 @@ def caught_up(run: Trajectory) -> float:
 
 
 PROTOCOLS = (
-    Protocol("pulsation", pulsation, ("thresholds",), quick=LAWS, cost=7),
-    Protocol("unsteady", jumps, ("thresholds",), quick=LAWS, drawn=lambda m: m.quantity == "jump_height", cost=5),
+    Protocol("pulsation", pulsation, ("thresholds",), quick=LAWS, plain=ONE, cost=7),
+    Protocol(
+        "unsteady", jumps, ("thresholds",), quick=LAWS, plain=ONE, drawn=lambda m: m.quantity == "jump_height", cost=5
+    ),
 )

@@ -102,9 +102,9 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             results.append(result)
     kept = Counter[tuple[str, float, Case]]()
     for centre, result in product(CENTRES, results):
-        set, p, case = result.trial.set, result.trial.p, Case(int(result.coarse.case[centre]))
+        set, p, case = result.trial.set, result.trial.p, Case(int(result.coarse.case[centre * lab.halves[0]]))
         if kept[set, p.nu_f, case] < lab.effort("field.kept"):
-            window = _window(case, result.coarse, result.fine, centre)
+            window = _window(lab, case, result.coarse, result.fine, centre)
             if window is not None:
                 kept[set, p.nu_f, case] += 1
                 for what, value in _values(case, window, p).items():
@@ -136,19 +136,19 @@ def _moving(lab: Lab, name: str, p: Parameters) -> Iterator[Trial]:
             yield replace(trial, p=q.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * time_unit(p))))
 
 
-def _window(case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
+def _window(lab: Lab, case: Case, coarse: Trajectory, fine: Trajectory, centre: int) -> Array | None:
     """What is read at the centre of a window (3, 22): extrapolated to a vanishing step, by the finer run, and by that
     with the lower degree. None if another case is in or near the window, or `turns_or_hovers`.
     """
     read = []
-    for run, times in ((coarse, 1), (fine, 2)):
+    for run, times in zip((coarse, fine), lab.halves, strict=True):
         near, half, middle = ((HALF_WINDOW + NEAR) * times, HALF_WINDOW * times, centre * times)
         window = slice(middle - half, middle + half + 1)
         if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(case, run, window):
             return None
         time, at = run.time[window], float(run.time[middle])
         # The forces of a sample act from then on for a step: they belong to the middle of it.
-        acting = time + (time[1] - time[0]) / 2
+        acting = time + (time[1] - time[0]) / lab.refine / 2
         forces = polynomials(acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at)[0]
         read.append(np.concatenate([*polynomials(time, run.x[window], WINDOW_DEGREES, at), forces], axis=1))
     (one, _), (two, lower) = read
@@ -299,15 +299,16 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             rebounds[trial.set] += bool(gap[low:].max() > gap[low] + 1e-2 * p.R)
         contact = [case.A if on_floor else case.B for case in coarse.cases]
         at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
-        if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
+        finer = at * lab.halves[1] // lab.halves[0]
+        if at >= len(contact) or coarse.case[at] != fine.case[finer]:
             why = f"{trial.name}: the contact did not close for good within 0.4 sqrt(R/g)"
             yield Missing("impacts", trial.set, why, len(NAMES))
             continue
-        change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
+        change = float(np.max((np.abs(fine.x[finer] - coarse.x[at]) / units)[changed]))
         # The contact closes at a whole step, up to one late; until then weight and friction differ.
         late = coarse_step(p) / REFINED / time_unit(p) / 2
         for quantity, k in zip(NAMES, changed, strict=True):
-            value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
+            value = Measured(float(fine.x[finer, k]), math.hypot(change, late) * float(units[k]))
             yield landing.row(lab, f"after_{quantity}", value, time=float(coarse.time[at]))
     for name, count in rebounds.items():
         p = next(trial.p for trial in trials if trial.set == name)

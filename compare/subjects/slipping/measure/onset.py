@@ -251,7 +251,7 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
         if 2 <= len(pressed) < len(seen[-1]):
             (a, high), (b, low) = pressed[-2:]
             where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
-            near[-1] = [arrow.task(where * (1 - part), times) for part in NEAR for times in (1, 2) if where]
+            near[-1] = [arrow.task(where * (1 - part), times) for part in NEAR for times in lab.halves if where]
     rows = zip(arrows, first, seen, why_not, near, lab.groups(near), strict=True)
     for arrow, orbits, begun, why, tasks, got in rows:
         lifted = next((run for run in begun if _force(run) is None), None)

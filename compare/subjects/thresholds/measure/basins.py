@@ -55,7 +55,8 @@ def planes(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterat
             p = plane.replace(eta=eta, omega_0=flow / time_unit(plane))
             p = p.replace(mu=eta) if figure == "fig-8" else p
             starts.append([begin(figure, p, how) for how in ("rest", "half as fast", "with the fluid", "on the wall")])
-        for (figure, u), states in zip(chosen, settle_groups(lab, starts, span=20.0, loose=LOOSE), strict=True):
+        how = {"span": 20.0, "loose": LOOSE, "rounds": lab.effort("plane.rounds")}
+        for (figure, u), states in zip(chosen, settle_groups(lab, starts, **how), strict=True):
             if not any(each.failure for each in states):
                 mask = sum(1 << case for case in {family(each.case) for each in states})
                 seen[figure].append((u, mask))

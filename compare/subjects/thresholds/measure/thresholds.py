@@ -125,7 +125,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             pressed = rider(lifted, height=0.0, less=1e-3)
             change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
             searches[name, "leaning"] = _search(lab, p, "leaning", change, pressed, fine * end.high)
-    brackets |= _narrowed(lab, searches)
+    brackets |= _narrowed(lab, searches, careful=not lab.beside)
 
     # The largest flow at which a ball on the floor settles, at least five standard uncertainties about the maximum of
     # the branch. There is no fold where the floor would have to pull at that maximum, or there is none and the floor's
@@ -171,7 +171,8 @@ def _settled_beside(lab: Lab, sets: Mapping[str, Parameters], of: Mapping[Key, B
     for name in sets:
         if carried := of.get((name, "riding")):
             places[name, "riding"] = carried.high * (1 + RIDES), "on the wall"
-            places[name, "sinking"] = carried.low * (1 - BESIDE / 2), "on the wall"
+            if not lab.beside:  # a ball that sinks swings for long
+                places[name, "sinking"] = carried.low * (1 - BESIDE / 2), "on the wall"
         end, last = of.get((name, "rolling")), of.get((name, "slipping"))
         if end and lifts(end):
             places[name, "lifted"] = end.high * (1 + RIDES), "on the wall"
