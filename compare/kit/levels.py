@@ -52,8 +52,10 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
     "hysteresis.parts": (2, 4, 8),
     # slope: slipping states of a set at which it is measured, at most
     "slope.slipping": (2, 20, 20),
-    # unsteady: time after a jump in units of 1/c; rates of the ramps, in units of c times the range of flows in which the ball slips
+    # unsteady: time after a jump in units of 1/c, and its time steps in a coarse one; rates of the ramps, in units of c
+    # times the range of flows in which the ball slips
     "unsteady.lasts": (48.0,) * 3,
+    "unsteady.refine": ((2, 4),) * 3,
     "unsteady.rates": ((1e-2,), (2.5e-3, 5e-3, 1e-2), (1.25e-3, 2.5e-3, 5e-3, 1e-2)),
     # pulsation
     "pulsation.octaves": ((3, 6), (0, 1, 3, 4, 6, 7), tuple(range(8))),  # of the frequencies, above c/(4 pi)
@@ -99,6 +101,7 @@ BESIDE: dict[str, Any] = {
     "hysteresis.hold": 15.0,
     "hysteresis.parts": 1,
     "unsteady.lasts": 16.0,
+    "unsteady.refine": (2, 2),
     "unsteady.rates": (4e-2,),
     "pulsation.octaves": (3,),
     "pulsation.steps": 256,
@@ -108,6 +111,7 @@ BESIDE: dict[str, Any] = {
     "rates.more": 0.5,
     "laws.refined": (4, 4),
     "field.starts": 2,
+    "field.kept": 2,
 }
 
 

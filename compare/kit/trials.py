@@ -64,15 +64,11 @@ class Result:
 
 
 def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Result | Missing]:
-    """Run all trials, and read each; or say which of its runs broke down.
-
-    An engine with several time steps runs them with the finer one only: the limit is taken of its steps.
-    """
+    """Run all trials, and read each; or say which of its runs broke down."""
     tasks: list[tuple[Trial, list[Task]]] = []
     for trial in trials:
         tasks.append((trial, []))
-        for refine in trial.refine[1:] * 2 if lab.beside else trial.refine:
-            step = coarse_step(trial.p) / refine
+        for step in (coarse_step(trial.p) / refine for refine in trial.refine):
             samples = trial.samples or round(trial.t_end / step)
             for p in trial.variants or (trial.p,):
                 task = lab.task(p, trial.x0, trial.t_end, step, flow=trial.flow, samples=samples)

@@ -34,7 +34,8 @@ def records(lab: Lab) -> Records:
 
 
 def _measured(lab: Lab, patch: pytest.MonkeyPatch, p: Parameters, *flows: float) -> Records:
-    patch.setitem(EFFORT, "settled.flows", (flows,) * 3)
+    starts = dict.fromkeys(("rest", "with the fluid", "on the wall"), flows)
+    patch.setitem(EFFORT, "settled.starts", (starts,) * 3)
     return Records.of(settled.measure(lab, {"thick": p}, Records()))
 
 

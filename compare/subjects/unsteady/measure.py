@@ -285,19 +285,8 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
         sides, known = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1)), {"case": case.name}
         t_end = lasting(p, lab.effort("unsteady.lasts"))
         samples = max(4000, round(t_end / (4 * coarse_step(p))))  # drag may be weak, and peaks come soon
-        motion = Trial(
-            set,
-            p,
-            case.name,
-            x0.stacked(),
-            t_end,
-            (1, 2) if lab.beside else (2, 4),
-            samples,
-            _jumped,
-            None,
-            sides,
-            known,
-        )
+        refine = lab.effort("unsteady.refine")
+        motion = Trial(set, p, case.name, x0.stacked(), t_end, refine, samples, _jumped, None, sides, known)
         trials.append(motion)
 
     for name, p in sets.items():
@@ -330,7 +319,11 @@ def jumps(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
                 rise = rate * p.c * span
                 t_end, known = (end - p.omega_0) / rise, {"rate": rise, **state_of(x[:6])}
                 flow = Flow.ramp(p.omega_0, end, t_end)
-                trials.append(Trial(start.set, p, "ramp", x, t_end, (1, 2), 16000, caught_up, flow, (), known))
+                trials.append(
+                    Trial(
+                        start.set, p, "ramp", x, t_end, (1, 1 if lab.beside else 2), 16000, caught_up, flow, (), known
+                    )
+                )
     for result in carry_out(lab, "unsteady", trials):
         if isinstance(result, Missing):
             yield result

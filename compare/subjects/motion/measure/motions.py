@@ -127,7 +127,8 @@ def _moving(lab: Lab, name: str, p: Parameters) -> Iterator[Trial]:
         rolls = case is Case.RR
         omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
         q = p.replace(omega_0=omega_0)
-        t_end, refine = (CENTRES[-1] + HALF_WINDOW + NEAR) * coarse_step(q) / REFINED, (REFINED, 2 * REFINED)
+        t_end = (CENTRES[-1] + HALF_WINDOW + NEAR) * coarse_step(q) / REFINED
+        refine = REFINED * lab.halves[0], REFINED * lab.halves[1]
         trial = Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0)
         yield trial
         if p.drag != STOKES and case in (Case.NN, Case.SN, Case.NS) and k < 2:
@@ -299,16 +300,15 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             rebounds[trial.set] += bool(gap[low:].max() > gap[low] + 1e-2 * p.R)
         contact = [case.A if on_floor else case.B for case in coarse.cases]
         at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
-        finer = at * lab.halves[1] // lab.halves[0]
-        if at >= len(contact) or coarse.case[at] != fine.case[finer]:
+        if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
             why = f"{trial.name}: the contact did not close for good within 0.4 sqrt(R/g)"
             yield Missing("impacts", trial.set, why, len(NAMES))
             continue
-        change = float(np.max((np.abs(fine.x[finer] - coarse.x[at]) / units)[changed]))
+        change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
         # The contact closes at a whole step, up to one late; until then weight and friction differ.
         late = coarse_step(p) / REFINED / time_unit(p) / 2
         for quantity, k in zip(NAMES, changed, strict=True):
-            value = Measured(float(fine.x[finer, k]), math.hypot(change, late) * float(units[k]))
+            value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
             yield landing.row(lab, f"after_{quantity}", value, time=float(coarse.time[at]))
     for name, count in rebounds.items():
         p = next(trial.p for trial in trials if trial.set == name)
