@@ -223,7 +223,7 @@ class Formulas:
         scattered : whether contacts of a pair may stand apart
         """
         contact, moved = data.contact, 0.0
-        places = contact.pos, contact.frame, data.geom_xpos, data.geom_xmat
+        places = contact.pos * 1e-3, contact.frame, data.geom_xpos, data.geom_xmat
         rows = contact.geom, contact.dim, contact.efc_address, contact.friction, data.efc_KBIP[:, 1]
         poses = np.concatenate((*places, *rows), axis=None)
         then = self._poses
@@ -246,10 +246,11 @@ class Formulas:
         geom, self._address = contact.geom[used], contact.efc_address[used]
         axes = data.geom_xmat[geom].reshape(-1, 2, 3, 3).swapaxes(2, 3)
         arm = contact.pos[used][:, None] - data.geom_xpos[geom]
-        self._turn = axes @ contact.frame[used].reshape(-1, 1, 3, 3).swapaxes(2, 3)
+        turn = axes @ contact.frame[used].reshape(-1, 1, 3, 3).swapaxes(2, 3)
+        self._turn = turn.reshape(-1, 6, 3)
         self._kept = np.zeros((len(used), WIDTH))
         self._kept[:, :2], self._kept[:, 2:8] = geom, (axes @ arm[..., None]).reshape(-1, 6)
-        self._kept[:, 25:28], self._kept[:, 28] = self._turn[:, 0, :, 0], contact.dist[used]
+        self._kept[:, 25:28], self._kept[:, 28] = self._turn[:, :3, 0], contact.dist[used]
         self._own = contact.dim[used][:, None] - 1 > _ROWS
         self._of, row = np.nonzero(self._own)
         self._place, self._friction = 6 * self._of + _COLUMNS[row], contact.friction[used][self._own]
@@ -264,8 +265,8 @@ class Formulas:
             nearest, before = nearest[same], before[same]
             moved = np.hypot.reduce(before[:, 2:8] - self._kept[nearest, 2:8], axis=1).max(initial=0.0) / math.sqrt(2)
             np.add.at(carried, nearest, before[:, 8:25])
-        turned = self._turn.swapaxes(2, 3) @ carried[:, :12].reshape(-1, 2, 3, 2)
-        self._forces = turned.sum(axis=1).ravel()[self._place] / 2
+        turned = self._turn.swapaxes(1, 2) @ carried[:, :12].reshape(-1, 6, 2)
+        self._forces = turned.ravel()[self._place] / 2
         if self._rows.ndim == 2:
             lean = self._forces / self._friction
             self._forces = (np.maximum(carried[:, 12:][self._own], abs(lean)) + lean * np.array([[1], [-1]])) / 2
@@ -288,7 +289,7 @@ class Formulas:
             forces *= np.clip(2 - asked / np.maximum(KEPT * load, 1e-300), 0, 1)[of]
         self._forces, along = forces, np.zeros(6 * count)
         along[self._place] = forces if elliptic else self._friction * (forces[0] - forces[1])
-        kept[:, 8:20] = (self._turn @ along.reshape(-1, 1, 3, 2)).reshape(-1, 12)
+        kept[:, 8:20] = (self._turn @ along.reshape(-1, 3, 2)).reshape(-1, 12)
         if not elliptic:
             kept[:, 20:25][self._own] = forces.sum(axis=0)
 
