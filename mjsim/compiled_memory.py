@@ -21,7 +21,9 @@ from numba.extending import intrinsic
 from mjsim import memory
 from model.arrays import Array
 
-_KEPT, _INSIDE, _WIDTH = memory.KEPT, memory.INSIDE, memory.WIDTH
+_KEPT, _INSIDE, _CALM, _WIDTH = memory.KEPT, memory.INSIDE, memory.CALM, memory.WIDTH
+_SAME = 1e-6
+"""Distance below which a contact is the one of the same number in the last step, m."""
 compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
 
 
@@ -45,10 +47,10 @@ def _layout(struct: str) -> type[ctypes.Structure]:
 _data, _contact = _layout("mjData"), _layout("mjContact")
 _FIELDS = (
     "ncon", "geom_xpos", "geom_xmat", "contact", "efc_KBIP", "efc_R", "efc_aref", "efc_force", "qacc", "efc_J",
-    "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind",
+    "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind", "qacc_warmstart",
 )  # fmt: skip
-_NCON, _XPOS, _XMAT, _CONTACT, _KBIP, _R, _AREF, _FORCE, _QACC, _J, _ROWNNZ, _ROWADR, _COLIND = range(13)
-_SIZE, _DIST, _POS, _FRAME, _FRICTION, _DIM, _GEOM, _ADDRESS = range(13, 21)
+_NCON, _XPOS, _XMAT, _CONTACT, _KBIP, _R, _AREF, _FORCE, _QACC, _J, _ROWNNZ, _ROWADR, _COLIND, _START = range(14)
+_SIZE, _DIST, _POS, _FRAME, _FRICTION, _DIM, _GEOM, _ADDRESS = range(14, 22)
 _AT = np.array(
     [getattr(_data, name).offset for name in _FIELDS]
     + [ctypes.sizeof(_contact)]
@@ -83,6 +85,17 @@ def _array(data: int, offset: int) -> int:
 
 
 @compiled  # type: ignore[untyped-decorator]
+def _apart(one: Array, other: Array) -> float:
+    """Square of the distance of two contacts, by their places on both bodies, m^2; of other geoms: infinite."""
+    if one[0] != other[0] or one[1] != other[1]:
+        return math.inf
+    square = 0.0
+    for j in range(2, 8):
+        square += (one[j] - other[j]) ** 2
+    return square
+
+
+@compiled  # type: ignore[untyped-decorator]
 def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, Array, float]:
     xpos, xmat, contact = _real(_array(data, at[_XPOS])), _real(_array(data, at[_XMAT])), _array(data, at[_CONTACT])
     damping, softness = _real(_array(data, at[_KBIP])), _real(_array(data, at[_R]))
@@ -108,26 +121,26 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool
     kept, used = kept[:count], used[:count]
 
     force, pairs = np.zeros((count, 5)), np.zeros((count, 5))
-    world, first, moved = np.empty((3, 2)), 0, 0.0
+    world, first, moved, heir, fewer = np.empty((3, 2)), 0, 0.0, np.zeros(count, np.bool_), False
     for m in range(len(before)):
         nearest, least, begin = -1, math.inf, first
-        for turn in range(count):  # contacts of a pair are together, mostly where they were
+        if m < count and _apart(kept[m], before[m]) < _SAME**2:
+            nearest, least = m, 0.0
+        for turn in range(0 if nearest == m else count):  # contacts of a pair are together, mostly where they were
             k = begin + turn
             if k >= count:
                 k -= count
-            if kept[k, 0] == before[m, 0] and kept[k, 1] == before[m, 1]:
+            distance = _apart(kept[k], before[m])
+            if distance < math.inf:
                 if nearest < 0:
                     first = k
-                distance = 0.0
-                for j in range(2, 8):
-                    distance += (kept[k, j] - before[m, j]) ** 2
                 if distance < least:
                     nearest, least = k, distance
             elif nearest >= 0 and not scattered:
                 break
         if nearest < 0:
             continue
-        moved = max(moved, least)
+        moved, fewer, heir[nearest] = max(moved, least), fewer or heir[nearest], True
         c = contact + used[nearest] * at[_SIZE]
         frame, kinds = _real(c + at[_FRAME]), 1 if _whole(c + at[_DIM])[0] == 3 else 2
         world[:] = 0.0
@@ -160,7 +173,7 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool
             level = pairs[k, j] - mean
             reference[a + 2 * j] += softness[a + 2 * j] * (level + force[k, j]) / 2
             reference[a + 2 * j + 1] += softness[a + 2 * j + 1] * (level - force[k, j]) / 2
-    return kept, used, math.sqrt(moved / 2)
+    return kept, used, math.sqrt(moved / 2) if fewer else 0.0
 
 
 @compiled  # type: ignore[untyped-decorator]
@@ -222,6 +235,9 @@ def _retain(data: int, at: Array, kept: Array, used: Array, elliptic: bool, nv: 
                     )
         for j in range(0 if elliptic else dim - 1):
             kept[k, 20 + j] = share * (forces[a + 2 * j] + forces[a + 2 * j + 1])
+    start = _real(_array(data, at[_START]))
+    for n in range(nv):
+        start[n] = start[n] if abs(start[n]) >= _CALM else 0.0
 
 
 def recall(model: Any, data: Any, before: Array, elliptic: bool, scattered: bool) -> tuple[Array, Array, float]:

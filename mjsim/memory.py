@@ -45,6 +45,8 @@ WIDTH = 29
 """Numbers remembered of a contact: geoms (2), its place on both in their axes (6), friction on both in their axes (3 of
 force and moment each, 12), what each pair of a pyramid's edges bears (5), normal in the axes of the first geom (3), and
 gap; m, N, N m."""
+CALM = 1e-5
+RETURN = 1
 CORNER = 1.05 * math.pi
 """Angle without other points of its patch that a corner of the patch sees at least."""
 SAME = 0.01
@@ -173,24 +175,25 @@ def put_back(model: Any, data: Any, before: Array) -> bool:
     pair, others = geom @ (model.ngeom, 1), data.contact.geom @ (model.ngeom, 1)
     left, had = ((pair[:, None] == each).sum(axis=1) for each in (others, pair))
     fewer = (left > 0) & (left < had)
+    if not fewer.any():
+        return False
     before, geom, pair = before[fewer], geom[fewer], pair[fewer]
     axes = data.geom_xmat[geom].reshape(-1, 2, 3, 3)
     first, second = np.moveaxis(data.geom_xpos[geom] + (axes @ before[:, 2:8].reshape(-1, 2, 3, 1))[..., 0], 1, 0)
     normal, apart = (axes[:, 0] @ before[:, 25:28, None])[..., 0], second - first
     opened = (normal * apart).sum(axis=1)
     gap, slip = before[:, 28] + opened, np.hypot.reduce(apart - opened[:, None] * normal, axis=1)
-    near = SAME * model.geom_rbound[geom].max(axis=1)
-    for k in np.flatnonzero((gap < 0) & (slip < near / 10)):
-        same, middle = others == pair[k], (first[k] + second[k]) / 2
+    near, middle = SAME * model.geom_rbound[geom].max(axis=1), (first + second) / 2
+    same, away = pair[:, None] == others, place - middle[:, None]
+    alone = np.where(same, (away**2).sum(axis=2), math.inf).min(axis=1) > near**2
+    for k in np.flatnonzero((gap < 0) & (slip < near / 10) & alone):
         across = np.cross(normal[k], np.eye(3)[abs(normal[k]).argmin()])
         across /= np.hypot.reduce(across)
         frame = np.array([normal[k], across, np.cross(normal[k], across)])
-        _, x, y = frame @ (place[same] - middle).T
-        angles = np.sort(np.arctan2(y, x))
-        corner = np.diff(angles, append=angles[0] + 2 * math.pi).max() > CORNER
-        if corner and np.hypot(x, y).min() > near[k]:
-            point = copy.copy(data.contact[same.argmax()])
-            point.pos, point.dist, point.frame = middle, gap[k], frame.ravel()
+        angles = np.sort(np.arctan2(*(frame[1:] @ away[k, same[k]].T)))
+        if np.diff(angles, append=angles[0] + 2 * math.pi).max() > CORNER:
+            point = copy.copy(data.contact[same[k].argmax()])
+            point.pos, point.dist, point.frame = middle[k], gap[k], frame.ravel()
             mujoco.mj_addContact(model, data, point)
     if data.ncon == len(place):
         return False
@@ -214,7 +217,7 @@ class Formulas:
     ) -> tuple[Array, npt.NDArray[np.intp], float]:
         """Add to the reference accelerations what contacts remember; return what is known of them, with no forces yet.
 
-        Also which contacts they are, and how far they have moved on the bodies, at most, m.
+        Also which contacts they are, and how far they have moved on the bodies, at most, m; 0 if no pair has fewer.
 
         Parameters
         ----------
@@ -223,7 +226,7 @@ class Formulas:
         scattered : whether contacts of a pair may stand apart
         """
         contact, moved = data.contact, 0.0
-        places = contact.pos * 1e-3, contact.frame, data.geom_xpos, data.geom_xmat
+        places = contact.pos * 1e-3, contact.frame, data.geom_xpos, data.geom_xmat  # points of flush faces shift by µm
         rows = contact.geom, contact.dim, contact.efc_address, contact.friction, data.efc_KBIP[:, 1]
         poses = np.concatenate((*places, *rows), axis=None)
         then = self._poses
@@ -258,12 +261,13 @@ class Formulas:
         self._rows = first + 1 + row if elliptic else first + 2 * row + np.array([[0], [1]])
 
     def _hand_on(self, before: Array) -> float:
-        """Give what is remembered to the contacts found; return how far these have moved, m."""
+        """Give what is remembered to the contacts found; return how far they have moved where there are fewer, m."""
         moved, carried = 0.0, np.zeros((len(self._used), 17))
         if len(before) and len(self._used):
             nearest, same = _nearest(before, self._kept)
             nearest, before = nearest[same], before[same]
-            moved = np.hypot.reduce(before[:, 2:8] - self._kept[nearest, 2:8], axis=1).max(initial=0.0) / math.sqrt(2)
+            if np.bincount(nearest, minlength=1).max() > 1:
+                moved = np.hypot.reduce(before[:, 2:8] - self._kept[nearest, 2:8], axis=1).max() / math.sqrt(2)
             np.add.at(carried, nearest, before[:, 8:25])
         turned = self._turn.swapaxes(1, 2) @ carried[:, :12].reshape(-1, 6, 2)
         self._forces = turned.ravel()[self._place] / 2
@@ -292,6 +296,8 @@ class Formulas:
         kept[:, 8:20] = (self._turn @ along.reshape(-1, 3, 2)).reshape(-1, 12)
         if not elliptic:
             kept[:, 20:25][self._own] = forces.sum(axis=0)
+        start = data.qacc_warmstart
+        start[abs(start) < CALM] = 0.0
 
 
 def _nearest(kept: Array, others: Array) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:

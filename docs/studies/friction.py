@@ -1,11 +1,12 @@
 """Write the tables on friction that holds: ``python -m docs.studies.friction docs/friction.md``.
 
-Creep, breakaway, sliding and cost take a minute or two; the piles, ``--only piles``, half an hour.
+All take some ten minutes, most of them the piles (``--only piles``).
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import math
 import sys
 import time
@@ -112,12 +113,12 @@ def shaken(way: dict[str, Any]) -> float:
 
 
 def wall() -> Any:
-    """A wall of boxes in three courses with some fifty contacts, leaning on friction."""
+    """A wall of nine boxes in three courses with 56 contacts, leaning on friction."""
     boxes = "".join(
-        f'<body pos="{0.22 * i + 0.11 * (row % 2)} 0 {0.05 + 0.1 * row}"><freejoint/>'
-        '<geom type="box" size=".1 .05 .05" mass="1"/></body>'
+        f'<body pos="{0.22 * i + 0.11 * row} 0 {0.05 + 0.1 * row}"><freejoint/>'
+        f'<geom type="box" size=".1 {0.06 - 0.01 * row} .05" mass="1"/></body>'
         for row in range(3)
-        for i in range(3 - row % 2)
+        for i in range(4 - row)
     )
     return mujoco.MjModel.from_xml_string(
         '<mujoco><option cone="elliptic" gravity="1 0 -9.6"/><worldbody><geom type="plane" size="9 9 1"/>'
@@ -125,36 +126,49 @@ def wall() -> Any:
     )
 
 
-def cost(way: dict[str, Any], rounds: int = 15) -> float:
+def cost(way: dict[str, Any], rounds: int = 25) -> float:
     """Processor time of a step at `wall`, in units of plain MuJoCo's with the same cone: median of runs in turn.
 
-    Both begin from the same state, which friction holds.
+    Both are at rest, in the state to which memory has brought them.
     """
-    cone = {name: value for name, value in way.items() if name == "cone"}
-    settled, memory = start(wall(), memory=True, **cone)
-    memory.step(settled, 2500)
-    runs, times = [start(wall(), **each) for each in (cone, way)], np.empty((rounds, 2))
+    plain = {name: value for name, value in way.items() if name == "cone"}
+    settled, remembering = start(wall(), memory=True, **plain)
+    remembering.step(settled, 2500)
+    runs, times = [start(wall(), **each) for each in (plain, way)], np.empty((rounds, 2))
     for data, stepper in runs:
         data.qpos[:], data.qvel[:] = settled.qpos, settled.qvel
-        stepper.step(data, 50)
+        stepper.step(data, 1000)
     for row in times:
-        for k, (data, stepper) in enumerate(runs):
-            begin = time.process_time()
-            stepper.step(data, 300)
-            row[k] = time.process_time() - begin
+        row[:] = [processor_time(stepper, data, 300) for data, stepper in runs]
     return float(np.median(times[:, 1] / times[:, 0]))
 
 
-def uncompiled(way: dict[str, Any]) -> float:
+def cost_in_motion(way: dict[str, Any]) -> float:
+    """The same while 18 boxes fall upon each other, up to 70 contacts: sums of ten piles, 2.4 s each."""
+    plain, times = {name: value for name, value in way.items() if name == "cone"}, np.zeros(2)
+    for seed in range(10):
+        runs = [start(pile(seed, mixed=False), **each) for each in (plain, way)]
+        for _ in range(4):
+            times += [processor_time(stepper, data, 300) for data, stepper in runs]
+    return float(times[1] / times[0])
+
+
+def processor_time(stepper: Stepper, data: Any, steps: int) -> float:
+    """Of some steps, s."""
+    begin = time.process_time()
+    stepper.step(data, steps)
+    return time.process_time() - begin
+
+
+def uncompiled(measure: Callable[[dict[str, Any]], float], way: dict[str, Any]) -> str:
     """Cost of a memory without numba."""
     with mock.patch.object(memory, "_kernels", memory.Formulas):
-        return cost(way)
+        return f"{measure(way):.2f}" if "memory" in way else "–"
 
 
 def holding() -> Rows:
     """Creep in the scenes, breakaway, drift of a shaken box, and cost, one row each, for each way."""
-    remembering = [way for way in WAYS.values() if "memory" in way]
-    without = ["–"] * (len(WAYS) - len(remembering)) + [f"{uncompiled(way):.2f}" for way in remembering]
+    costs = {"wall of boxes at rest, 56 contacts": cost, "boxes that fall upon each other": cost_in_motion}
     return [
         ["", *WAYS],
         *(
@@ -163,8 +177,14 @@ def holding() -> Rows:
         ),
         ["box that is pulled: breaks away at, μN", *(f"{breakaway(way):.4f}" for way in WAYS.values())],
         ["box shaken on a slope of 10°: drift in 8 s, m", *(f"{shaken(way):.0e}" for way in WAYS.values())],
-        ["wall of boxes with some 50 contacts: cost of a step", *(f"{cost(way):.2f}" for way in WAYS.values())],
-        ["the same without numba", *without],
+        *(
+            row
+            for name, measure in costs.items()
+            for row in (
+                [f"{name}: cost of a step", *(f"{measure(way):.2f}" for way in WAYS.values())],
+                ["the same without numba", *(uncompiled(measure, way) for way in WAYS.values())],
+            )
+        ),
     ]
 
 
@@ -204,6 +224,61 @@ def sliding() -> Rows:
                 ("ball that slides, then rolls: 5/7 v", rolling),
             )
         ),
+    ]
+
+
+def servo() -> Rows:
+    """Depth and creep with a servo and without."""
+
+    def grasped(scene: str, servo: float | None) -> list[str]:
+        model = mujoco.MjModel.from_xml_path(f"docs/friction/{scene}.xml")
+        return settled(model, servo)
+
+    def settled(model: Any, servo: float | None) -> list[str]:
+        model.geom_margin[:] = 4e-3 if servo else 0.0
+        data, stepper = mujoco.MjData(model), FrictionMemory(model, servo)
+        stepper.step(data, 2500)
+        place = data.xpos.copy()
+        stepper.step(data, 500)
+        return [f"{np.abs(data.contact.dist).max():.0e}", f"{np.abs(data.xpos - place).max():.0e}"]
+
+    def rolls(servo: float | None) -> list[str]:
+        model = one('<geom size=".01" mass=".03"/>', slope=5)
+        model.geom_margin[:] = 4e-3 if servo else 0.0
+        model.qpos0[2] = 0.01
+        data, stepper = mujoco.MjData(model), FrictionMemory(model, servo)
+        stepper.step(data, 500)
+        speed = data.qvel[0]
+        stepper.step(data, 500)
+        exact = 5 / 7 * G * math.sin(math.radians(5))
+        return [f"{np.abs(data.contact.dist).max():.0e}", f"{(data.qvel[0] - speed) / exact - 1:+.1e}"]
+
+    def dropped(servo: float | None) -> list[str]:
+        model = one(BOX.replace("mass", 'euler="10 20 0" mass'))
+        model.qpos0[2] = 0.2
+        return settled(model, servo)
+
+    def resting(servo: float | None) -> list[str]:
+        still = 0
+        for seed in range(10):
+            model = pile(seed, mixed=False)
+            model.geom_margin[:] = 4e-3 if servo else 0.0
+            still += settle(model, FrictionMemory(model, servo))[0] < STILL
+        return ["–", f"{still} of 10"]
+
+    scenes: dict[str, Callable[[float | None], list[str]]] = {
+        SCENES["stack"] + ": creep, m/s": functools.partial(grasped, "stack"),
+        SCENES["fingers"] + ": creep, m/s": functools.partial(grasped, "fingers"),
+        SCENES["grasp"] + ": creep, m/s": functools.partial(grasped, "grasp"),
+        "box dropped on an edge: creep, m/s": dropped,
+        "ball of 1 cm that rolls down 5°: acceleration, error": rolls,
+        "piles of 18 boxes: at rest": resting,
+    }
+    servos = {"no servo": None, "servo 0.1 s": 0.1, "servo 0.02 s": 0.02}
+    head = [text for name in servos for text in (f"{name}: depth, m", "")]
+    return [
+        ["scene", *head],
+        *([name, *(cell for servo in servos.values() for cell in measure(servo))] for name, measure in scenes.items()),
     ]
 
 
@@ -260,7 +335,7 @@ def piles() -> Rows:
     return rows
 
 
-TABLES: dict[str, Callable[[], Rows]] = {"holding": holding, "sliding": sliding, "piles": piles}
+TABLES: dict[str, Callable[[], Rows]] = {"holding": holding, "sliding": sliding, "servo": servo, "piles": piles}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
