@@ -8,12 +8,13 @@ the surface.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from compare.kit.adapters.adapter import tangent
 from compare.kit.statistics import plain
 from model.arrays import Array
 from model.kinematics import rotated
@@ -170,9 +171,16 @@ class Case:
         """How far the body reaches from its centre against normals (n, 3), m."""
         if self.body.shape == "sphere":
             return np.full(len(normal), self.body.size[0])
-        w, *axis = self.body.orientation
-        own = rotated(np.array([w, *(-a for a in axis)]), normal)
-        return np.asarray(np.abs(own) @ np.array(self.body.size))
+        return np.asarray(np.abs(_into(self.body.orientation, normal)) @ np.array(self.body.size))
+
+    def planes(self, facets: int) -> Iterator[tuple[Surface, str, Array, Array]]:
+        """Each surface with a name, a point and the normal of a plane; a cylinder's are so many."""
+        for surface in self.surfaces:
+            if surface.radius is None:
+                yield surface, surface.name, np.array(surface.point), np.array(surface.normal)
+            else:
+                for k in range(facets):
+                    yield surface, f"{surface.name}{k}", *tangent(surface.radius, math.tau * k / facets)
 
     def in_contact(self, letters: str) -> Array:
         """Where the exact motion has one of these letters, (n, surfaces)."""
@@ -181,7 +189,7 @@ class Case:
     def mjcf(self, timestep: float = 1e-3) -> str:
         """The scene for MuJoCo with all of its contact parameters as they come; `force` is not in it."""
         body, parts = self.body, []
-        for surface in self.surfaces:
+        for surface, name, point, normal in self.planes(FACETS):
             friction = f'friction="{surface.friction} 0 0"'
             if surface.turning:  # a plane can't turn: a disc so heavy that the body doesn't slow it
                 parts.append(
@@ -189,14 +197,9 @@ class Case:
                     f'armature="1e6"/><geom name="{surface.name}" type="cylinder" size="5 0.5" pos="0 0 -0.5" mass="1" '
                     f"{friction}/></body>"
                 )
-            elif surface.radius is None:
-                pose = f'pos="{_text(surface.point)}" zaxis="{_text(surface.normal)}"'
-                parts.append(f'<geom name="{surface.name}" type="plane" size="0 0 1" {pose} {friction}/>')
             else:
-                for k in range(FACETS):
-                    inwards = np.array([-math.cos(math.tau * k / FACETS), -math.sin(math.tau * k / FACETS), 0.0])
-                    pose = f'pos="{_text(surface.point - surface.radius * inwards)}" zaxis="{_text(inwards)}"'
-                    parts.append(f'<geom name="{surface.name}{k}" type="plane" size="0 0 1" {pose} {friction}/>')
+                pose = f'pos="{_text(point)}" zaxis="{_text(normal)}"'
+                parts.append(f'<geom name="{name}" type="plane" size="0 0 1" {pose} {friction}/>')
         turns = [surface.turning for surface in self.surfaces if surface.turning]
         inwards = _into(body.orientation, body.spin)  # MuJoCo counts the spin of a free body in its own axes
         qpos = [*[0.0] * len(turns), *body.position, *body.orientation]
@@ -224,10 +227,10 @@ class Case:
 
 
 def _text(numbers: Any) -> str:
-    return " ".join(repr(float(number)) for number in numbers)
+    return " ".join(repr(float(number) + 0.0) for number in numbers)  # no negative zero
 
 
-def _into(orientation: tuple[float, ...], vector: Vector) -> Array:
-    """A vector of the world in the axes of a body."""
+def _into(orientation: tuple[float, ...], vectors: Any) -> Array:
+    """Vectors of the world, (3,) or (n, 3), in the axes of a body."""
     w, *axis = orientation
-    return rotated(np.array([w, *(-a for a in axis)]), np.array(vector))
+    return rotated(np.array([w, *(-a for a in axis)]), np.array(vectors))

@@ -31,8 +31,8 @@ class Dart(Free):
             solver.setBoxedLcpSolver(self.cone)
             solver.setSplitImpulseEnabled(True)
         self.tables: list[tuple[Any, float]] = []
-        for k, (surface, point, normal) in enumerate(self.planes()):
-            skeleton = bodies.Skeleton(f"{surface.name}{k}")
+        for surface, name, point, normal in self.planes():
+            skeleton = bodies.Skeleton(name)
             if surface.turning:
                 joint, node = skeleton.createRevoluteJointAndBodyNodePair()
                 joint.setAxis([0.0, 0.0, 1.0])

@@ -35,14 +35,14 @@ class Drake(Free):
             self.own.add(ball, place, shape, f"body{k}")
         self.wall, hinges = None, []
         facets = max((surface.radius or 0.0) for surface in case.surfaces) if not self.best else 0.0
-        for k, (surface, point, normal) in enumerate(self.planes()):
+        for surface, name, point, normal in self.planes():
             of = plant.world_body()
             if not facets and (surface.radius or surface.turning):
                 heavy = engine.UnitInertia(HEAVY, HEAVY, HEAVY)
                 of = plant.AddRigidBody(surface.name, engine.SpatialInertia(body.mass, np.zeros(3), heavy))
                 frames = plant.world_body().body_frame(), of.body_frame()
                 hinges.append((surface, plant.AddJoint(engine.RevoluteJoint(surface.name, *frames, [0.0, 0.0, 1.0]))))
-            self.own.plane(of, point, normal, f"{surface.name}{k}", surface.friction, 100.0 * facets)
+            self.own.plane(of, point, normal, name, surface.friction, 100.0 * facets)
         self.own.build()
         self.force = np.zeros(plant.num_velocities())
         self.q, self.v = ball.floating_positions_start(), plant.num_positions() + ball.floating_velocities_start_in_v()

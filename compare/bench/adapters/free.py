@@ -7,8 +7,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
 from compare.bench.case import FACETS, Case, Surface, Vector
 from compare.kit.adapters.adapter import tangent
 from model.arrays import Array
@@ -61,14 +59,9 @@ class Free(ABC):
             self.advance()
             self.now += self.timestep
 
-    def planes(self) -> Iterator[tuple[Surface, Array, Array]]:
-        """Each surface with a point and the normal of a plane; a cylinder's are many, or the one that moves along."""
-        for surface in self.case.surfaces:
-            if surface.radius is None:
-                yield surface, np.array(surface.point), np.array(surface.normal)
-            else:
-                for k in range(1 if self.best else FACETS):
-                    yield surface, *tangent(surface.radius, math.tau * k / FACETS)
+    def planes(self) -> Iterator[tuple[Surface, str, Array, Array]]:
+        """As `Case.planes`: a cylinder's are many, or the one that moves along."""
+        return self.case.planes(1 if self.best else FACETS)
 
     @abstractmethod
     def make(self) -> None:

@@ -44,7 +44,7 @@ class Newton(Free):
 
         if hasattr(self.solver, "register_custom_attributes"):
             self.solver.register_custom_attributes(builder)
-        for surface, point, normal in self.planes():
+        for surface, _, point, normal in self.planes():
             if surface.turning:
                 raise NotImplementedError("its planes don't turn")
             material = rough(surface.friction**2 if rooted else 2 * surface.friction)

@@ -28,7 +28,7 @@ class PyBullet(Free):
         case, body = self.case, self.case.body
         settings = Settings(scale=10.0) if self.best else DEFAULTS
         self.own = own = Server(engine, replace(settings, timestep=self.timestep), case.g)
-        for surface, point, normal in self.planes():
+        for surface, _, point, normal in self.planes():
             if surface.turning:
                 raise NotImplementedError("its planes don't turn")
             self.wall = own.plane(point, np.array([0.0, 0.0, 1.0]), surface.friction)

@@ -30,7 +30,7 @@ class Rapier(Free):
             settings.contact_recycling, settings.num_solver_iterations = False, 16
             settings.length_unit, settings.normalized_max_linear_velocity = 0.01, 1e6
             settings.contact_softness = settings.static_contact_softness = engine.SpringCoefficients(200.0, 10.0)
-        for surface, point, normal in self.planes():
+        for surface, _, point, normal in self.planes():
             kind = engine.RigidBody.kinematic_velocity_based() if surface.turning else engine.RigidBody.fixed()
             shape = (
                 engine.Collider.halfspace(normal.tolist()).friction(surface.friction).friction_combine_rule(multiply)

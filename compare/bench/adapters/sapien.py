@@ -35,7 +35,7 @@ class Sapien(Free):
         physx.set_body_config(bodies)
         self.scene = engine.Scene([physx.PhysxCpuSystem()])
         self.scene.timestep = self.timestep
-        for surface, point, normal in self.planes():
+        for surface, _, point, normal in self.planes():
             if surface.turning:
                 raise NotImplementedError("its planes don't turn")
             self.wall = self.add(physx.PhysxRigidStaticComponent(), pose(point, normal), 2 * surface.friction)
