@@ -16,7 +16,7 @@ pytest_plugins = ("compare.plugin",)
 _CLAIM = "compare.claim"
 _MODULES = dict.fromkeys(("Claim", "Outcome", "Verdict"), _CLAIM) | {
     "Check": "compare.kit.record",
-    "Level": "compare.kit.lab",
+    "Level": "compare.kit.levels",
     "validate": "compare.validation",
 }
 

@@ -21,9 +21,17 @@ from compare.bench.case import Case
 from compare.bench.contact_law import impedance, reference
 from mjsim import ContactSettings, scene
 from model import InputError, Parameters
-from model.parameters import NOT_NEGATIVE, POSITIVE, check_choice, check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
 
-_NUMBERS = ("timestep", "impratio", "iterations", "tolerance", "noslip_iterations")
+_FEW = Range(0, 1e5, whole=True)
+NUMBERS: dict[str, tuple[str, Range, str]] = {
+    "timestep": ("s", POSITIVE, "time step"),
+    "impratio": ("1", POSITIVE, "impedance of friction, divided by that of the normal force"),
+    "iterations": ("1", _FEW, "most iterations of the solver"),
+    "tolerance": ("1", NOT_NEGATIVE, "tolerance at which the solver stops"),
+    "noslip_iterations": ("1", _FEW, "iterations that suppress slip"),
+}
+"""Options of the engine that are numbers: unit, range and meaning."""
 CHOICES = {
     option: {name: int(getattr(kind, f"{prefix}_{name.upper()}")) for name in names.split()}
     for option, kind, prefix, names in (
@@ -71,10 +79,8 @@ class Native:
     """What the file that it was read from lacks, and what stands for it."""
 
     def __post_init__(self) -> None:
-        check_number("timestep", self.timestep, "s", POSITIVE)
-        check_number("impratio", self.impratio, "1", POSITIVE)
-        for name in ("iterations", "noslip_iterations", "tolerance"):
-            check_number(name, getattr(self, name), "1", NOT_NEGATIVE)
+        for name, (unit, allowed, _) in NUMBERS.items():
+            check_number(name, getattr(self, name), unit, allowed)
         for name, known in CHOICES.items():
             check_choice(name, getattr(self, name), list(known))
 
@@ -98,7 +104,7 @@ class Native:
 
     def set(self, spec: Any, contacts: Iterable[tuple[Pair, Any]]) -> None:
         """Set options, and the pairs of a scene each to one of ours."""
-        for name in _NUMBERS:
+        for name in NUMBERS:
             setattr(spec.option, name, getattr(self, name))
         for name, known in CHOICES.items():
             setattr(spec.option, name, known[getattr(self, name)])
@@ -159,7 +165,7 @@ def read(path: Path) -> Native:
     missing, other = ("floor", "wall") if walls else ("wall", "floor")
     note = f"{path}: there is no {missing} that the ball can touch; the contact with its {other} stands for both"
     note = "" if floors and walls else note
-    same: dict[str, Any] = {name: getattr(model.opt, name) for name in _NUMBERS}
+    same: dict[str, Any] = {name: getattr(model.opt, name) for name in NUMBERS}
     for name, known in CHOICES.items():
         same[name] = next(key for key, value in known.items() if value == getattr(model.opt, name))
     return Native(**same, A=(floors or walls)[0], B=(walls or floors)[0], note=note)

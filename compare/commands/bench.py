@@ -18,24 +18,16 @@ from rich.text import Text
 
 from compare.bench import exact, forecast, grade, league, native
 from compare.bench.case import VERSION
-from compare.bench.native import CHOICES, Native
+from compare.bench.native import CHOICES, NUMBERS, Native
 from compare.commands import options, running
 from compare.kit import engines, pages, progress
 from mjsim import ContactSettings
 from model import InputError
 from model.files import make_directory, write_text
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_names
+from model.parameters import POSITIVE, check_names
 
 LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
 JSON, PAGE = "league.json", "league.html"
-_FEW = options.Number(allowed=Range(0, 1e5, whole=True))
-_NUMBERS: dict[str, tuple[options.Number, str]] = {
-    "timestep": (options.seconds, "time step"),
-    "impratio": (options.Number(allowed=POSITIVE), "impedance of friction, divided by that of the normal force"),
-    "iterations": (_FEW, "most iterations of the solver"),
-    "tolerance": (options.Number(allowed=NOT_NEGATIVE), "tolerance at which the solver stops"),
-    "noslip_iterations": (_FEW, "iterations that suppress slip"),
-}
 _PAIR: dict[str, tuple[Any, Any, str]] = {
     "solref": (2, ("TIMECONST", "DAMPRATIO"), "spring and damper of a contact"),
     "solreffriction": (2, ("TIMECONST", "DAMPRATIO"), "the same of its friction"),
@@ -63,9 +55,9 @@ def add(commands: options.Commands) -> None:
     mine = "MJCF file with a ball and its contacts"
     command.add_argument("file", type=Path, nargs="?", metavar="FILE.xml", help=mine)
     group = command.add_argument_group("settings", "as in MJCF; where not given, those of FILE.xml or MuJoCo's own")
-    for name, (parse, meaning) in _NUMBERS.items():
-        metavar = "s" if name == "timestep" else "N"
-        group.add_argument(f"--{name.replace('_', '-')}", type=parse, metavar=metavar, help=meaning)
+    for name, (unit, allowed, meaning) in NUMBERS.items():
+        kind, metavar = options.Number(unit, allowed), "s" if unit == "s" else "N"
+        group.add_argument(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=meaning)
     for name, known in CHOICES.items():
         group.add_argument(f"--{name}", metavar="NAME", help=", ".join(known))
     for name, (count, metavar, meaning) in _PAIR.items():
@@ -154,7 +146,7 @@ def _of_mujoco(args: argparse.Namespace) -> tuple[Native, str]:
     base = native.read(args.file) if args.file else Native()
     if base.note:
         print(f"dualball: {base.note}", file=sys.stderr)
-    own, pair = options.given(args, (*_NUMBERS, *CHOICES)), options.given(args, _PAIR)
+    own, pair = options.given(args, (*NUMBERS, *CHOICES)), options.given(args, _PAIR)
     said = [f"{name} {value}" for name, value in own.items()]
     said += [f"{name} {' '.join(f'{v:g}' for v in np.atleast_1d(value))}" for name, value in pair.items()]
     source = f"Settings of {args.file}" if args.file else "MuJoCo's defaults"
@@ -176,7 +168,7 @@ def _of_another(args: argparse.Namespace) -> tuple[dict[str, tuple[Any, float]],
         raise InputError(engine.missing)
     if "timestep" not in engine.options:
         raise InputError(f"{engine.name} has no time step, and no settings to grade")
-    if args.file or options.given(args, (*_NUMBERS, *CHOICES, *_PAIR)).keys() - {"timestep"}:
+    if args.file or options.given(args, (*NUMBERS, *CHOICES, *_PAIR)).keys() - {"timestep"}:
         raise InputError(f"a file and contact settings are MuJoCo's; of {engine.name} only --timestep can be given")
     step = options.given(args, ["timestep"]).get("timestep", ContactSettings.timestep)
     names = [name for name in (engine.name, engine.as_it_comes, "mujoco") if name in league.ENGINES]
