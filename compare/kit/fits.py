@@ -165,8 +165,3 @@ def matched(values: npt.NDArray[np.complex128], to: npt.NDArray[np.complex128]) 
 
     order = linear_sum_assignment(np.abs(to[:, None] - values[None, :]))[1]
     return np.asarray(values[order])
-
-
-def at_zero(x: Array, y: Array, degree: int) -> float:
-    """Value at x = 0 of the polynomial through points x, y (n,); with x and y exchanged, where y vanishes."""
-    return float(Polynomial.fit(x, y, degree)(0.0))

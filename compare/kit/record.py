@@ -21,7 +21,7 @@ import numpy as np
 
 from compare.kit.lab import Lab
 from compare.kit.quantities import quantity
-from compare.kit.statistics import COVERAGE, Measured
+from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from model import Parameters, StorageError
 from model.arrays import Array
@@ -92,11 +92,6 @@ def measurement(
         conditions=conditions,
         runs=tuple(task.key for task in tasks),
     )
-
-
-def sure_enough(name: str, value: Measured, scale: float) -> bool:
-    """Whether the tolerance, divided by the natural scale of a quantity, is as small as its checks need."""
-    return COVERAGE * value.uncertainty <= quantity(name).resolves * scale
 
 
 def if_found(row: Measurement, why: str) -> Measurement | Missing:

@@ -12,9 +12,10 @@ from compare.claim import Outcome
 from compare.judge import judge
 from compare.kit.lab import Lab
 from compare.kit.levels import Level
-from compare.kit.record import Records, sure_enough
+from compare.kit.quantities import QUANTITIES
+from compare.kit.record import Records
 from compare.kit.sets import sets
-from compare.kit.statistics import Measured
+from compare.kit.statistics import COVERAGE
 from compare.subjects.unsteady import claims
 from compare.subjects.unsteady import measure as unsteady
 from model import Case, Flow, Parameters
@@ -76,7 +77,7 @@ def test_a_mean_may_depend_on_more_than_the_state(lab) -> None:
     begin = theory.swing(p, a, f, 0.0)[0] - p.omega_0
     driven = unsteady.Pulsation("design-5", p, f, a, reach=1.0, begin=float(begin) / a)
     (row,) = unsteady.mean_errors(replace(lab, level=Level.DEFAULT), [(driven, a)])
-    assert not sure_enough("mean_error", Measured(row.value, row.uncertainty), 0.9 * abs(row.value))
+    assert COVERAGE * row.uncertainty > QUANTITIES["mean_error"].resolves * 0.9 * abs(row.value)
 
 
 def test_sets_without_slip_say_why(lab) -> None:

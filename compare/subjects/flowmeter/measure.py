@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
-from compare.kit.fits import at_zero
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import ONE, TWO, Protocol
 from compare.kit.record import Condition, Measurement, Missing, Records, if_found, measurement, state_of
@@ -280,7 +280,8 @@ def _landed(run: Trajectory) -> Numbers:
     growing = np.arange(*np.searchsorted(np.maximum.accumulate(slip), (1e-4, 1e-3)))
     if not len(touches) or not 1 < touches[0] < len(run.time) - 12 or len(growing) < 10:
         return {}
-    quadratic, cubic = (at_zero(np.sqrt(slip[growing]), run.time[growing], degree) for degree in (2, 3))
+    root, times = np.sqrt(slip[growing]), run.time[growing]
+    quadratic, cubic = (float(Polynomial.fit(root, times, degree)(0.0)) for degree in (2, 3))
     k = int(touches[0]) - 1
     wait = float(run.y[k] / -run.v_y[k])
     v_y = float(run.v_y[k] + (run.v_y[k] - run.v_y[k - 1]) / step * wait)

@@ -23,9 +23,10 @@ import numpy as np
 from compare.kit.brackets import Bracket, Care, Search, narrow
 from compare.kit.lab import Lab, coarse_step
 from compare.kit.programme import LAWS, ONE, Protocol
-from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of, sure_enough
+from compare.kit.quantities import QUANTITIES
+from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import lasting, settle
-from compare.kit.statistics import Measured, peaks, top
+from compare.kit.statistics import COVERAGE, Measured, peaks, top
 from compare.kit.tasks import Task
 from compare.kit.trials import Start, Trial, carry_out, finer, known_flow
 from model import Case, Contact, Flow, Parameters, State, Trajectory
@@ -144,7 +145,7 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
         measured = each.row(lab, "slip_amplitude", onset, bracket.tasks)
         # The predicted amplitude may be a tenth smaller than the measured one.
         yield measured
-        if sure_enough("slip_amplitude", onset, 0.9 * onset.value):
+        if COVERAGE * onset.uncertainty <= QUANTITIES["slip_amplitude"].resolves * 0.9 * onset.value:
             slipping.append((each, 1.5 * onset.value))
         else:
             yield Missing("pulsation", each.set, f"slip in {at} begins at no definite amplitude: no mean reading there")
