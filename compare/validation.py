@@ -7,6 +7,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -23,7 +24,7 @@ from compare.kit.lab import Lab
 from compare.kit.levels import Level
 from compare.kit.progress import Show, Whole, nowhere
 from compare.kit.record import Missing, Records, Testimony
-from compare.kit.workers import Spread, Workers, spread
+from compare.kit.workers import Spread, Workers, processes
 from compare.report import results
 from compare.report.results import Summary
 from compare.witnesses import hear
@@ -113,8 +114,8 @@ def validate(
         for each in engines
     }
     count = workers if isinstance(workers, int) else workers.count
-    with spread(min(count, os.cpu_count() or 1)) as over:
-        draw = whole.drawing(over) if report else None
+    with closing(processes(min(count, os.cpu_count() or 1))) as work:
+        draw = whole.drawing(work.map) if report else None
         _write(output, level, files, results.testimony(files), verdicts, draw)
     return [verdicts[claim.id] for claim in chosen]
 
@@ -137,10 +138,10 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
     forget()
     testimony = stored(directory)  # what can't be read is said before anything is judged
     files = summary.files(directory)
-    with spread(workers) as over:  # the last claims first: they take longest
-        found = over(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
+    with closing(processes(workers)) as work:  # the last claims first: they take longest
+        found = work.map(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
         verdicts = {claim.id: Verdict(claim=claim, **each) for claim, each in zip(CLAIMS[::-1], found, strict=True)}
-        written = _write(directory, Level[summary.level], files, testimony, verdicts, over)
+        written = _write(directory, Level[summary.level], files, testimony, verdicts, work.map)
     return [v for v in written if v.claim.id in chosen]
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -59,7 +58,18 @@ class Workers:
                     self._running = None
         raise StorageError("workers die as soon as they are started")
 
-    def close(self, at_once: bool) -> None:
+    def map(self, one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
+        """As Python's own, which a single worker leaves it to; what a worker that died was to do is done here."""
+        if self.count < 2:
+            yield from map(one, items)
+            return
+        for item, future in [(item, self.submit(one, item)) for item in items]:
+            try:
+                yield future.result()
+            except self.lost:
+                yield one(item)
+
+    def close(self, at_once: bool = False) -> None:
         """Let the workers go, `at_once` and for good, or after what is under way."""
         with self._lock:
             running, self._running, self._closed = self._running, None, at_once
@@ -125,30 +135,6 @@ def _follow(end: Connection) -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=wait, daemon=True).start()
-
-
-@contextmanager
-def spread(count: int) -> Iterator[Spread]:
-    """A `map` over that many processes of this machine; what a process that died was to do is done by this one.
-
-    Raises `InputError` for a bad count.
-    """
-    workers = processes(count)
-    if count < 2:
-        yield map
-        return
-
-    def over(one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
-        left = deque(items)
-        try:
-            for result in pool.map(one, tuple(left)):
-                left.popleft()
-                yield result
-        except BrokenProcessPool:
-            yield from map(one, left)
-
-    with workers.start() as pool:
-        yield over
 
 
 class _Here(Executor):

@@ -37,7 +37,7 @@ _OPTIONS = {Level.QUICK: " --quick", Level.DEFAULT: "", Level.FULL: " --full"}
 def write(material: Material, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map) -> Path:
     """Write ``summary.json`` and ``report.html`` into the material's results directory; return the page's path.
 
-    Figures are drawn by what `spread` makes of a `map`. Raises `model.StorageError` if it can't be written.
+    Figures are drawn by `spread`, a `map`. Raises `model.StorageError` if it can't be written.
     """
     directory = material.directory
     results.save(summary, directory)

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ import pytest
 from compare.commands import cli
 from compare.kit.campaign import FAILURES, Campaign, Failure, run_batch
 from compare.kit.tasks import Task
-from compare.kit.workers import dask, spread
+from compare.kit.workers import dask, processes
 from model import InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
 
@@ -207,9 +208,9 @@ def square(parent: int, number: int) -> int:
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_what_a_killed_process_was_to_do_is_done_here(count: int) -> None:
-    with spread(count) as over:
-        assert list(over(functools.partial(square, os.getpid()), range(8))) == [k**2 for k in range(8)]
-        assert list(over(abs, [-1, -2])) == [1, 2]
+    with closing(processes(count)) as work:
+        assert list(work.map(functools.partial(square, os.getpid()), range(8))) == [k**2 for k in range(8)]
+        assert list(work.map(abs, [-1, -2])) == [1, 2]
 
 
 def test_a_full_disk_is_said_once_and_what_is_whole_stays(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import zlib
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -24,7 +25,7 @@ from compare.kit.drawing import Drawing, GapError, Material
 from compare.kit.levels import Level
 from compare.kit.pages import readable
 from compare.kit.record import Check, Missing, Records
-from compare.kit.workers import spread
+from compare.kit.workers import processes
 from compare.report import pictures, report, results, wording
 from compare.report.results import Summary
 from model import Case, Parameters, StorageError
@@ -270,8 +271,8 @@ def test_processes_draw_every_figure(tmp_path: Path) -> None:
     for name, drawing in FIGURES.items():
         assert pickle.loads(pickle.dumps(drawing)).title == drawing.title, name
     summary, pages = Summary.of(tmp_path, VERDICTS, Level.QUICK, {}), []
-    with spread(2) as over:
-        for name, how in (("there", over), ("here", map)):
+    with closing(processes(2)) as work:
+        for name, how in (("there", work.map), ("here", map)):
             material = Material({v.claim.id: v.checks for v in VERDICTS}, directory=tmp_path / name)
             (material.directory / results.FIGURES).mkdir(parents=True)
             pages.append(report.render(material, VERDICTS, summary, how))

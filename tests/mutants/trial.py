@@ -17,6 +17,7 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Container, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, FrameType
@@ -30,7 +31,7 @@ from compare.judge import forget, judge, verdict
 from compare.kit import levels, pages
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Records
-from compare.kit.workers import spread
+from compare.kit.workers import processes
 from compare.report import results
 from tests.mutants import engines
 from tests.mutants.engines import WRONG_ENGINES
@@ -174,8 +175,8 @@ def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
 def _tried(one: Callable[[int], Trial], count: int, workers: int) -> list[Trial]:
     """The trials by number, each shown on standard error as soon as it is there."""
     tried = []
-    with spread(workers) as over:
-        for trial in over(one, range(count)):
+    with closing(processes(workers)) as work:
+        for trial in work.map(one, range(count)):
             print(f"{trial.what}: {trial.by}", file=sys.stderr, flush=True)
             tried.append(trial)
     return tried
