@@ -7,7 +7,6 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import closing
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -114,7 +113,7 @@ def validate(
         for each in engines
     }
     count = workers if isinstance(workers, int) else workers.count
-    with closing(processes(min(count, os.cpu_count() or 1))) as work:
+    with processes(min(count, os.cpu_count() or 1)) as work:
         draw = whole.drawing(work.map) if report else None
         _write(output, level, files, results.testimony(files), verdicts, draw)
     return [verdicts[claim.id] for claim in chosen]
@@ -138,7 +137,7 @@ def judge_stored(directory: str | Path, claims: Sequence[str] | None = None, wor
     forget()
     testimony = stored(directory)  # what can't be read is said before anything is judged
     files = summary.files(directory)
-    with closing(processes(workers)) as work:  # the last claims first: they take longest
+    with processes(workers) as work:  # the last claims first: they take longest
         found = work.map(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
         verdicts = {claim.id: Verdict(claim=claim, **each) for claim, each in zip(CLAIMS[::-1], found, strict=True)}
         written = _write(directory, Level[summary.level], files, testimony, verdicts, work.map)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection
 from types import FrameType
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from model import InputError, StorageError
 from model.parameters import Range, check_number
@@ -44,6 +44,12 @@ class Workers:
         self._running: Executor | None = None
         self._closed, self._lock = False, threading.Lock()
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
+        self.close(at_once=kind is not None)
+
     def submit(self, *call: Any) -> Future[Any]:
         """Give a call to the workers; raises `CancelledError` once there is to be no more work."""
         with self._lock:
@@ -69,7 +75,7 @@ class Workers:
             except self.lost:
                 yield one(item)
 
-    def close(self, at_once: bool = False) -> None:
+    def close(self, at_once: bool) -> None:
         """Let the workers go, `at_once` and for good, or after what is under way."""
         with self._lock:
             running, self._running, self._closed = self._running, None, at_once

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -208,7 +207,7 @@ def square(parent: int, number: int) -> int:
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_what_a_killed_process_was_to_do_is_done_here(count: int) -> None:
-    with closing(processes(count)) as work:
+    with processes(count) as work:
         assert list(work.map(functools.partial(square, os.getpid()), range(8))) == [k**2 for k in range(8)]
         assert list(work.map(abs, [-1, -2])) == [1, 2]
 

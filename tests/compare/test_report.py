@@ -10,7 +10,6 @@ import re
 import shutil
 import subprocess
 import zlib
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -271,7 +270,7 @@ def test_processes_draw_every_figure(tmp_path: Path) -> None:
     for name, drawing in FIGURES.items():
         assert pickle.loads(pickle.dumps(drawing)).title == drawing.title, name
     summary, pages = Summary.of(tmp_path, VERDICTS, Level.QUICK, {}), []
-    with closing(processes(2)) as work:
+    with processes(2) as work:
         for name, how in (("there", work.map), ("here", map)):
             material = Material({v.claim.id: v.checks for v in VERDICTS}, directory=tmp_path / name)
             (material.directory / results.FIGURES).mkdir(parents=True)

@@ -17,7 +17,6 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Container, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, FrameType
@@ -175,7 +174,7 @@ def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
 def _tried(one: Callable[[int], Trial], count: int, workers: int) -> list[Trial]:
     """The trials by number, each shown on standard error as soon as it is there."""
     tried = []
-    with closing(processes(workers)) as work:
+    with processes(workers) as work:
         for trial in work.map(one, range(count)):
             print(f"{trial.what}: {trial.by}", file=sys.stderr, flush=True)
             tried.append(trial)

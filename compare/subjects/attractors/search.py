@@ -162,15 +162,11 @@ def run(directory: Path, search: Search, count: int, workers: Workers, show: Sho
     paths = [directory / f"{search.key(chunk)}.json" for chunk in range(len(chunks))]
     todo = [chunk for chunk, path in enumerate(paths) if not path.exists()]
     show("search", len(points) - len(todo) * CHUNK, len(points), 0)
-    executor, at_once = workers.start(), True
-    try:
-        running = [executor.submit(carry_out, search, k, chunks[k], paths[k]) for k in todo]
+    with workers:
+        running = [workers.submit(carry_out, search, k, chunks[k], paths[k]) for k in todo]
         for left, future in zip(reversed(range(len(todo))), as_completed(running), strict=True):
             future.result()
             show("search", len(points) - left * CHUNK, len(points), 0)
-        at_once = False
-    finally:
-        workers.stop(executor, at_once)
     rows = [row for path in paths for row in json.loads(path.read_text("utf-8"))["rows"]]
     sets = [dict(zip(BOX, point, strict=True)) for point in points.tolist()]
     found = tuple(groups | row for groups, row in zip(sets, rows, strict=True) if row["hops"])
