@@ -31,6 +31,24 @@ def spins(case: Case, flows: npt.ArrayLike, p: Parameters) -> list[float]:
     return [float(bifurcation.wall_spin(analytic.solution(q, case, formal=True).state, q)) for q in sets]
 
 
+def going_round(
+    axes: Axes,
+    p: Parameters,
+    quantity: Quantity,
+    case: Case,
+    begin: float,
+    end: float,
+    text: str = "RR",
+    place: Place = (0.5, (-5, 5)),
+    line: style.Line = style.STABLE,
+) -> None:
+    """A branch on which the ball goes round with the fluid, RR, SR, NR or NS, from one flow to another; its name."""
+    flows = np.linspace(begin, end, 200)
+    rolls = p.R / p.r * flows
+    slip_x = np.asarray(rolls if case is Case.RR else spins(Case.NR if case is Case.SR else case, flows, p)) - rolls
+    style.curve(axes, case, flows, quantity(slip_x, flows), text, place, line)
+
+
 def slipping(
     axes: Axes, p: Parameters, quantity: Quantity, stable: Place | None = None, unstable: Place | None = None
 ) -> None:

@@ -16,7 +16,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import OrbitBranch
-from compare.branches import Quantity, lifted, slipping, spin, spins
+from compare.branches import Quantity, going_round, lifted, slipping, spin
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Material
 from model import Case, Parameters, State
@@ -63,12 +63,8 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
             end = analytic.solution(fast, Case.SS, stable=stable).state
             height = float(quantity(end.slip_x, end.omega_c))
             style.name(axes, fast.omega_0, height, text, slips, style.COLOURS[Case.SS])
-        for case, x, text, place in (
-            (Case.NR, np.linspace(edge, HIGH * edge, 100), "SR, NR", (0.6, rides)),
-            (Case.NS, np.array([LOW, 1 - 1e-9]) * edge, "NS", (0.5, (-3, 9))),
-        ):
-            slip = np.asarray(spins(case, x, p)) - p.R / p.r * x
-            style.curve(axes, case, x, quantity(slip, x), text, place)
+        going_round(axes, p, quantity, Case.NR, edge, HIGH * edge, "SR, NR", (0.6, rides))
+        going_round(axes, p, quantity, Case.NS, LOW * edge, (1 - 1e-9) * edge, "NS", (0.5, (-3, 9)))
         cycles = [quantity(each.cycle.slip_x, each.cycle.omega_c) for each in branch.orbits]
         mean = quantity(means.slip_x, means.omega_c)
         low, high = [c.min() for c in cycles], [c.max() for c in cycles]
