@@ -21,19 +21,17 @@ class Form:
     """How quantities are written: as floats of one run, or as arrays with an entry for each run."""
 
     lean: Callable[[Array], Array]
-    """The view of an array (n, runs) that `read` takes: for floats without the axis of the runs."""
+    """The view of an array (n, runs) or (runs,) that `read` takes: for floats without the axis of the runs."""
     read: Callable[[Array], Any]
     """The rows of such a view as quantities, which stay as they are when the array changes."""
-    one: Callable[[Array], Any]
-    """The quantity in an array (runs,)."""
     some: Callable[[Any], Any]
     """Whether a condition holds in some run."""
     cos: Any
     sin: Any
 
 
-FLOATS = Form(lambda rows: rows[..., 0], np.ndarray.tolist, np.ndarray.item, bool, math.cos, math.sin)
-ARRAYS = Form(lambda rows: rows, np.ndarray.copy, lambda omega_0: omega_0, np.ndarray.any, np.cos, np.sin)
+FLOATS = Form(lambda rows: rows[..., 0], np.ndarray.tolist, bool, math.cos, math.sin)
+ARRAYS = Form(lambda rows: rows, np.ndarray.copy, np.ndarray.any, np.cos, np.sin)
 
 
 @dataclass(frozen=True)

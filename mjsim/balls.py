@@ -144,7 +144,7 @@ class Balls:
             self._orientation[:] = self._upright
             _, applied, floor, wall = self._driven
             forces, (floor[0], floor[1], wall[0], wall[1]) = corrections(
-                velocity, last, ball.R - h, form.one(fluid), contact, normals, ball
+                velocity, last, ball.R - h, self._quantities(fluid), contact, normals, ball
             )
             applied[0], applied[1], applied[2], applied[3], applied[4], applied[5] = forces
             if whole:
