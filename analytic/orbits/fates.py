@@ -10,7 +10,6 @@ simulation (`confirm`).
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.orbits import periodic as orbits
-from analytic.orbits.periodic import NoOrbitError, Orbit, extent, lands
+from analytic.orbits.periodic import NoOrbitError, Orbit, extent, landings
 from analytic.simulation.ensemble import interval, random_starts, simulate_many
 from analytic.simulation.motion import natural_units
 from analytic.simulation.settings import Settings, fitting_step
@@ -320,17 +319,17 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     """
     unit = math.sqrt(p.R / p.g)
     seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SEEN_SAMPLES)
-    if not any(map(lands, seen.events.from_case, seen.events.to_case)):
+    if not any(landings(zip(seen.events.from_case, seen.events.to_case, strict=True))):
         return None
     fate = periodic(seen)
-    if fate and fate.orbit and (landings := sum(itertools.starmap(lands, fate.orbit.changes))):
+    if fate and fate.orbit and (count := sum(landings(fate.orbit.changes))):
         orbit = fate.orbit
         omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R
-        return Hopping(landings, orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max()))
+        return Hopping(int(count), orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max()))
     lasts = max(CONFIRMING / p.c, 4 * SEEN * unit)
     run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SEEN_SAMPLES)
     last = run.time > run.time[-1] * 2 / 3
-    times = run.events.time[list(map(lands, run.events.from_case, run.events.to_case))]
+    times = run.events.time[landings(zip(run.events.from_case, run.events.to_case, strict=True))]
     times = times[times > run.time[-1] * 2 / 3]
     if len(times) < 3 or run.time[-1] - times[-1] > 3 * np.max(np.diff(times)):
         return None

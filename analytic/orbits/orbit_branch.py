@@ -25,7 +25,7 @@ from analytic.orbits.periodic import (
     closed,
     defect_jacobian,
     extent,
-    lands,
+    landings,
     refine,
 )
 from model import InputError, Parameters, State
@@ -222,7 +222,8 @@ def _between(here: Orbit, there: Orbit, step: Array, name: str, matrix: Array) -
         nearest = close(loop)
     except NoOrbitError:  # disturbances there land where others don't
         nearest = there
-    kind = Bifurcation.PERSISTENCE if _landings(here.changes) == _landings(there.changes) else Bifurcation.GRAZING
+    same = sum(landings(here.changes)) == sum(landings(there.changes))
+    kind = Bifurcation.PERSISTENCE if same else Bifurcation.GRAZING
     yield Place(kind, loop.value(name), nearest)
 
 
@@ -234,11 +235,7 @@ def _sequence(changes: Changes) -> Changes:
 
 def _strays(here: Orbit, by: Array, changes: Changes) -> bool:
     """Whether a long step came to other landings than those of the orbit it began at."""
-    return bool(np.linalg.norm(by) > GRAZING) and _landings(changes) != _landings(here.changes)
-
-
-def _landings(changes: Changes) -> int:
-    return sum(lands(before, after) for before, after in changes)
+    return bool(np.linalg.norm(by) > GRAZING) and sum(landings(changes)) != sum(landings(here.changes))
 
 
 _TESTS: dict[Bifurcation, Callable[[npt.NDArray[np.complex128]], float]] = {

@@ -11,6 +11,7 @@ which disturbances of the orbit change in a period.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -46,9 +47,9 @@ Changes = tuple[tuple[Case, Case], ...]
 """Changes of case in order, (before, after)."""
 
 
-def lands(before: int, after: int) -> bool:
-    """Whether a change of case, by the cases or their codes, is a landing on the floor."""
-    return Case(before).A is Contact.N is not Case(after).A
+def landings(changes: Iterable[tuple[int, int]]) -> npt.NDArray[np.bool_]:
+    """Which changes of case, given by the cases or their codes, are landings on the floor."""
+    return np.array([Case(before).A is Contact.N is not Case(after).A for before, after in changes], dtype=bool)
 
 
 class NoOrbitError(ArithmeticError):
