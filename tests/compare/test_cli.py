@@ -42,11 +42,15 @@ def test_predict_says_what_the_ball_does_and_what_ends_the_operating_range(capsy
         ("--set high-wall-friction", "the wall can carry it"),
     ):
         assert cli.main(["predict", *given.split()]) == 0
-        assert words in " ".join(capsys.readouterr().out.split())
+        shown = " ".join(capsys.readouterr().out.split())
+        assert words in shown
+        assert "Re " not in shown  # without a fluid there is no Reynolds number
     assert cli.main(["predict", "--mu", "0", "--json"]) == 0
     described = json.loads(capsys.readouterr().out)
     assert described["operating_range"] == 0
     assert described["operating_range_ends"]["by"] == "SMOOTH"
+    assert described["fluid_inertia"] is described["model_holds"] is None
+    assert {(s["Re"], s["drag_law_covers_Re"]) for s in described["solutions"]} == {(None, None)}
 
 
 def test_predict_waits_for_no_heavy_package() -> None:
@@ -112,16 +116,6 @@ def test_predict_says_where_a_law_of_drag_ends(capsys: pytest.CaptureFixture[str
     shown = " ".join(capsys.readouterr().out.split())
     assert ("Warning: Re = 518 in SS, " in shown) is not covered
     assert "the fluid's inertia (added mass, pressure gradient): it would shift ω₀₁ by -3.8 %, ω₀₂ by +7 %" in shown
-
-
-def test_predict_without_a_fluid_knows_no_reynolds_number(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["predict", "--omega-0", "25"]) == 0
-    assert "Re " not in capsys.readouterr().out
-    assert cli.main(["predict", "--omega-0", "25", "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)
-    assert printed["fluid_inertia"] is None
-    assert printed["model_holds"] is None
-    assert {(s["Re"], s["drag_law_covers_Re"]) for s in printed["solutions"]} == {(None, None)}
 
 
 def test_simulate_inspect_and_xarray(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,11 +11,8 @@ from mjsim.stepping import Polar
 from model import Flow, Parameters
 from tests.random_motions import random_start
 
-HOPS = Parameters(
-    mu=0.455544891368194, eta=0.07254346340444341, j=0.23894921089415236, r=0.02210534827760574, R=0.05, m=0.03,
-    g=9.81, c=0.17417791846732222, omega_0=69.21145783256775,
-)  # fmt: skip
-"""Reference set of a hopping attractor; a hop lasts 0.22 s, and the floor is touched for half a millisecond of it."""
+HOPS = Parameters.named("hopping")
+"""A hop lasts 0.22 s, and the floor is touched for half a millisecond of it."""
 START = [0.004068, 0.0822234, 57.2275, -100.0124, 0, 0, 0, 0]
 """Close to it, in the air and rolling up the wall."""
 LASTS = 0.6
