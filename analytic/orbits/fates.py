@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.orbits import periodic as orbits
-from analytic.orbits.periodic import NoOrbitError, Orbit, extent, landings
+from analytic.orbits.periodic import NoOrbitError, Orbit, active_variables, extent, landings
 from analytic.simulation.ensemble import interval, random_starts, simulate_many
 from analytic.simulation.motion import natural_units
 from analytic.simulation.settings import Settings, fitting_step
@@ -261,8 +261,7 @@ def lyapunov(
     """
     first = full_state(x)
     case = run(p, first, renewed, renewed).cases[0]
-    active = [VARIABLES.index(name) for name in TRAITS[case].active]
-    push = np.zeros(8)
+    active, push = active_variables(case), np.zeros(8)
     push[active] = np.random.default_rng(0).normal(size=len(active))
     second = first + push * state_units(p) * APART / np.linalg.norm(push)
     growth, before = [], APART

@@ -96,7 +96,7 @@ class Loop:
         case, start, end = max(stretches, key=lambda each: each[2] - each[1])
         inner = np.abs(run.time - (start + end) / 2) <= (end - start) / 4
         rates = np.abs([dynamics.rates(case, z, p, p.omega_0) for z in run.x[inner].tolist()]) / state_units(p)
-        active = _active(case)
+        active = active_variables(case)
         at, fixed = np.unravel_index(np.argmax(rates[:, active]), (len(rates), len(active)))
         return cls(p, case, run.x[inner][at], period, active[int(fixed)], size, restitution)
 
@@ -106,16 +106,13 @@ class Loop:
 
     def with_value(self, name: str, value: float) -> Loop:
         """The same with another value of a parameter, or of the coefficient of restitution."""
-        return (
-            replace(self, restitution=value)
-            if name == RESTITUTION
-            else replace(self, p=self.p.replace(**{name: value}))
-        )
+        changed = {RESTITUTION: value} if name == RESTITUTION else {"p": self.p.replace(**{name: value})}
+        return replace(self, **changed)
 
     @property
     def free(self) -> list[int]:
         """Indices of the coordinates among the state variables."""
-        return [k for k in _active(self.case) if k != self.fixed]
+        return [k for k in active_variables(self.case) if k != self.fixed]
 
     def coordinates(self, x: Array) -> Array:
         """Coordinates (..., d - 1) of states (..., 8), or of differences of states."""
@@ -299,5 +296,6 @@ def _simulated(p: Parameters, x: npt.ArrayLike, duration: float, samples: int, r
         raise NoOrbitError(f"no motion for {duration:g} s: {error}") from error
 
 
-def _active(case: Case) -> list[int]:
+def active_variables(case: Case) -> list[int]:
+    """Indices of the active variables of a case (Table 4) among those of the state."""
     return [VARIABLES.index(name) for name in TRAITS[case].active]

@@ -60,10 +60,7 @@ def simulate_many(
 
     Raises `InputError` if numbers of runs differ, or as `simulate` for the first run that can't start.
     """
-    from analytic.simulation import (
-        stepping,
-        time_stepping,  # here, because numba takes a while to load
-    )
+    from analytic.simulation import stepping, time_stepping  # here, since numba takes a while to load
 
     settings = settings or Settings(method="time-stepping")
     sets = [parameters] if isinstance(parameters, Parameters) else list(parameters)
