@@ -69,6 +69,7 @@ def validate(
     StorageError
         If the directory can't be written or holds results of another version.
     """
+    forget()
     output, chosen = Path(output), [each for each in select(CLAIMS, claims) if claims or each.level <= level]
     results.open_directory(output)
     names = [protocol.name for protocol in PROTOCOLS] if claims is None else [n for c in chosen for n in c.protocols]
@@ -196,7 +197,6 @@ def _write(
 
 def _announced(claim: Claim, testimony: Testimony, broken: Mapping[str, str], announce: Announce) -> Verdict:
     """The verdict, or that one of the protocols of its claim broke down."""
-    forget()
     judged = hear(claim, testimony)
     if errors := [why for name, why in broken.items() if name in claim.protocols]:
         judged = replace(judged, outcome=Outcome.ERROR, error="; ".join(errors))
