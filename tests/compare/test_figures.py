@@ -240,9 +240,9 @@ def test_figures_are_written_and_gaps_named(tmp_path: Path, monkeypatch: pytest.
 def test_how_figures_look(material: Material) -> None:
     assert set(style.COLOURS) == set(Case)
     assert len(set(style.COLOURS.values())) == len(Case)
-    labels = {"omega_c": "$ω_{c}$ (rad/s)", "slip_x": r"$\tilde{ω}_{x}$ (rad/s)", "wall_spin": "$ω_{x}^0$ (rad/s)"}
-    labels |= {"force_Ax-By": "$A_{x}$ − $B_{y}$ (N)", "gamma": "γ (rad/s²)", "hops": "hops on"}
-    assert {name: style.label(name) for name in labels} == labels
+    symbols = {"omega_c": "$ω_{c}$", "slip_x": r"$\tilde{ω}_{x}$", "wall_spin": "$ω_{x}^0$"}
+    symbols |= {"force_Ax-By": "$A_{x}$ − $B_{y}$", "gamma": "γ", "hops": "hops on"}
+    assert {name: style.symbol(name) for name in symbols} == symbols
     states = list(material.select("omega_c", "case"))[:2]
     words = style.caption(Parameters.named("reference"), "What it is.", states=states, names=("mu",))
     assert words.startswith("What it is. μ = 0.2. Marks: measured (2)")
