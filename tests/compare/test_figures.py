@@ -244,8 +244,9 @@ def test_how_figures_look(material: Material) -> None:
     symbols |= {"force_Ax-By": "$A_{x}$ − $B_{y}$", "gamma": "γ", "hops": "hops on"}
     assert {name: style.symbol(name) for name in symbols} == symbols
     states = list(material.select("omega_c", "case"))[:2]
-    words = style.caption(Parameters.named("reference"), "What it is.", states=states, names=("mu",))
-    assert words.startswith("What it is. μ = 0.2. Marks: measured (2)")
+    words = style.caption(Parameters.named("reference"), "What it is.", states=states)
+    assert words.startswith("What it is. μ = 0.2, η = 0.2, j = 0.4, κ = ")
+    assert ". Marks: measured (2)" in words
 
 
 def test_what_a_figure_file_is_called_decides_its_format(tmp_path: Path) -> None:
