@@ -180,8 +180,9 @@ def advice(native: Native, creep: float, chatter: float) -> Iterator[str]:
     yield (
         f'For this problem and step the theory asks for cone elliptic, solref "{fitting.solref[0]:g} '
         f'{fitting.solref[1]:g}", solreffriction "{fitting.solreffriction:.3g} 1", solimp "{fitting.solimp:.3g} '
-        f'{fitting.solimp:.3g} 0.0001 0.5 2", impratio {fitting.impratio:.3g}. For the contacts of any other scene: '
-        "dualball forecast."
+        f'{fitting.solimp:.3g} 0.0001 0.5 2", impratio {fitting.impratio:.3g}. That is for a ball: so soft '
+        "an impedance keeps what slips fast from hovering, but blocks, which rest on several points, lose contact with "
+        "it (block-rests, block-slides, box-stops). For any other scene: dualball forecast."
     )
 
 
