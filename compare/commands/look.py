@@ -45,7 +45,7 @@ def add(commands: options.Commands) -> None:
     command.add_argument("-o", "--output", type=Path, required=True, help="picture.png or film.gif")
     second, radii = options.Number("s", POSITIVE), options.Number("radii", NOT_NEGATIVE)
     for option, kind, usual, meaning in (
-        ("width", options.Number(allowed=Range(16, 8192, whole=True)), None, "pixels (default: 960, of a film 640)"),
+        ("width", options.Number(allowed=Range(160, 1920, whole=True)), None, "pixels (default: 960, of a film 640)"),
         ("at", options.moment, None, "time of a picture (default: the end)"),
         ("from", options.moment, 0.0, "start of a film, in the time of the run"),
         ("seconds", second, 6.0, "length of a film; shorter if the run ends before"),
