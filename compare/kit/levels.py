@@ -89,14 +89,14 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
 
 BESIDE: dict[str, Any] = {
     # engines beside the one on trial measure as much as the quick level at every level, but for this
-    "settled.starts": {"with the fluid": (0.62, 1.7), "on the wall": (1.7, 4.2)},
+    "settled.starts": {"with the fluid": (0.62, 1.7, 4.2), "on the wall": (1.7, 4.2)},
     "settled.loose": 100.0,
     "settling.rounds": (0.45,),
     "settling.steps": 512,
     "brackets.sections": 1,
     "thresholds.width": 5e-4,
-    "thresholds.loose": 1e5,
-    "thresholds.rounds": (0.3,),
+    "thresholds.loose": 1e4,
+    "thresholds.rounds": (0.4,),
     "plane.rounds": (1.0, 2.0),
     "hysteresis.hold": 15.0,
     "hysteresis.parts": 1,
