@@ -43,6 +43,13 @@ def test_known_sequences_have_their_limit_and_order(errors, order):
     assert found == pytest.approx(order, abs=0.01)
 
 
+def test_where_terms_of_two_orders_cancel_no_order_is_found_and_the_limit_is_covered():
+    errors = np.array([1.28e-3, -3.7e-4, -4.7e-4])  # -2.8e-3 h + 4.1e-3 h^2
+    limit, order = extrapolated(1 / np.array([1.0, 2.0, 3.0]) / 20, errors, np.full(3, 1e-14))
+    assert math.isnan(order)
+    assert abs(limit.value) <= COVERAGE * limit.uncertainty
+
+
 def test_where_there_is_only_noise_the_last_is_the_limit_and_there_is_no_order():
     limit, order = extrapolated(STEPS, np.array([1e-3, -2e-3, 5e-4, -5e-4]), np.full(4, 1e-3))
     assert (limit.value, math.isnan(order)) == (-5e-4, True)
