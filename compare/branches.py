@@ -16,7 +16,7 @@ from compare.kit.style import UNSTABLE, Place
 from model import Case, Parameters, State
 from model.arrays import Array
 
-Quantity = Callable[[Array, Array], Array]
+Drawn = Callable[[Array, Array], Array]
 """What is drawn, of slip_x and omega_c."""
 
 
@@ -34,7 +34,7 @@ def spins(case: Case, flows: npt.ArrayLike, p: Parameters) -> list[float]:
 def going_round(
     axes: Axes,
     p: Parameters,
-    quantity: Quantity,
+    quantity: Drawn,
     case: Case,
     begin: float,
     end: float,
@@ -50,7 +50,7 @@ def going_round(
 
 
 def slipping(
-    axes: Axes, p: Parameters, quantity: Quantity, stable: Place | None = None, unstable: Place | None = None
+    axes: Axes, p: Parameters, quantity: Drawn, stable: Place | None = None, unstable: Place | None = None
 ) -> None:
     """The branch of SS, its line by its eigenvalues; a name at each part that has a place for it."""
     s = np.linspace(-16.0, 16.0, 1601)

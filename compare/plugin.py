@@ -46,8 +46,8 @@ def pytest_collection_modifyitems(session: pytest.Session, config: pytest.Config
         known = _known(config.getoption("dualball_known"), own)
 
         @functools.cache
-        def trial() -> runner.Trial:  # begins with the first case asked for
-            begun = runner.Trial(engine)
+        def trial() -> runner.EngineProcess:  # begins with the first case asked for
+            begun = runner.EngineProcess(engine)
             config.add_cleanup(begun.close)
             return begun
 

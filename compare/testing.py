@@ -22,7 +22,7 @@ from model.errors import suggestion
 from model.parameters import POSITIVE, check_number
 from model.trajectory import AXES, columns
 
-WINDOW = 0.25
+SETTLED_PART = 0.25
 """Last part of a motion, in which it has to have settled."""
 FEWEST = 10
 """Samples below which nothing is judged."""
@@ -232,14 +232,15 @@ def assert_settles(
     if len(motion.time) < FEWEST:
         raise InputError(f"the motion is too short to judge: {len(motion.time)} samples, at least {FEWEST} are needed")
     t, w = (
-        row[motion.time >= np.quantile(motion.time[[0, -1]], 1 - WINDOW)] for row in (motion.time, motion["omega_c"])
+        row[motion.time >= np.quantile(motion.time[[0, -1]], 1 - SETTLED_PART)]
+        for row in (motion.time, motion["omega_c"])
     )
     state = min(states, key=lambda s: abs(s.state.omega_c - w.mean()))
     name, exact = state.case.name, state.state.omega_c
     slowest = max((1 + 2 * p.j) / p.c, *filter(math.isfinite, [0.0, analytic.slowest_time_constant(state)]))
     lasts, swing = float(motion.time[-1] - motion.time[0]), float(np.ptp(w))
     scale, off = abs(exact) or rotation_scale(p), np.abs(w - exact)
-    needed = slowest * (max(3.0, -math.log(rtol)) if off.max() > rtol * scale < swing else 3.0) / (1 - WINDOW)
+    needed = slowest * (max(3.0, -math.log(rtol)) if off.max() > rtol * scale < swing else 3.0) / (1 - SETTLED_PART)
     if lasts < needed:
         raise InputError(
             f"the motion is too short to judge: it lasts {lasts:.3g} s and should last {needed:.3g} s, since to forget "
@@ -248,7 +249,8 @@ def assert_settles(
     elsewhere = [s.case.name for s in lasting if np.all(np.abs(w - s.state.omega_c) <= rtol * scale)]
     k = int(off.argmax())
     assert off[k] <= rtol * scale, (
-        f"the ball does not settle in {name}: for the last {WINDOW * lasts:.3g} s omega_c should be within {rtol:g} of "
-        f"{exact:.8g} rad/s, but is off by {off[k] / scale:.2e} at t = {t[k]:g} s (on average {w.mean():.8g} rad/s; it "
-        f"swings by {swing:.1e} rad/s)" + "".join(f"; it settles in {other}" for other in elsewhere[:1])
+        f"the ball does not settle in {name}: for the last {SETTLED_PART * lasts:.3g} s omega_c should be within "
+        f"{rtol:g} of {exact:.8g} rad/s, but is off by {off[k] / scale:.2e} at t = {t[k]:g} s (on average "
+        f"{w.mean():.8g} rad/s; it swings by {swing:.1e} rad/s)"
+        + "".join(f"; it settles in {other}" for other in elsewhere[:1])
     )

@@ -32,14 +32,14 @@ from model.kinematics import VARIABLES, state_units
 CEILING, COARSEST = 300.0, 2e-2
 """A check in the limit may overlook so many times as much as one of the engine on trial, but no more than 2 %, unless
 that may, too. (Raised from 100 after a first measurement, when uncertainties were made three times as large.)"""
-USUAL = 2e-3
+USUAL_STEP = 2e-3
 """MuJoCo's own time step, s, at which users meet its deviations."""
 NEAR = 0.1
 """Largest difference of the conditions of two measurements of the same thing with different steps, by their size."""
 MARGIN = 0.03
 """Relative distance from a threshold below which no limit is taken of a settled state: with a step of a millisecond
 thresholds lie up to so far off, and so the step decides on the case. (Chosen after a first measurement on 24 sets.)"""
-LEAST = 3
+LEAST_STEPS = 3
 """Time steps with which a number must have been measured to have a limit."""
 NO_LIMIT = f"nothing was measured with three time steps, and more than {MARGIN:.0%} from any threshold"
 Step = tuple[int, Check]
@@ -94,7 +94,9 @@ def _heard(
         for _, check in own
         if quantity(check.measurement.quantity).resolves and check.relation is Relation.EQUAL
         if check.scale > 10 * check.tolerance
-        if by.allowance or len(steps) == 1 or math.isclose(coarse_step(check.measurement.parameters) / refine, USUAL)
+        if by.allowance
+        or len(steps) == 1
+        or math.isclose(coarse_step(check.measurement.parameters) / refine, USUAL_STEP)
     ]
     usual = [each for each in usual if math.isfinite(each)]
     order, left_out = math.nan, sum(each.rows for each in missing)
@@ -174,11 +176,11 @@ def _limit(there: Sequence[Step]) -> tuple[Check, float] | None:
     last = there[-1][1]
     m, scale = last.measurement, last.scale or 1.0
     wanted = quantity(m.quantity).resolves
-    if wanted == 0 or (math.isnan(last.predicted) and len(there) >= LEAST):
+    if wanted == 0 or (math.isnan(last.predicted) and len(there) >= LEAST_STEPS):
         return last, math.nan  # what is counted, or unknown to theory, has no limit but what the finest step says
     errors = np.array([(each.measurement.value - each.predicted) / (each.scale or 1.0) for _, each in there])
     own = np.array([each.measurement.uncertainty / (each.scale or 1.0) for _, each in there])
-    if len(there) < LEAST or not np.all(np.isfinite(errors)):
+    if len(there) < LEAST_STEPS or not np.all(np.isfinite(errors)):
         return None
     p = m.parameters
     shortest = min(time_unit(p), 1 / abs(p.omega_0) if p.omega_0 else math.inf)

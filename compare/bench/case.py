@@ -22,7 +22,7 @@ from model.kinematics import rotated
 Vector = tuple[float, float, float]
 VERSION = 1
 """Of the set of cases; a change of any number in it is another version."""
-STEPS = (4e-3, 2e-3, 1e-3)
+TIME_STEPS = (4e-3, 2e-3, 1e-3)
 """Time steps at which an engine is asked, s; every sample of a case falls on a step of each."""
 TOLERANCE = 1e-2
 """Error, in units of the case's scales, up to which an engine passes at the shortest step. A method of first order is
@@ -220,7 +220,7 @@ class Case:
 
     def to_mapping(self) -> dict[str, Any]:
         """All of it but the MJCF as JSON-able data; scales that are infinite are None."""
-        data = vars(self) | {"schema": "dualball-case", "version": VERSION, "steps": STEPS, "tolerance": TOLERANCE}
+        data = vars(self) | {"schema": "dualball-case", "version": VERSION, "steps": TIME_STEPS, "tolerance": TOLERANCE}
         data |= {"turned": self.round, "wrong": {name: self.error(states) for name, states in self.wrong.items()}}
         del data["motion"]
         return dict(plain(data))

@@ -38,7 +38,7 @@ CHECKED, CHECKS = 3.0, 3
 """A changed model must settle within so many s to be advised; so many are tried, after which there is no advice."""
 SHOWN, OFF = 12, 0.05
 """Pairs in a table; and share of the predicted creep by which the measured one may differ without a word."""
-QUANTITIES = {
+FAULTS = {
     "creep": ("creep", 1e6, "µm/s"),
     "depth": ("depth", 1e6, "µm"),
     "largest_step": ("largest step", 1e3, "ms"),
@@ -51,7 +51,7 @@ class UnsettledError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Pair:
+class PairForecast:
     """Two geoms in contact, at the worst of their contacts: what is predicted of them, and what was measured."""
 
     name: str
@@ -82,7 +82,7 @@ class Pair:
     replaced: tuple[str, ...]
     """What the engine takes in the place of what the model says."""
     harm: Mapping[str, float]
-    """For each of `QUANTITIES`, how many times what passes for good."""
+    """For each of `FAULTS`, how many times what passes for good."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Change:
 class Forecast:
     """Of a settled model: pairs in contact, the worst first, and what to do."""
 
-    pairs: tuple[Pair, ...]
+    pairs: tuple[PairForecast, ...]
     timestep: float
     largest_step: float
     """Of all contacts together, s."""
@@ -194,7 +194,7 @@ def forecast(
         own = those.only(part)
         step, speed = own.largest_step(), math.sqrt(2 * G * min(radius[part].min(), 1))
         pairs.append(
-            Pair(
+            PairForecast(
                 name=f"{names[first]} / {names[second]}",
                 members=tuple(np.flatnonzero(part).tolist()),
                 load=float(own.force[:, 0].sum()),
@@ -313,7 +313,13 @@ def apply(model: Any, option: str, value: Sequence[float]) -> None:
 
 
 def _change(
-    model: Any, data: Any, c: Contacts, number: Array, harm: Callable[[Contacts], Any], pair: Pair, restless: int
+    model: Any,
+    data: Any,
+    c: Contacts,
+    number: Array,
+    harm: Callable[[Contacts], Any],
+    pair: PairForecast,
+    restless: int,
 ) -> tuple[Change | None, dict[str, Array]]:
     """The first option, in its mildest value, that makes all contacts good, or else the one that helps most.
 
@@ -399,7 +405,7 @@ def sentences(f: Forecast) -> Iterator[str]:
     """What to do, what was found when it was tried, and what else should be known, in words."""
     sliding = [p.name for p in f.pairs if p.slides]
     if f.change:
-        name, factor, unit = QUANTITIES[f.change.quantity]
+        name, factor, unit = FAULTS[f.change.quantity]
         endless = "any" if f.change.quantity == "largest_step" else "∞"
         before, after, found = (_number(v, factor, endless) for v in (f.change.before, f.change.after, f.change.found))
         done = "" if found == "–" else f" Tried: {found} {unit}."

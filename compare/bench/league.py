@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _OWN = "compare.bench.adapters"
-ENGINES: dict[str, str] = {
+ENTRIES: dict[str, str] = {
     "event": f"{_OWN}.simulators:event",
     "time-stepping": f"{_OWN}.simulators:time_stepping",
     "mujoco": f"{_OWN}.simulators:mujoco",
@@ -46,7 +46,7 @@ KINDS = ("sticking", "rolling", "sliding", "landing")
 QUICK = (2e-3,)
 LEAST = 1e-11
 """Smaller errors are drawn here."""
-MARKS, COLOURS = (
+ENTRY_MARKS, ENTRY_COLOURS = (
     "osv^DPX*<>phd",
     ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C564B"),
 )
@@ -206,7 +206,12 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
             known = np.isfinite(own[:, 1]).mean(0) > 0.5  # where the median is
             cost, error = np.nanmedian(np.where(np.isfinite(own[:, 1:]), own, np.nan)[..., known], axis=0)
             number = families.index(name.removesuffix("-defaults"))
-            look = {"marker": MARKS[number % len(MARKS)], "color": COLOURS[number % len(COLOURS)], "ms": 6, "lw": 1}
+            look = {
+                "marker": ENTRY_MARKS[number % len(ENTRY_MARKS)],
+                "color": ENTRY_COLOURS[number % len(ENTRY_COLOURS)],
+                "ms": 6,
+                "lw": 1,
+            }
             look |= {"mfc": "white", "ls": ":"} if name.endswith("-defaults") else {}
             axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
         axes.axhline(TOLERANCE, color="0.5", lw=0.8)

@@ -18,7 +18,7 @@ from model import Parameters, State
 from model.arrays import Array
 
 G, J = 9.81, 0.4
-BALL, BLOCK = 0.1, (0.1, 0.1, 0.05)
+RADIUS, BLOCK = 0.1, (0.1, 0.1, 0.05)
 """Radius of the spheres and half edges of the blocks, m; all weigh 1 kg."""
 CLOSED = 1e-14
 """Round-off of a closed form, in units of the scales."""
@@ -80,7 +80,7 @@ def block(tilt: float = 0.0) -> dict[str, Any]:
     return {"shape": "box", "size": BLOCK, "mass": 1.0, "inertia": moments, "orientation": turn}
 
 
-def sphere(radius: float = BALL) -> dict[str, Any]:
+def sphere(radius: float = RADIUS) -> dict[str, Any]:
     """A uniform sphere."""
     return {"shape": "sphere", "size": (radius,), "mass": 1.0, "inertia": (J * radius**2,) * 3}
 
@@ -201,17 +201,17 @@ def _spheres() -> list[Case]:
         """From 2 m/s without spin: slides until v/r = spin, at 2/(mu g (1 + 1/j)), then rolls."""
         slid = np.minimum(t, 2.0 / (mu * G * (1 + 1 / j)))
         v, s = 2.0 - mu * G * slid, 2.0 * slid - mu * G * slid**2 / 2
-        return along(np.array([1.0, 0.0, 0.0]), s + v * (t - slid), v, mu * G * slid / (j * BALL), BALL * _UP)
+        return along(np.array([1.0, 0.0, 0.0]), s + v * (t - slid), v, mu * G * slid / (j * RADIUS), RADIUS * _UP)
 
     def descends(t: Array, angle: float, mu: float = 0.5, j: float = J) -> tuple[Array, Array, Array]:
         """From rest on a slope: rolls if tan <= mu (1 + 1/j), else slips."""
         way, normal = slope(angle)
         a = max(G * math.sin(angle) / (1 + j), G * (math.sin(angle) - mu * math.cos(angle)))
-        spun = (G * math.sin(angle) - a) / (j * BALL)
-        return along(way, a * t**2 / 2, a * t, spun * t, BALL * np.array(normal))
+        spun = (G * math.sin(angle) - a) / (j * RADIUS)
+        return along(way, a * t**2 / 2, a * t, spun * t, RADIUS * np.array(normal))
 
     def spins(t: Array, decay: float = 0.0) -> tuple[Array, Array, Array]:
-        return BALL * _UP, np.zeros(3), np.outer(20.0 * np.exp(-decay * t), _UP)
+        return RADIUS * _UP, np.zeros(3), np.outer(20.0 * np.exp(-decay * t), _UP)
 
     gentle, steep = math.atan(0.5), math.atan(2.5)
     return [
@@ -274,8 +274,8 @@ def _turntable() -> Case:
         k = turning * j / (1 + j)
         cos, sin, none = np.cos(k * t), np.sin(k * t), 0 * t
         place, way = 0.5 * np.stack([cos, sin, none], axis=1), 0.5 * k * np.stack([-sin, cos, none], axis=1)
-        rolling = np.cross(_UP, way - np.cross(turning * _UP, place)) / BALL
-        return place + BALL * _UP, way, rolling
+        rolling = np.cross(_UP, way - np.cross(turning * _UP, place)) / RADIUS
+        return place + RADIUS * _UP, way, rolling
 
     return closed(
         "turntable",
@@ -301,14 +301,14 @@ def _cylinder() -> Case:
         z, fall = -deep * (1 - np.cos(k * t)), -deep * k * np.sin(k * t)
         out = np.stack([np.cos(turns * t), np.sin(turns * t), 0 * t], axis=1)
         on = np.cross(_UP, out)
-        spin = (turns * z / BALL)[:, None] * out - orbit * turns / BALL * _UP + (fall / BALL)[:, None] * on
+        spin = (turns * z / RADIUS)[:, None] * out - orbit * turns / RADIUS * _UP + (fall / RADIUS)[:, None] * on
         return orbit * out + np.outer(z, _UP), orbit * turns * on + np.outer(fall, _UP), spin
 
     return closed(
         "cylinder",
         "a ball rolls round inside a vertical cylinder: it comes down and rises again, at sqrt(2/7) of its orbit",
         sphere(),
-        (Surface("wall", 1.0, radius=orbit + BALL),),
+        (Surface("wall", 1.0, radius=orbit + RADIUS),),
         rises,
         {"a hollow sphere": {"j": 2 / 3}, "it falls freely": {"j": 1e-9}},
         until=2.0,
@@ -321,5 +321,5 @@ def _cylinder() -> Case:
 
 def _high_up(orbit: float, turns: float) -> tuple[Parameters, State]:
     """The same in the study's vessel, far above its floor and without drag."""
-    p = Parameters(m=1.0, r=BALL, R=orbit, j=J, mu=1.0, eta=1.0, g=G, c=0.0, omega_0=0.0)
-    return p, State(y=10.0, omega_c=turns, slip_x=-turns * orbit / BALL)
+    p = Parameters(m=1.0, r=RADIUS, R=orbit, j=J, mu=1.0, eta=1.0, g=G, c=0.0, omega_0=0.0)
+    return p, State(y=10.0, omega_c=turns, slip_x=-turns * orbit / RADIUS)

@@ -10,7 +10,7 @@ An engine is anything with three functions, a module most simply:
 ``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It may say of itself:
 ``NAME``, ``PRECISION`` (``f64`` or ``f32``), ``DECLARED`` (in words, all that isn't a free body in plain geometry under
 the engine's own settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
-`STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``).
+`TIME_STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from compare.bench import adapters
-from compare.bench.case import STEPS, TOLERANCE, Case
+from compare.bench.case import TIME_STEPS, TOLERANCE, Case
 from model import InputError
 from model.arrays import Array
 from model.parameters import POSITIVE, check_choice, check_number
@@ -60,7 +60,7 @@ class About:
     """What is worst, and why, in a sentence."""
     version: str = ""
     """Of its package, and the version with which it is known to work if that is another."""
-    steps: tuple[float, ...] = STEPS
+    steps: tuple[float, ...] = TIME_STEPS
     missing: str = ""
     """Why it can't be used here; empty if it can."""
 
@@ -126,12 +126,12 @@ def run_all(
     cases: Iterable[Case], engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
 ) -> Iterator[Result]:
     """One engine on many cases, one after the other in one process, that is begun anew where it hangs or dies."""
-    with closing(Trial(engine, limit)) as trial:
+    with closing(EngineProcess(engine, limit)) as trial:
         for case in cases:
             yield trial.result(case, steps)
 
 
-class Trial:
+class EngineProcess:
     """A process with an engine in it."""
 
     def __init__(self, engine: Any, limit: float = LIMIT) -> None:
@@ -225,7 +225,9 @@ def _load(given: Any) -> tuple[Any, About]:
         declared=getattr(engine, "DECLARED", ""),
         note=getattr(engine, "NOTE", ""),
         version=_version(given, engine),
-        steps=tuple(check_number("TIMESTEPS", step, "s", POSITIVE) for step in getattr(engine, "TIMESTEPS", STEPS)),
+        steps=tuple(
+            check_number("TIMESTEPS", step, "s", POSITIVE) for step in getattr(engine, "TIMESTEPS", TIME_STEPS)
+        ),
     )
     return engine, about
 

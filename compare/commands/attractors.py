@@ -23,7 +23,7 @@ from compare.kit.statistics import plain
 from compare.kit.sweep import Axis, grid
 from compare.kit.tasks import carry_out
 from compare.subjects.attractors import search
-from compare.subjects.attractors.search import BOX, FATES, Search, Searched
+from compare.subjects.attractors.search import BOX, FATES, AttractorSearch, Searched
 from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
@@ -199,7 +199,7 @@ def searched(args: argparse.Namespace) -> int:
         searches = [Searched.load(path) for path in args.kept]
     else:
         axes = Axis.several(args.range, dict.fromkeys(BOX, "1"), "group", POSITIVE)
-        asked = Search(BOX | {axis.name: axis.ends for axis in axes}, args.starts, args.seed)
+        asked = AttractorSearch(BOX | {axis.name: axis.ends for axis in axes}, args.starts, args.seed)
         with progress.shown(args.quiet or args.json) as show:
             searches = [search.run(args.output, asked, args.sets, running.workers(args), show)]
     if args.save:

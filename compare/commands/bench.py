@@ -74,7 +74,7 @@ def add(commands: options.Commands) -> None:
 
     command = options.command(commands, "league", ranked, "--quick")
     command.add_argument("--quick", action="store_true", help="one time step")
-    named = f"only this one (repeatable), or a module of your own: {', '.join(league.ENGINES)}"
+    named = f"only this one (repeatable), or a module of your own: {', '.join(league.ENTRIES)}"
     command.add_argument("--engine", action="append", metavar="NAME", help=named)
     running.add_processes(command)
     options.outputs(command, "results")
@@ -171,8 +171,8 @@ def _of_another(args: argparse.Namespace) -> tuple[dict[str, tuple[Any, float]],
     if args.file or options.given(args, (*NUMBERS, *CHOICES, *_PAIR)).keys() - {"timestep"}:
         raise InputError(f"a file and contact settings are MuJoCo's; of {engine.name} only --timestep can be given")
     step = options.given(args, ["timestep"]).get("timestep", ContactSettings.timestep)
-    names = [name for name in (engine.name, engine.as_it_comes, "mujoco") if name in league.ENGINES]
-    those = {name: (league.ENGINES[name], step) for name in dict.fromkeys(names)}
+    names = [name for name in (engine.name, engine.as_it_comes, "mujoco") if name in league.ENTRIES]
+    those = {name: (league.ENTRIES[name], step) for name in dict.fromkeys(names)}
     return those, f"{engine.name} in its best known settings and as it comes, step {1e3 * step:g} ms."
 
 
@@ -180,9 +180,9 @@ def ranked(args: argparse.Namespace) -> int:
     """Measure, show the table, write JSON and page."""
     from compare.report.pictures import address, svg  # here, because drawing takes a second to load
 
-    chosen = {name: league.ENGINES.get(name, name) for name in args.engine or league.ENGINES}
+    chosen = {name: league.ENTRIES.get(name, name) for name in args.engine or league.ENTRIES}
     modules = {name for name in chosen if re.search(r"[.:]", name) or Path(f"{name}.py").exists()}
-    check_names(chosen.keys() - modules, list(league.ENGINES), "engine")
+    check_names(chosen.keys() - modules, list(league.ENTRIES), "engine")
     make_directory(args.output)
     with progress.shown(quiet=args.json or args.quiet) as show:
         found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)

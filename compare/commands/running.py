@@ -13,7 +13,7 @@ from typing import Any
 from compare.commands.options import count_or_none, given, number, seconds
 from compare.kit import engines, progress
 from compare.kit.campaign import Campaign
-from compare.kit.engines import Settings
+from compare.kit.engines import AnySettings
 from compare.kit.tasks import Task
 from compare.kit.workers import Workers, dask, processes
 from model import Flow, InputError, Parameters, State
@@ -84,7 +84,7 @@ def add_engine_name(
     parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)
 
 
-def settings(args: argparse.Namespace, p: Parameters) -> Settings:
+def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
     """Settings of the engine that the options of `add_engine` choose, for a ball."""
     chosen: engines.Engine = args.engine
     return chosen.configured(given(args, ("timestep", "rtol", "restitution")), p)

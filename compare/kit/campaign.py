@@ -39,7 +39,7 @@ HELD = 2**18
 READ = 2**19
 """Samples of new runs, and of those read last, that are held in memory, some 100 MB: most are looked at soon after."""
 FAILURES = "failures.json"
-Outcome = tuple[str, Path | None, Trajectory | None]
+Ended = tuple[str, Path | None, Trajectory | None]
 """Why a run is not whole, empty if it is; the file that holds what there is of it; the run, if it fits in memory."""
 _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 """Label, ID, and whether it broke down; files of earlier versions have no label."""
@@ -182,13 +182,13 @@ class Campaign:
         self._read, self._samples = {}, 0
         self._files = {key: file for key, file in self._files.items() if file not in gone}
 
-    def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[tuple[Task, ...], Sequence[Outcome]]]:
+    def _carry_out(self, fresh: Iterator[tuple[Task, ...]]) -> Iterator[tuple[tuple[Task, ...], Sequence[Ended]]]:
         """Yield each batch that ends, with what became of its tasks.
 
         A worker that dies takes all batches under way with it. Their tasks are tried again at the end, one at a time;
         one that then loses its worker twice has failed.
         """
-        pending: dict[Future[list[Outcome]], tuple[Task, ...]] = {}
+        pending: dict[Future[list[Ended]], tuple[Task, ...]] = {}
         again: deque[Task] = deque()
         died: Counter[str] = Counter()
         while True:
@@ -221,7 +221,7 @@ def listed(failures: Iterable[Failure]) -> list[dict[str, Any]]:
     return [{"key": f.task.key, "reason": f.reason, "task": f.task.describe()} for f in failures]
 
 
-def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) -> list[Outcome]:
+def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) -> list[Ended]:
     """Carry out tasks and store their runs under a label; raises `StorageError` if that can't be done.
 
     Where a batch can't be carried out as a whole, its tasks are tried one by one.
@@ -242,7 +242,7 @@ def run_batch(tasks: Sequence[Task], directory: Path, label: str, limit: float) 
     together = directory / f"{label}-{hashlib.sha256(' '.join(whole).encode()).hexdigest()[:24]}.h5"
     if whole:
         storage.save_batch(whole, together)
-    outcomes: list[Outcome] = []
+    outcomes: list[Ended] = []
     for run, path in zip(runs, paths, strict=True):
         file = together if run.complete else failed_path(path)
         if not run.complete:

@@ -23,7 +23,7 @@ from model.arrays import Array
 from model.errors import suggestion
 from model.trajectory import version
 
-Settings = ContactSettings | analytic.Settings | adapter.Settings
+AnySettings = ContactSettings | analytic.Settings | adapter.Settings
 """Numerical settings of any engine."""
 Simulate = Callable[[Parameters, State, float, Flow, Any, float | None, Callable[[float], None]], Trajectory]
 """One whole run from parameters, start, duration, flow, settings and sample interval; the function is called with the
@@ -40,12 +40,12 @@ class Engine:
     """
 
     name: str
-    settings: type[Settings]
+    settings: type[AnySettings]
     options: tuple[str, ...]
     """Options of the command line that `configure` takes."""
-    configure: Callable[[Mapping[str, float], Parameters], Settings]
+    configure: Callable[[Mapping[str, float], Parameters], AnySettings]
     """Settings of a user's run from such options; those not given have their defaults."""
-    study: Callable[[float, Parameters], Settings] | None = None
+    study: Callable[[float, Parameters], AnySettings] | None = None
     """Settings of a study for a time step in s, where they differ from those of a user's run."""
     simulate: Simulate | None = None
     stream: Stream | None = None
@@ -80,13 +80,13 @@ class Engine:
         needed = {self.needs.name: self.needs.version} if self.needs else {}
         return {name: version(name) for name in self.stands_on} | needed
 
-    def at(self, step: float | None, p: Parameters) -> Settings:
+    def at(self, step: float | None, p: Parameters) -> AnySettings:
         """Settings of a study for a time step in s; engines without a step ignore it."""
         if step is None or "timestep" not in self.options:
             return self.configure({}, p)
         return self.study(step, p) if self.study else self.configure({"timestep": step}, p)
 
-    def configured(self, given: Mapping[str, float], p: Parameters) -> Settings:
+    def configured(self, given: Mapping[str, float], p: Parameters) -> AnySettings:
         """`configure`, but an option that belongs to other engines is an `InputError`."""
         for name in given:
             if name not in self.options:

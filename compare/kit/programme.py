@@ -27,7 +27,7 @@ from model.files import make_directory
 
 DIRECTORY = "measurements"
 UNDAMPED = "without drag (c = 0 s-1) no motion settles, and nothing can be measured"
-MOST = 3e4
+LONGEST_WAIT = 3e4
 """Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or more at a time; and
 contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c is three times that: as much as
 `omega_c` may be off in a state that counts as settled."""
@@ -235,4 +235,4 @@ def _too_weak(p: Parameters, protocol: Protocol) -> str:
         return UNDAMPED
     steps = 1 / (p.c * coarse_step(p))
     weak = f"drag is so weak (1/c = {1 / p.c:.3g} s, {steps:.2g} time steps) that motions take too long to settle"
-    return weak if protocol.waits and steps > MOST else ""
+    return weak if protocol.waits and steps > LONGEST_WAIT else ""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from compare.kit.settling import GROUPS, scale
+from compare.kit.settling import ERROR_GROUPS, scale
 from compare.kit.short import slip_unit
 from model import Parameters
 from model.kinematics import VARIABLES, state_units
 
-_SETTLED = frozenset(name for group in GROUPS for name in group)
+_SETTLED = frozenset(name for group in ERROR_GROUPS for name in group)
 _RATIOS = frozenset({"slope", "steepest", "filippov_share", "response", "law_in_motion"})
 """Ratios, angles, and deviations that are divided by their scales already."""
 

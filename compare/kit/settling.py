@@ -43,7 +43,7 @@ LOOSE = 1000.0
 FORCES = tuple(f"force_{contact}{axis}" for contact in "AB" for axis in "xyz")
 SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
 """What mechanics determine of the forces where both contacts roll: the rest is a family of one parameter."""
-GROUPS = (("omega_c",), ("slip_x", "slip_y", "slip_z", "wall_spin"), ("v_y",), (*FORCES, *SUMS[2:]))
+ERROR_GROUPS = (("omega_c",), ("slip_x", "slip_y", "slip_z", "wall_spin"), ("v_y",), (*FORCES, *SUMS[2:]))
 """Quantities whose errors have the same causes, and are taken to be as large as the largest of them."""
 
 
@@ -213,7 +213,7 @@ def judged(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> Set
         case = Case(int(counts.argmax()))
         means, drifts = steady_mean(rows, length)
         mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
-        groups = [[q for q in group if q in determined(case)] for group in GROUPS]
+        groups = [[q for q in group if q in determined(case)] for group in ERROR_GROUPS]
         worst = {q: max(drift[each] / scale(each, p) for each in group) for group in groups for q in group}
         values = {q: Measured(mean[q], math.hypot(solved, worst[q]) * scale(q, p)) for q in worst}
         swings = max(float(np.ptp(series[q][-length:])) / scale(q, p) for q in worst)

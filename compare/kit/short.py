@@ -24,7 +24,7 @@ LAG = 3
 HALF_WINDOW, WINDOW_DEGREES = 8, (5, 3)
 """Half the width of a window in the middle of a motion, in steps of the coarser run; degrees of the polynomials
 through it, of which the lower one shows what the degree changes."""
-LIMIT, DOUBT = 2 / 3, 1 / 3
+EXTRAPOLATION, DOUBT = 2 / 3, 1 / 3
 """Limit of a vanishing step beyond the finer run, and its uncertainty, in differences of the two runs: the error is
 between first order in the step, for the direction of friction, and second, with limits of 1 and 1/3."""
 

@@ -47,7 +47,7 @@ class Trial(Start):
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class TrialResult:
     """What was read from a trial with the coarser and with the finer time step."""
 
     protocol: str
@@ -63,7 +63,7 @@ class Result:
         return measurement(lab, self.protocol, trial.set, trial.p, quantity, value, self.tasks, **conditions)
 
 
-def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Result | Missing]:
+def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[TrialResult | Missing]:
     """Run all trials, and read each; or say which of its runs broke down."""
     tasks: list[tuple[Trial, list[Task]]] = []
     for trial in trials:
@@ -78,7 +78,7 @@ def carry_out(lab: Lab, protocol: str, trials: Iterable[Trial]) -> Iterator[Resu
             yield Missing(protocol, trial.set, f"{trial.name}: the run {runs}", trial.rows)
         else:
             half = len(runs) // 2
-            yield Result(protocol, trial, own, trial.read(*runs[:half]), trial.read(*runs[half:]))
+            yield TrialResult(protocol, trial, own, trial.read(*runs[:half]), trial.read(*runs[half:]))
 
 
 def known_flow(records: Records, set: str, threshold: str) -> float | None:

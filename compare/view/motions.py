@@ -13,7 +13,7 @@ from compare.kit.quantities import QUANTITIES
 from compare.testing import UNITS, Series, common, difference
 from model import InputError, Trajectory
 
-COLOURS = "#0072B2", "#D55E00"
+PAIR_COLOURS = "#0072B2", "#D55E00"
 SEEN = 1e-5
 """A gap in m below which it isn't drawn."""
 LISTED = 8
@@ -88,7 +88,7 @@ def draw_both(a: Series, b: Series) -> Figure:
     t = common(a, b)
     for axes, name in zip(panels, names, strict=False):
         symbol = style.symbol(name) if name in QUANTITIES else name
-        for each, colour, line in zip((a, b), COLOURS, ("-", "--"), strict=True):
+        for each, colour, line in zip((a, b), PAIR_COLOURS, ("-", "--"), strict=True):
             axes.plot(each.time, each[name], line, color=colour, label=each.name)
         axes.set(ylabel=f"{symbol} ({pages.readable(UNITS[name])})", xlim=t[[0, -1]])
         there = [np.interp(t, each.time, each[name]) for each in (a, b)]

@@ -40,7 +40,7 @@ from model.trajectory import columns
 
 WIDTHS = Range(160, 1920)
 """Of pictures, pixels."""
-STEP = 5e-3
+TRAIL_STEP = 5e-3
 """Longest time between points of the trail and of the rotation, s."""
 ARROW = 3.0
 """Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball, unless said."""
@@ -165,7 +165,7 @@ def frames(
     Raises `InputError` if there is no OpenGL, or the run holds no scene with a ball.
     """
     p, now = run.header.parameters, resampled(run, times)
-    steps = max(1, math.ceil((run.time[-1] - run.time[0]) / STEP))
+    steps = max(1, math.ceil((run.time[-1] - run.time[0]) / TRAIL_STEP))
     past = resampled(run, np.linspace(run.time[0], run.time[-1], steps + 1))
     turns = orientations(past)[np.searchsorted(past.time, times).clip(max=steps)]
     centres, axes = to_world(now.x, now.theta, p).position, frame(now.theta)
@@ -181,7 +181,7 @@ def frames(
     height = width * 10 // 16
     inset = height * 5 // 12
     model = _model(run, 2 * width, 2 * height)
-    data, ball, most = mujoco.MjData(model), model.geom("ball").id, 100 + math.ceil(_LONGEST_TRAIL / STEP)
+    data, ball, most = mujoco.MjData(model), model.geom("ball").id, 100 + math.ceil(_LONGEST_TRAIL / TRAIL_STEP)
     mujoco.mj_forward(model, data)
     choose_opengl()
     above, behind = mujoco.MjvCamera(), mujoco.MjvCamera()

@@ -23,7 +23,7 @@ import analytic
 from analytic import StationarySolution
 from compare.kit import style
 from compare.kit.campaign import Campaign
-from compare.kit.engines import Engine, Settings
+from compare.kit.engines import AnySettings, Engine
 from compare.kit.pages import Rows
 from compare.kit.tasks import Task, carry_out
 from model import Case, Contact, Parameters, State, Trajectory
@@ -183,7 +183,7 @@ class Contestant:
     engine: Engine
     step: float | None
     """s; None for one that chooses its own."""
-    settings: Settings
+    settings: AnySettings
 
     def task(self, asked: Asked) -> Task:
         """A run; it samples no more often than it steps."""

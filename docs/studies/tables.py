@@ -91,12 +91,12 @@ def _league(kept: Path) -> dict[str, list[Result]]:
     def results(name: str) -> list[Result]:
         file = kept / f"{name}.pickle"
         if not file.exists():
-            (found,) = league.measure({name: league.ENGINES[name]}, None, 1, show).values()
+            (found,) = league.measure({name: league.ENTRIES[name]}, None, 1, show).values()
             file.write_bytes(pickle.dumps(found))
         return cast(list[Result], pickle.loads(file.read_bytes()))
 
     with progress.shown(counted=True) as show, ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = dict(zip(league.ENGINES, pool.map(results, league.ENGINES), strict=True))
+        found = dict(zip(league.ENTRIES, pool.map(results, league.ENTRIES), strict=True))
     if missing := [results[0].skipped for results in found.values() if all(result.skipped for result in results)]:
         raise InputError(f"the page is about all engines: {missing[0]}")
     write_text(kept / "league.json", json.dumps(league.to_mapping(found)))

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import analytic
 from compare.bench import cases
-from compare.bench.case import STEPS, TOLERANCE
+from compare.bench.case import TIME_STEPS, TOLERANCE
 from model import Case as Kinds
 
 ALL = pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
@@ -25,7 +25,7 @@ def test_a_case_is_whole(case):
     assert case.bound <= 1e-10
     assert case.about
     assert case.source
-    for step in STEPS:  # every sample falls on a step
+    for step in TIME_STEPS:  # every sample falls on a step
         assert np.allclose(case.times / step, np.rint(case.times / step), atol=1e-9)
     assert case.error(case.exact) == 0
     gaps, slips = case.touching(case.exact)

@@ -81,7 +81,7 @@ def few_points() -> Iterator[None]:
     """Of the branch of hops a few orbits, and few frequencies of pulsation: theory takes about a second for each."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(orbit_branch, "follow", functools.partial(orbit_branch.follow, most=2))
-        patch.setattr(unsteady, "POINTS", 3)
+        patch.setattr(unsteady, "FREQUENCIES", 3)
         yield
 
 
@@ -160,9 +160,9 @@ def test_the_path_of_slip_bends_and_ends_as_the_paper_says(name: str) -> None:
     path = np.stack([run.slip_z, run.slip_y], axis=-1)
     first = path[0] / np.linalg.norm(path[0])
     across = np.abs(path @ np.array([-first[1], first[0]])).max()
-    assert across > 0.1 * slipping.SLIP
+    assert across > 0.1 * slipping.PUSHED
     assert (run.cases[-1] is Case.NR) == (name == "fig-4")
-    assert (np.linalg.norm(path[-1]) > slipping.SLIP) == (name == "fig-5")
+    assert (np.linalg.norm(path[-1]) > slipping.PUSHED) == (name == "fig-5")
 
 
 def test_the_bistable_region_is_named_and_points_not_as_predicted_are_crossed(material: Material) -> None:

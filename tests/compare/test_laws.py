@@ -68,13 +68,13 @@ def test_every_deviation_is_measured() -> None:
 
 
 def verdict_of(name: str, records: Records) -> Verdict:
-    return judge([claim for claim in claims.LAWS if claim.id == name], records)[0]
+    return judge([claim for claim in claims.LAW_CLAIMS if claim.id == name], records)[0]
 
 
 def test_laws_and_drag_are_measured_with_mujoco(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(laws, "LASTS", 256)
+    monkeypatch.setattr(laws, "RUN_LENGTH", 256)
     records = Records.of(laws.measure(lab, {"reference": Parameters.named("reference")}, Records()))
-    mine = [claim for claim in claims.LAWS if claim.protocols == {laws.PROTOCOL}]
+    mine = [claim for claim in claims.LAW_CLAIMS if claim.protocols == {laws.PROTOCOL}]
     outcome_of = {verdict.claim.id: verdict.outcome for verdict in judge(mine, records)}
     assert outcome_of == {"table-3": Outcome.CONFIRMED, "eq-10": Outcome.CONFIRMED}
     right = drag.sinking_speed

@@ -21,7 +21,7 @@ from compare.kit.statistics import Measured
 from compare.subjects.thresholds import claims as bifurcations
 from compare.subjects.thresholds.measure import thresholds
 from compare.subjects.thresholds.measure.basins import Edge, ends_slipping
-from compare.subjects.thresholds.measure.thresholds import BESIDE, TURNS
+from compare.subjects.thresholds.measure.thresholds import DISTANCES, TURNS
 from model import Case, Parameters, State
 from tests.measured import measured
 
@@ -84,7 +84,7 @@ def test_the_drag_at_which_a_fold_is_born_is_judged_where_that_of_the_set_is_too
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6])
 def test_extrapolated_zero_is_as_sure_as_it_says(noise):
-    where = 2.0 * (1 + BESIDE)
+    where = 2.0 * (1 + DISTANCES)
     zero = vanishing(where, [Measured(math.sin(w - 2) * (1 + w), noise) for w in where])
     assert abs(zero.value - 2.0) < 3 * zero.uncertainty < 3e-4
 
@@ -93,7 +93,7 @@ def test_extrapolated_zero_is_as_sure_as_it_says(noise):
 def test_extrapolated_zero_of_what_is_no_power_series_is_as_sure_as_it_says(power):
     """As omega_0 is none of the lag where drag isn't linear."""
     for part in (0.02, 0.1, 0.5):
-        order = BESIDE / BESIDE[-1]
+        order = DISTANCES / DISTANCES[-1]
         where = 1.0 + 0.05 * (order + part * order**power + 0.1 * order**3)
         place = vanishing(where, [Measured(float(value), 1e-12) for value in order])
         assert abs(place.value - 1.0) < 3 * place.uncertainty

@@ -100,7 +100,7 @@ CASES = [(Case.RR, 0, True), (Case.SS, 0, True), (Case.SS, 14, True), (Case.SS, 
 @pytest.mark.parametrize(("case", "at", "rolls"), [*CASES, (Case.RS, 9, True)])
 def test_rolling_on_is_judged_after_the_beginning(case, at: int, rolls: bool) -> None:
     cases = np.full(16, Case.RR)
-    cases[at : at + unsteady.LASTS] = case
+    cases[at : at + unsteady.LASTING] = case
     assert unsteady.rolls_on(SimpleNamespace(time=np.linspace(0.0, 1.5, 16), case=cases)) is rolls
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from compare.bench import cases, run
-from compare.bench.case import STEPS, VERSION
+from compare.bench.case import TIME_STEPS, VERSION
 from compare.bench.runner import run_all
 from compare.commands import cli
 from model import InputError
@@ -75,9 +75,9 @@ def test_what_breaks_loses_the_case_and_not_the_run():
 def test_errors_order_creep_and_cost():
     found = run(STOPS, Exact())
     assert found.passed
-    assert found.steps == STEPS
+    assert found.steps == TIME_STEPS
     assert found.order == pytest.approx(1.0)
-    assert found.errors[-1] == pytest.approx(STEPS[-1] * STOPS.times[-1] / STOPS.scales[0])
+    assert found.errors[-1] == pytest.approx(TIME_STEPS[-1] * STOPS.times[-1] / STOPS.scales[0])
     assert found.creep == 0
     assert found.lost == 0
     assert found.cost >= 0

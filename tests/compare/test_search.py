@@ -16,19 +16,28 @@ from compare.kit.campaign import Campaign
 from compare.kit.sweep import Axis
 from compare.kit.workers import processes
 from compare.subjects.attractors import search
-from compare.subjects.attractors.search import BOX, FATES, Basins, Search, Searched, basins, parameters, random_starts
+from compare.subjects.attractors.search import (
+    BOX,
+    FATES,
+    AttractorSearch,
+    Basins,
+    Searched,
+    basins,
+    parameters,
+    random_starts,
+)
 from docs.studies.figures import SEARCHES
 from model import InputError, Parameters, StorageError, storage
 
 BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
-QUICK = Search({**BOX, "kappa": (0.5, 1.0)}, starts=2)
+QUICK = AttractorSearch({**BOX, "kappa": (0.5, 1.0)}, starts=2)
 
 
 def test_points_fill_the_box_and_a_longer_search_contains_the_shorter():
-    points = Search().points(64)
+    points = AttractorSearch().points(64)
     low, high = np.array(list(BOX.values())).T
     assert np.all((points >= low) & (points <= high))
-    np.testing.assert_array_equal(Search().points(1000)[:64], points)
+    np.testing.assert_array_equal(AttractorSearch().points(1000)[:64], points)
     halves = points[:, 0] < math.sqrt(low[0] * high[0])
     assert halves.sum() == 32  # a Sobol sequence puts equally many into each half, here of log mu
     p = parameters(points[0])

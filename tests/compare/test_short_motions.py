@@ -50,7 +50,7 @@ def measured(lab: Lab) -> Measured:
 
 
 def verdicts(records: Records) -> dict[str, Verdict]:
-    return {each.claim.id: each for each in judge(motion.LAWS + motion.EQUATIONS + slipping.CLAIMS, records)}
+    return {each.claim.id: each for each in judge(motion.LAW_CLAIMS + motion.EQUATIONS + slipping.CLAIMS, records)}
 
 
 @pytest.mark.parametrize("name", ["field", "growth", "bounds", "lift", "impacts"])
@@ -107,7 +107,7 @@ def test_the_fold_is_born_at_the_critical_drag(lab: Lab) -> None:
 def test_without_friction_nothing_rolls_and_the_reader_is_told(lab: Lab) -> None:
     smooth = {"ice": SETS["reference"].replace(eta=0.0)}
     for protocol, measure in (("growth", growth.measure), ("bounds", onset.bounds)):
-        assert list(measure(lab, smooth, Records())) == [Missing(protocol, "ice", growth.SMOOTH)]
+        assert list(measure(lab, smooth, Records())) == [Missing(protocol, "ice", growth.FRICTIONLESS)]
 
 
 def test_pieces_keep_away_from_changes_of_case(lab: Lab, measured: Measured) -> None:

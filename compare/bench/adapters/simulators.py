@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from compare.bench.adapters import mujoco_free
-from compare.bench.case import STEPS, Case
+from compare.bench.case import TIME_STEPS, Case
 from compare.kit.engines import ENGINES, Engine, engine
 from compare.kit.tasks import Task, carry_out
 from model import InputError
@@ -31,7 +31,7 @@ class Simulated:
         self.DECLARED = "; ".join(filter(None, (JOINTS if free else "", declared or own)))
         self.NOTE = note or getattr(free, "NOTE", "")
         if "timestep" not in ENGINES[name].options:
-            self.TIMESTEPS = STEPS[-1:]
+            self.TIMESTEPS = TIME_STEPS[-1:]
         self._states: Array | None = None
 
     def build(self, case: Case, timestep: float) -> None:

@@ -30,7 +30,7 @@ def main() -> None:
         given, answer = json.loads(line), None
         try:
             if isinstance(given, dict):
-                scene = (Turning if given["coordinates"] == "joints" else Free)(given)
+                scene = (Turning if given["coordinates"] == "joints" else FreeBall)(given)
             elif len(given) == 9:
                 scene.start(given[:3], given[3:])
             else:
@@ -168,7 +168,7 @@ class Contact(kernel.NewtonEuler3DR):  # type: ignore[misc]
         self.pc1()[:] = self.pc2()[:] = q[:3] - self.r * normal
 
 
-class Free(Scene):
+class FreeBall(Scene):
     """A free ball in a true cylinder."""
 
     directions = "jachqT"

@@ -16,14 +16,14 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import OrbitBranch
-from compare.branches import Quantity, going_round, lifted, slipping, spin
+from compare.branches import Drawn, going_round, lifted, slipping, spin
 from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Material
 from model import Case, Parameters, State
 from model.files import reading_json
 
 SET = Parameters.named("hopping")
-LOW, HIGH = 0.9, 1.4
+LOWEST_FLOW, HIGHEST_FLOW = 0.9, 1.4
 """Flows shown, in units of omega_02."""
 COLOUR = "#7B3294"
 
@@ -42,7 +42,7 @@ def _orbit() -> orbits.Orbit:
 @functools.cache
 def _branch() -> OrbitBranch:
     edge = bifurcation.thresholds(SET).omega_02
-    return orbit_branch.follow(_orbit(), "omega_0", LOW * edge, HIGH * edge)
+    return orbit_branch.follow(_orbit(), "omega_0", LOWEST_FLOW * edge, HIGHEST_FLOW * edge)
 
 
 def draw_branch(of: Diagram) -> tuple[Figure, str]:
@@ -50,10 +50,10 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
     p, branch = of.p, _branch()
     edge = bifurcation.thresholds(p).omega_02
     figure, (orbit, wall) = style.panels(9.0, 4.2, 1, 2)
-    fast = p.replace(omega_0=0.95 * HIGH * edge)  # the branch of SS goes on far beyond the frame
+    fast = p.replace(omega_0=0.95 * HIGHEST_FLOW * edge)  # the branch of SS goes on far beyond the frame
     means = State(*np.transpose([each.mean for each in branch.orbits]))
     # What is drawn, and where names stand, in points from the curves of SS, SR and NR, and hopping.
-    shown: tuple[tuple[Axes, Quantity, tuple[tuple[float, float], ...]], ...] = (
+    shown: tuple[tuple[Axes, Drawn, tuple[tuple[float, float], ...]], ...] = (
         (orbit, lambda slip_x, omega_c: omega_c, ((-5, -7), (-5, 7), (-5, 12))),
         (wall, functools.partial(spin, p), ((-5, 7), (-60, -50), (-18, -80))),
     )
@@ -63,8 +63,8 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
             end = analytic.solution(fast, Case.SS, stable=stable).state
             height = float(quantity(end.slip_x, end.omega_c))
             style.name(axes, fast.omega_0, height, text, slips, style.COLOURS[Case.SS])
-        going_round(axes, p, quantity, Case.NR, edge, HIGH * edge, "SR, NR", (0.6, rides))
-        going_round(axes, p, quantity, Case.NS, LOW * edge, (1 - 1e-9) * edge, "NS", (0.5, (-3, 9)))
+        going_round(axes, p, quantity, Case.NR, edge, HIGHEST_FLOW * edge, "SR, NR", (0.6, rides))
+        going_round(axes, p, quantity, Case.NS, LOWEST_FLOW * edge, (1 - 1e-9) * edge, "NS", (0.5, (-3, 9)))
         cycles = [quantity(each.cycle.slip_x, each.cycle.omega_c) for each in branch.orbits]
         mean = quantity(means.slip_x, means.omega_c)
         low, high = [c.min() for c in cycles], [c.max() for c in cycles]
@@ -76,9 +76,9 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
             if special.kind is orbit_branch.Bifurcation.BIRTH:
                 born = State(*special.orbit.mean)
                 style.mark(axes, special.value, float(quantity(born.slip_x, born.omega_c)), "birth", (-10, -30))
-        axes.set(xlim=(LOW * edge, HIGH * edge), xlabel=style.OMEGA_0)
+        axes.set(xlim=(LOWEST_FLOW * edge, HIGHEST_FLOW * edge), xlabel=style.OMEGA_0)
         style.guides(axes, {"omega_02": edge})
-    orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * HIGH * edge))
+    orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * HIGHEST_FLOW * edge))
     wall.set(ylabel=style.OMEGA_X, ylim=(0, 1.6 * lifted(edge, p)))
     style.points(orbit, of.states)
     style.legend(orbit, loc="center right")

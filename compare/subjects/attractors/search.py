@@ -62,7 +62,7 @@ FATES = ("hops", "RR", "SS", "off the floor", "undecided")
 
 
 @dataclass(frozen=True)
-class Search:
+class AttractorSearch:
     """A search: its box, how many starts a set, and the seed of both sets and starts."""
 
     box: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(BOX))
@@ -87,7 +87,7 @@ class Search:
 class Searched:
     """What a search has found: the sets among its first `sets` in which some start still hops by time stepping."""
 
-    search: Search
+    search: AttractorSearch
     sets: int
     rows: tuple[Mapping[str, Any], ...]
     """The groups of each; "hops", how many starts do; "confirmed", the fields of `fates.Hopping` or None."""
@@ -108,7 +108,7 @@ class Searched:
         """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of these."""
         with reading_json(path, "search") as data:
             box = {name: tuple(ends) for name, ends in data["search"].pop("box").items()}
-            return cls(Search(box, **data["search"]), data["sets"], tuple(data["rows"]), data["failed"])
+            return cls(AttractorSearch(box, **data["search"]), data["sets"], tuple(data["rows"]), data["failed"])
 
 
 def parameters(point: Array) -> Parameters:
@@ -130,7 +130,7 @@ def random_starts(p: Parameters, count: int, seed: Sequence[int]) -> Array:
     return State(y, 0.0, omega_c, *slips.T).stacked()
 
 
-def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
+def carry_out(search: AttractorSearch, chunk: int, points: Array, path: Path) -> None:
     """Search the sets of a chunk and write its file.
 
     Confirmed is the first hopping state that can be; if none can, "broken" says where the simulation broke down.
@@ -154,7 +154,7 @@ def carry_out(search: Search, chunk: int, points: Array, path: Path) -> None:
     write_text(path, json.dumps({"chunk": chunk, "rows": rows}))
 
 
-def run(directory: Path, search: Search, count: int, workers: Workers, show: Show) -> Searched:
+def run(directory: Path, search: AttractorSearch, count: int, workers: Workers, show: Show) -> Searched:
     """Search `count` sets, rounded up to whole chunks; finished chunks are read."""
     make_directory(directory)
     points = search.points(math.ceil(count / CHUNK) * CHUNK)

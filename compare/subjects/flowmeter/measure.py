@@ -36,15 +36,15 @@ from compare.kit.settling import (
     settled_cases,
 )
 from compare.kit.statistics import Measured, settled_case
-from compare.kit.trials import Result, Start, Trial, carry_out
+from compare.kit.trials import Start, Trial, TrialResult, carry_out
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
 
-STEP = 1e-3
+NEIGHBOUR = 1e-3
 """Relative distance of neighbouring flows; half of it shows the effect of curvature."""
 ACROSS = (-1e-3, -5e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)
 """Distances from the flow at which slipping sets in, relative to it."""
-SHARP = {"neighbours": 0.3, "jump": 0.1, "mean": 1.0}
+SHARPNESS = {"neighbours": 0.3, "jump": 0.1, "mean": 1.0}
 """Factor on the drift limit of settled states, by what is measured: for the jump the states lie close together."""
 LANDING, UNLOADED, UPWARDS, BY_SPIN = "unloading until it lands", "unloading", "push upwards", "push by spin"
 """Names of the trials."""
@@ -74,7 +74,7 @@ def slope(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
     """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there to unloading."""
     most = lab.effort("slope.slipping")
     curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
-    for by, sharp in SHARP.items():
+    for by, sharp in SHARPNESS.items():
         own = [curve for curve in curves if curve.by == by]
         starts = [[Start(c.set, c.p.replace(omega_0=w), by, np.array(c.x0)) for w in c.flows] for c in own]
         for curve, states in zip(own, settle_groups(lab, starts, span=24.0, sharp=sharp), strict=True):
@@ -108,7 +108,7 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
             omega_0, values = alike[k]
             q, moving = values["omega_c"].parameters, ("v_y", "omega_c", "slip_x", "slip_y", "slip_z")
             x0 = (high(q) * (case is Case.NR), *(values[each].value for each in moving), 0.0, 0.0)
-            flows = tuple(omega_0 * (1 + d) for d in (-STEP, -STEP / 2, STEP / 2, STEP))
+            flows = tuple(omega_0 * (1 + d) for d in (-NEIGHBOUR, -NEIGHBOUR / 2, NEIGHBOUR / 2, NEIGHBOUR))
             yield Curve("neighbours", name, q, flows, x0)
     slips, holds = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
     if slips is not None:
@@ -219,7 +219,7 @@ def unloading(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
                 yield Missing("unloading", state.start.set, f"no ball to begin with on the wall: {state.failure}")
             else:
                 trials += [_trial(lab, state, name) for name in names]
-    measured: dict[tuple[str, str, str], list[tuple[Result, Measured, float]]] = {}
+    measured: dict[tuple[str, str, str], list[tuple[TrialResult, Measured, float]]] = {}
     for result in carry_out(lab, "unloading", trials):
         if isinstance(result, Missing):
             yield result

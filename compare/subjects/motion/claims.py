@@ -14,7 +14,7 @@ from compare.judge import RTOL, simulated, theory
 from compare.kit.record import Condition, Measurement, state
 from compare.kit.settling import forces
 from compare.subjects.motion.measure.laws import FLUIDS
-from compare.subjects.motion.measure.motions import NAMES
+from compare.subjects.motion.measure.motions import LANDED
 from model import Case
 from model.cases import TRAITS
 from model.kinematics import VARIABLES
@@ -75,7 +75,7 @@ def _either(m: Measurement) -> float:
     return leaves if leaves == m.value or _last(m, "infeasible") != m.value else m.value
 
 
-LAWS = (
+LAW_CLAIMS = (
     claim(
         "table-3",
         "Table 3, (12)-(17)",
@@ -171,7 +171,7 @@ LAWS = (
         "extension",
         "A ball that lands does not rebound, and friction takes its share of the impulse.",
         Bearing("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
-        *(Bearing("impacts", f"after_{name}", _end, by=_RUN) for name in NAMES),
+        *(Bearing("impacts", f"after_{name}", _end, by=_RUN) for name in LANDED),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for the impulses.",
     ),
 )
@@ -222,4 +222,4 @@ EQUATIONS = tuple(
     )
     for case in Case
 )
-SECTIONS = {"Laws and cases": LAWS, "Equations of motion": EQUATIONS}
+SECTIONS = {"Laws and cases": LAW_CLAIMS, "Equations of motion": EQUATIONS}

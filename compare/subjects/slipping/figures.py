@@ -15,10 +15,10 @@ from model import Case, Parameters
 
 BETA = 0.9
 """Direction (54) of the push, rad: across the direction in which slip dies out or grows, so that the path bends."""
-SLIP = 1.0
+PUSHED = 1.0
 """Size of the push, rad s-1."""
 _ROUGH = Parameters.named("high-wall-friction")
-FLOWS = {"fig-4": _ROUGH.replace(omega_0=25.0), "fig-5": _ROUGH.replace(omega_0=16.0)}
+ROUGH_FLOWS = {"fig-4": _ROUGH.replace(omega_0=25.0), "fig-5": _ROUGH.replace(omega_0=16.0)}
 """Above and below omega_02 = 18.1 rad/s."""
 _LASTS = 0.012
 """Time that Fig. 5 shows, s."""
@@ -26,8 +26,10 @@ _LASTS = 0.012
 
 def select(_: Material, figure: str) -> Motion:
     """The motion of the event-driven simulation, which starts in the formal stationary state of NR."""
-    p = FLOWS[figure]
-    return Motion(f"{SLIP}, {BETA}", EVENT.name, p, partial(simulator.slip_perturbation, p, SLIP, BETA, t_end=_LASTS))
+    p = ROUGH_FLOWS[figure]
+    return Motion(
+        f"{PUSHED}, {BETA}", EVENT.name, p, partial(simulator.slip_perturbation, p, PUSHED, BETA, t_end=_LASTS)
+    )
 
 
 def draw(push: Motion) -> tuple[Figure, str]:
@@ -51,7 +53,7 @@ def draw(push: Motion) -> tuple[Figure, str]:
     w_y, w_z = run.slip_y[shown], run.slip_z[shown]
     plane.plot(w_z, w_y, color="black", lw=1.4)
     plane.plot([w_z[0], 0], [w_y[0], 0], **style.GUIDE)
-    halfway = int(np.searchsorted(np.hypot(np.diff(w_z), np.diff(w_y)).cumsum(), 0.5 * SLIP))
+    halfway = int(np.searchsorted(np.hypot(np.diff(w_z), np.diff(w_y)).cumsum(), 0.5 * PUSHED))
     tail, head = zip(w_z[halfway : halfway + 2], w_y[halfway : halfway + 2], strict=True)
     plane.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": "black", "mutation_scale": 14})
     plane.plot(w_z[0], w_y[0], "kx", ms=7, mew=1.8)
@@ -64,7 +66,7 @@ def draw(push: Motion) -> tuple[Figure, str]:
     dies = "above ω₀₂: the slip dies out within finite time, and the ball rolls on the wall again"
     grows = "below ω₀₂: the slip grows, and the ball keeps slipping (NS)"
     return figure, (
-        f"The stationary orbit on the wall (NR), pushed by a slip of {SLIP:g} rad/s in the direction β = {BETA:g}, "
+        f"The stationary orbit on the wall (NR), pushed by a slip of {PUSHED:g} rad/s in the direction β = {BETA:g}, "
         f"{dies if stops else grows}. Left: the slip over time. Right: its path in the plane orthogonal to NR, from "
         "the cross; dotted: the straight line. Event-driven simulation; "
         f"{style.named(push.p)}, Ω₀ = {push.p.Omega_0:.3g}."

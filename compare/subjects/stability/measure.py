@@ -42,7 +42,7 @@ RECORD = (64, 256)
 """Length of a record in coarse steps, which is about 3 sqrt(R/g), and its samples."""
 PUSH = {Case.RS: 0.3, Case.SR: 0.1}
 """Size of a push, in the `units`, where it is extrapolated to zero from this and half of it."""
-USUAL, SLIGHT = 2e-4, 2e-6
+USUAL_PUSH, SLIGHT_PUSH = 2e-4, 2e-6
 """Size of a push elsewhere, under Stokes' law of drag and under others: theirs is in proportion to a lag only far below
 a Reynolds number of 1. The run with the coarser step has half of it, and shows that it doesn't matter."""
 SLOWEST = 0.04
@@ -84,7 +84,7 @@ class Pushed:
     @property
     def sizes(self) -> tuple[float, ...]:
         """Sizes of the pushes: the first with the coarser step, the others with the finer one, the largest first."""
-        size = PUSH.get(self.case, USUAL if self.start.p.drag == STOKES else SLIGHT)
+        size = PUSH.get(self.case, USUAL_PUSH if self.start.p.drag == STOKES else SLIGHT_PUSH)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
 
     def tasks(self, lab: Lab) -> list[Task]:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from compare.kit.lab import Lab, time_unit
 from compare.kit.programme import FOUR, ONE, Protocol
 from compare.kit.record import Measurement, Missing, Records, measurement
-from compare.kit.settling import GROUPS, SPIN, Settled, begin, duration, family, scale, settle
+from compare.kit.settling import ERROR_GROUPS, SPIN, Settled, begin, duration, family, scale, settle
 from compare.kit.statistics import Measured
 from compare.kit.trials import Start
 from model import Parameters, State
@@ -71,7 +71,9 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             why = f"{same[0].case.name} at {at} is {fine.case.name} with half the time step"
             yield Missing(PROTOCOL, fine.start.set, why, len(fine.values))
         else:
-            for group in GROUPS:  # what step and start change is added to the uncertainty, the largest in the group
+            for (
+                group
+            ) in ERROR_GROUPS:  # what step and start change is added to the uncertainty, the largest in the group
                 sizes = {n: scale(n, fine.start.p) for n in group if all(n in each.values for each in (fine, *same))}
                 changes = [abs(s.values[n].value - fine.values[n].value) / sizes[n] for s in same for n in sizes]
                 for n, size in sizes.items():

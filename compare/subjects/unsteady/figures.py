@@ -24,7 +24,7 @@ SET = "reference"
 REFERENCE = Parameters.named(SET)
 DECADES = (0.04, 12.0)
 """Frequencies shown, Hz."""
-POINTS = 22
+FREQUENCIES = 22
 """Frequencies for which theory computes the onset of slip and the mean error."""
 FLOWS = (18.0, 25.0, 35.0)
 """Flows about which the jumps of a slipping ball are shown, rad s-1."""
@@ -57,7 +57,7 @@ def select(material: Material, figure: str) -> Measurements:
 @cache
 def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
     """Frequencies, amplitudes at which slip begins, mean errors at half as much again."""
-    f = np.geomspace(*DECADES, POINTS).tolist()
+    f = np.geomspace(*DECADES, FREQUENCIES).tolist()
     onsets = [pulsation.slip_onset(p, each) for each in f]
     return f, onsets, [pulsation.mean_error(p, 1.5 * a, each, 1e-4) for each, a in zip(f, onsets, strict=True)]
 

@@ -37,7 +37,7 @@ RAISE = 1.5
 """Factor by which the amplitude is raised at a time where the law of drag isn't Stokes'."""
 PERIODS, ROUNDS = 3, 5
 """Periods in a run, and successive runs until it is settled, the last with half the step."""
-LASTS = 5
+LASTING = 5
 """Samples for which slip must last to count: friction may be full for a moment before."""
 PHASES = 8
 """Phases of a period at which the motion is started anew from its state."""
@@ -133,7 +133,7 @@ def pulsation(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Ite
     for each, bracket in zip(rolling, narrow(lab, [_search(lab, each) for each in rolling]), strict=True):
         at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
         # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
-        unseen = (math.pi * LASTS / samples) ** 2 / 2 * place.value
+        unseen = (math.pi * LASTING / samples) ** 2 / 2 * place.value
         onset = Measured(place.value, math.hypot(place.uncertainty, unseen))
         if low is None or high is None:
             yield Missing("pulsation", each.set, f"in {at} there is slip at no amplitude, or at all")
@@ -232,9 +232,9 @@ def _search(lab: Lab, each: Pulsation) -> Search:
 
 
 def rolls_on(run: Trajectory) -> bool:
-    """Whether after the first sixth of a run the ball nowhere slips at both points or leaves the floor for `LASTS`."""
+    """Whether after the first sixth the ball nowhere slips at both points or leaves the floor for `LASTING`."""
     gone = np.isin(run.case[run.time > run.time[-1] / 6], [Case.SS, *(case for case in Case if case.A is Contact.N)])
-    return bool(np.convolve(gone, np.ones(LASTS)).max() < LASTS)
+    return bool(np.convolve(gone, np.ones(LASTING)).max() < LASTING)
 
 
 def mean_errors(lab: Lab, slipping: Sequence[tuple[Pulsation, float]]) -> Iterator[Measurement | Missing]:

@@ -21,7 +21,7 @@ from model.arrays import Array
 from model.kinematics import slip_velocities
 
 PROTOCOL = "laws"
-LASTS = 768
+RUN_LENGTH = 768
 """Length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples."""
 ROUNDING = 100 * float(np.finfo(float).eps)
 FLUIDS: Mapping[str, Mapping[str, float]] = {
@@ -39,14 +39,14 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     tasks = []
     for p in sets.values():
         step, fast = coarse_step(p), 3.0 / time_unit(p)
-        t_end = LASTS * step
+        t_end = RUN_LENGTH * step
         # From rest in a flow that rises; high on the wall in one that falls; and along the floor towards the wall.
         up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
         down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
         half = Flow.steady(fast / 2)
         starts = (up, State()), (down, State(y=2 * p.R, omega_c=fast)), (half, State(omega_c=fast / 3, h=p.R / 2))
         finer = [(step / parts, *start) for parts in refined for start in starts]
-        tasks.append([lab.task(p, x, t_end, h, flow=flow, samples=LASTS) for h, flow, x in finer])
+        tasks.append([lab.task(p, x, t_end, h, flow=flow, samples=RUN_LENGTH) for h, flow, x in finer])
     falls = []
     for p in balls.values():
         # In the middle of still fluid, off floor and wall, from rest and sinking already.

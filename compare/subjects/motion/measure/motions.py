@@ -24,8 +24,8 @@ from compare.kit.record import Condition, Measurement, Missing, Records, measure
 from compare.kit.settling import PRESSES
 from compare.kit.short import (
     DOUBT,
+    EXTRAPOLATION,
     HALF_WINDOW,
-    LIMIT,
     REFINED,
     WINDOW_DEGREES,
     constrained,
@@ -45,7 +45,7 @@ from model.kinematics import VARIABLES, slip_velocities, state_units
 SEED = 53
 CENTRES = (16, 40, 64)
 """Centres of the windows, in steps of the coarser run."""
-NEAR = 4
+BEFORE_AND_AFTER = 4
 """Steps before and after a window in which the case doesn't change, either, so that friction has built up."""
 TURN = 0.5
 """Largest change of a slip in a window, and of that which friction alone would make, divided by the slip: where slip is
@@ -55,7 +55,7 @@ MOVING = {
     for case in Case
 }
 """The variables whose rates of change are measured."""
-STATE, RATES, FORCES = slice(0, 8), slice(8, 16), slice(16, 22)
+STATE_PART, RATES_PART, FORCES_PART = slice(0, 8), slice(8, 16), slice(16, 22)
 """Parts of what is read at the centre of a window (22,): state, rates of change in SI, and forces at A and B in N."""
 
 STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
@@ -87,7 +87,7 @@ LANDINGS: dict[str, tuple[float, ...]] = {
     "wall, at a slant": (0.6, -0.5, 0.9, -0.4, -0.2, 0.1, 0.05, -0.3),
 }
 """States in the units of `STARTS`."""
-NAMES = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
+LANDED = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
 """Variables that a landing changes."""
 
 
@@ -108,7 +108,7 @@ def field(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterato
             if window is not None:
                 kept[set, p.nu_f, case] += 1
                 for what, value in _values(case, window, p).items():
-                    yield result.row(lab, what, value, case=case.name, **state_of(window[0, STATE]))
+                    yield result.row(lab, what, value, case=case.name, **state_of(window[0, STATE_PART]))
     for name, case in product(sets, Case):
         if lacking := lab.effort("field.kept") - kept[name, sets[name].nu_f, case]:
             why = f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} steps"
@@ -127,7 +127,7 @@ def _moving(lab: Lab, name: str, p: Parameters) -> Iterator[Trial]:
         rolls = case is Case.RR
         omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2) if rolls else rng.uniform(0.3, 2.5) / time_unit(p)
         q = p.replace(omega_0=omega_0)
-        t_end = (CENTRES[-1] + HALF_WINDOW + NEAR) * coarse_step(q) / REFINED
+        t_end = (CENTRES[-1] + HALF_WINDOW + BEFORE_AND_AFTER) * coarse_step(q) / REFINED
         refine = REFINED * lab.halves[0], REFINED * lab.halves[1]
         trial = Trial(name, q, f"from {case.name}", x, t_end, refine, rows=0)
         yield trial
@@ -143,7 +143,7 @@ def _window(lab: Lab, case: Case, coarse: Trajectory, fine: Trajectory, centre: 
     """
     read = []
     for run, times in zip((coarse, fine), lab.halves, strict=True):
-        near, half, middle = ((HALF_WINDOW + NEAR) * times, HALF_WINDOW * times, centre * times)
+        near, half, middle = ((HALF_WINDOW + BEFORE_AND_AFTER) * times, HALF_WINDOW * times, centre * times)
         window = slice(middle - half, middle + half + 1)
         if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(case, run, window):
             return None
@@ -153,8 +153,8 @@ def _window(lab: Lab, case: Case, coarse: Trajectory, fine: Trajectory, centre: 
         forces = polynomials(acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at)[0]
         read.append(np.concatenate([*polynomials(time, run.x[window], WINDOW_DEGREES, at), forces], axis=1))
     (one, _), (two, lower) = read
-    best = two + (two - one) * LIMIT
-    best[STATE] = constrained(case, best[STATE], fine.header.parameters)
+    best = two + (two - one) * EXTRAPOLATION
+    best[STATE_PART] = constrained(case, best[STATE_PART], fine.header.parameters)
     return np.stack([best, two, lower])
 
 
@@ -181,13 +181,16 @@ def _values(case: Case, window: Array, p: Parameters) -> dict[str, Measured]:
     moving = MOVING[case]
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
     scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
-    forces = [_forces(case, row) for row in window[:, FORCES]]
+    forces = [_forces(case, row) for row in window[:, FORCES_PART]]
     rate_change, force_change = (
-        max((abs(a - b) * DOUBT / LIMIT + abs(b - c) for a, b, c in np.transpose(rows).tolist()), default=0.0)
-        for rows in ((window[:, RATES] / scales)[:, moving], [[w / weight for w in each.values()] for each in forces])
+        max((abs(a - b) * DOUBT / EXTRAPOLATION + abs(b - c) for a, b, c in np.transpose(rows).tolist()), default=0.0)
+        for rows in (
+            (window[:, RATES_PART] / scales)[:, moving],
+            [[w / weight for w in each.values()] for each in forces],
+        )
     )
     rate_change, force_change = max(rate_change, lag_error(p) * (1 + p.j) / p.j), max(force_change, lag_error(p))
-    rates = {f"rate_{VARIABLES[k]}": Measured(window[0, RATES][k], rate_change * scales[k]) for k in moving}
+    rates = {f"rate_{VARIABLES[k]}": Measured(window[0, RATES_PART][k], rate_change * scales[k]) for k in moving}
     return rates | {f"moving_force_{name}": Measured(w, force_change * weight) for name, w in forces[0].items()}
 
 
@@ -284,9 +287,9 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
             step = coarse_step(start.p) / REFINED
             conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
             t_end, refine = round(0.4 * time_unit(p) / step) * step, (REFINED, 2 * REFINED)
-            trials.append(Trial(name, start.p, how, start.x0, t_end, refine, conditions=conditions, rows=len(NAMES)))
+            trials.append(Trial(name, start.p, how, start.x0, t_end, refine, conditions=conditions, rows=len(LANDED)))
     rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
-    changed = [VARIABLES.index(name) for name in NAMES]
+    changed = [VARIABLES.index(name) for name in LANDED]
     for landing in carry_out(lab, "impacts", trials):
         if isinstance(landing, Missing):
             yield landing
@@ -302,12 +305,12 @@ def impacts(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
         at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
         if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
             why = f"{trial.name}: the contact did not close for good within 0.4 sqrt(R/g)"
-            yield Missing("impacts", trial.set, why, len(NAMES))
+            yield Missing("impacts", trial.set, why, len(LANDED))
             continue
         change = float(np.max((np.abs(fine.x[2 * at] - coarse.x[at]) / units)[changed]))
         # The contact closes at a whole step, up to one late; until then weight and friction differ.
         late = coarse_step(p) / REFINED / time_unit(p) / 2
-        for quantity, k in zip(NAMES, changed, strict=True):
+        for quantity, k in zip(LANDED, changed, strict=True):
             value = Measured(float(fine.x[2 * at, k]), math.hypot(change, late) * float(units[k]))
             yield landing.row(lab, f"after_{quantity}", value, time=float(coarse.time[at]))
     for name, count in rebounds.items():

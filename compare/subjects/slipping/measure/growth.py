@@ -23,8 +23,8 @@ from compare.kit.lab import Lab, coarse_step, dragged_speed, time_unit
 from compare.kit.record import Measurement, Missing, Records, measurement, state_of
 from compare.kit.short import (
     DOUBT,
+    EXTRAPOLATION,
     HALF_WINDOW,
-    LIMIT,
     REFINED,
     WINDOW_DEGREES,
     lag_error,
@@ -52,7 +52,7 @@ SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
 """Which of slip_x, slip_y, slip_z a case allows beyond the one it leaves."""
 STEPS, SKIPPED = 20, 6
 """Steps of a record, and those at its start in which contact forces build up."""
-LARGE, SMALL, BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
+LARGE, SMALL, SLIP_BESIDE = (3.0, 1.5), (0.3, 0.15), (1.2, 0.6, 0.3)
 """Slips at the start in units of `start_unit`: so large that they neither end nor turn much in a record; small where
 one contact has to hold; and three beside a slip that is there already, where the direction depends on the size."""
 SETTLED = 6
@@ -63,7 +63,7 @@ AT_START = slope_error(np.arange(SKIPPED, STEPS + 1.0), DEGREES[0]) / slope_erro
     np.arange(-HALF_WINDOW, HALF_WINDOW + 1.0), WINDOW_DEGREES[0]
 )
 """Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a window."""
-SMOOTH = "without friction at both contacts there is nothing that rolls"
+FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ class Push:
     def sizes(self) -> tuple[float, ...]:
         """Sizes of slip, in units of `start_unit`, each half of the one before."""
         if self.inner in (Case.RS, Case.SR):
-            return BESIDE
+            return SLIP_BESIDE
         return SMALL if self.outer in (Case.RS, Case.SR) else LARGE
 
     def pair(self, lab: Lab, size: float, refine: int = 1) -> list[Task]:
@@ -132,7 +132,7 @@ class Push:
 def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """gamma out of random states, along every arrow; where one contact may slip to either side, their shares (69)."""
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
-    yield from (Missing("growth", name, SMOOTH) for name in sets if name not in rough)
+    yield from (Missing("growth", name, FRICTIONLESS) for name in sets if name not in rough)
     sides = [push for name, p in rough.items() for push in _pushes(name, p, lab.effort("growth.more"))]
     tasks = [push.tasks(lab) for pushes in sides for push in pushes]
     runs = zip(tasks, lab.groups(tasks), strict=True)
@@ -172,7 +172,7 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Measured | None:
     coarse, fine = (np.array([push.rates(run) for run in some]) for some in (runs[::2], runs[1::2]))
     if np.isnan(coarse).any() or np.isnan(fine).any():
         return None
-    best = fine + (fine - coarse) * LIMIT
+    best = fine + (fine - coarse) * EXTRAPOLATION
     value, lower = without_size(best)
     step = without_size(fine - coarse)[0] * DOUBT
     size = (value - without_size(best[-2:])[0]) / 3

@@ -21,11 +21,11 @@ from compare.kit.fits import straight_line, vanishing, zero_and_slope
 from compare.kit.lab import Lab, coarse_step, time_unit
 from compare.kit.record import Measurement, Missing, Records, if_found, measurement, state_of
 from compare.kit.settling import begin, settle_groups
-from compare.kit.short import DOUBT, LIMIT, REFINED, lag_error, polynomials, slip_unit
+from compare.kit.short import DOUBT, EXTRAPOLATION, REFINED, lag_error, polynomials, slip_unit
 from compare.kit.statistics import Measured
 from compare.kit.tasks import Task
 from compare.kit.trials import Start
-from compare.subjects.slipping.measure.growth import SMOOTH, Push, without_size
+from compare.subjects.slipping.measure.growth import FRICTIONLESS, Push, without_size
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -35,7 +35,7 @@ AROUND, AROUND_BENT = (0.7, 1.3), (0.8, 1.1)
 """The second two flows, divided by the zero that the first two show; and where the law of drag bends the line."""
 MEDIUM = (1.0, 0.5)
 """Sizes of slip of a ball that hangs on a smooth wall, and so goes round fast, in units as those of `Push.sizes`."""
-BEYOND, LARGEST = 2.1, 100.0
+BEYOND, FOLLOWED = 2.1, 100.0
 """Largest zero that is recorded, divided by the largest value at which slip stayed in its case; and that is followed,
 divided by the largest of the first flows."""
 HANGING = (1.05, 1.6, 1.3)
@@ -51,7 +51,7 @@ LEADS = 1.5
 """How much faster than the ball the fluid goes round where a contact slips."""
 ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 """The first orbits, omega_c sqrt(R/g)."""
-NEAR = (0.05, 0.08, 0.12, 0.17)
+LATER_ORBITS = (0.05, 0.08, 0.12, 0.17)
 """Relative distances of the later orbits below the one at which the first ones show the ball to leave."""
 STEPS, SKIPPED, FEWEST = 16, 4, 5
 """Steps of a run, those at its start in which contact forces build up, and the fewest that must be left."""
@@ -84,7 +84,7 @@ class Crossing:
         q = flows**self.power
         slope = np.diff(gammas)[0] / np.diff(q)[0]
         zero = float(q[0] - gammas[0] / slope) if slope else math.inf
-        if not 0 < zero < (LARGEST * max(flows)) ** self.power:  # or nan
+        if not 0 < zero < (FOLLOWED * max(flows)) ** self.power:  # or nan
             return ()
         least, first = flows[0] if self.power == 1 else 0.0, self.pushes[0]
         pushes = []
@@ -98,7 +98,7 @@ class Crossing:
 
 def bounds(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator[Measurement | Missing]:
     """Zero and slope of gamma along every line."""
-    yield from (Missing("bounds", name, SMOOTH) for name, p in sets.items() if not (p.mu and p.eta))
+    yield from (Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta))
     sets = {name: p for name, p in sets.items() if p.mu and p.eta}
     lines = [line for name, p in sets.items() for line in _rolling(name, p)]
     ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
@@ -173,7 +173,7 @@ def _points(
             coarse, large, small = (push.rates(run) for run in records)
             best, change = without_size(np.array([large, small])), (large - coarse)[0]
             noise = math.hypot(change * DOUBT, best[1] - best[0], lag_error(p, refine) * slip_unit(p))
-            points.append((p.omega_0, best[0] + change * LIMIT, noise))
+            points.append((p.omega_0, best[0] + change * EXTRAPOLATION, noise))
         tasks_of_row = [task for each in own for task in each]
         yield np.reshape(points, (-1, 3)).T, tasks_of_row, strays
 
@@ -251,7 +251,7 @@ def lift(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iterator
         if 2 <= len(pressed) < len(seen[-1]):
             (a, high), (b, low) = pressed[-2:]
             where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
-            near[-1] = [arrow.task(where * (1 - part), times) for part in NEAR for times in lab.halves if where]
+            near[-1] = [arrow.task(where * (1 - part), times) for part in LATER_ORBITS for times in lab.halves if where]
     rows = zip(arrows, first, seen, why_not, near, lab.groups(near), strict=True)
     for arrow, orbits, begun, why, tasks, got in rows:
         lifted = next((run for run in begun if _force(run) is None), None)
@@ -289,7 +289,7 @@ def _onset(runs: Sequence[Trajectory]) -> Measured | None:
         if coarse is None or fine is None:
             return None
         change = fine.value - coarse.value
-        forces.append(Measured(fine.value + change * LIMIT, math.hypot(fine.uncertainty, change * DOUBT)))
+        forces.append(Measured(fine.value + change * EXTRAPOLATION, math.hypot(fine.uncertainty, change * DOUBT)))
     square = vanishing(squares, forces) if forces else Measured(0.0, math.inf)
     if not square.value > 0 or math.isinf(square.uncertainty):
         return None

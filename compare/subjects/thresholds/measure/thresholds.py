@@ -46,7 +46,7 @@ from model.arrays import Array
 PROTOCOL = "thresholds"
 COARSE = 1e-2
 """Relative width of a bracket where only the neighbourhood is wanted."""
-BESIDE: Array = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
+DISTANCES: Array = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
 """Relative distances of settled states from a flow at which something vanishes."""
 TURNS: Array = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
 """The same below a fold, where slip goes like the root of the distance; in parts of the range of slipping."""
@@ -172,13 +172,13 @@ def _settled_beside(lab: Lab, sets: Mapping[str, Parameters], of: Mapping[Key, B
         if carried := of.get((name, "riding")):
             places[name, "riding"] = carried.high * (1 + RIDES), "on the wall"
             if not lab.beside:  # a ball that sinks swings for long
-                places[name, "sinking"] = carried.low * (1 - BESIDE / 2), "on the wall"
+                places[name, "sinking"] = carried.low * (1 - DISTANCES / 2), "on the wall"
         end, last = of.get((name, "rolling")), of.get((name, "slipping"))
         if end and lifts(end):
             places[name, "lifted"] = end.high * (1 + RIDES), "on the wall"
         elif end and last:
             span = last.low - end.high
-            places[name, "slipping"] = end.high + BESIDE * min(span, end.high), "rest"
+            places[name, "slipping"] = end.high + DISTANCES * min(span, end.high), "rest"
             places[name, "turning"] = last.low - TURNS * span, "rest"
     starts = [
         [begin(name, sets[name].replace(omega_0=flow), how) for flow in flows.tolist()]
