@@ -83,7 +83,7 @@ def _heard(
     if not found or not any(found.values()):
         reason = "formal: theory against theory" if claim.algebra else ""
         dear = (
-            f"{', '.join(sorted(claim.protocols))} cost more than the quick level spends on it: ask the default level"
+            f"{', '.join(sorted(claim.protocols))} cost more than this level spends on it (the default one may)"
         )
         dear = "only settled states are asked of an engine as it comes" if by.allowance else dear
         reason = reason or next((f"nothing measured: {each}" for each in missing), dear)

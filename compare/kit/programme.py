@@ -87,7 +87,7 @@ class Protocol:
         """The sets that it measures at a level with an engine, by name."""
         asked = {PLAIN.name: self.plain, NEWCOMER.name: self.defaults}.get(lab.engine.name, self.quick)
         known = sets(lab.level)
-        if lab.engine is PLAIN and lab.refine not in PLAIN.refine[: self.steps]:
+        if (lab.beside and self.engine) or (lab.engine is PLAIN and lab.refine not in PLAIN.refine[: self.steps]):
             return {}
         if lab.level > Level.QUICK:
             asked = tuple(known)
