@@ -82,9 +82,7 @@ def _heard(
     missing = [each for n, own in steps.items() for each in own.missing if last.get(each.protocol) == n]
     if not found or not any(found.values()):
         reason = "formal: theory against theory" if claim.algebra else ""
-        dear = (
-            f"{', '.join(sorted(claim.protocols))} cost more than this level spends on it (the default one may)"
-        )
+        dear = f"{', '.join(sorted(claim.protocols))} cost more than this level spends on it (the default one may)"
         dear = "only settled states are asked of an engine as it comes" if by.allowance else dear
         reason = reason or next((f"nothing measured: {each}" for each in missing), dear)
         return Witness(engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason)
