@@ -81,7 +81,9 @@ def validate(
     def judge_what_is_there() -> None:
         waiting = Counter(protocol.name for protocol, _ in jobs)
         for claim in chosen:
-            if claim.id not in judged and not waiting.keys() & claim.protocols:
+            # Next to a threshold a settled state has no limit: see `witnesses.MARGIN`.
+            needed = claim.protocols | ({"thresholds"} if "settled" in claim.protocols else set())
+            if claim.id not in judged and not waiting.keys() & needed:
                 heard = {name: dict(steps) for name, steps in testimony.items()}
                 judged[claim.id] = bench.submit(_announced, claim, heard, dict(broken), announce)
                 judged[claim.id].add_done_callback(lambda _: whole.judged())
