@@ -29,6 +29,12 @@ from compare.kit.statistics import COVERAGE, Measured
 from model.arrays import Array
 from model.kinematics import VARIABLES, state_units
 
+SAFETY = 0.1
+"""Least standard uncertainty of a limit from three steps, divided by what extrapolation takes away from the finest: one
+check is all they allow. Grid convergence studies have a factor of safety of 1.25, for two standard uncertainties."""
+SAME = 0.01
+"""Least tolerance in units of the ceiling: sampling, windows and fits are the same at every step, and no step shows
+what they do. (Both chosen after a first measurement on 24 sets.)"""
 CEILING, COARSEST = 300.0, 2e-2
 """A check in the limit may overlook so many times as much as one of the engine on trial, but no more than 2 %, unless
 that may, too. (Raised from 100 after a first measurement, when uncertainties were made three times as large.)"""
@@ -166,7 +172,9 @@ def _aligned(found: Mapping[int, Sequence[tuple[int, Check]]], last: Mapping[str
 def _marginal(m: Measurement, ends: Set[tuple[str, float]]) -> bool:
     """Whether a settled state is so near a threshold that the step may decide on its case."""
     flow = m.parameters.omega_0
-    return m.protocol == "settled" and any(abs(flow - end) < MARGIN * end for name, end in ends if name == m.set)
+    return m.protocol in ("settled", "hysteresis") and any(
+        abs(flow - end) < MARGIN * end for name, end in ends if name == m.set
+    )
 
 
 def _limit(there: Sequence[Step]) -> tuple[Check, float] | None:
@@ -186,9 +194,11 @@ def _limit(there: Sequence[Step]) -> tuple[Check, float] | None:
     p = m.parameters
     shortest = min(time_unit(p), 1 / abs(p.omega_0) if p.omega_0 else math.inf)
     value, order = extrapolated(coarse_step(p) / shortest / np.array([n for n, _ in there], float), errors, own)
-    doubt = math.hypot(value.uncertainty, (value.value - errors[-1]) * (m.quantity == WORST))
-    measured = replace(m, value=last.predicted + value.value * scale, uncertainty=doubt * scale)
     ceiling = max(wanted, min(CEILING * wanted, COARSEST))
+    share = 1.0 if m.quantity == WORST else SAFETY if len(there) == LEAST_STEPS else 0.0
+    taken = share * (value.value - errors[-1])
+    doubt = max(math.hypot(value.uncertainty, taken), SAME * ceiling / COVERAGE)
+    measured = replace(m, value=last.predicted + value.value * scale, uncertainty=doubt * scale)
     return replace(last, measurement=measured, tolerance=COVERAGE * measured.uncertainty, ceiling=ceiling), order
 
 

@@ -115,6 +115,17 @@ BESIDE: dict[str, Any] = {
 }
 
 
+LONGER: dict[str, Any] = {
+    # and at the levels above quick, on whose rarer sets motions die out more slowly
+    "thresholds.loose": 1e3,
+    "thresholds.rounds": (1.0, 2.0),
+    "unsteady.lasts": 48.0,
+}
+
+
 def effort(name: str, level: Level, beside: bool = False) -> Any:
     """The entry of `EFFORT` for a level, or of an engine beside the one on trial."""
-    return BESIDE[name] if beside and name in BESIDE else EFFORT[name][Level.QUICK if beside else level]
+    if not beside:
+        return EFFORT[name][level]
+    more = LONGER if level > Level.QUICK else {}
+    return (BESIDE | more).get(name, EFFORT[name][Level.QUICK])
