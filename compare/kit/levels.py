@@ -115,7 +115,7 @@ BESIDE: dict[str, Any] = {
 }
 
 
-LONGER: dict[str, Any] = {
+BESIDE_LONGER: dict[str, Any] = {
     # and at the levels above quick, on whose rarer sets motions die out more slowly
     "thresholds.loose": 1e3,
     "thresholds.rounds": (1.0, 2.0),
@@ -127,5 +127,5 @@ def effort(name: str, level: Level, beside: bool = False) -> Any:
     """The entry of `EFFORT` for a level, or of an engine beside the one on trial."""
     if not beside:
         return EFFORT[name][level]
-    more = LONGER if level > Level.QUICK else {}
+    more = BESIDE_LONGER if level > Level.QUICK else {}
     return (BESIDE | more).get(name, EFFORT[name][Level.QUICK])
