@@ -3,7 +3,9 @@
 An engine in the limit measures the same with several time steps. Of every check the deviation from theory, divided by
 its scale, is extrapolated to no step, by polynomials in h through the steps that begin with h or, too, where the order
 found is above 1.5, with h^2. The standard uncertainty is made up of what the last term changes and of the difference of
-both kinds of polynomials. A claim is then judged as always, with a ceiling on what a check may overlook.
+both kinds of polynomials; where there are only three steps it is at least a share of what extrapolation takes away. A
+claim is then judged as always, with a ceiling on what a check may overlook. Settled states next to a measured threshold
+have no limit, since there the step decides on the case.
 
 An engine as it comes measures with its own step alone, and a claim holds if no number is off by more than a share of
 its scale, `Engine.allowance`.

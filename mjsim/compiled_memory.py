@@ -22,7 +22,7 @@ from mjsim import memory
 from model.arrays import Array
 
 _KEPT, _INSIDE, _CALM, _WIDTH = memory.KEPT, memory.INSIDE, memory.CALM, memory.WIDTH
-_SAME = 1e-6
+_UNMOVED = 1e-6
 """Distance below which a contact is the one of the same number in the last step, m."""
 compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
 
@@ -124,7 +124,7 @@ def _recall(data: int, at: Array, before: Array, elliptic: bool, scattered: bool
     world, first, moved, heir, fewer = np.empty((3, 2)), 0, 0.0, np.zeros(count, np.bool_), False
     for m in range(len(before)):
         nearest, least, begin = -1, math.inf, first
-        if m < count and _apart(kept[m], before[m]) < _SAME**2:
+        if m < count and _apart(kept[m], before[m]) < _UNMOVED**2:
             nearest, least = m, 0.0
         for turn in range(0 if nearest == m else count):  # contacts of a pair are together, mostly where they were
             k = begin + turn

@@ -85,6 +85,14 @@ def test_a_claim_is_judged_in_the_limit_of_no_step(left, outcome):
     assert check.ceiling == max(resolves, min(CEILING * resolves, COARSEST))
 
 
+@pytest.mark.parametrize(("left", "outcome"), [(5e-7, Outcome.CONFIRMED), (5e-6, Outcome.REFUTED)])
+def test_three_steps_show_a_limit_to_a_share_of_what_extrapolation_takes_away(left, outcome):
+    """Of 3.3e-6, with a standard uncertainty of a tenth; with four steps the lesser one is noticed, too."""
+    steps = {n: seen(left + 1e-5 / n, "mujoco-plain") for n in (1, 2, 3, 4)}
+    three = {n: records for n, records in steps.items() if n < 4}
+    assert [hear(CLAIM, {"mujoco-plain": each}).outcome for each in (three, steps)] == [outcome, Outcome.REFUTED]
+
+
 @pytest.mark.parametrize(("near", "outcome"), [(0.99, Outcome.INCONCLUSIVE), (0.9, Outcome.REFUTED)])
 def test_no_limit_is_taken_next_to_a_threshold(near, outcome):
     """There the step decides on the case, and all of a state in the wrong case would be off."""

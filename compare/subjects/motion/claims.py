@@ -216,7 +216,7 @@ EQUATIONS = tuple(
         f"motion-{case.name}",
         _SOURCES.get(case, "(20)"),
         f"In case {case.name} the accelerations and contact forces are those of the equations of motion.",
-        *(_moving(case)),
+        *_moving(case),
         text=Text.CORRECTED if case in _CORRECTED else Text.PRINTED,
         reason=_CORRECTED.get(case, "" if case in _SOURCES else _OWN),
     )

@@ -254,12 +254,14 @@ def steepest(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
             elif value := growth(push, got):
                 grown.append(value)
         start, tasks = fan[0].start, [task for push in fan for task in push.tasks(lab)]
-        harmonics = np.fft.rfft([g.value for g in grown] if len(grown) == len(fan) else [0.0]) * 2 / len(fan)
-        # An angle near pi may come out on either side of it.
-        if len(harmonics) > 1 and abs(angle := float(-np.angle(harmonics[1]))) < 3:
-            scatter = np.sqrt(2.0 / len(fan)) * max(g.uncertainty for g in grown)
-            others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
-            beta = Measured(angle, float(np.hypot(scatter, others) / np.abs(harmonics[1])))
-            yield measurement(lab, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
-        else:
+        angle = math.nan
+        if len(grown) == len(fan):
+            harmonics = np.fft.rfft([g.value for g in grown]) * 2 / len(fan)
+            angle = float(-np.angle(harmonics[1]))
+        if not abs(angle) < 3:  # one near pi may come out on either side of it
             yield Missing("steepest", start.set, why)
+            continue
+        scatter = np.sqrt(2.0 / len(fan)) * max(g.uncertainty for g in grown)
+        others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
+        beta = Measured(angle, float(np.hypot(scatter, others) / np.abs(harmonics[1])))
+        yield measurement(lab, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
