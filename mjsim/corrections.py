@@ -235,13 +235,14 @@ def unbearable(hover: Quantity, most: Quantity) -> Quantity:
 def lands(gap: Quantity, speed: Quantity, last: Quantity, hover: Quantity, ball: Ball) -> Quantity:
     """Whether a gap, known `ahead` of its speed, closes by the end of a step with the acceleration of the last one.
 
-    A contact that would hover under half of the weight may open and close all the time: that is no landing, unless it
-    comes down faster than the forces of a few steps can make it.
+    A contact that would hover under half of the weight, or under what presses it now, may open and close all the time:
+    that is no landing, unless it comes down faster than the forces of a few steps can make it.
     """
     change = speed - last
     gap = gap - ball.step * ball.ahead * (speed + ball.ahead / 2 * change)  # at the beginning
     end, closing = gap + ball.step * (speed + change / 2), speed * speed - 2 * change * gap / ball.step
-    falls = (closing > ball.fall**2) & ((2 * hover < ball.weight) | (closing > (_FEW * ball.step * hover) ** 2))
+    presses = (2 * hover < ball.weight) & (ball.step * hover < -change)
+    falls = (closing > ball.fall**2) & (presses | (closing > (_FEW * ball.step * hover) ** 2))
     return (end < 0) & (speed + change < 0) & falls
 
 

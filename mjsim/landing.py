@@ -18,6 +18,8 @@ _ROUNDS = 60
 """Most rounds of the search for margins and forces that belong to a state, or to an impact."""
 _SAME = 1e-12
 """Change from one round to the next with which it ends, relative to the largest acceleration."""
+_SWINGS = 0.01
+"""Change over two rounds, divided by that in the last, with which it goes back and forth for ever, and ends, too."""
 _UNDAMPED = 1e-6
 """Factor that takes the damping from the contacts: the impulse of an impact is that of the margin alone."""
 _TOUCH = 1e-15
@@ -75,19 +77,9 @@ def restart(balls: Balls, runs: Runs, moment: Array, closed: Mask, fluid: Array)
 
 def _settle(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
     """Search for the margins, friction forces and accelerations that belong to the present state, at a fixed time."""
-    balls.last[:, runs] = balls.qvel[:, runs]
     if balls.settings.servo:
         balls.margins[:, runs] *= touches
-    for _ in range(_ROUNDS):
-        before = balls.acceleration[:, runs]
-        balls.forward(runs, fluid)
-        after = balls.acceleration[:, runs]
-        missing = after[GAPS] if balls.settings.servo else 0 * after[GAPS]
-        goes_on = _adjust(balls, runs, touches, missing, before)
-        balls.last[:, runs] = balls.qvel[:, runs] - balls.steps[runs] * after
-        runs, touches = runs[goes_on], touches[:, goes_on]
-        if len(runs) == 0:
-            return
+    _balance(balls, runs, touches, fluid)
 
 
 def _stop(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
@@ -96,33 +88,42 @@ def _stop(balls: Balls, runs: Runs, touches: Mask, fluid: Array) -> None:
     Without the damping of the contacts and the other forces on the ball, `mj_forward` gives the impulses at both
     contacts at a fixed time, while the margins are adjusted until neither contact approaches or rebounds.
     """
-    stopping, solref = runs, balls.solref[:, runs]
+    solref = balls.solref[:, runs]
     balls.damp(runs, np.abs(balls.speeds[:, runs]).max(axis=0) / balls.steps[runs])
     balls.solref[1::2, runs] *= _UNDAMPED
     balls.last[:, runs] = balls.qvel[:, runs]
     balls.margins[:, runs] = _TOUCH * touches
     balls.forward(runs, fluid)
-    others, h = np.zeros(balls.qvel.shape), balls.steps
+    others = np.zeros(balls.qvel.shape)
     others[:, runs] = balls.force[:, runs]
+    _balance(balls, runs, touches, fluid, others)
+    balls.qvel[:, runs] += balls.steps[runs] * balls.acceleration[:, runs]
+    balls.solref[:, runs] = solref
+
+
+def _balance(balls: Balls, runs: Runs, touches: Mask, fluid: Array, others: Array | None = None) -> None:
+    """Search for the margins with which the gaps of contacts that touch, (2, k), have no acceleration, or no speed.
+
+    No speed after an impact, without the `others` of the forces, (6, runs). A contact that slides so fast that it
+    hovers with more than it needs would close and open in turn for ever: it is left hovering.
+    """
+    balls.last[:, runs] = balls.qvel[:, runs]
+    states = np.full((2, 8, len(balls.ticks)), np.nan)
     for _ in range(_ROUNDS):
-        before = balls.acceleration[:, runs]
-        balls.forward(runs, fluid, others[:, runs])
-        missing = balls.speeds[:, runs] / h[runs] + balls.acceleration[GAPS][:, runs]
-        goes_on = _adjust(balls, runs, touches, missing, before)
+        balls.forward(runs, fluid, 0.0 if others is None else others[:, runs])
+        rates, kept, stiffness = balls.acceleration[:, runs], balls.margins[:, runs], balls.stiffness[runs]
+        if others is not None:
+            excess = rates[GAPS] + balls.speeds[:, runs] / balls.steps[runs]
+        else:
+            excess = rates[GAPS] if balls.settings.servo else 0 * rates[GAPS]
+            balls.last[:, runs] = balls.qvel[:, runs] - balls.steps[runs] * rates
+        margins = balls.margins[:, runs] = touches * np.maximum(kept - excess / stiffness, 0.0)
+        state = np.concatenate([rates, margins * stiffness])
+        before, latest = states[:, :, runs]
+        states[:, :, runs] = latest, state
+        changes, swings = np.abs(state - latest).max(axis=0), np.abs(state - before).max(axis=0)
+        hovers = (swings < _SWINGS * changes) & ((state - latest)[GAPS].sum(axis=0) > 0)
+        goes_on = ~(changes <= _SAME * np.abs(rates).max(axis=0)) & ~hovers
         runs, touches = runs[goes_on], touches[:, goes_on]
         if len(runs) == 0:
-            break
-    balls.qvel[:, stopping] += h[stopping] * balls.acceleration[:, stopping]
-    balls.solref[:, stopping] = solref
-
-
-def _adjust(balls: Balls, runs: Runs, touches: Mask, excess: Array, before: Array) -> Mask:
-    """Change the margins of contacts that touch by what their acceleration, (2, k), exceeds the wanted one.
-
-    Returns whether accelerations (6, k) or margins still differ from those `before`.
-    """
-    kept, after, stiffness = balls.margins[:, runs], balls.acceleration[:, runs], balls.stiffness[runs]
-    margins = balls.margins[:, runs] = touches * np.maximum(kept - excess / stiffness, 0.0)
-    changes = np.concatenate([after - before, (margins - kept) * stiffness])
-    differ: Mask = np.abs(changes).max(axis=0) > _SAME * np.abs(after).max(axis=0)
-    return differ
+            return

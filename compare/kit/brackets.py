@@ -63,6 +63,7 @@ class Search:
 
 Question = tuple[Search, float, Bracket]
 """What is asked, at which value, given the bracket so far."""
+Asked = tuple[list[Task], list[Trajectory | None], list[bool | None]]
 
 
 def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
@@ -70,7 +71,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
 
     A round asks inside every bracket, and once more, for longer, where the run doesn't show the answer; one that breaks
     down shows none. The new bracket is from the last yes before the first no to the first no beyond which runs show all
-    answers.
+    answers. An end that was taken for granted, and is still one, is asked in the end; if it was wrong it has no run.
 
     With `careful` the ends of the brackets are asked once more with half the time step: one that doesn't hold is as
     uncertain as the bracket before it was wide, see `Bracket.shift`.
@@ -78,7 +79,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     failures: dict[Search, str] = {}
     sections = lab.effort("brackets.sections")
 
-    def ask(questions: Sequence[Question], care: Care) -> tuple[list[Task], list[Trajectory | None], list[bool | None]]:
+    def ask(questions: Sequence[Question], care: Care = USUAL) -> Asked:
         tasks, runs = [search.task(value, bracket, care) for search, value, bracket in questions], []
         for (search, *_), run in zip(questions, lab.each(tasks), strict=True):
             if isinstance(run, str):
@@ -96,7 +97,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
     while todo := [k for k in todo if brackets[k].high - brackets[k].low > searches[k].width]:
         values = {k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist() for k in todo}
         asked = [(searches[k], value, brackets[k]) for k in todo for value in values[k][1:-1]]
-        tasks, runs, answers = ask(asked, USUAL)
+        tasks, runs, answers = ask(asked)
         unclear = [n for n, answer in enumerate(answers) if answer is None and runs[n] is not None]
         for n, task, run, answer in zip(unclear, *ask([asked[n] for n in unclear], LONGER), strict=True):
             tasks[n], runs[n], answers[n] = task, run, answer
@@ -112,6 +113,12 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             new = Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by, said=all_said)
             before[k], brackets[k] = brackets[k], new
         todo = [k for k in todo if brackets[k].high - brackets[k].low < 0.51 * (before[k].high - before[k].low)]
+    granted = [(k, end) for k, bracket in enumerate(brackets) for end in (0, 1) if bracket.runs[end] is None]
+    _, runs, answers = ask([(searches[k], (brackets[k].low, brackets[k].high)[end], brackets[k]) for k, end in granted])
+    for (k, end), shows, holds in zip(granted, runs, answers, strict=True):
+        if holds is (end == 0):
+            kept = brackets[k].runs
+            brackets[k] = replace(brackets[k], runs=(kept[0], shows) if end else (shows, kept[1]))
     if careful:
         asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in (b.low, b.high)]
         _, runs, answers = ask(asked, FINER)
