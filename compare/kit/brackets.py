@@ -71,7 +71,8 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
 
     A round asks inside every bracket, and once more, for longer, where the run doesn't show the answer; one that breaks
     down shows none. The new bracket is from the last yes before the first no to the first no beyond which runs show all
-    answers. An end that was taken for granted, and is still one, is asked in the end; if it was wrong it has no run.
+    answers. An end that was taken for granted, and is still one, is asked in the end; if it was wrong it has no run. An
+    engine beside the one on trial, which looks where that one found something, takes it for granted.
 
     With `careful` the ends of the brackets are asked once more with half the time step: one that doesn't hold is as
     uncertain as the bracket before it was wide, see `Bracket.shift`.
@@ -113,7 +114,7 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             new = Bracket(values[k][yes], values[k][no], (shown[yes], shown[no]), by, said=all_said)
             before[k], brackets[k] = brackets[k], new
         todo = [k for k in todo if brackets[k].high - brackets[k].low < 0.51 * (before[k].high - before[k].low)]
-    granted = [(k, end) for k, bracket in enumerate(brackets) for end in (0, 1) if bracket.runs[end] is None]
+    granted = [(k, end) for k, b in enumerate(brackets) for end in (0, 1) if not (b.runs[end] or lab.beside)]
     _, runs, answers = ask([(searches[k], (brackets[k].low, brackets[k].high)[end], brackets[k]) for k, end in granted])
     for (k, end), shows, holds in zip(granted, runs, answers, strict=True):
         if holds is (end == 0):

@@ -74,8 +74,8 @@ class Protocol:
     plain: tuple[str, ...] = ()
     """The sets that plain MuJoCo measures at the quick level, in the limit of no time step. At the others it measures
     twelve of these protocols, and `reference` of the rest."""
-    steps: int = 3
-    """With how many of its time steps plain MuJoCo measures, the coarsest first."""
+    steps: tuple[int, int] = (3, 3)
+    """With how many of its time steps plain MuJoCo measures, the coarsest first: at the quick level, and above."""
     follows: bool = False
     """Whether an engine beside the one on trial looks where that one found something."""
     defaults: tuple[str, ...] = ()
@@ -87,7 +87,8 @@ class Protocol:
         """The sets that it measures at a level with an engine, by name."""
         asked = {PLAIN.name: self.plain, NEWCOMER.name: self.defaults}.get(lab.engine.name, self.quick)
         known = sets(lab.level)
-        if (lab.beside and self.engine) or (lab.engine is PLAIN and lab.refine not in PLAIN.refine[: self.steps]):
+        steps = self.steps[lab.level > Level.QUICK]
+        if (lab.beside and self.engine) or (lab.engine is PLAIN and lab.refine not in PLAIN.refine[:steps]):
             return {}
         if lab.level > Level.QUICK:
             asked = tuple(known)

@@ -10,7 +10,7 @@ import analytic
 from compare.catalogue import CLAIMS
 from compare.claim import Outcome
 from compare.judge import judge, select
-from compare.kit.brackets import FINER, LONGER, Bracket, Search, narrow
+from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
 from compare.kit.fits import turning, vanishing
 from compare.kit.lab import coarse_step, time_unit
 from compare.kit.levels import Level
@@ -26,7 +26,7 @@ from model import Case, Parameters, State
 from tests.measured import measured
 
 REFERENCE = Parameters.named("reference")
-NUMBERS = SimpleNamespace(each=list, effort=lambda name: 7)
+NUMBERS = SimpleNamespace(each=list, effort=lambda name: 7, beside=False)
 """Stands for a lab whose tasks are their own runs."""
 
 
@@ -40,7 +40,9 @@ def test_bisection_closes_in_on_the_change():
     bracket = narrowed(lambda run: run[0] < math.pi / 10, 1e-6)
     assert bracket.low < math.pi / 10 < bracket.high <= bracket.low + 1e-6
     assert bracket.shift == 0
-    assert narrowed(lambda run: True, 0.5, careful=False).runs[1] is None  # an end that was never asked shows
+    # An end that was taken for granted is asked: it has a run if it was right.
+    assert narrowed(lambda run: run[0] < 0.95, 0.5, careful=False).runs[1] == (1.0, USUAL)
+    assert narrowed(lambda run: True, 0.5, careful=False).runs[1] is None
     moves = narrowed(lambda run: run[0] < (0.31 if run[1] is FINER else 0.3), 1e-4)  # with the time step
     assert moves.low < 0.3 < moves.high
     assert moves.place.uncertainty >= moves.shift > 0

@@ -300,7 +300,7 @@ _HOPS = "hops that last are those of the set hopping"
 PROTOCOLS = (
     Protocol("recurrent", hopping, alone=_HOPS, first=True, cost=5),
     Protocol("stepped", partial(hopping, protocol="stepped", refine=(40, 80)), engine=MOREAU, alone=_HOPS, first=True),
-    Protocol("choice", choice, alone="it is one of balls with mu > 1", plain=ONE, steps=4, first=True),
+    Protocol("choice", choice, alone="it is one of balls with mu > 1", plain=ONE, steps=(4, 4), first=True),
     Protocol("followed", followed, level=Level.DEFAULT, alone=_HOPS),
     Protocol("rebounding", rebounding, engine=MOREAU, level=Level.DEFAULT, alone=_HOPS),
     Protocol(

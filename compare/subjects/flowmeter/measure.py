@@ -308,7 +308,7 @@ def first_top(run: Trajectory) -> Measured:
 
 
 PROTOCOLS = (
-    Protocol("hysteresis", hysteresis, ("settled",), quick=ONE, plain=ONE, steps=4),
+    Protocol("hysteresis", hysteresis, ("settled",), quick=ONE, plain=ONE, steps=(4, 4)),
     Protocol(
         "unloading",
         unloading,

@@ -93,4 +93,4 @@ def _record(lab: Lab, each: Settled, quantity: str, value: Measured | float) -> 
     return measurement(lab, PROTOCOL, start.set, start.p, quantity, value, [each.task], **at)
 
 
-PROTOCOLS = (Protocol("settled", measure, plain=FOUR, steps=4, defaults=ONE, cost=11),)
+PROTOCOLS = (Protocol("settled", measure, plain=FOUR, steps=(4, 4), defaults=ONE, cost=11),)

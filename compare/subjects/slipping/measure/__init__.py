@@ -8,6 +8,6 @@ from compare.subjects.slipping.measure import growth, onset
 PROTOCOLS = (
     Protocol("growth", growth.measure, plain=FOUR, waits=False),
     Protocol("steepest", growth.steepest, plain=FOUR, waits=False),
-    Protocol("lift", onset.lift, plain=TWO, steps=4, waits=False),
+    Protocol("lift", onset.lift, plain=TWO, steps=(4, 4), waits=False),
     Protocol("bounds", onset.bounds, ("thresholds",), plain=ONE, cost=2),
 )
