@@ -86,11 +86,12 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
             if isinstance(run, str):
                 failures[search] = run
             runs.append(None if isinstance(run, str) else run)
-        return (
-            tasks,
-            runs,
-            [None if run is None else search.answer(run) for (search, *_), run in zip(questions, runs, strict=True)],
-        )
+        answers = [None if run is None else q[0].answer(run) for q, run in zip(questions, runs, strict=True)]
+        unclear = [n for n, (run, answer) in enumerate(zip(runs, answers, strict=True)) if run and answer is None]
+        if care is USUAL and unclear:
+            for n, task, longer, answer in zip(unclear, *ask([questions[n] for n in unclear], LONGER), strict=True):
+                tasks[n], runs[n], answers[n] = task, longer, answer
+        return tasks, runs, answers
 
     brackets = [search.begin for search in searches]
     before = list(brackets)
@@ -99,9 +100,6 @@ def narrow(lab: Lab, searches: Sequence[Search], careful: bool = True) -> list[B
         values = {k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist() for k in todo}
         asked = [(searches[k], value, brackets[k]) for k in todo for value in values[k][1:-1]]
         tasks, runs, answers = ask(asked)
-        unclear = [n for n, answer in enumerate(answers) if answer is None and runs[n] is not None]
-        for n, task, run, answer in zip(unclear, *ask([asked[n] for n in unclear], LONGER), strict=True):
-            tasks[n], runs[n], answers[n] = task, run, answer
         for n, k in enumerate(todo):
             inside = slice(n * sections, (n + 1) * sections)
             ends = brackets[k].runs

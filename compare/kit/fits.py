@@ -105,9 +105,10 @@ def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Meas
     """An estimate (values, n) from the first n values, with n all of them; uncertain by its convergence and noise.
 
     It is made without the last two points, without the last, and with all. Its changes are continued as a geometric
-    series with the larger ratio of any two, from the last change but one, since the last may be small by chance. The
-    error is the term after the last, or the sum of all further terms where the last two changes have the same sign:
-    with the largest ratio where their ratio has grown, as it does where the quantity is no smooth function.
+    series with the larger ratio of any two, at most 1, from the last change but one, since the last may be small by
+    chance, or from the last if it is larger. The error is the term after the last, or the sum of all further terms
+    where the last two changes have the same sign: with the largest ratio where their ratio has grown, as it does where
+    the quantity is no smooth function.
     """
     values, noise = (np.array([getattr(m, name) for m in points]) for name in ("value", "uncertainty"))
     count = len(values)
@@ -115,7 +116,7 @@ def _extrapolated(estimate: Callable[[Array, int], float], points: Sequence[Meas
     changes = np.abs(np.diff(row))
     ratios = np.divide(changes[1:], changes[:-1], out=np.ones(2), where=changes[:-1] > 0)
     ratio = float(np.clip(ratios.max(), LEAST_RATIO, 1.0))
-    rest = float(changes[-2]) * ratio**2
+    rest = max(float(changes[-2]) * ratio**2, float(changes[-1]) * ratio)
     if (row[-1] - row[-2]) * (row[-2] - row[-3]) > 0:
         rest /= 1 - (LARGEST_RATIO if ratios[1] > ratios[0] > 0 else min(ratio, LARGEST_RATIO))
     carried = [estimate(values + shift, count) - row[-1] for shift in np.diag(noise)]

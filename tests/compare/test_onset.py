@@ -139,6 +139,10 @@ def test_edge_tells_by_the_way_a_run_still_goes():
     for begins, rate, falls in ((25, -0.1, True), (25, 0.1, False), (10, 0, True), (30, 0, False)):
         omega_c = begins + rate * time
         assert ends_slipping(SimpleNamespace(time=time, omega_c=omega_c), edge) is falls
+    # Next to the border: what grows decides, and what dies out doesn't.
+    for rate, falls in ((0.05, False), (-0.05, None)):
+        omega_c = 20.0 + 1e-2 * np.exp(rate * time)
+        assert ends_slipping(SimpleNamespace(time=time, omega_c=omega_c), edge) is falls
 
 
 def _settled(name, p, flows):

@@ -37,6 +37,8 @@ DRAG = 1.25
 FIGURES = ("fig-7", "fig-8")
 """mu as it is, and mu = eta."""
 
+LONG, NEAR = 0.1, 0.01
+"""Distances divided by that of the attractors: a long way, in two fifths of a run, and where a ball has arrived."""
 CLOSING = (0.1, 0.17, 0.26, 0.38)
 """Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
 
@@ -200,21 +202,30 @@ def _search(lab: Lab, edge: Edge) -> Search:
     """
     t_end, step = lasting(edge.p, lab.effort("edge.time")), coarse_step(edge.p)
     reach = 5e-3 * 4.0**edge.missed
-    around, width = (Bracket(-reach, reach), 2.5e-6) if edge.bracket else (Bracket(0.0, 1.0), 3e-4)
+    around, width = (Bracket(-reach, reach), 2.5e-6) if edge.bracket else (Bracket(0.0, 1.0), 1e-5)
 
     def task(s: float, bracket: Bracket, care: Care) -> Task:
-        return lab.task(edge.p, edge.centre + s * edge.line, t_end, step, samples=round(t_end / (8 * step)))
+        lasts = t_end * care.time
+        return lab.task(edge.p, edge.centre + s * edge.line, lasts, step, samples=round(lasts / (8 * step)))
 
     return Search(around, task, partial(ends_slipping, edge=edge), width)
 
 
-def ends_slipping(run: Trajectory, edge: Edge) -> bool:
-    """Whether a ball ends up slipping, by the direction in which it still moves, or the state it settled to."""
+def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
+    """Whether a ball ends up slipping: by the way it goes, or where it would come to rest.
+
+    None while it moves by little, ever more slowly, and to neither attractor: then it isn't the border's instability
+    that moves it.
+    """
     slipping, lifted = (float(State.of(x).omega_c) for x in (edge.slipping, edge.lifted))
-    first, second = (float(half.mean()) for half in np.array_split(run.omega_c[tail(run, 0.2)], 2))
-    if abs(second - first) > 1e-5 * (lifted - slipping):
-        return second < first
-    return second - slipping < (lifted - slipping) / 2
+    parts = np.array_split(run.omega_c[tail(run, 0.4)], 4)
+    first, second, third, last = (float(taper(len(part)) @ part / taper(len(part)).sum()) for part in parts)
+    before, now, way = second - first, last - third, abs(lifted - slipping)
+    if abs(last - first) > LONG * way or (before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)):
+        return (last - first) * (slipping - lifted) > 0
+    end = last + now * abs(now) / max(abs(before) - abs(now), abs(now), 1e-300)  # by a geometric series
+    rests = [abs(end - each) < NEAR * way for each in (slipping, lifted)]
+    return rests[0] if any(rests) else None
 
 
 def _onward(edge: Edge) -> Edge:
@@ -224,7 +235,8 @@ def _onward(edge: Edge) -> Edge:
     """
     if edge.bracket is None:
         return edge
-    low, high = (run.x for run in edge.bracket.runs if run is not None)
+    both = [run.x for run in edge.bracket.runs if run is not None]
+    low, high = (x[: min(map(len, both))] for x in both)
     along = np.abs((high - low) @ edge.line / float(edge.line @ edge.line))
     together = int(np.argmax(along > 2e-3)) or len(along)
     length = max(together - together // 4, 1)
