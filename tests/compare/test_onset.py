@@ -110,6 +110,14 @@ def test_extrapolated_maximum_is_as_sure_as_it_says():
     assert abs(pull.value - 0.9 + math.sin(1)) < 3 * pull.uncertainty < 3e-3
 
 
+def test_an_extrapolation_whose_last_change_is_the_largest_is_as_uncertain_as_that():
+    """Slips and flows of a set whose branch is steep next to the fold, at 123.226 rad/s."""
+    where = np.array([122.23004, 121.19617, 119.64536, 118.09455, 114.99294, 111.89133, 107.75585])
+    slips = [-198.87326, -183.12067, -166.63932, -154.07601, -134.79674, -119.85194, -103.77153]
+    top = turning(where, [Measured(slip, 1e-7) for slip in slips])
+    assert abs(top.value - 123.226) < 3 * top.uncertainty
+
+
 @pytest.mark.parametrize("bend", [0.0, 1e-15, -1e-15, 1e-4])
 def test_a_line_has_no_maximum(bend):
     """Nor has one that is bent by round-off, or so little that a maximum would be far away."""

@@ -50,6 +50,13 @@ def test_where_terms_of_two_orders_cancel_no_order_is_found_and_the_limit_is_cov
     assert abs(limit.value) <= COVERAGE * limit.uncertainty
 
 
+def test_a_deviation_that_falls_as_the_root_of_the_step_is_covered():
+    """As where heavy-core loses the floor: 23.56, 23.45, 23.42 and 23.40 rad/s, in theory 23.30."""
+    for errors in (0.01 * np.sqrt(RATIOS), np.array([1.102e-2, 6.33e-3, 5.39e-3, 4.8e-3])):
+        limit, _ = extrapolated(STEPS, errors, np.full(4, 1.4e-4))
+        assert abs(limit.value) <= COVERAGE * limit.uncertainty
+
+
 def test_where_there_is_only_noise_the_last_is_the_limit_and_there_is_no_order():
     limit, order = extrapolated(STEPS, np.array([1e-3, -2e-3, 5e-4, -5e-4]), np.full(4, 1e-3))
     assert (limit.value, math.isnan(order)) == (-5e-4, True)
