@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import minimize_scalar
 
 from analytic.mechanics import dynamics
 from analytic.stationary import slipping_branch
@@ -55,12 +56,15 @@ def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
 
 
 def peak(p: Parameters, case: Case) -> tuple[float, float]:
-    """Time in s and height of the top of the `step_response`, relative to its end value; inf, 1 without overshoot."""
+    """Time in s and height of the top of the `step_response`, relative to its end; inf, 1 without overshoot."""
     slowest = 1 / np.abs(np.linalg.eigvals(_linear(p, case)[0]).real).min()
     t = np.linspace(0.0, 8 * slowest, _GRID)
-    y = step_response(p, case, t) / np.real(transfer(p, case, 0.0))
-    k = int(y.argmax())
-    return (float(t[k]), float(y[k])) if y[k] > 1 else (np.inf, 1.0)
+    y = step_response(p, case, t) / (end := np.real(transfer(p, case, 0.0)))
+    if (k := int(y.argmax())) == 0 or y[k] <= 1:
+        return np.inf, 1.0
+    beside = t[k - 1], t[min(k + 1, len(t) - 1)]
+    top = minimize_scalar(lambda at: -float(step_response(p, case, at) / end), bounds=beside, options={"xatol": 1e-9})
+    return float(top.x), -float(top.fun)
 
 
 def ramp_coefficient(p: Parameters) -> float:

@@ -127,6 +127,16 @@ def test_rolling_is_a_first_order_lag_at_any_amplitude(frequency: float) -> None
     assert response.peak(P, Case.RR) == (np.inf, 1.0)
 
 
+def test_a_peak_lies_between_the_points_of_a_grid():
+    """Where drag is weak the response lasts a thousand times as long as its first peak."""
+    p = P.replace(c=0.01, omega_0=20.0)
+    at, height = response.peak(p, Case.SS)
+    t = at * (1 + np.array([-1e-3, 0.0, 1e-3]))
+    y = response.step_response(p, Case.SS, t) / np.real(response.transfer(p, Case.SS, 0.0))
+    assert y.argmax() == 1
+    assert y[1] == pytest.approx(height, rel=1e-12)
+
+
 @pytest.mark.parametrize("frequency", [0.3, 1.1, 3.0])
 def test_slipping_follows_by_its_jacobian(frequency: float) -> None:
     """What the linear theory leaves out goes with the square of the amplitude, and so does the shift of the mean."""
