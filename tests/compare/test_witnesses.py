@@ -11,9 +11,9 @@ import pytest
 import tests.measured
 from compare.claim import Bearing, Claim, Outcome
 from compare.kit.quantities import quantity
-from compare.kit.record import Missing, Records
+from compare.kit.record import Check, Missing, Records
 from compare.kit.statistics import COVERAGE
-from compare.witnesses import CEILING, COARSEST, extrapolated, hear
+from compare.witnesses import CEILING, COARSEST, _limit, extrapolated, hear
 from model import Parameters
 
 P = Parameters.named("reference")
@@ -98,6 +98,15 @@ def test_three_steps_show_a_limit_to_a_share_of_what_extrapolation_takes_away(le
     steps = {n: seen(left + 1e-5 / n, "mujoco-plain") for n in (1, 2, 3, 4)}
     three = {n: records for n, records in steps.items() if n < 4}
     assert [hear(CLAIM, {"mujoco-plain": each}).outcome for each in (three, steps)] == [outcome, Outcome.REFUTED]
+
+
+@pytest.mark.parametrize("errors", [(7.0e-4, 1.2e-3, 1.2e-3), (0.03, 0.02, 0.015)])
+def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors):
+    """Two that are the same don't show a limit that well; and one that is far off shows none."""
+    places = (tests.measured.measured("thresholds", "omega_01", 10 * (1 + error), 1.4e-3) for error in errors)
+    limit = _limit([(n, Check(place, 10.0, 0.0, 10.0)) for n, place in zip((2, 3, 4), places, strict=True)])
+    assert (limit is None) == (errors[-1] > 0.01)
+    assert limit is None or limit[0].agrees
 
 
 @pytest.mark.parametrize(("near", "outcome"), [(0.99, Outcome.INCONCLUSIVE), (0.9, Outcome.REFUTED)])
