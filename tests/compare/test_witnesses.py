@@ -103,8 +103,9 @@ def test_three_steps_show_a_limit_to_a_share_of_what_extrapolation_takes_away(le
 @pytest.mark.parametrize("errors", [(7.0e-4, 1.2e-3, 1.2e-3), (0.03, 0.02, 0.015)])
 def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors):
     """Two that are the same don't show a limit that well; and one that is far off shows none."""
-    places = (tests.measured.measured("thresholds", "omega_01", 10 * (1 + error), 1.4e-3) for error in errors)
-    limit = _limit([(n, Check(place, 10.0, 0.0, 10.0)) for n, place in zip((2, 3, 4), places, strict=True)])
+    places = [tests.measured.measured("thresholds", "omega_01", 10 * (1 + error), 1.4e-3) for error in errors]
+    checks = [Check(measurement=place, predicted=10.0, tolerance=0.0, scale=10.0) for place in places]
+    limit = _limit(list(zip((2, 3, 4), checks, strict=True)))
     assert (limit is None) == (errors[-1] > 0.01)
     assert limit is None or limit[0].agrees
 

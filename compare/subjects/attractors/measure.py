@@ -39,7 +39,7 @@ TOP = State(y=6.4e-3, omega_c=57.3, slip_x=-106.0)
 HOLD, LAST, LATER = 12.0, 3.0, 2.0
 """How long each flow is held, the last part of it that is measured, and the first part, in which disturbances are not
 yet linear, s."""
-REFINED, FINER = (8, 16), (16, 32)
+REFINED, MARGINAL = (8, 16), (16, 32)
 """Time steps in one of `coarse_step`: of hops that attract, and of those that hardly do."""
 SAMPLE = 1e-3
 """Sample interval, s: a parabola through three samples then gives a top to 1e-6 of the height."""
@@ -173,7 +173,7 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
         ahead = steady[-1]
         if k > 1:
             ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (steady[-1] - steady[-2])
-        pair = [task(q, x, lasts, refined) for x, refined in zip(ahead, FINER, strict=True)]
+        pair = [task(q, x, lasts, refined) for x, refined in zip(ahead, MARGINAL, strict=True)]
         (runs,) = lab.groups([pair])
         parts = [] if isinstance(runs, str) else [tops(run, LATER, lasts) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
@@ -188,7 +188,7 @@ def followed(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Iter
     place = death(etas[-4:], factors[-4:])  # disturbances begin to grow at one of the last four walls
     used = [task for pair in tasks[-4:] for task in pair]
     yield measurement(lab, "followed", SET, walls[-4], "orbit_death", place, used, **near[-4])
-    again = [task(walls[k], np.array(tasks[k][1].x0), 60.0, FINER[0]) for k in (-4, -1)]
+    again = [task(walls[k], np.array(tasks[k][1].x0), 60.0, MARGINAL[0]) for k in (-4, -1)]
     yield from _left_alone(lab, "followed", SET, again)
 
 

@@ -37,7 +37,7 @@ DRAG = 1.25
 FIGURES = ("fig-7", "fig-8")
 """mu as it is, and mu = eta."""
 
-LONG, NEAR = 0.1, 0.01
+FAR_AWAY, ARRIVED = 0.1, 0.01
 """Distances divided by that of the attractors: a long way, in two fifths of a run, and where a ball has arrived."""
 CLOSING = (0.1, 0.17, 0.26, 0.38)
 """Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it begins."""
@@ -221,10 +221,10 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
     parts = np.array_split(run.omega_c[tail(run, 0.4)], 4)
     first, second, third, last = (float(taper(len(part)) @ part / taper(len(part)).sum()) for part in parts)
     before, now, way = second - first, last - third, abs(lifted - slipping)
-    if abs(last - first) > LONG * way or (before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)):
+    if abs(last - first) > FAR_AWAY * way or (before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)):
         return (last - first) * (slipping - lifted) > 0
     end = last + now * abs(now) / max(abs(before) - abs(now), abs(now), 1e-300)  # by a geometric series
-    rests = [abs(end - each) < NEAR * way for each in (slipping, lifted)]
+    rests = [abs(end - each) < ARRIVED * way for each in (slipping, lifted)]
     return rests[0] if any(rests) else None
 
 
