@@ -32,7 +32,7 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
     "settled.starts": (dict.fromkeys(_STARTS, _FEW), dict.fromkeys(_STARTS, _FLOWS), dict.fromkeys(_STARTS, _FLOWS)),
     "settled.sharp": (1.0, 0.1, 0.1),
     "settled.loose": (1.0, 1.0, 1.0),
-    # flows inside a bracket in each round, by which it shrinks to an eighth
+    # flows inside a bracket in each round, by which it shrinks to a half or an eighth
     "brackets.sections": (1, 7, 7),
     # thresholds: relative widths of the last brackets, of those about a fold, and the factor on the settling tolerance
     "thresholds.width": (5e-5, 1e-6, 5e-7),
