@@ -69,7 +69,7 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     for each in records.missing:
         if each.protocol in claim.protocols:
             left_out[replace(each, rows=0)] += each.rows
-    missing = tuple(replace(each, rows=rows) for each, rows in left_out.items())
+    missing = tuple(replace(each, rows=rows) for each, rows in left_out.most_common())
     try:
         checks = tuple(claim.algebra()) if claim.algebra else tuple(check for _, check in checks_of(claim, records))
     except Exception as error:  # a theory that breaks down, in whatever way, loses its claim and no other

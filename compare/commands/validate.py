@@ -98,18 +98,19 @@ def line(verdict: Verdict) -> Text:
     """A claim in one line: verdict, largest deviation, what error of theory would be noticed, or what went wrong."""
     kind, mark = wording.MARKS[Outcome.CONFIRMED if verdict.passed else verdict.outcome]
     shown = Text.assemble((f"{mark} {verdict.outcome:<13}", _STYLES[kind]), f"{verdict.claim.id:<18}")
+    parts = []
     if verdict.checks:
         found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
         count = len(verdict.checks)
-        shown.append("; ".join([f"{count:>5} number{'s' if count > 1 else ''}", *found]))
+        parts.append(Text("; ".join([f"{count:>5} number{'s' if count > 1 else ''}", *found])))
+    elif verdict.error:
+        parts.append(Text(verdict.error, "red"))
+    elif verdict.missing:
+        parts.append(Text(str(verdict.missing[0]), "dim"))
     for each in (witness for witness in verdict.witnesses[1:] if witness.outcome is not Outcome.NOT_ASKED):
         kind, mark = wording.MARKS[each.outcome]
-        shown.append(f"; {each.engine} ").append(f"{mark} {each.outcome}", _STYLES[kind])
-    if verdict.error:
-        shown.append(f"  {verdict.error}", "red")
-    if verdict.outcome is Outcome.NOT_RUN and verdict.missing:
-        shown.append(f"  {verdict.missing[0]}", "dim")
-    return shown
+        parts.append(Text.assemble(f"{each.engine} ", (f"{mark} {each.outcome}", _STYLES[kind])))
+    return shown.append(Text("; ").join(parts))
 
 
 def summary(verdicts: Sequence[Verdict]) -> Text:

@@ -81,6 +81,7 @@ EFFORT: dict[str, tuple[Any, Any, Any]] = {
     "growth.more": (1, 2, 6),  # multiples of the numbers of directions in growth.PUSHES
     "steepest.states": (1, 3, 12),  # random states of every set out of which slip is pushed all round
     "rates.refined": ((8, 16), (16, 32), (32, 64)),  # the two time steps, in parts of the coarse step
+    "rates.leaning": ((8, 16),) * 3,  # in SR: with shorter steps an almost unloaded floor lets go under larger loads
     "rates.more": (1, 2, 5),  # multiples of the numbers of states in rates.STATES
     "laws.refined": ((4, 8), (8, 16), (16, 32)),  # the two time steps, in parts of the coarse step
     "motions.pieces": (6, 20, 32),  # pieces of a motion
@@ -108,6 +109,7 @@ BESIDE: dict[str, Any] = {
     "pulsation.samples": 512,
     "pulsation.width": 2e-3,
     "rates.refined": (16, 16),
+    "rates.leaning": (16, 16),
     "rates.more": 0.5,
     "laws.refined": (4, 4),
     "field.starts": 2,

@@ -235,14 +235,15 @@ def presses(run: Trajectory) -> bool:
     return bool(np.all(run.force_A[tail(run), 1] > 0))
 
 
-def settles(run: Trajectory) -> bool | None:
+def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
     """Whether a ball that slips on the floor comes to rest there, however slowly; None where the run is too short.
 
-    Its speed must change less in the last tenth than in the tenth before the middle. On the way past a fold that it has
-    missed the change falls at most like 1/time^2, from one to the other to 0.22; after that it rises.
+    In the last tenth its speed must change by less than a share `slowed` of what it does in the tenth before the
+    middle. On the way past a fold that it has missed the change falls at most like 1/time^2, from one to the other to
+    0.22; after that it rises.
     """
     if settled_case(run).A is Contact.N or settled_case(run) is Case.SR or not presses(run):
         return False
     middle, last = (abs(float(run.omega_c[k] - run.omega_c[k - 10])) for k in (-51, -1))
     slowing = last / middle if last > 1e-11 * abs(float(run.omega_c[-1])) and middle > 0 else 0.0  # round-off: at rest
-    return False if slowing > 1 else True if slowing < 0.2 else None
+    return False if slowing > 1 else True if slowing < slowed else None

@@ -87,18 +87,22 @@ class Pushed:
         size = PUSH.get(self.case, USUAL_PUSH if self.start.p.drag == STOKES else SLIGHT_PUSH)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
 
+    def steps(self, lab: Lab) -> tuple[float, float]:
+        """The longer and the shorter time step, s."""
+        coarse, fine = lab.effort("rates.leaning" if self.case is Case.SR else "rates.refined")
+        return coarse_step(self.start.p) / coarse, coarse_step(self.start.p) / fine
+
     def tasks(self, lab: Lab) -> list[Task]:
         """Runs for each of the `sizes`: every active variable is pushed, up and down."""
-        p, step = self.start.p, coarse_step(self.start.p)
-        coarse, fine = lab.effort("rates.refined")
+        p, step, (coarse, fine) = self.start.p, coarse_step(self.start.p), self.steps(lab)
         lasts, samples = self.record
         tasks = []
-        for size, refined in zip(self.sizes, (coarse, fine, fine), strict=False):
+        for size, h in zip(self.sizes, (coarse, fine, fine), strict=False):
             for k, unit in zip(self.active, size * self.units, strict=True):
                 for push in (unit, -unit):
                     x = self.start.x0.copy()
                     x[k] += push
-                    tasks.append(lab.task(p, x, lasts * step, step / refined, samples=samples))
+                    tasks.append(lab.task(p, x, lasts * step, h, samples=samples))
         return tasks
 
     def missing(self, why: str, modes: int = 0) -> Missing:
@@ -114,7 +118,7 @@ def measure(lab: Lab, sets: Mapping[str, Parameters], records: Records) -> Itera
     states = [each for each in found if isinstance(each, Pushed)]
     tasks = [state.tasks(lab) for state in states]
     for state, own, runs in zip(states, tasks, lab.groups(tasks), strict=True):
-        step = coarse_step(state.start.p) / lab.effort("rates.refined")[1]
+        _, step = state.steps(lab)
         if isinstance(runs, str):
             yield state.missing(f"a run {runs}")
             continue
@@ -197,8 +201,14 @@ def answer(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
 
 
 def stays(run: Trajectory, case: Case) -> int:
-    """Samples after the first for which a run is in a case, and the first."""
-    return int(np.argmax(np.append(run.case[1:] != case, True))) + 1
+    """Samples after the first for which a run is in a case, and the first.
+
+    A ball on an almost unloaded floor may bounce by less than a contact's gap; it is in SR until the floor lets go.
+    """
+    left = run.case[1:] != case
+    if case is Case.SR:
+        left |= run.force_A[1:, 1] <= 0
+    return int(np.argmax(np.append(left, True))) + 1
 
 
 def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> tuple[Exponents, Array]:
