@@ -140,6 +140,14 @@ def test_what_runs_away_beyond_the_fold_does_not_settle(lab):
     assert settles(_ran(lab, REFERENCE, 1.02 * omega_04, x, 20.0)) is False
 
 
+def test_a_short_run_says_only_what_a_long_one_would(lab):
+    omega_04 = analytic.thresholds(REFERENCE).omega_04
+    x = analytic.solution(REFERENCE.replace(omega_0=0.9 * omega_04), Case.SS).x
+    for share, short, long in ((0.95, True, True), (1.003, None, False), (1.1, False, False)):
+        said = [thresholds.may_settle(_ran(lab, REFERENCE, share * omega_04, x, units)) for units in (10.0, 40.0)]
+        assert said == [short, long]
+
+
 def test_edge_tells_by_the_way_a_run_still_goes():
     slipping, lifted = np.eye(8)[2] * 10.0, np.eye(8)[2] * 30.0
     edge = Edge("reference", REFERENCE, slipping, lifted, slipping, lifted - slipping)

@@ -1,5 +1,8 @@
 """Whole spectra from pushes: exact on linear motions, honest on bent ones, and judged."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm
@@ -80,6 +83,13 @@ def test_a_run_counts_up_to_where_the_ball_leaves_the_case(lab: Lab) -> None:
     assert len(set(run.cases)) > 1
     assert all(case is first for case in run.cases[1 : rates.stays(run, first)])
     assert run.cases[rates.stays(run, first)] is not first
+
+
+def test_a_ball_that_bounces_on_an_unloaded_floor_has_left_it() -> None:
+    floor = np.zeros((6, 3))
+    floor[:, 1] = 1.0, 1.0, 0.5, 0.0, 0.8, 0.0
+    run: Any = SimpleNamespace(case=np.full(6, int(Case.SR)), force_A=floor)
+    assert rates.stays(run, Case.SR) == 3
 
 
 def test_the_rate_of_rolling_and_of_spinning_is_measured_with_mujoco(lab: Lab) -> None:
