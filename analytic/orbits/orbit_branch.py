@@ -32,7 +32,7 @@ from model import InputError, Parameters, State
 from model.arrays import Array
 from model.parameters import check_names, check_number
 
-FIRST_STEP, LEAST_STEP, LONGEST_STEP = 0.05, 1e-5, 0.5
+FIRST_STEP, LEAST_STEP, LONGEST_STEP = 0.2, 1e-5, 0.5
 """Steps along the branch, in natural units: the first, those at which it is given up, and the longest."""
 GRAZING = 0.01
 """Longest step in which the number of landings may change: other branches, as of balls that ride the wall, are near."""

@@ -71,7 +71,7 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
         axes.fill_between(branch.values, low, high, color=COLOUR, alpha=0.25, lw=0)
         for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
             axes.plot(branch.values, np.where(part, mean, np.nan), color=COLOUR, ls=line, lw=2)
-        style.name(axes, float(branch.values[-3]), float(mean[-3]), "hopping", hops, COLOUR)
+        style.name(axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, COLOUR)
         for special in branch.places:
             if special.kind is orbit_branch.Bifurcation.BIRTH:
                 born = State(*special.orbit.mean)

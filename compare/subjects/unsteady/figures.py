@@ -118,11 +118,11 @@ def draw_unsteady(of: Measurements) -> tuple[Figure, str]:
     ends, fold = of.of("ramp_end"), bifurcation.thresholds(REFERENCE).omega_04
     p = ends[0].parameters if ends else REFERENCE.replace(omega_0=34.9)
     slipping(ramp, REFERENCE, lambda slip_x, omega_c: omega_c, unstable=(0.2, (-4, 6)))
-    rates, passed = np.array([0.05, 0.3, 1.0]), []
+    rates, passed, start = np.array([0.05, 0.3, 1.0]), [], analytic.solution(p, Case.SS).x
     for rate, shade in zip(rates.tolist(), (1.0, 0.65, 0.4), strict=True):
         lasts = 15.0 / rate
         flow = Flow.ramp(p.omega_0, p.omega_0 + 15.0, lasts)
-        run = analytic.simulate(p, analytic.solution(p, Case.SS).x, lasts, flow, sample_interval=lasts / 5000)
+        run = analytic.simulate(p, start, lasts, flow, sample_interval=lasts / 5000, rtol=1e-6)
         passed.append(caught_up(run) - fold)
         ramp.plot(flow(run.time), run.omega_c, "k", alpha=shade, lw=1.5, label=f"rising by {rate:g} rad/s²")
     beyond = np.array([fold - 6, fold + 7])
