@@ -1,0 +1,1086 @@
+"""The law as loops over contacts, compiled with numba, which the extra `fast` installs; `formulas` says the same in NumPy.
+
+A step of a small scene takes 10 µs, and handing over its arrays would cost as much. So the loops read and write `mjData`
+where the engine keeps it: `mujoco.introspect` tells the offsets, and the engine's functions are called by their
+addresses. What a simulation remembers lies in blocks of memory, whose addresses and sizes are its `head`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import functools
+import math
+import weakref
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import mujoco
+import numba
+import numpy as np
+import numpy.typing as npt
+from llvmlite import ir
+from mujoco.introspect import ast_nodes, structs
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from . import law
+
+Array = npt.NDArray[np.float64]
+
+if numba.config.DISABLE_JIT:
+    raise ImportError("numba is told not to compile: formulas on arrays must serve")
+
+# -- where things are in the engine's memory ---------------------------------------------------------------------------
+
+
+def _layout(struct: str) -> type[ctypes.Structure]:
+    """A structure of MuJoCo as ctypes knows it."""
+    scalars = {"int": ctypes.c_int, "mjtNum": ctypes.c_double, "float": ctypes.c_float} | dict.fromkeys(
+        ("mjtSize", "size_t", "uintptr_t", "uint64_t"), ctypes.c_uint64
+    )
+    scalars |= {"mjtBool": ctypes.c_bool, "mjtByte": ctypes.c_uint8, "unsigned char": ctypes.c_uint8}
+
+    def kind(declared: Any) -> Any:
+        if isinstance(declared, ast_nodes.PointerType):
+            return ctypes.c_void_p
+        if isinstance(declared, ast_nodes.ArrayType):
+            return kind(declared.inner_type) * math.prod(declared.extents)
+        if isinstance(declared, ast_nodes.ValueType):
+            return scalars.get(declared.name) or _layout(declared.name)
+        return _fields(declared.fields)
+
+    def _fields(fields: Any) -> type[ctypes.Structure]:
+        return type(struct, (ctypes.Structure,), {"_fields_": [(field.name, kind(field.type)) for field in fields]})
+
+    return _fields(structs.STRUCTS[struct].fields)
+
+
+_DATA = (
+    "time", "ncon", "nefc", "ne", "nf", "warning", "geom_xpos", "geom_xmat", "contact", "efc_KBIP", "efc_R", "efc_D",
+    "efc_diagA", "efc_vel", "efc_margin", "efc_aref", "efc_frictionloss", "efc_J", "efc_J_rownnz", "efc_J_rowadr",
+    "efc_J_colind", "qacc", "qacc_warmstart", "nisland", "map_efc2iefc", "iefc_R", "iefc_D",
+)  # fmt: skip
+(
+    TIME, NCON, NEFC, NE, NF, WARNING, XPOS, XMAT, CONTACT, KBIP, R, D, DIAG, VEL, MARGIN, AREF, LOSS, J, ROWNNZ, ROWADR,
+    COLIND, QACC, START, NISLAND, ISLAND_PLACE, ISLAND_R, ISLAND_D,
+) = range(len(_DATA))  # fmt: skip
+_CONTACT = ("dist", "pos", "frame", "friction", "mu", "dim", "geom", "efc_address", "includemargin", "adhesion")
+DIST, POS, FRAME, FRICTION, MU, DIM, GEOM, ADDRESS, INCLUDE, ADHESION = range(len(_DATA), len(_DATA) + len(_CONTACT))
+SIZE = len(_DATA) + len(_CONTACT)
+_MODEL = ("nv", "ngeom", "geom_rbound")
+NV, NGEOM, RBOUND = range(SIZE + 1, SIZE + 1 + len(_MODEL))
+_OPTION = ("timestep", "gravity", "cone", "solver")
+STEP, GRAVITY, CONE, SOLVER = range(NV + len(_MODEL), NV + len(_MODEL) + len(_OPTION))
+
+_data, _contact, _model = _layout("mjData"), _layout("mjContact"), _layout("mjModel")
+_option = _model.opt.offset
+_offsets: npt.NDArray[np.int64] = np.array(
+    [getattr(_data, name).offset if hasattr(_data, name) else -1 for name in _DATA]
+    + [getattr(_contact, name).offset if hasattr(_contact, name) else -1 for name in _CONTACT]
+    + [ctypes.sizeof(_contact)]
+    + [getattr(_model, name).offset for name in _MODEL]
+    + [_option + getattr(_layout("mjOption"), name).offset for name in _OPTION],
+    np.int64,
+)
+
+
+def _agrees() -> bool:
+    """Whether a small model lies in memory as `mujoco.introspect` says."""
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option timestep="0.0078125" gravity="0 0 -7"/><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 '
+        '.09"><freejoint/><geom size=".1" condim="4" friction=".7 .03 .01"/></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    data.time = 3.0
+    mujoco.mj_forward(model, data)
+    seen, known, contact = _data.from_address(data._address), _model.from_address(model._address), data.contact
+    if not seen.contact:
+        return False
+    point = _contact.from_address(seen.contact)
+    return bool(
+        (seen.time, seen.ncon, seen.nefc, known.nv, known.ngeom) == (3.0, 1, data.nefc, 6, 2)
+        and (known.opt.timestep, known.opt.gravity[2], known.opt.cone) == (0.0078125, -7.0, model.opt.cone)
+        and (point.dist, point.dim, point.efc_address, point.friction[2])
+        == (contact.dist[0], 4, 0, contact.friction[0, 2])
+        and (point.geom[0], point.geom[1], point.mu) == (0, 1, contact.mu[0])
+        and np.array_equal(
+            np.ctypeslib.as_array((ctypes.c_double * data.nefc).from_address(seen.efc_aref)), data.efc_aref
+        )
+        and np.array_equal(np.ctypeslib.as_array((ctypes.c_double * 6).from_address(seen.qacc)), data.qacc)
+    )
+
+
+if not _agrees():
+    raise ImportError("MuJoCo's structures are not laid out as mujoco.introspect says: formulas on arrays must serve")
+
+_library = next(
+    path
+    for path in sorted(Path(mujoco.__file__).parent.iterdir())
+    if path.name.startswith(("libmujoco.so", "libmujoco.")) or path.name == "mujoco.dll"
+)
+_engine = ctypes.CDLL(str(_library))
+_simulations = np.zeros(3 * 4096, np.int64)
+"""Simulations under `installed`: how many, the address of `adopt`, 0; then model, data and head of each, by address."""
+SIMULATIONS = len(_simulations) // 3 - 1
+for _name in (
+    "mj_step1", "mj_step2", "mj_fwdActuation", "mj_fwdAcceleration", "mj_fwdConstraint", "mj_isSparse", "mj_addContact",
+    "mj_makeConstraint", "mj_island", "mj_projectConstraint", "mj_fwdVelocity",
+):  # fmt: skip
+    llvmlite.binding.add_symbol(f"coulomb_{_name}", ctypes.cast(getattr(_engine, _name), ctypes.c_void_p).value)
+llvmlite.binding.add_symbol("coulomb_realloc", ctypes.cast(ctypes.pythonapi.PyMem_RawRealloc, ctypes.c_void_p).value)
+llvmlite.binding.add_symbol("coulomb_offsets", _offsets.ctypes.data)
+llvmlite.binding.add_symbol("coulomb_simulations", _simulations.ctypes.data)
+
+
+def _function(name: str, *arguments: Any, returns: Any = types.void) -> Any:
+    return types.ExternalFunction(f"coulomb_{name}", returns(*(arguments or (types.intp, types.intp))))
+
+
+mj_step1, mj_step2 = _function("mj_step1"), _function("mj_step2")
+mj_fwdActuation, mj_fwdAcceleration = _function("mj_fwdActuation"), _function("mj_fwdAcceleration")
+mj_fwdConstraint, mj_fwdVelocity = _function("mj_fwdConstraint"), _function("mj_fwdVelocity")
+mj_makeConstraint, mj_island = _function("mj_makeConstraint"), _function("mj_island")
+mj_projectConstraint = _function("mj_projectConstraint")
+mj_isSparse = _function("mj_isSparse", types.intp, returns=types.int32)
+mj_addContact = _function("mj_addContact", types.intp, types.intp, types.intp, returns=types.int32)
+realloc = _function("realloc", types.intp, types.intp, returns=types.intp)
+
+
+def _symbol(name: str) -> Any:
+    """A function that gives the address of a symbol, which compiled code in numba's cache finds anew."""
+
+    @intrinsic  # type: ignore[untyped-decorator]
+    def address(typing: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            symbol = (
+                cgutils.add_global_variable(builder.module, ir.IntType(64), name)
+                if (name not in builder.module.globals)
+                else builder.module.globals[name]
+            )
+            return builder.ptrtoint(symbol, ir.IntType(64))
+
+        return types.intp(), code
+
+    return address
+
+
+_offsets_address, _simulations_address = _symbol("coulomb_offsets"), _symbol("coulomb_simulations")
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _pointer(typing: Any, address: Any) -> Any:
+    """The address as a pointer."""
+    return types.voidptr(types.intp), lambda context, builder, call, args: builder.inttoptr(args[0], cgutils.voidptr_t)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _adopt(typing: Any, function: Any, m: Any, d: Any) -> Any:
+    """What a C function of two integers at an address returns."""
+
+    def code(context: Any, builder: Any, call: Any, args: Any) -> Any:
+        integer = ir.IntType(64)
+        pointer = builder.inttoptr(args[0], ir.FunctionType(integer, [integer, integer]).as_pointer())
+        return builder.call(pointer, args[1:])
+
+    return types.intp(types.intp, types.intp, types.intp), code
+
+
+def compiled(function: Any) -> Any:
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
+    try:
+        return numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # no place for a cache
+        return numba.njit(**options)(function)
+
+
+@compiled
+def _int32(address: int) -> Any:
+    return numba.carray(_pointer(address), 1 << 40, np.int32)
+
+
+@compiled
+def _int64(address: int) -> Any:
+    return numba.carray(_pointer(address), 1 << 40, np.int64)
+
+
+@compiled
+def _real(address: int) -> Any:
+    return numba.carray(_pointer(address), 1 << 40, np.float64)
+
+
+@compiled
+def _at(name: int) -> int:
+    return int(_int64(_offsets_address())[name])
+
+
+@compiled
+def _array(struct: int, name: int) -> Any:
+    """An array of reals of `mjData` or `mjModel`."""
+    return _real(_int64(struct + _at(name))[0])
+
+
+@compiled
+def _whole(struct: int, name: int) -> Any:
+    """An array of integers of `mjData` or `mjModel`."""
+    return _int32(_int64(struct + _at(name))[0])
+
+
+@compiled
+def _number(struct: int, name: int) -> int:
+    return int(_int32(struct + _at(name))[0])
+
+
+@compiled
+def _value(struct: int, name: int) -> float:
+    return float(_real(struct + _at(name))[0])
+
+
+_BADQPOS = int(mujoco.mjtWarning.mjWARN_BADQPOS)
+_UNMOVED = 1e-6
+"""Distance below which a contact is the one of the same number in the last step, m."""
+_STILL = 1e-9
+"""Most that contacts and bodies may move, m or rad, for what depends on their poses to stay as it is."""
+_OPEN = 1e9
+"""Approach that a contact allows which is open, m s-2."""
+_CORNER = 1.05 * math.pi
+"""Angle without other points of its patch that a corner of the patch sees at least."""
+
+# -- what a simulation remembers ---------------------------------------------------------------------------------------
+
+KEPT, BEFORE, AXES, PLACES, ROWS, JACOBIAN, COLUMNS, DRY, POSES, SCRATCH = range(0, 20, 2)
+"""Blocks of memory in a `head`, address and size of each: contacts now and before (`law.WIDTH` numbers each); their axes
+in those of both bodies, friction and regular friction (24); their places (4); rows (9); Jacobians and their columns; what
+dry friction bore."""
+COUNT, COUNT_BEFORE, COUNT_ROWS, COUNT_DRY, DRY_BEFORE, COUNT_FOUND, COUNT_ALL, TURNED, PENDING, RESETS, SOLVES = range(
+    20, 31
+)
+"""Contacts now and before, rows, dry rows now and before; whether forces are still to be found; resets by the engine."""
+MOMENT, LASTED, LEAST = 31, 32, 33
+"""Time and time step of the last call, s; distance by which contacts must move for points to be put back, m."""
+RIGID, RESTITUTION, SERVO, SHARE, MOST, SOFTNESS, PUSH, CALM, NEAR = range(34, 43)
+"""The numbers of a `law.Law`, in its order."""
+HEAD = 43
+INDEX, FIRST, LENGTH, AT = range(4)
+"""Of a contact: its number in `mjData`, its first row there, how many it has, the first of them in `ROWS`."""
+SOFT, REFERENCE, MEMORY, HELD, RESIDUAL, FOUND, BEGIN, NONZEROS, ADDRESS_OF, LIMIT, ROW = range(11)
+"""Of a row: R, its reference acceleration without memory and slip, the force remembered, J qacc less the reference, the
+force found; where its Jacobian begins and how long it is; what dry friction bears at most; its number in `mjData`."""
+W = law.WIDTH
+
+
+@compiled
+def _room(head: int, block: int, numbers: int) -> Any:
+    """A block with room for so many reals."""
+    blocks = _int64(head)
+    if blocks[block + 1] < numbers:
+        blocks[block + 1] = numbers + numbers // 2 + 64
+        blocks[block] = realloc(blocks[block], 8 * blocks[block + 1])
+    return _real(blocks[block])
+
+
+@compiled
+def room(head: int, block: int, numbers: int) -> None:
+    """Make room."""
+    _room(head, block, numbers)
+
+
+@compiled
+def _integers(head: int, block: int, numbers: int) -> Any:
+    _room(head, block, numbers)
+    return _int64(_int64(head)[block])
+
+
+@compiled
+def _block(head: int, block: int) -> Any:
+    return _real(_int64(head)[block])
+
+
+@compiled
+def _elliptic(m: int) -> bool:
+    return _number(m, CONE) == 1
+
+
+@compiled
+def _gravity(m: int) -> float:
+    """Its acceleration, m s-2; the earth's if there is none."""
+    g = _real(m + _at(GRAVITY))
+    size = math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
+    return size if size > 0 else 9.81
+
+
+@compiled
+def _resets(d: int) -> int:
+    """How often the engine has reset the state as it was bad."""
+    warnings = _int32(d + _at(WARNING))
+    return int(warnings[2 * _BADQPOS + 1] + warnings[2 * _BADQPOS + 3] + warnings[2 * _BADQPOS + 5])
+
+
+# -- the law -----------------------------------------------------------------------------------------------------------
+
+
+@compiled
+def control(m: int, d: int, head: int) -> None:
+    """Between the reference accelerations of a step and its forces: see `law`."""
+    counts, numbers = _int64(head), _real(head)
+    time, resets = _value(d, TIME), _resets(d)
+    elapsed = time - numbers[MOMENT]
+    known = 0 <= elapsed <= 1.5 * numbers[LASTED] and counts[RESETS] in (resets, -1)
+    source = FOUND if elapsed > 0 else MEMORY
+    if known and elapsed > 0:
+        retain(m, d, head)
+    numbers[MOMENT], numbers[LASTED], counts[RESETS] = time, _value(m, STEP), resets
+    start = _array(d, START)
+    for i in range(_number(m, NV)):
+        start[i] = start[i] if abs(start[i]) >= numbers[CALM] else 0.0
+    if known and _still(m, d, head):
+        rows = _block(head, ROWS)
+        for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
+            rows[r + MEMORY] = rows[r + source]
+    else:
+        _turn_in(m, head, source, known)
+        _find(m, d, head)
+        if _hand_on(m, d, head, False) > numbers[LEAST] and _put_back(m, d, head):
+            _find(m, d, head)
+            _hand_on(m, d, head, True)
+        _copy_rows(m, d, head)
+    if counts[COUNT] + counts[COUNT_DRY] == 0:
+        counts[PENDING] = 0
+        return
+    _accelerate(m, d, head)
+    if numbers[RIGID]:
+        _stiffen(m, d, head)
+    elif numbers[SERVO]:
+        _lift(m, d, head)
+    _hold(m, d, head)
+    enough = numbers[SHARE] * _gravity(m)
+    if _foresee(m, d, head, enough):
+        mj_fwdActuation(m, d)
+        mj_fwdAcceleration(m, d)
+        last = math.inf
+        for _ in range(numbers[MOST]):
+            _refer(m, d, head)
+            mj_fwdConstraint(m, d)
+            counts[SOLVES] += 1
+            qacc = _array(d, QACC)
+            for i in range(_number(m, NV)):
+                start[i] = qacc[i]
+            worst = _weigh(m, d, head)
+            _take_over(m, d, head)
+            if worst <= 1e-6 * enough or (worst <= enough and (not numbers[RIGID] or worst > 0.1 * last)):
+                break
+            last = worst
+    _refer(m, d, head)
+    counts[PENDING] = 1
+
+
+@compiled
+def _same(d: int, offset: int, length: int, poses: Any, at: int) -> bool:
+    """Whether an array of `mjData` is as it was."""
+    now = _real(_int64(d + offset)[0])
+    for i in range(length):
+        if not abs(now[i] - poses[at + i]) < _STILL:
+            return False
+    return True
+
+
+@compiled
+def _still(m: int, d: int, head: int) -> bool:
+    """Whether bodies and contacts are where their axes and Jacobians were taken last."""
+    counts, poses, ngeom, ncon = _int64(head), _block(head, POSES), _number(m, NGEOM), _number(d, NCON)
+    if counts[COUNT_FOUND] != ncon or counts[COUNT_DRY] != _number(d, NF) or counts[COUNT_ALL] != _number(d, NEFC):
+        return False
+    if not _same(d, _at(XPOS), 3 * ngeom, poses, 0) or not _same(d, _at(XMAT), 9 * ngeom, poses, 3 * ngeom):
+        return False
+    contact, size, at, kept = _int64(d + _at(CONTACT))[0], _at(SIZE), 12 * ngeom, _block(head, KEPT)
+    place, frame, gap, numbers = _at(POS), _at(FRAME), _at(DIST), _at(DIM)
+    address, geom, friction, used = _at(ADDRESS), _at(GEOM), _at(FRICTION), 0
+    places = _int64(counts[PLACES])
+    for i in range(ncon):
+        c, first = contact + i * size, at + 20 * i
+        pos, axes, geoms, slide = _real(c + place), _real(c + frame), _int32(c + geom), _real(c + friction)
+        if (
+            geoms[0] != poses[first + 12]
+            or geoms[1] != poses[first + 13]
+            or _int32(c + numbers)[0] != poses[first + 14]
+            or _int32(c + address)[0] != poses[first + 15]
+        ):
+            return False
+        for j in range(3):  # points of flush faces shift by µm
+            if not abs(pos[j] - poses[first + j]) < 1e3 * _STILL:
+                return False
+        for j in range(6):
+            if not abs(axes[j] - poses[first + 3 + j]) < _STILL:
+                return False
+        for j in range(3):
+            if slide[j] != poses[first + 9 + j]:
+                return False
+        if used < counts[COUNT] and places[4 * used + INDEX] == i:
+            kept[W * used + law.GAP] = _real(c + gap)[0]
+            used += 1
+    return True
+
+
+@compiled
+def _turn_in(m: int, head: int, source: int, known: bool) -> None:
+    """What contacts bore, friction in the axes of both bodies, becomes what is handed on."""
+    counts = _int64(head)
+    if not known:
+        counts[COUNT_BEFORE] = counts[DRY_BEFORE] = 0
+        return
+    if not counts[TURNED]:
+        convert(m, head, source)
+    counts[TURNED] = 0
+    for i in range(2):
+        counts[KEPT + i], counts[BEFORE + i] = counts[BEFORE + i], counts[KEPT + i]
+    counts[COUNT_BEFORE], counts[DRY_BEFORE] = counts[COUNT], counts[COUNT_DRY]
+
+
+@compiled
+def convert(m: int, head: int, source: int) -> None:
+    """Keep what rows bear as what contacts bear, friction in the axes of both bodies."""
+    counts, elliptic, scratch = _int64(head), _elliptic(m), np.zeros(12)
+    kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
+    for i in range(counts[COUNT]):
+        k, a, r, length = W * i, 24 * i, ROW * places[4 * i + AT] + source, places[4 * i + LENGTH]
+        load, scratch[:] = k + law.LOAD, 0.0
+        for j in range(5):
+            kept[load + j] = 0.0
+        kept[load] = rows[r]
+        for t in range(length - 1 if elliptic else length // 2):
+            if elliptic:
+                force = rows[r + ROW * (t + 1)]
+            else:
+                plus, minus = rows[r + 2 * ROW * t], rows[r + 2 * ROW * t + ROW]
+                kept[load + t], force = plus + minus, axes[a + 18 + t] * (plus - minus)
+            other, kind = a + _axis(t), 1 if t >= 2 else 0
+            for j in range(6):
+                scratch[2 * j + kind] += axes[other + 3 * j] * force
+        for j in range(12):
+            kept[k + law.FORCE + j] = scratch[j]
+    dry = _room(head, DRY, counts[COUNT_DRY])
+    for i in range(counts[COUNT_DRY]):
+        dry[i] = rows[ROW * (counts[COUNT_ROWS] + i) + source]
+
+
+@compiled
+def _find(m: int, d: int, head: int) -> None:
+    """Contacts, their places on both bodies and their rows."""
+    counts, elliptic, rigid, ngeom = _int64(head), _elliptic(m), _real(head)[RIGID] > 0, _number(m, NGEOM)
+    xpos, xmat, contact, kbip = _array(d, XPOS), _array(d, XMAT), _int64(d + _at(CONTACT))[0], _array(d, KBIP)
+    ncon, count, rows, size = _number(d, NCON), 0, 0, _at(SIZE)
+    kept, axes, places = _room(head, KEPT, ncon * W), _room(head, AXES, 24 * ncon), _integers(head, PLACES, 4 * ncon)
+    poses = _room(head, POSES, 12 * ngeom + 20 * ncon)
+    for i in range(3 * ngeom):
+        poses[i] = xpos[i]
+    for i in range(9 * ngeom):
+        poses[3 * ngeom + i] = xmat[i]
+    at = _at(POS), _at(FRAME), _at(FRICTION), _at(GEOM), _at(DIM), _at(ADDRESS), _at(DIST), _at(MU)
+    for i in range(ncon):
+        c, first = contact + i * size, 12 * ngeom + 20 * i
+        pos, frame, friction = _real(c + at[0]), _real(c + at[1]), _real(c + at[2])
+        geom, dim, address = _int32(c + at[3]), _int32(c + at[4])[0], _int32(c + at[5])[0]
+        for j in range(3):
+            poses[first + j], poses[first + 9 + j] = pos[j], friction[j]
+        for j in range(6):
+            poses[first + 3 + j] = frame[j]
+        poses[first + 12], poses[first + 13], poses[first + 14], poses[first + 15] = geom[0], geom[1], dim, address
+        if address < 0 or geom[0] < 0 or geom[1] < 0:
+            continue
+        if not rigid and (dim == 1 or kbip[4 * (address + 1) + 1] <= 0):
+            continue
+        k, a, p = W * count, 24 * count, 4 * count
+        for j in range(W):
+            kept[k + j] = 0.0
+        for side in range(2):
+            g = geom[side]
+            kept[k + law.GEOMS + side] = g
+            x, y, z = pos[0] - xpos[3 * g], pos[1] - xpos[3 * g + 1], pos[2] - xpos[3 * g + 2]
+            for axis in range(3):
+                u, v, w = xmat[9 * g + axis], xmat[9 * g + 3 + axis], xmat[9 * g + 6 + axis]
+                kept[k + law.PLACE + 3 * side + axis] = u * x + v * y + w * z
+                for other in range(3):
+                    axes[a + 9 * side + 3 * axis + other] = (
+                        u * frame[3 * other] + v * frame[3 * other + 1] + w * frame[3 * other + 2]
+                    )
+        for axis in range(3):
+            kept[k + law.NORMAL + axis] = axes[a + 3 * axis]
+        kept[k + law.GAP] = _real(c + at[6])[0]
+        for j in range(5):
+            axes[a + 18 + j] = friction[j]
+        axes[a + 23] = _real(c + at[7])[0]
+        length = 1 if dim == 1 else dim if elliptic else 2 * (dim - 1)
+        places[p + INDEX], places[p + FIRST], places[p + LENGTH], places[p + AT] = i, address, length, rows
+        count += 1
+        rows += length
+    counts[COUNT], counts[COUNT_ROWS], counts[COUNT_DRY] = count, rows, _number(d, NF)
+    counts[COUNT_FOUND], counts[COUNT_ALL] = ncon, _number(d, NEFC)
+    _room(head, ROWS, ROW * (rows + counts[COUNT_DRY]))
+
+
+@compiled
+def _apart(one: Any, k: int, other: Any, m: int) -> float:
+    """Square of the distance of two contacts, by their places on both bodies, m^2; of other geoms: infinite."""
+    if one[k] != other[m] or one[k + 1] != other[m + 1]:
+        return math.inf
+    square = 0.0
+    for j in range(law.PLACE, law.PLACE + 6):
+        square += (one[k + j] - other[m + j]) ** 2
+    return square
+
+
+@compiled
+def _axis(t: int) -> int:
+    """Axis of a contact of the direction t of friction: tangents 1 and 2, then spinning about 0 and rolling about 1, 2."""
+    return t + 1 if t < 2 else t - 2
+
+
+@compiled
+def _hand_on(m: int, d: int, head: int, scattered: bool) -> float:
+    """Give what is remembered to the nearest contact of the same geoms; how far those have moved whose pair has fewer, m."""
+    counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
+    count, kept, before = counts[COUNT], _block(head, KEPT), _block(head, BEFORE)
+    axes, places, rows = _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
+    first, moved, fewer = 0, 0.0, False
+    for i in range(counts[COUNT_BEFORE]):
+        b, nearest, least, begin = W * i, -1, math.inf, first
+        if i < count and _apart(kept, W * i, before, b) < _UNMOVED**2:
+            nearest, least = i, 0.0
+        for turn in range(0 if nearest == i else count):  # contacts of a pair are together, mostly where they were
+            k = begin + turn
+            if k >= count:
+                k -= count
+            distance = _apart(kept, W * k, before, b)
+            if distance < math.inf:
+                if nearest < 0:
+                    first = k
+                if distance < least:
+                    nearest, least = k, distance
+            elif nearest >= 0 and not scattered:
+                break
+        if nearest < 0:
+            continue
+        k = W * nearest
+        moved, fewer = max(moved, least), fewer or kept[k + law.STATE] != law.NEW
+        kept[k + law.STATE] = max(kept[k + law.STATE], before[b + law.STATE])
+        kept[k + law.ERROR] = max(kept[k + law.ERROR], before[b + law.ERROR])
+        kept[k + law.LIFT] = max(kept[k + law.LIFT], before[b + law.LIFT])
+        for j in range(5):
+            kept[k + law.LOAD + j] += before[b + law.LOAD + j]
+        for side in range(2):
+            for axis in range(3):
+                for other in range(3):
+                    turned = axes[24 * nearest + 9 * side + 3 * axis + other] / 2
+                    for kind in range(2):
+                        kept[k + law.FORCE + 2 * other + kind] += (
+                            turned * before[b + law.FORCE + 6 * side + 2 * axis + kind]
+                        )
+    for i in range(count):
+        k, p, mu = W * i, 4 * i, 24 * i + 18
+        length, r = places[p + LENGTH], ROW * places[p + AT] + MEMORY
+        if elliptic or length == 1:
+            rows[r] = kept[k + law.LOAD]
+            for t in range(length - 1):
+                rows[r + ROW * (t + 1)] = kept[k + law.FORCE + 2 * _axis(t) + (t >= 2)]
+            continue
+        for t in range(length // 2):
+            lean = kept[k + law.FORCE + 2 * _axis(t) + (t >= 2)] / axes[mu + t]
+            pair = max(kept[k + law.LOAD + t], abs(lean))
+            rows[r + 2 * ROW * t], rows[r + 2 * ROW * t + ROW] = (pair + lean) / 2, (pair - lean) / 2
+    for i in range(counts[COUNT_DRY]):
+        remembered = counts[DRY_BEFORE] == counts[COUNT_DRY]
+        rows[ROW * (counts[COUNT_ROWS] + i) + MEMORY] = _block(head, DRY)[i] if remembered else 0.0
+    return math.sqrt(moved / 2) if fewer else 0.0
+
+
+@compiled
+def _stiffen(m: int, d: int, head: int) -> None:
+    """Rows of rigid contacts: as stiff as `Law.softness`, with the velocities that Moreau and Jean's time stepping asks."""
+    counts, numbers, elliptic, h = _int64(head), _real(head), _elliptic(m), _value(m, STEP)
+    kept, places, rows = _block(head, KEPT), _int64(counts[PLACES]), _block(head, ROWS)
+    softness, stiffness, diagonal = _array(d, R), _array(d, D), _array(d, DIAG)
+    velocity, reference = _array(d, VEL), _array(d, AREF)
+    islands = _at(NISLAND) >= 0 and _number(d, NISLAND) > 0  # they have copies
+    place = _whole(d, ISLAND_PLACE if islands else COLIND)
+    island_softness, island_stiffness = _array(d, ISLAND_R if islands else R), _array(d, ISLAND_D if islands else D)
+    slow = h * _gravity(m)
+    for i in range(counts[COUNT]):
+        a, length, gap = places[4 * i + FIRST], places[4 * i + LENGTH], kept[W * i + law.GAP]
+        edges = length > 1 and not elliptic
+        speed = (velocity[a] + velocity[a + 1]) / 2 if edges else velocity[a]
+        goal = -gap / h if gap > 0 else min(-numbers[PUSH] * gap / h, slow)
+        r, above = ROW * places[4 * i + AT] + RESIDUAL, max(gap, 0.0)
+        fall = h * max(-(rows[r] + rows[r + ROW]) / 2 if edges else -rows[r], 0.0)
+        if numbers[RESTITUTION] > 0 and gap + h * (speed - fall) < 0 and speed < -2 * slow:
+            # Euler's method keeps v²/2 + gz - hgv/2 in flight
+            energy = speed * (speed - fall) / 2 + fall / h * above
+            square = fall**2 / 4 + 2 * (numbers[RESTITUTION] ** 2 * energy - fall / h * above)
+            goal = max(goal, math.sqrt(max(square, 0.0)) - fall / 2)
+        factor = numbers[SOFTNESS] * diagonal[a] / softness[a]
+        for r in range(a, a + length):
+            softness[r] *= factor
+            stiffness[r] = 1 / softness[r]
+            reference[r] = ((goal if edges or r == a else 0.0) - velocity[r]) / h
+            if islands:
+                island_softness[place[r]], island_stiffness[place[r]] = softness[r], stiffness[r]
+    if _number(m, SOLVER) == 0:  # PGS has it in its matrix
+        mj_projectConstraint(m, d)
+
+
+@compiled
+def _lift(m: int, d: int, head: int) -> None:
+    """Servo: move the distances that contacts hold, so that loaded ones come to have no depth."""
+    counts, numbers, elliptic = _int64(head), _real(head), _elliptic(m)
+    kept, places, kbip, reference = _block(head, KEPT), _int64(counts[PLACES]), _array(d, KBIP), _array(d, AREF)
+    contact = _int64(d + _at(CONTACT))[0]
+    for i in range(counts[COUNT]):
+        k, a, length = W * i, places[4 * i + FIRST], places[4 * i + LENGTH]
+        margin, gap = _value(contact + places[4 * i + INDEX] * _at(SIZE), INCLUDE), kept[k + law.GAP]
+        lift = min(max(kept[k + law.LIFT] - _value(m, STEP) / numbers[SERVO] * gap, 0.0), margin)
+        kept[k + law.LIFT] = lift
+        spring = kbip[4 * a] * kbip[4 * a + 2] * (margin - lift) if lift > 0 or gap <= 0 else _OPEN
+        for r in range(a, a + (1 if elliptic else length)):
+            reference[r] -= spring
+
+
+@compiled
+def _copy_rows(m: int, d: int, head: int) -> None:
+    """Keep the Jacobians: the engine's own arrays are gone when the next step wants to know what forces there were."""
+    counts, nv, sparse = _int64(head), _number(m, NV), mj_isSparse(m)
+    places, rows, count = _int64(counts[PLACES]), _block(head, ROWS), ROW * counts[COUNT_ROWS]
+    for i in range(counts[COUNT]):
+        for r in range(places[4 * i + LENGTH]):
+            rows[ROW * (places[4 * i + AT] + r) + ADDRESS_OF] = places[4 * i + FIRST] + r
+    ne, loss = _number(d, NE), _array(d, LOSS)
+    for i in range(counts[COUNT_DRY]):
+        rows[count + ROW * i + ADDRESS_OF], rows[count + ROW * i + LIMIT] = ne + i, loss[ne + i]
+    total, length = 0, _whole(d, ROWNNZ)
+    count += ROW * counts[COUNT_DRY]
+    for r in range(0, count, ROW):
+        rows[r + BEGIN], rows[r + NONZEROS] = total, length[int(rows[r + ADDRESS_OF])] if sparse else nv
+        total += int(rows[r + NONZEROS])
+    jacobian, columns = _room(head, JACOBIAN, total), _integers(head, COLUMNS, total)
+    given, column, begin = _array(d, J), _whole(d, COLIND), _whole(d, ROWADR)
+    for r in range(0, count, ROW):
+        address, to = int(rows[r + ADDRESS_OF]), int(rows[r + BEGIN])
+        source = begin[address] if sparse else address * nv
+        for n in range(int(rows[r + NONZEROS])):
+            jacobian[to + n] = given[source + n]
+            columns[to + n] = column[source + n] if sparse else n
+
+
+@compiled
+def _hold(m: int, d: int, head: int) -> None:
+    """The rows' own numbers, with what memory adds: of soft contacts friction, of pyramids what differs from the mean."""
+    counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
+    places, rows, softness, reference = _int64(counts[PLACES]), _block(head, ROWS), _array(d, R), _array(d, AREF)
+    for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
+        address = int(rows[r + ADDRESS_OF])
+        rows[r + SOFT], rows[r + REFERENCE], rows[r + HELD] = softness[address], reference[address], rows[r + MEMORY]
+    for i in range(0 if rigid else counts[COUNT]):
+        r, length, mean = ROW * places[4 * i + AT], places[4 * i + LENGTH], 0.0
+        if elliptic:
+            rows[r + HELD] = 0.0
+            continue
+        for e in range(r, r + ROW * length, ROW):
+            mean += rows[e + MEMORY] / length
+        for e in range(r, r + ROW * length, ROW):
+            rows[e + HELD] -= mean
+
+
+@compiled
+def _accelerate(m: int, d: int, head: int) -> None:
+    """J qacc of all rows, into `RESIDUAL`."""
+    counts, rows, qacc = _int64(head), _block(head, ROWS), _array(d, QACC)
+    jacobian, columns, moves = _block(head, JACOBIAN), _int64(counts[COLUMNS]), False
+    for i in range(_number(m, NV)):
+        moves |= qacc[i] != 0
+    for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
+        total, begin = 0.0, int(rows[r + BEGIN])
+        for n in range(begin, begin + int(rows[r + NONZEROS]) if moves else begin):
+            total += jacobian[n] * qacc[columns[n]]
+        rows[r + RESIDUAL] = total
+
+
+@compiled
+def _slip(rows: Any, r: int, length: int, elliptic: bool, axes: Any, mu: int) -> float:
+    """By how much slip lifts a contact in the engine's convex law, from the rows' `RESIDUAL` plus R f, m s-2."""
+    square, most = 0.0, 0.0
+    if elliptic:
+        for t in range(length - 1):
+            n = r + ROW * (t + 1)
+            square += (axes[mu + t] * (rows[n + RESIDUAL] + rows[n + SOFT] * rows[n + FOUND])) ** 2
+        return math.sqrt(square)
+    for e in range(r, r + ROW * (length - 1), 2 * ROW):
+        plus, minus = (
+            rows[e + RESIDUAL] + rows[e + SOFT] * rows[e + FOUND],
+            rows[e + ROW + RESIDUAL] + rows[e + ROW + SOFT] * rows[e + ROW + FOUND],
+        )
+        most = max(most, abs(plus - minus) / 2)
+    return most
+
+
+@compiled
+def _foresee(m: int, d: int, head: int, enough: float) -> bool:
+    """Foresee slip from the velocities now and the accelerations of the last step; whether that is in doubt."""
+    counts, elliptic, rigid, gravity = _int64(head), _elliptic(m), _real(head)[RIGID] > 0, _gravity(m)
+    kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
+    diagonal = _array(d, DIAG)
+    for r in range(0, ROW * counts[COUNT_ROWS], ROW):
+        rows[r + RESIDUAL] -= rows[r + REFERENCE]
+        rows[r + FOUND] = 0.0
+    doubt = False
+    for i in range(counts[COUNT]):
+        k, r, length, state = W * i, ROW * places[4 * i + AT], places[4 * i + LENGTH], kept[W * i + law.STATE]
+        slip = _slip(rows, r, length, elliptic, axes, 24 * i + 18)
+        edges = length > 1 and not elliptic
+        closing = (rows[r + RESIDUAL] + rows[r + ROW + RESIDUAL] < 0) if edges else rows[r + RESIDUAL] < 0
+        error = kept[k + law.ERROR] > enough
+        kept[k + law.SLIP] = slip
+        if state == law.NEW or state == law.OPEN:
+            doubt |= closing and (rigid or slip > enough)
+            continue
+        ahead = 0.0  # of friction and slip: it stops
+        if edges:
+            for e in range(r, r + ROW * length, 2 * ROW):
+                ahead += (rows[e + MEMORY] - rows[e + ROW + MEMORY]) * (rows[e + RESIDUAL] - rows[e + ROW + RESIDUAL])
+        else:
+            for e in range(r + ROW, r + ROW * length, ROW):
+                ahead += rows[e + MEMORY] * rows[e + RESIDUAL]
+        if state == law.STICKS or ahead >= 0:
+            kept[k + law.SLIP] = 0.0
+            doubt |= slip > enough and not _holds(rows, r, length, edges, axes, 24 * i + 18, diagonal)
+        else:
+            doubt |= error
+        for e in range(r, r + ROW * length if rigid else r, ROW):  # forces will change by a weight
+            doubt |= abs(rows[e + RESIDUAL]) > gravity
+    return doubt
+
+
+@compiled
+def _holds(rows: Any, r: int, length: int, edges: bool, axes: Any, mu: int, diagonal: Any) -> bool:
+    """Whether the forces of a contact would stay inside the cone if they alone did what accelerations lack to hold it."""
+    square, load = 0.0, 0.0
+    for e in range(r, r + ROW * length, ROW):
+        lacks = rows[e + RESIDUAL] + rows[e + SOFT] * (rows[e + MEMORY] - rows[e + HELD])
+        force = rows[e + MEMORY] - lacks / (diagonal[int(rows[e + ADDRESS_OF])] + rows[e + SOFT])
+        if edges and force < 0:
+            return False
+        if e == r:
+            load = force
+        elif not edges:
+            square += (force / axes[mu + (e - r) // ROW - 1]) ** 2
+    return edges or (load > 0 and square <= load**2)
+
+
+@compiled
+def _refer(m: int, d: int, head: int) -> None:
+    """Reference accelerations with memory, less slip in the normal direction."""
+    counts, elliptic, reference = _int64(head), _elliptic(m), _array(d, AREF)
+    kept, places, rows = _block(head, KEPT), _int64(counts[PLACES]), _block(head, ROWS)
+    for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
+        reference[int(rows[r + ADDRESS_OF])] = rows[r + REFERENCE] + rows[r + SOFT] * rows[r + HELD]
+    for i in range(counts[COUNT]):
+        a = places[4 * i + FIRST]
+        for r in range(a, a + (1 if elliptic else places[4 * i + LENGTH])):
+            reference[r] -= kept[W * i + law.SLIP]
+
+
+@compiled
+def _weigh(m: int, d: int, head: int) -> float:
+    """Forces and slip that follow from the accelerations; by how much what was foreseen is wrong at most, m s-2."""
+    counts, elliptic, rigid = _int64(head), _elliptic(m), _real(head)[RIGID] > 0
+    kept, axes, places, rows = _block(head, KEPT), _block(head, AXES), _int64(counts[PLACES]), _block(head, ROWS)
+    _accelerate(m, d, head)
+    for r in range(0, ROW * (counts[COUNT_ROWS] + counts[COUNT_DRY]), ROW):
+        rows[r + RESIDUAL] -= rows[r + REFERENCE] + rows[r + SOFT] * rows[r + HELD]
+    most = 0.0
+    for i in range(counts[COUNT]):
+        k, r, length, a = W * i, ROW * places[4 * i + AT], places[4 * i + LENGTH], 24 * i + 18
+        edges, foreseen = length > 1 and not elliptic, kept[k + law.SLIP]
+        for e in range(r, r + ROW * (length if edges else 1), ROW):
+            rows[e + RESIDUAL] += foreseen
+        state, error = _share(rows, r, length, edges, axes, a), 0.0
+        slip = _slip(rows, r, length, elliptic, axes, a) if state != law.STICKS else 0.0
+        if state == law.OPEN:  # its slip matters if without it the contact would have closed
+            approach = rows[r + RESIDUAL] + rows[r + SOFT] * rows[r + HELD] - foreseen
+            if edges:
+                approach += rows[r + ROW + RESIDUAL] + rows[r + ROW + SOFT] * rows[r + ROW + HELD] - foreseen
+            error = abs(slip - foreseen) if approach < 0 else 0.0
+        else:
+            error = abs(slip - foreseen)
+        for e in range(r, r + ROW * length if rigid else r, ROW):
+            error = max(error, abs(rows[e + SOFT] * (rows[e + FOUND] - rows[e + MEMORY])))
+        kept[k + law.STATE], kept[k + law.ERROR], kept[k + law.SEEN] = state, error, slip
+        most = max(most, error)
+    first = ROW * counts[COUNT_ROWS]
+    for r in range(first, first + ROW * counts[COUNT_DRY], ROW):
+        rows[r + FOUND] = min(max(-rows[r + RESIDUAL] / rows[r + SOFT], -rows[r + LIMIT]), rows[r + LIMIT])
+    return most
+
+
+@compiled
+def _share(rows: Any, r: int, length: int, edges: bool, axes: Any, a: int) -> int:
+    """Forces of a contact's rows, as the engine's solver has them, and its state."""
+    if edges or length == 1:
+        idle = 0
+        for e in range(r, r + ROW * length, ROW):
+            rows[e + FOUND] = max(-rows[e + RESIDUAL] / rows[e + SOFT], 0.0)
+            idle += rows[e + FOUND] == 0
+        return law.STICKS if idle == 0 else law.OPEN if idle == length else law.SLIDES
+    mu, square = axes[a + 5], 0.0
+    normal = mu * rows[r + RESIDUAL]
+    for t in range(length - 1):
+        square += (axes[a + t] * rows[r + ROW * (t + 1) + RESIDUAL]) ** 2
+    tangent = math.sqrt(square)
+    if normal >= mu * tangent:
+        for e in range(r, r + ROW * length, ROW):
+            rows[e + FOUND] = 0.0
+        return law.OPEN
+    if mu * normal + tangent <= 0:
+        for e in range(r, r + ROW * length, ROW):
+            rows[e + FOUND] = -rows[e + RESIDUAL] / rows[e + SOFT]
+        return law.STICKS
+    load = (mu * tangent - normal) / (rows[r + SOFT] * mu * (1 + mu * mu))
+    rows[r + FOUND] = load
+    for t in range(length - 1):
+        e = r + ROW * (t + 1)
+        rows[e + FOUND] = -load / tangent * axes[a + t] ** 2 * rows[e + RESIDUAL]
+    return law.SLIDES
+
+
+@compiled
+def _take_over(m: int, d: int, head: int) -> None:
+    """What was found is what is foreseen next: slip, and the forces of rigid contacts."""
+    counts, kept, rows = _int64(head), _block(head, KEPT), _block(head, ROWS)
+    for i in range(counts[COUNT]):
+        kept[W * i + law.SLIP] = kept[W * i + law.SEEN]
+    if _real(head)[RIGID]:
+        for r in range(0, ROW * counts[COUNT_ROWS], ROW):
+            rows[r + HELD] = rows[r + MEMORY] = rows[r + FOUND]
+
+
+@compiled
+def retain(m: int, d: int, head: int) -> None:
+    """Find the forces that the step came to."""
+    counts = _int64(head)
+    if counts[PENDING]:
+        counts[PENDING] = 0
+        _weigh(m, d, head)
+
+
+@compiled
+def _put_back(m: int, d: int, head: int) -> bool:
+    """Put back points that the collider has dropped, corners of patches that have others, if still overlapping."""
+    counts, share = _int64(head), _real(head)[NEAR]
+    ncon, size, contact = _number(d, NCON), _at(SIZE), _int64(d + _at(CONTACT))[0]
+    xpos, xmat, bound = _array(d, XPOS), _array(d, XMAT), _array(m, RBOUND)
+    before, count = _block(head, BEFORE), counts[COUNT_BEFORE]
+    point, angle, added = _integers(head, SCRATCH, size // 8), np.empty(ncon), 0
+    address = counts[SCRATCH]
+    normal, across, along, middle = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for i in range(count):
+        b = W * i
+        gap, g = before[b + law.GAP], (int(before[b + law.GEOMS]), int(before[b + law.GEOMS + 1]))
+        opened, apart = 0.0, 0.0
+        for j in range(3):
+            normal[j], middle[j], along[j] = 0.0, 0.0, 0.0
+            for axis in range(3):
+                normal[j] += xmat[9 * g[0] + 3 * j + axis] * before[b + law.NORMAL + axis]
+            for side in range(2):
+                place = xpos[3 * g[side] + j]
+                for axis in range(3):
+                    place += xmat[9 * g[side] + 3 * j + axis] * before[b + law.PLACE + 3 * side + axis]
+                middle[j] += place / 2
+                along[j] += place if side else -place
+            opened += normal[j] * along[j]
+        for j in range(3):
+            apart += (along[j] - opened * normal[j]) ** 2
+        near = share * max(bound[g[0]], bound[g[1]])
+        if gap + opened >= 0 or apart >= (near / 10) ** 2:
+            continue
+        had, left, alone, same = 0, 0, True, -1
+        for n in range(count):
+            had += before[W * n] == g[0] and before[W * n + 1] == g[1]
+        for n in range(ncon):
+            geom = _int32(contact + n * size + _at(GEOM))
+            if geom[0] != g[0] or geom[1] != g[1]:
+                continue
+            left, same, place = left + 1, n, _real(contact + n * size + _at(POS))
+            square = 0.0
+            for j in range(3):
+                square += (place[j] - middle[j]) ** 2
+            alone = alone and square > near**2
+        if not (0 < left < had and alone):
+            continue
+        thin = 0  # the axis that is farthest from the normal
+        for j in range(1, 3):
+            thin = j if abs(normal[j]) < abs(normal[thin]) else thin
+        for j in range(3):
+            one, two = (j + 1) % 3, (j + 2) % 3
+            across[j] = normal[one] * (two == thin) - normal[two] * (one == thin)
+        length = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
+        for j in range(3):
+            across[j] /= length
+        for j in range(3):
+            one, two = (j + 1) % 3, (j + 2) % 3
+            along[j] = normal[one] * across[two] - normal[two] * across[one]
+        seen = 0
+        for n in range(ncon):
+            geom = _int32(contact + n * size + _at(GEOM))
+            if geom[0] == g[0] and geom[1] == g[1]:
+                place, x, y = _real(contact + n * size + _at(POS)), 0.0, 0.0
+                for j in range(3):
+                    x, y = x + across[j] * (place[j] - middle[j]), y + along[j] * (place[j] - middle[j])
+                angle[seen] = math.atan2(y, x)
+                seen += 1
+        angle[:seen].sort()
+        widest = angle[0] + 2 * math.pi - angle[seen - 1]
+        for n in range(1, seen):
+            widest = max(widest, angle[n] - angle[n - 1])
+        if widest <= _CORNER:
+            continue
+        template = _int64(contact + same * size)
+        for n in range(size // 8):
+            point[n] = template[n]
+        _real(address + _at(DIST))[0] = gap + opened
+        place, frame = _real(address + _at(POS)), _real(address + _at(FRAME))
+        for j in range(3):
+            place[j], frame[j], frame[3 + j], frame[6 + j] = middle[j], normal[j], across[j], along[j]
+        mj_addContact(m, d, address)
+        added += 1
+    if added:
+        mj_makeConstraint(m, d)
+        mj_island(m, d)
+        mj_projectConstraint(m, d)
+        mj_fwdVelocity(m, d)
+    return added > 0
+
+
+# -- doors -------------------------------------------------------------------------------------------------------------
+
+
+@compiled
+def advance(m: int, d: int, head: int, nstep: int) -> None:
+    """So many steps."""
+    for _ in range(nstep):
+        mj_step1(m, d)
+        control(m, d, head)
+        mj_step2(m, d)
+        retain(m, d, head)
+
+
+@compiled
+def _serve(m: int, d: int) -> None:
+    """`control` for a simulation of a model that is under `doors.Coulomb.installed`; others are left alone."""
+    table = _int64(_simulations_address())
+    for i in range(3, 3 + 3 * table[0], 3):
+        if table[i] == m and table[i + 1] == d:
+            head = table[i + 2]
+            break
+    else:
+        head = _adopt(table[1], m, d)
+    if head:
+        control(m, d, head)
+
+
+def _native(function: Any) -> Any:
+    """As a callback of MuJoCo's."""
+    signature = types.void(types.intp, types.intp)
+    try:
+        return numba.cfunc(signature, cache=True, nopython=True)(function)
+    except RuntimeError:  # no place for a cache
+        return numba.cfunc(signature, nopython=True)(function)
+
+
+@functools.cache
+def callback(find: Callable[[int, int], int]) -> Any:
+    """A control callback that asks `find` for the head of a simulation which it sees for the first time; 0: none.
+
+    `find` is a Python function of the addresses of model and data.
+    """
+    ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(find)
+    _simulations[1] = ctypes.cast(ask, ctypes.c_void_p).value
+    _kept.append(ask)
+    return _native(_serve.py_func).ctypes
+
+
+_kept: list[Any] = []
+"""Callbacks into Python, which live as long as the program."""
+
+
+def remember(m: int, d: int, head: int) -> None:
+    """Know a simulation of the callback by its addresses, as long as there is room."""
+    count = int(_simulations[0])
+    if count < SIMULATIONS:
+        _simulations[3 + 3 * count : 6 + 3 * count] = m, d, head
+        _simulations[0] = count + 1
+
+
+def forget_all() -> None:
+    """Ask again for every simulation of the callback."""
+    _simulations[0] = 0
+
+
+class Simulation:
+    """What one simulation remembers, in memory that the compiled loops read and write."""
+
+    def __init__(self, model: Any, numbers: law.Law) -> None:
+        self._model, self._head, self._data = model, np.zeros(HEAD, np.int64), 0
+        self._real = self._head.view(float)
+        self.address = self._head.ctypes.data
+        self._real[RIGID:HEAD] = [float(value) for value in dataclasses.astuple(numbers)]
+        self._real[LEAST] = numbers.near * model.geom_rbound.min(where=model.geom_rbound > 0, initial=1e9)
+        self.reset()
+        weakref.finalize(self, _free, self._head)
+
+    def reset(self) -> None:
+        self._real[MOMENT], self._head[PENDING], self._head[TURNED] = math.nan, 0, 0
+
+    def serve(self, data: int) -> int:
+        """The address of this, for the simulation at another."""
+        self._data = data
+        return int(self.address)
+
+    def control(self, model: Any, data: Any) -> None:
+        control(model._address, data._address, self.address)
+
+    def retain(self, model: Any, data: Any) -> None:
+        retain(model._address, data._address, self.address)
+
+    def advance(self, model: Any, data: Any, nstep: int) -> None:
+        advance(model._address, data._address, self.address, nstep)
+
+    def _array(self, block: int, numbers: int) -> Array:
+        pointer = ctypes.cast(int(self._head[block]), ctypes.POINTER(ctypes.c_double))
+        return np.ctypeslib.as_array(pointer, (numbers,)) if numbers else np.empty(0)
+
+    def state(self) -> dict[str, Array]:
+        if math.isnan(self._real[MOMENT]):
+            return {"contacts": np.empty((0, W)), "joints": np.empty(0), "time": np.full(2, math.nan)}
+        if self._head[PENDING]:
+            retain(self._model._address, self._data, self.address)
+        if not self._head[TURNED]:  # what goes on from here does as what is restored
+            convert(self._model._address, self.address, FOUND)
+            self._head[TURNED], self._head[COUNT_FOUND] = 1, -1
+        contacts = self._array(KEPT, W * self._head[COUNT]).reshape(-1, W)
+        dry = self._array(DRY, self._head[COUNT_DRY])
+        return {"contacts": contacts.copy(), "joints": dry.copy(), "time": self._real[[MOMENT, LASTED]]}
+
+    def restore(self, contacts: Array, joints: Array, time: Array) -> None:
+        for block, count, values in ((KEPT, COUNT, contacts), (DRY, COUNT_DRY, joints)):
+            room(self.address, block, values.size)
+            self._array(block, values.size)[:] = values.ravel()
+            self._head[count] = len(values)
+        self._real[[MOMENT, LASTED]] = time
+        self._head[[PENDING, TURNED, COUNT_FOUND, RESETS]] = 0, 1, -1, -1
+
+
+def _free(head: npt.NDArray[np.int64]) -> None:
+    release = ctypes.pythonapi.PyMem_RawFree
+    release.argtypes = [ctypes.c_void_p]
+    for block in range(KEPT, COUNT, 2):
+        release(int(head[block]) or None)

@@ -1,0 +1,214 @@
+"""The doors through which Coulomb's law reaches a simulation: its own steps, halves of steps, MuJoCo's callback."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from .law import WIDTH, Law
+
+try:
+    from . import compiled as kernels
+except ImportError:
+    from . import formulas as kernels  # type: ignore[no-redef]
+
+Array = npt.NDArray[np.float64]
+_INTEGRATORS = ("EULER", "RK4", "IMPLICIT", "IMPLICITFAST")
+
+
+class Coulomb:
+    """Coulomb's law of friction in a MuJoCo simulation: contacts that stick do not creep, those that slide do not lift.
+
+    Parameters
+    ----------
+    model : any `mujoco.MjModel`, of MuJoCo 3.3 or later; both cones, condim 1, 3, 4 and 6
+    rigid : False: MuJoCo's own contacts, whose depth, bounce and damping `solref` and `solimp` say. True: Moreau and
+        Jean's time stepping, in which contacts have no depth to speak of and land within one step. Geoms get a `margin`
+        in which contacts are seen ahead, but bear nothing: at least the way of a step at the speed of a fall through
+        the scene.
+    restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1
+    servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has them. It needs geoms with a
+        `margin`, more than bodies sink in, of which an open contact then takes no notice; and it must be slower than
+        the contact, best five times the time constant of `solref`.
+
+    What is remembered belongs to one simulation: make one for each `MjData` (under `installed` that is done for you).
+    It takes part in the state of the simulation, so save and restore both. Contacts of flexes are left as they are.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range, or the model asks for what the law cannot serve.
+    """
+
+    def __init__(
+        self, model: Any, *, rigid: bool = False, restitution: float = 0.0, servo: float | None = None
+    ) -> None:
+        if not isinstance(model, mujoco.MjModel):
+            raise ValueError(f"model is a {type(model).__name__}; a mujoco.MjModel is needed")
+        _check_number("restitution", restitution, "", 0.0, 1.0)
+        if restitution and not rigid:
+            raise ValueError(f"restitution = {restitution} needs rigid=True: solref says how soft contacts bounce")
+        if servo is not None:
+            _check_number("servo", servo, " s", float(model.opt.timestep), math.inf)
+            if rigid:
+                raise ValueError("servo is for soft contacts: rigid ones have no depth")
+        self.model, self._law = model, Law(rigid, float(restitution), servo or 0.0)
+        self._check()
+        if rigid:
+            _see_ahead(model)
+        self._own = kernels.Simulation(model, self._law)
+        self._adopted: dict[int, Any] | None = None
+
+    def _check(self) -> None:
+        model, option = self.model, self.model.opt
+        name = mujoco.mjtIntegrator(option.integrator).name.removeprefix("mjINT_")
+        if name not in _INTEGRATORS or (name == "RK4" and self._law.rigid):
+            why = "is of another order than blows" if name == "RK4" else "computes reference accelerations of its own"
+            raise ValueError(f"integrator = {name} {why}; Coulomb's law needs Euler, implicit or implicitfast")
+        if option.noslip_iterations:
+            raise ValueError(f"noslip_iterations = {option.noslip_iterations} must be 0: Coulomb's law is in its place")
+        for field in ("geom_friction", "pair_friction"):
+            friction = getattr(model, field)
+            if not np.isfinite(friction).all():
+                number = int(np.argwhere(~np.isfinite(friction))[0, 0])
+                raise ValueError(f"{field}[{number}] = {friction[number].tolist()} must be finite")
+        if self._law.rigid and model.nflex:
+            raise ValueError(f"the model has {model.nflex} flexes; rigid contacts are for bodies alone")
+
+    def reset(self) -> None:
+        """Forget all, as after `mj_resetData`; a jump of `data.time` does so, too."""
+        for simulation in (self._own, *(self._adopted or {}).values()):
+            simulation.reset()
+
+    def state(self) -> dict[str, Array]:
+        """A copy of what is remembered: contacts, (n, `law.WIDTH`), friction of joints, time and time step, s."""
+        return self._own.state()  # type: ignore[no-any-return]
+
+    def restore(self, state: Mapping[str, npt.ArrayLike]) -> None:
+        """Go on from a `state`.
+
+        Raises
+        ------
+        ValueError
+            If it isn't one.
+        """
+        try:
+            values = {name: np.array(state[name], float) for name in ("contacts", "joints", "time")}
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"not a state of Coulomb: {error}") from None
+        if values["contacts"].shape[1:] != (WIDTH,) or values["time"].shape != (2,):
+            raise ValueError(f"not a state of Coulomb: contacts of shape {values['contacts'].shape}, not (n, {WIDTH})")
+        self._own.restore(**values)
+
+    # -- steps of its own ----------------------------------------------------------------------------------------------
+
+    def step(self, data: Any, nstep: int = 1) -> None:
+        """Advance by `nstep` steps, as `mujoco.mj_step` does.
+
+        Raises
+        ------
+        ValueError
+            If the data belong to another model, or an option was changed to one that is refused.
+        """
+        if not self._begin(data):
+            mujoco.mj_step(self.model, data, nstep)
+            return
+        self._own.advance(self.model, data, nstep)
+
+    def step1(self, data: Any) -> None:
+        """First half of a step, as `mujoco.mj_step1`: then set controls, and call `step2`."""
+        self._begin(data)
+        mujoco.mj_step1(self.model, data)
+
+    def step2(self, data: Any) -> None:
+        """Second half of a step, as `mujoco.mj_step2`."""
+        if self._begin(data):
+            self._own.control(self.model, data)
+            mujoco.mj_step2(self.model, data)
+            self._own.retain(self.model, data)
+        else:
+            mujoco.mj_step2(self.model, data)
+
+    def _begin(self, data: Any) -> bool:
+        """Whether the law comes from here, and not from the callback."""
+        if data.model is not self.model:
+            raise ValueError("data belong to another MjModel than this Coulomb")
+        self._check()
+        if self.model._address in _INSTALLED:
+            return False
+        if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+            raise ValueError("integrator = RK4 has four stages in a step: use mj_step under Coulomb(model).installed()")
+        return True
+
+    # -- MuJoCo's callback ---------------------------------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def installed(self) -> Iterator[Coulomb]:
+        """Within this, `mujoco.mj_step`, `mj_forward` and `mj_step1` with `mj_step2` obey the law for this model.
+
+        It is MuJoCo's control callback, for programs that step by themselves. Each `MjData` of the model has a memory of
+        its own; other models are left alone. Several may be installed at once.
+
+        Raises
+        ------
+        ValueError
+            If the callback is somebody else's, the model is installed already, or disables its controls and so the
+            callback.
+        """
+        model, taken = self.model, mujoco.get_mjcb_control()
+        self._check()
+        if taken is not None and not _INSTALLED:
+            raise ValueError(f"mjcb_control is taken by {getattr(taken, '__qualname__', taken)!r}: use step() instead")
+        if model._address in _INSTALLED:
+            raise ValueError("this model is under installed() already")
+        if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION:
+            raise ValueError("the model's flag actuation is disabled, and with it the callback: use step() instead")
+        self._adopted = {}
+        _INSTALLED[model._address] = self
+        kernels.forget_all()
+        mujoco.set_mjcb_control(kernels.callback(_simulation))
+        try:
+            yield self
+        finally:
+            del _INSTALLED[model._address]
+            kernels.forget_all()
+            self._adopted = None
+            if not _INSTALLED:
+                mujoco.set_mjcb_control(None)
+
+
+_INSTALLED: dict[int, Coulomb] = {}
+"""By the address of their models."""
+
+
+def _simulation(model: int, data: int) -> Any:
+    """What serves a simulation that the callback meets for the first time, if anything: its address, or 0."""
+    coulomb = _INSTALLED.get(model)
+    if coulomb is None or coulomb._adopted is None:
+        kernels.remember(model, data, 0)
+        return 0
+    known = coulomb._adopted
+    if data not in known:
+        known[data] = kernels.Simulation(coulomb.model, coulomb._law) if known else coulomb._own
+    head = known[data].serve(data)
+    kernels.remember(model, data, head)
+    return head
+
+
+def _check_number(name: str, value: float, unit: str, least: float, most: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+        allowed = f"from {least:g} to {most:g}" if most < math.inf else f"at least {least:g}"
+        raise ValueError(f"{name} = {value!r}{unit if isinstance(value, (int, float)) else ''} must be {allowed}{unit}")
+
+
+def _see_ahead(model: Any) -> None:
+    """Widen margins to the way of a step at the speed of a fall through the scene."""
+    ahead = model.opt.timestep * math.sqrt(2 * np.linalg.norm(model.opt.gravity) * model.stat.extent)
+    for margin in (model.geom_margin, model.pair_margin):
+        np.maximum(margin, ahead, out=margin)

@@ -1,0 +1,47 @@
+"""What is remembered of contacts, and the numbers of the law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+GEOMS, PLACE, NORMAL, GAP, LIFT, STATE, ERROR, SLIP, SEEN, LOAD, FORCE, WIDTH = (
+    0,
+    2,
+    8,
+    11,
+    12,
+    13,
+    14,
+    15,
+    16,
+    17,
+    22,
+    34,
+)
+"""Where in the row of a contact stand: its geoms (2); its place on both, in their axes (6), m; its normal in the axes of
+the first (3); its gap, m; the distance that a servo holds, m; whether it was open, stuck or slid; by how much its slip
+was not foreseen, m s-2; its slip as foreseen and as found, times the coefficient of friction, m s-2; what its normal, or each pair of a pyramid's edges, bears (5), N; force and
+moment of friction in the axes of both geoms (axis; force, moment; 12), N and N m."""
+NEW, OPEN, STICKS, SLIDES = range(4)
+
+
+@dataclass(frozen=True)
+class Law:
+    """The numbers of the law, each with its table in docs/friction.md."""
+
+    rigid: bool = False
+    restitution: float = 0.0
+    servo: float = 0.0
+    """Time in which contacts lose their depth, s; 0: never."""
+    share: float = 1e-2
+    """Share of gravity to which the slip of contacts, and what rigid ones bear, must be foreseen."""
+    most: int = 20
+    """Solutions that a step may take to foresee them."""
+    softness: float = 1e-4
+    """R of a rigid contact, in units of the inverse mass that the engine estimates."""
+    push: float = 0.1
+    """Share of its depth that a rigid contact loses in a step."""
+    calm: float = 1e-5
+    """Acceleration below which the solver starts from none, m s-2 or rad s-2."""
+    near: float = 0.01
+    """Share of the larger radius up to which two points of contact count as one."""
