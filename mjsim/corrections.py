@@ -186,7 +186,7 @@ def corrections(
 
     # Memory of friction. A rolling contact of finite softness creeps at R_t f/b_f; a surface that moves backwards at
     # that speed for the last step's friction f leaves only the change of f to creep: the friction rows then read
-    # a + R_t (f - f_last) = -b_f v, with the cone where it was. That is the law of `mjsim.memory`;
+    # a + R_t (f - f_last) = -b_f v, with the cone where it was. That is the law of `mjsim.coulomb`;
     # surface velocities carry it into a batch, whose steps have no halves. The friction forces follow from
     # contact = (., A_x + B_x, A_y + B_y, -r A_z, r B_z, .).
     (_, inward, upward, about_x, about_y, _), (A_normal, B_normal) = contact, normals

@@ -22,7 +22,7 @@ import numpy as np
 
 from compare.kit.pages import Rows
 from docs.studies.tables import write
-from mjsim import FrictionMemory, memory
+from mjsim import Coulomb
 
 G = 9.81
 SCENES = {
@@ -65,7 +65,7 @@ def start(model: Any, memory: bool = False, **options: Any) -> tuple[Any, Steppe
     """Data of a model with other options, and what steps them."""
     for name, value in options.items():
         setattr(model.opt, name, value)
-    return mujoco.MjData(model), FrictionMemory(model) if memory else Plain(model)
+    return mujoco.MjData(model), Coulomb(model) if memory else Plain(model)
 
 
 def one(geom: str, mu: float = 0.6, slope: float = 0.0) -> Any:
@@ -238,7 +238,7 @@ def servo() -> Rows:
 
     def settled(model: Any, servo: float | None) -> list[str]:
         model.geom_margin[:] = 4e-3 if servo else 0.0
-        data, stepper = mujoco.MjData(model), FrictionMemory(model, servo)
+        data, stepper = mujoco.MjData(model), Coulomb(model, servo)
         stepper.step(data, 2500)
         place = data.xpos.copy()
         stepper.step(data, 500)
@@ -248,7 +248,7 @@ def servo() -> Rows:
         model = one('<geom size=".01" mass=".03"/>', slope=5)
         model.geom_margin[:] = 4e-3 if servo else 0.0
         model.qpos0[2] = 0.01
-        data, stepper = mujoco.MjData(model), FrictionMemory(model, servo)
+        data, stepper = mujoco.MjData(model), Coulomb(model, servo)
         stepper.step(data, 500)
         speed = data.qvel[0]
         stepper.step(data, 500)
@@ -265,7 +265,7 @@ def servo() -> Rows:
         for seed in range(10):
             model = pile(seed, mixed=False)
             model.geom_margin[:] = 4e-3 if servo else 0.0
-            still += settle(model, FrictionMemory(model, servo))[0] < STILL
+            still += settle(model, Coulomb(model, servo))[0] < STILL
         return ["–", f"{still} of 10"]
 
     scenes: dict[str, Callable[[float | None], list[str]]] = {
@@ -317,7 +317,7 @@ def settle(model: Any, stepper: Stepper) -> tuple[float, float]:
 def fallen(remembers: bool, mixed: bool, seed: int) -> tuple[float, float]:
     """What `settle` finds of a pile."""
     model = pile(seed, mixed)
-    return settle(model, FrictionMemory(model) if remembers else Plain(model))
+    return settle(model, Coulomb(model) if remembers else Plain(model))
 
 
 def piles() -> Rows:

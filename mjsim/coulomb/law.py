@@ -1,4 +1,4 @@
-"""What is remembered of contacts, and the numbers of the law."""
+"""What is remembered of a contact, and the numbers of the law."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ GEOMS, PLACE, NORMAL, GAP, LIFT, STATE, ERROR, SLIP, SEEN, LOAD, FORCE, WIDTH = 
 )
 """Where in the row of a contact stand: its geoms (2); its place on both, in their axes (6), m; its normal in the axes of
 the first (3); its gap, m; the distance that a servo holds, m; whether it was open, stuck or slid; by how much its slip
-was not foreseen, m s-2; its slip as foreseen and as found, times the coefficient of friction, m s-2; what its normal, or each pair of a pyramid's edges, bears (5), N; force and
-moment of friction in the axes of both geoms (axis; force, moment; 12), N and N m."""
+was not foreseen, m s-2; its slip as foreseen and as found, times the coefficient of friction, m s-2; what its normal, or
+each pair of a pyramid's edges, bears (5), N; force and moment of friction in the axes of both geoms (geom; axis; force,
+moment; 12), N and N m."""
 NEW, OPEN, STICKS, SLIDES = range(4)
 
 
 @dataclass(frozen=True)
 class Law:
-    """The numbers of the law, each with its table in docs/friction.md."""
+    """The numbers of the law; docs/friction.md has the table that decided each."""
 
     rigid: bool = False
     restitution: float = 0.0

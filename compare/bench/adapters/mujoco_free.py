@@ -21,11 +21,11 @@ DECLARED = f"{FACETS} planes for a cylinder; a table that turns hangs on a hinge
 class Bodies:
     """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a time step.
 
-    With `memory` its contacts remember their friction (`mjsim.FrictionMemory`).
+    With `coulomb` its contacts obey Coulomb's law (`mjsim.Coulomb`).
     """
 
-    def __init__(self, tune: Callable[[Any, Case, float], None] | None = None, memory: bool = False) -> None:
-        self._tune, self._memory = tune, memory
+    def __init__(self, tune: Callable[[Any, Case, float], None] | None = None, coulomb: bool = False) -> None:
+        self._tune, self._coulomb = tune, coulomb
 
     def build(self, case: Case, timestep: float) -> None:
         """The scene at its start."""
@@ -36,7 +36,7 @@ class Bodies:
         self._data = mujoco.MjData(self._model)
         mujoco.mj_resetDataKeyframe(self._model, self._data, 0)
         plain = functools.partial(mujoco.mj_step, self._model)
-        self._advance = mjsim.FrictionMemory(self._model).step if self._memory else plain
+        self._advance = mjsim.Coulomb(self._model).step if self._coulomb else plain
 
     def step(self, n: int) -> None:
         """Take n steps."""

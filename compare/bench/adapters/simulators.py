@@ -79,7 +79,7 @@ class Simulated:
 _STUDY = "elliptic cone, contact settings of the study"
 mujoco = Simulated(
     "mujoco",
-    mujoco_free.Bodies(mujoco_free.studied, memory=True),
+    mujoco_free.Bodies(mujoco_free.studied, coulomb=True),
     f"{_STUDY}, corrections between the steps",
     "friction rows that are slow enough not to hover follow, ten steps late, a friction that turns or sets in",
 )

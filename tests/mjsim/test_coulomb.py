@@ -1,0 +1,428 @@
+"""Coulomb's law in any MuJoCo model: what sticks does not creep, what slides does not lift, what lands does not bounce.
+
+Closed forms are of one rigid body. MuJoCo's step is of first order: what moves is wrong by h/2 times its speed.
+"""
+
+import math
+import threading
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from mjsim import Coulomb
+
+G = 9.81
+BOX = '<geom type="box" size=".05 .05 .05" mass="1"/>'
+FLAT = '<geom type="box" size=".1 .1 .05" mass="1"/>'
+CYLINDER = '<geom type="cylinder" size=".05 .05" mass="1"/>'
+BALL = '<geom type="sphere" size=".05" mass="1"/>'
+SCENES = Path(__file__).parents[2] / "docs" / "friction"
+CONES = pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+WAYS = pytest.mark.parametrize("rigid", [False, True], ids=["soft", "rigid"])
+
+
+def scene(
+    slope=0.0, mu=0.6, cone="elliptic", boxes=1, geom=BOX, option="", friction=".005 .0001", condim=3, height=0.05
+):
+    """Bodies one on top of the other on a plane that is tilted by `slope`, rad; gravity is turned instead."""
+    bodies = "".join(f'<body pos="0 0 {height + 0.1 * i}"><freejoint/>{geom}</body>' for i in range(boxes))
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option cone="{cone}" gravity="{G * np.sin(slope)} 0 {-G * np.cos(slope)}" {option}/>'
+        f'<default><geom friction="{mu} {friction}" condim="{condim}"/></default>'
+        f'<worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
+    )
+    return model, mujoco.MjData(model)
+
+
+def creep(model, rigid=False):
+    """How far bodies move in 500 steps after 2500, m."""
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
+    law.step(data, 2500)
+    place = data.xpos.copy()
+    law.step(data, 500)
+    return np.abs(data.xpos - place).max()
+
+
+@CONES
+@WAYS
+@pytest.mark.parametrize(
+    ("option", "more"),
+    [
+        ("", {}),
+        ('integrator="implicitfast"', {}),
+        ('integrator="implicit" impratio="10"', {}),
+        ('solver="CG"', {}),
+        ('solver="PGS" iterations="1000"', {}),
+        ("", {"condim": 4}),
+        ("", {"condim": 6}),
+        ("", {"condim": 6, "friction": ".005 .02", "geom": BALL}),
+    ],
+)
+def test_nothing_creeps(cone, rigid, option, more):
+    """Nothing moves inside the cone, nor a ball inside that of rolling friction, .02 m of a radius of .05 m.
+
+    What is left is the solver's: with its default tolerance, 1e-8, about 1e-12 m/s, with implicit integrators 1e-10.
+    """
+    model, _ = scene(np.radians(10), cone=cone, option=f'tolerance="1e-14" {option}', **more)
+    assert creep(model, rigid) < (1e-7 if "PGS" in option else 1e-12)
+
+
+@CONES
+@WAYS
+def test_breaks_away_at_the_limit(cone, rigid):
+    model, data = scene(cone=cone)
+    law = Coulomb(model, rigid=rigid)
+    for share in [*np.linspace(0, 0.95, 500), *np.linspace(0.95, 1.05, 1000)]:
+        data.qfrc_applied[0] = share * 0.6 * G
+        law.step(data)
+        if share > 0.97 and data.qvel[0] > 1e-5:
+            break
+    assert share == pytest.approx(1, abs=5e-3)
+
+
+@CONES
+@WAYS
+@pytest.mark.parametrize("geom", [BOX, CYLINDER, BALL], ids=["box", "cylinder", "ball"])
+@pytest.mark.parametrize("step", [4e-3, 2e-3, 1e-3])
+def test_what_slides_keeps_its_contacts(cone, rigid, geom, step):
+    """Down a slope with g (sin - mu cos), to 1e-9, and never without contact; where it begins, it settles for 2 s."""
+    slope, mu = np.radians(20), 0.05 if geom == BALL else 0.25  # a ball slides as long as mu < 2/7 tan
+    model, data = scene(slope, mu, cone, geom=geom, option=f'timestep="{step}" tolerance="1e-12"')
+    law, speeds, loads = Coulomb(model, rigid=rigid), [], []
+    law.step(data, round(2 / step))
+    for _ in range(round(0.5 / step)):
+        law.step(data)
+        speeds.append(data.qvel[0])
+        loads.append(data.efc_force.max(initial=0))
+    exact = G * (np.sin(slope) - mu * np.cos(slope))
+    # A cylinder's three points turn it a little as it begins: that dies out as slowly as it slides fast.
+    assert np.diff(speeds) / step == pytest.approx(exact, rel=1e-4 if geom == CYLINDER and rigid else 1e-9)
+    assert min(loads) > 0
+
+
+@CONES
+@WAYS
+@pytest.mark.parametrize("step", [4e-3, 1e-3])
+@pytest.mark.parametrize(("mu", "speed"), [(0.2, 2), (0.4, 2), (1.2, 2), (1.2, 5)])
+def test_what_is_pushed_off_keeps_its_height_and_stops_in_time(cone, rigid, step, mu, speed):
+    model, data = scene(mu=mu, cone=cone, geom=FLAT, option=f'timestep="{step}" tolerance="1e-12"')
+    law, heights = Coulomb(model, rigid=rigid), []
+    law.step(data, round(1 / step))
+    data.qvel[0], begin = speed, data.qpos[0]
+    for _ in range(round(1.2 * speed / (mu * G * step))):
+        law.step(data)
+        heights.append(data.qpos[2])
+    assert np.ptp(heights) < 3e-5
+    assert data.qpos[0] - begin == pytest.approx(speed**2 / (2 * mu * G), abs=1.1 * step * speed / 2)
+
+
+@CONES
+@WAYS
+def test_a_ball_slides_then_rolls(cone, rigid):
+    model, data = scene(mu=0.3, cone=cone, geom=BALL, option='tolerance="1e-12"')
+    law = Coulomb(model, rigid=rigid)
+    law.step(data, 500)
+    data.qvel[0], depth = 1.0, max(-data.contact.dist[0], 0)
+    law.step(data, 500)  # the contact lies midway in the depth, which is the lever
+    assert data.qvel[0] == pytest.approx(5 / 7, abs=1.1 * 0.3 * G * model.opt.timestep / 2 + depth / 0.05)
+
+
+@CONES
+@WAYS
+def test_a_box_that_turns_stops_in_first_order(cone, rigid):
+    """The time in which a spinning box stops is that at half the step, and the difference halves with the step."""
+
+    def turned(step):
+        model, data = scene(mu=0.4, cone=cone, geom=FLAT, option=f'timestep="{step}" tolerance="1e-12"')
+        law = Coulomb(model, rigid=rigid)
+        law.step(data, round(1 / step))
+        data.qvel[5] = 10.0
+        law.step(data, round(1 / step))
+        return 2 * math.atan2(data.qpos[6], data.qpos[3])
+
+    coarse, middle, fine = (turned(step) for step in (4e-3, 2e-3, 1e-3))
+    assert abs(coarse - middle) < 1.1 * 2e-3 / 2 * 10
+    assert abs(middle - fine) < 0.7 * abs(coarse - middle)
+
+
+@CONES
+@pytest.mark.parametrize("geom", [BOX, CYLINDER, BALL], ids=["box", "cylinder", "ball"])
+@pytest.mark.parametrize("step", [4e-3, 2e-3, 1e-3])
+def test_a_rigid_body_lands_in_one_step(cone, geom, step):
+    """The step in which it arrives ends where it touches, and in the next it has no speed left."""
+    model, data = scene(cone=cone, geom=geom, height=0.25, option=f'timestep="{step}"')
+    law, speeds = Coulomb(model, rigid=True), [0.0]
+    while data.qpos[2] > 0.0501:
+        law.step(data)
+        speeds.append(data.qvel[2])
+    for _ in range(20):
+        law.step(data)
+        assert abs(data.qvel[2]) < 1e-10 * abs(min(speeds))
+        assert data.qpos[2] > 0.05 - 1e-9
+
+
+@CONES
+@pytest.mark.parametrize("geom", [BOX, BALL], ids=["box", "ball"])
+@pytest.mark.parametrize("restitution", [0.5, 0.9, 1.0])
+def test_a_rigid_body_bounces_with_its_restitution(cone, geom, restitution):
+    """From 0.2 m up to restitution² of that, and restitution² of that again."""
+    model, data = scene(cone=cone, geom=geom, height=0.25)
+    law, heights = Coulomb(model, rigid=True, restitution=restitution), []
+    for _ in range(500):
+        law.step(data)
+        heights.append(data.qpos[2] - 0.05)
+    tops = [b for a, b, c in zip(heights, heights[1:], heights[2:], strict=False) if a < b >= c and b > 0.02]
+    assert math.sqrt(tops[0] / 0.2) == pytest.approx(restitution, abs=1e-3)
+    assert all(math.sqrt(b / a) == pytest.approx(restitution, abs=1e-3) for a, b in zip(tops, tops[1:], strict=False))
+
+
+@CONES
+def test_servo_takes_the_depth_away(cone):
+    """A ball that rolls down has the lever r, so that it gains 5/7 g sin(slope): 1 % less without servo."""
+    slope, ball = np.radians(5), '<geom size=".05" mass=".03" margin="2e-3"/>'
+    model, data = scene(slope, cone=cone, geom=ball, option='tolerance="1e-12"')
+    law = Coulomb(model, servo=0.1)
+    law.step(data, 500)
+    speed = data.qvel[0]
+    law.step(data, 500)
+    assert abs(data.contact.dist[0]) < 1e-9
+    assert data.qvel[0] - speed == pytest.approx(5 / 7 * G * np.sin(slope), rel=1e-4)
+    model, data = scene(geom=BOX.replace("mass", 'euler="10 20 0" margin="2e-3" mass'), cone=cone)
+    data.qpos[2], free = 0.2, np.sqrt(2 * (0.2 - 0.075) / G)
+    law = Coulomb(model, servo=0.1)
+    law.step(data, int(free / model.opt.timestep) - 12)
+    assert data.qvel[2] == pytest.approx(-G * data.time, rel=1e-9)  # the margin bears nothing
+    law.step(data, 2000)
+    assert np.abs(data.contact.dist).max() < 1e-9
+
+
+@WAYS
+def test_states_threads_and_neighbours(rigid):
+    """Simulations are independent, and one that is restored goes on to the bit."""
+    model, data = scene(np.radians(15), boxes=2)
+    law = Coulomb(model, rigid=rigid)
+    law.step(data, 60)
+    kept, copies = law.state(), [mujoco.MjData(model) for _ in range(3)]
+    others = [Coulomb(model, rigid=rigid) for _ in copies]
+    for other, copied in zip(others, copies, strict=True):
+        mujoco.mj_copyData(copied, model, data)
+        other.restore(kept)
+    law.step(data, 60)
+    threads = [threading.Thread(target=o.step, args=(c, 60)) for o, c in zip(others, copies, strict=True)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all((copied.qpos == data.qpos).all() for copied in copies)
+
+
+@CONES
+@WAYS
+def test_every_door_leads_to_the_same_bits(cone, rigid):
+    """`step`, its halves, those of MuJoCo under the callback in both orders, and `mj_step` under it, of two simulations."""
+    model, data = scene(0.3, mu=0.25, cone=cone, boxes=2)
+    Coulomb(model, rigid=rigid).step(data, 100)
+    halves, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
+    for _ in range(100):
+        law.step1(halves)
+        law.step2(halves)
+    assert (halves.qpos == data.qpos).all()
+    whole, turned, other, later = (mujoco.MjData(model) for _ in range(4))
+    with Coulomb(model, rigid=rigid).installed():
+        mujoco.mj_step1(model, turned)
+        for _ in range(100):
+            mujoco.mj_step2(model, turned)  # as dm_control does
+            mujoco.mj_step1(model, turned)
+            mujoco.mj_step(model, whole)
+            mujoco.mj_step(model, other)
+        mujoco.mj_step(model, later, 100)
+    assert mujoco.get_mjcb_control() is None
+    for one in (whole, other, turned, later):
+        assert (one.qpos == data.qpos).all()
+
+
+def test_runge_kutta_has_the_callback():
+    model, data = scene(np.radians(15), option='integrator="RK4" tolerance="1e-14"')
+    with Coulomb(model).installed():
+        mujoco.mj_step(model, data, 2500)
+        place = data.qpos.copy()
+        mujoco.mj_step(model, data, 500)
+    assert data.qpos == pytest.approx(place, abs=1e-12)
+    with pytest.raises(ValueError, match=r"integrator = RK4 .*installed\(\)"):
+        Coulomb(model).step(data)
+
+
+def test_forward_under_the_callback_changes_nothing():
+    """`mj_forward` between steps finds the forces of the step, and takes nothing from the memory."""
+    model, data = scene(np.radians(15), option='tolerance="1e-14"')
+    with Coulomb(model).installed():
+        mujoco.mj_step(model, data, 1000)
+        load, place = data.efc_force.copy(), data.qpos.copy()
+        for _ in range(300):
+            mujoco.mj_forward(model, data)
+            assert data.efc_force == pytest.approx(load, rel=1e-6)
+            mujoco.mj_step(model, data)
+    assert data.qpos == pytest.approx(place, abs=1e-12)
+
+
+def test_other_models_and_other_callbacks():
+    """What isn't installed is MuJoCo's own, to the bit; a callback of somebody else's is refused, and always restored."""
+    model, data = scene(np.radians(15))
+    plain, copied = mujoco.MjData(model), scene(np.radians(15))
+    mujoco.mj_step(model, plain, 100)
+    with Coulomb(model).installed() as law:
+        mujoco.mj_step(*copied, 100)
+        with pytest.raises(ValueError, match="installed\\(\\) already"), Coulomb(model).installed():
+            pass
+        law.step(data, 100)  # the callback serves it
+        with Coulomb(copied[0]).installed():
+            mujoco.mj_step(*copied)
+        assert mujoco.get_mjcb_control() is not None
+    assert (copied[1].qpos[:3] != plain.qpos[:3]).any()
+    other = mujoco.MjData(model)
+    Coulomb(model).step(other, 100)
+    assert (data.qpos == other.qpos).all()
+    with pytest.raises(RuntimeError, match="mine"), Coulomb(model).installed():
+        raise RuntimeError("mine")
+    assert mujoco.get_mjcb_control() is None
+    mujoco.set_mjcb_control(lambda model, data: None)
+    try:
+        with pytest.raises(ValueError, match="mjcb_control is taken by .*lambda"), Coulomb(model).installed():
+            pass
+    finally:
+        mujoco.set_mjcb_control(None)
+
+
+def test_what_is_refused():
+    model, data = scene()
+    with pytest.raises(ValueError, match="another MjModel"):
+        Coulomb(model).step(scene()[1])
+    with pytest.raises(ValueError, match="integrator = DISCRETE"):
+        Coulomb(scene(option='integrator="discrete"')[0])
+    with pytest.raises(ValueError, match="noslip_iterations = 5"):
+        Coulomb(scene(option='noslip_iterations="5"')[0])
+    with pytest.raises(ValueError, match="restitution = 0.5 needs rigid"):
+        Coulomb(model, restitution=0.5)
+    for wrong in (-0.1, 1.1, math.nan, "half"):
+        with pytest.raises(ValueError, match="restitution = .* must be from 0 to 1"):
+            Coulomb(model, rigid=True, restitution=wrong)
+    with pytest.raises(ValueError, match="servo = 0.001 s must be at least 0.002 s"):
+        Coulomb(model, servo=1e-3)
+    with pytest.raises(ValueError, match="model is a MjData"):
+        Coulomb(data)
+    with pytest.raises(ValueError, match="not a state"):
+        Coulomb(model).restore({"contacts": np.zeros((1, 3)), "joints": [], "time": [0, 0]})
+    off = scene(option="/><option")[0]
+    off.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    with pytest.raises(ValueError, match="actuation is disabled"), Coulomb(off).installed():
+        pass
+    model.geom_friction[1, 0] = math.inf
+    with pytest.raises(ValueError, match=r"geom_friction\[1\] = \[inf"):
+        Coulomb(model)
+
+
+@pytest.mark.parametrize(("array", "value"), [("qvel", np.nan), ("qfrc_applied", 1e300)])
+def test_a_state_that_mujoco_resets_is_forgotten(array, value, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo logs that it does
+    model, data = scene(np.radians(15))
+    law, fresh = Coulomb(model), mujoco.MjData(model)
+    law.step(data, 50)
+    getattr(data, array)[0] = value
+    law.step(data, 50)
+    Coulomb(model).step(fresh, 50)
+    assert (data.qpos == fresh.qpos).all()
+
+
+@CONES
+@pytest.mark.parametrize(
+    ("given", "solref", "begin"),
+    [
+        ({"slope": 0.1, "condim": 1, "geom": BALL}, (0.02, 1), 0),
+        ({"slope": 0.1, "geom": BALL}, (-1000, 0), 0),
+        ({"slope": 0.1, "height": 9}, (0.02, 1), 0),
+    ],
+)
+def test_contacts_without_friction_or_damping_or_none_at_all_are_the_engines_own(cone, given, solref, begin):
+    model, data = scene(cone=cone, **given)
+    model.geom_solref[:] = solref
+    mujoco.mj_step(model, data, begin)
+    plain = mujoco.MjData(model)
+    mujoco.mj_copyData(plain, model, data)
+    Coulomb(model).step(data, 400)
+    mujoco.mj_step(model, plain, 400)
+    assert data.qpos == pytest.approx(plain.qpos, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", [path.name for path in SCENES.glob("*.xml")])
+@WAYS
+def test_scenes_of_the_page_hold(name, rigid):
+    assert creep(mujoco.MjModel.from_xml_path(str(SCENES / name)), rigid) < 1e-12
+
+
+@WAYS
+def test_forces_turn_with_a_hand(rigid):
+    fingers = "".join(
+        f'<body pos="{side * 0.03} 0 0"><joint type="slide" axis="{-side} 0 0" stiffness="500" damping="20" '
+        'springref=".02"/><geom type="box" size=".01 .03 .03" mass=".2"/></body>'
+        for side in (-1, 1)
+    )
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><option cone="elliptic" tolerance="1e-12"/><default><geom friction="1"/></default><worldbody><body>'
+        f'<joint axis="0 0 1" armature="1000"/><geom size=".005" contype="0" conaffinity="0"/>{fingers}</body>'
+        '<body><freejoint/><geom type="capsule" size=".02 .03" mass=".1"/></body></worldbody></mujoco>'
+    )
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
+    data.qvel[0] = 2
+    law.step(data, 2000)
+    height, turned = data.qpos[5], data.qpos[0]
+    law.step(data, 500)
+    assert data.qpos[5] == pytest.approx(height, abs=1e-12)
+    assert data.qpos[0] - turned > 1
+
+
+def rise(model, step, seconds, velocity=()):
+    """Most that the energy of free bodies, kinetic and potential, rises above the least it has been so far, J."""
+    data, least, most = mujoco.MjData(model), np.inf, 0.0
+    data.qvel[: len(velocity)] = velocity
+    for _ in range(round(seconds / model.opt.timestep)):
+        step(data)
+        mujoco.mj_energyVel(model, data)
+        energy = data.energy[1] - model.body_mass @ (data.xipos @ model.opt.gravity)
+        least = min(least, energy)
+        most = max(most, energy - least)
+    return most
+
+
+@WAYS
+@pytest.mark.parametrize(
+    ("geom", "velocity"),
+    [
+        (BOX, (1, 0.3, 0)),  # slides to a stop
+        (BOX, (0, 0, 0.5, 3, 5, 1)),  # is thrown
+        (BALL, (1, 0, 0)),  # slides, then rolls
+        (BALL, (1, 0, 0, 0, 20, 0)),  # rolls
+        (BALL, (0, 0, 0, 0, 0, 30)),  # spins
+    ],
+)
+def test_never_more_energy(geom, velocity, rigid):
+    """Energy rises no further than in plain MuJoCo, whose bodies hop; five starts of each, as the hops are random."""
+    model, _ = scene(geom=geom, condim=4)
+    starts = [factor * np.array(velocity) for factor in (0.8, 0.9, 1.0, 1.1, 1.2)]
+    plain = [rise(model, lambda data: mujoco.mj_step(model, data), 0.8, start) for start in starts]
+    ours = [rise(model, Coulomb(model, rigid=rigid).step, 0.8, start) for start in starts]
+    assert np.mean(ours) <= np.mean(plain) + np.std(plain) + 1e-6
+
+
+@WAYS
+@pytest.mark.parametrize("seeds", [[47], pytest.param(range(20), marks=pytest.mark.slow)])
+def test_piles_come_to_rest(seeds, rigid):
+    """The collider of boxes drops points and finds them again: bodies would rock if they were not put back."""
+    from docs.studies import friction
+
+    models = [friction.pile(seed, mixed=False) for seed in seeds]
+    plain = [friction.settle(model, friction.Plain(model))[1] for model in models]
+    drift, rise = np.transpose([friction.settle(model, Coulomb(model, rigid=rigid)) for model in models])
+    assert (drift < friction.STILL).sum() >= 0.95 * len(models)
+    assert rise.max() <= max(friction.RISES[0], *plain)
