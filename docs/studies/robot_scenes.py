@@ -5,6 +5,7 @@ Each is a function of a `Way`, which steps it and returns what was `Found`.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Callable
@@ -68,21 +69,32 @@ def lift(way: Way) -> Found:
     act(3, towards(start, 0.3), 1)
     act(1, still, -1)
     act(2, towards(start + up), -1)
-    placed, rests = run.places(cube)[0, 2], run.creep(cube)
+    placed = run.places(cube)[0, 2]
     return run.found(
-        {CREEP: creep, SLIP: slip, "creep on the table, m/s": rests},
+        {CREEP: creep, SLIP: slip},
         {"not lifted": height < 0.1, "not placed": abs(placed - start[2]) > 5e-3},
     )
 
 
 def _hand(way: Way, name: str) -> Found:
-    """Shadow hand of gymnasium-robotics, palm upwards: the object lies in the closing hand, which is then shaken."""
+    """Shadow hand of gymnasium-robotics, palm upwards, with an object; the worst of three starts."""
+    tried = [_held(way, name, seed) for seed in (3, 4, 5)]
+    return dataclasses.replace(
+        max(tried, key=lambda found: found.depth),
+        values={key: max(found.values[key] for found in tried) for key in tried[0].values},
+        step=float(np.mean([found.step for found in tried])),
+        wrong=sorted({name for found in tried for name in found.wrong}),
+    )
+
+
+def _held(way: Way, name: str, seed: int) -> Found:
+    """The object lies in the closing hand, which is then shaken."""
     import gymnasium
     import gymnasium_robotics
 
     gymnasium.register_envs(gymnasium_robotics)
     env: Any = gymnasium.make(name).unwrapped
-    env.reset(seed=3)
+    env.reset(seed=seed)
     env._set_action(np.zeros(20))
     run = Run(way, env.model, env.data)
     palm, wrist = "robot0:palm", run.model.actuator("robot0:A_WRJ0").id
@@ -140,11 +152,12 @@ def humanoids(way: Way) -> Found:
     """22 of dm_control's humanoids fall in a heap, and lie."""
     import dm_control.suite
 
-    file = Path(dm_control.suite.__file__).parent / "humanoid.xml"
-    one = mujoco.MjSpec.from_file(str(file))
+    one = mujoco.MjSpec.from_file(str(Path(dm_control.suite.__file__).parent / "humanoid.xml"))
+    one.delete(one.geom("floor"))
     world = mujoco.MjSpec()
-    world.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[9, 9, 1])
+    world.memory = 1 << 28
     world.option.timestep = 0.005
+    world.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[9, 9, 1])
     for k in range(HUMANOIDS):
         frame = world.worldbody.add_frame(pos=[k % 3, k // 3 % 3, 2.0 * (k // 9)])
         world.attach(one.copy(), prefix=f"h{k}-", frame=frame)

@@ -210,7 +210,7 @@ def tendon(way: Way) -> Found:
     return run.found({CREEP: run.creep("weight")})
 
 
-def flex(way: Way) -> Found:
+def soft_grip() -> Any:
     """A box between two soft pads of finite elements."""
     pad = (
         '<body name="{0}" pos="0 {1} .2"><joint name="{0}" type="slide" axis="0 {2} 0" damping="20"/>'
@@ -225,7 +225,12 @@ def flex(way: Way) -> Found:
         + free("box", "0 0 .2", 'type="box" size=".03 .03 .03" mass=".1"')
     )
     actuators = '<actuator><motor joint="left"/><motor joint="right"/></actuator>'
-    run = Run(way, model(world, 'integrator="implicitfast"', more=actuators, mu=1))
+    return model(world, 'integrator="implicitfast"', more=actuators, mu=1)
+
+
+def flex(way: Way) -> Found:
+    """Two soft pads close on a box, and hold it as its weight sets in."""
+    run = Run(way, soft_grip())
     run.data.ctrl[:] = 4
     run.model.opt.gravity[:] = 0
     run.advance(0.5)
