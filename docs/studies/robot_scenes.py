@@ -5,7 +5,6 @@ Each is a function of a `Way`, which steps it and returns what was `Found`.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from collections.abc import Callable
@@ -15,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from docs.studies.ways import CREEP, SLIP, Array, Found, Run, Way
+from docs.studies.ways import CREEP, SLIP, Array, Found, Run, Way, worst
 
 HUMANOIDS = 22
 
@@ -78,13 +77,7 @@ def lift(way: Way) -> Found:
 
 def _hand(way: Way, name: str) -> Found:
     """Shadow hand of gymnasium-robotics, palm upwards, with an object; the worst of three starts."""
-    tried = [_held(way, name, seed) for seed in (3, 4, 5)]
-    return dataclasses.replace(
-        max(tried, key=lambda found: found.depth),
-        values={key: max(found.values[key] for found in tried) for key in tried[0].values},
-        step=float(np.mean([found.step for found in tried])),
-        wrong=sorted({name for found in tried for name in found.wrong}),
-    )
+    return worst([_held(way, name, seed) for seed in (3, 4, 5)])
 
 
 def _held(way: Way, name: str, seed: int) -> Found:

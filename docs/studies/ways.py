@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -157,6 +157,19 @@ class Found:
     depth: float
     rise: float | None
     wrong: list[str]
+
+
+def worst(tried: Sequence[Found]) -> Found:
+    """Of several starts of a scene the worst in each respect."""
+    rises = [found.rise for found in tried if found.rise is not None]
+    return Found(
+        {name: max(found.values[name] for found in tried) for name in tried[0].values},
+        max(found.step for found in tried),
+        max(found.contacts for found in tried),
+        max(found.depth for found in tried),
+        max(rises, default=None),
+        sorted({name for found in tried for name in found.wrong}),
+    )
 
 
 class Run:
