@@ -69,11 +69,11 @@ def carousel(way: Way) -> Found:
 
 def dominos(way: Way) -> Found:
     """A row of dominos, of which the first is pushed; they come to lie on each other; the worst of four pushes."""
-    return worst([_pushed(way, push) for push in (3.0, 3.2, 3.5, 4.0)])
+    return worst([pushed(way, push) for push in (3.0, 3.2, 3.5, 4.0)])
 
 
-def _pushed(way: Way, push: float) -> Found:
-    """The first begins to turn about its edge, rad/s."""
+def pushed(way: Way, push: float) -> Found:
+    """The first begins to turn about its edge, at so many rad/s."""
     size = 'type="box" size=".005 .025 .05" mass=".05"'
     row = "".join(free(f"d{k}", f"{0.04 * k} 0 .05", size) for k in range(DOMINOS))
     run = Run(way, model(FLOOR + row), passive=True)

@@ -22,9 +22,9 @@ def assert_no_worse(plain, memory):
         assert memory.rise <= WORSE * plain.rise + 1e-3
 
 
-@pytest.mark.parametrize("name", ["treadmill", "dominos", "nut", "tactile", "mocap", "tendon", "sleeping"])
+@pytest.mark.parametrize("name", ["treadmill", "nut", "tactile", "mocap", "tendon", "sleeping"])
 def test_what_should_hold_still_does(name):
-    """Nearly: what plain MuJoCo creeps in a second takes memory a quarter of an hour."""
+    """Its creep is at least a hundred times less."""
     plain, memory = both(SCENES[name].run)
     assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
     assert_no_worse(plain, memory)
@@ -33,6 +33,12 @@ def test_what_should_hold_still_does(name):
 def test_a_castle_stands(monkeypatch):
     monkeypatch.setattr(small_scenes, "COURSES", 2)
     plain, memory = both(small_scenes.castle)
+    assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
+    assert_no_worse(plain, memory)
+
+
+def test_fallen_dominos_lie_still():
+    plain, memory = (small_scenes.pushed(WAYS[name], push=3.0) for name in ("plain", "memory"))
     assert memory.values[CREEP] < 1e-2 * plain.values[CREEP]
     assert_no_worse(plain, memory)
 
