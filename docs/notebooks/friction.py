@@ -3,7 +3,7 @@
 #
 # A box on a slope and a rod in a gripper, both well inside their friction cones, both
 # with MuJoCo's own contact parameters. Both creep. How fast can be computed before the
-# simulation runs; one option makes it slower, and a memory for friction ends it.
+# simulation runs; one option makes it slower, and Coulomb's law ends it.
 
 # %%
 # %config InlineBackend.figure_formats = ["svg"]
@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from compare.bench import forecast
-from mjsim import FrictionMemory
+from mjsim import Coulomb
 
 plt.rcParams |= {
     "figure.figsize": (7, 3.2),
@@ -110,11 +110,11 @@ figure.tight_layout()
 plt.show()
 
 # %% [markdown]
-# ## A memory
+# ## Coulomb's law
 #
-# `mjsim.FrictionMemory(model).step(data)` takes the place of `mj_step`. Each contact
-# remembers the friction force it had in the last step, so that none of it is left to
-# creep. How far the box and the rod come in five seconds:
+# `mjsim.Coulomb(model).step(data)` takes the place of `mj_step`. Each contact remembers
+# the friction force it had in the last step, so that none of it is left to creep. How
+# far the box and the rod come in five seconds:
 
 
 # %%
@@ -133,20 +133,52 @@ for axes, (name, text) in zip(
     panels, {"box on a slope": SLOPE, "rod in a gripper": GRIPPER}.items(), strict=True
 ):
     model, data, _ = settled(text)
-    remembering = mujoco.MjData(model)
-    mujoco.mj_copyData(remembering, model, data)
-    memory = FrictionMemory(model)
-    memory.step(remembering, 500)  # it takes a moment to know the forces
+    held = mujoco.MjData(model)
+    mujoco.mj_copyData(held, model, data)
+    coulomb = Coulomb(model)
+    coulomb.step(held, 500)  # it takes a moment to know the forces
     plainly = functools.partial(mujoco.mj_step, model)
     axes.plot(*way(model, data, plainly), color="#D55E00", label="plain")
-    with_memory = way(model, remembering, memory.step)
-    axes.plot(*with_memory, color="#0072B2", label="with memory")
+    lawful = way(model, held, coulomb.step)
+    axes.plot(*lawful, color="#0072B2", label="Coulomb's law")
     axes.set(title=name, xlabel="time (s)", ylabel="way (µm)")
-    print(f"{name}: {with_memory[1][-1]:.1e} µm in 5 s with memory")
+    print(f"{name}: {lawful[1][-1]:.1e} µm in 5 s under Coulomb's law")
 panels[0].legend()
 figure.tight_layout()
 plt.show()
 
 # %% [markdown]
-# [Friction that holds](../friction.md) derives the formulas, and says where the memory
-# ends: it changes nothing about what slides.
+# ## What slides
+#
+# The same box on a slope of 30°, where friction cannot hold it any more: it slides down
+# with $g(\\sin 30° - 0.25\\cos 30°)$. In plain MuJoCo slip lifts it; it hovers, lands and
+# hovers again. Under the law it keeps its contact, and its acceleration.
+
+# %%
+SLIDE = SLOPE.replace("0 15 0", "0 30 0").replace("0.6", "0.25")
+SLIDE = SLIDE.replace('pos="0.013 0 0.0485"', 'pos="0.025 0 0.0433"')
+exact = 9.81 * (np.sin(np.radians(30)) - 0.25 * np.cos(np.radians(30)))
+figure, (loads, speeds) = plt.subplots(1, 2)
+for name, color in {"plain": "#D55E00", "Coulomb's law": "#0072B2"}.items():
+    model = mujoco.MjModel.from_xml_string(SLIDE)
+    data, coulomb = mujoco.MjData(model), Coulomb(model)
+    plainly = functools.partial(mujoco.mj_step, model)
+    step = plainly if name == "plain" else coulomb.step
+    rows = []
+    for _ in range(500):
+        step(data)
+        pressed = data.efc_force[: 3 * data.ncon : 3].sum()  # rows: normal, two of friction
+        rows.append((data.time, pressed, np.linalg.norm(data.qvel[:3])))
+    time, load, speed = np.transpose(rows)
+    loads.plot(time, load, color=color, label=name, lw=0.8)
+    speeds.plot(time, speed - exact * time, color=color, lw=0.8)
+    print(f"{name}: without contact in {np.mean(load[100:] == 0):.0%} of the steps after 0.2 s")
+loads.set(xlabel="time (s)", ylabel="normal force (N)", ylim=(0, 40))
+speeds.set(xlabel="time (s)", ylabel="speed less exact speed (m/s)")
+loads.legend()
+figure.tight_layout()
+plt.show()
+
+# %% [markdown]
+# [Coulomb's law in MuJoCo](../friction.md) derives the formulas and the law, and says
+# where it ends.

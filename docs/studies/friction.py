@@ -1,6 +1,6 @@
-"""Write the tables on friction that holds: ``python -m docs.studies.friction docs/friction.md``.
+"""Write the tables on Coulomb's law: ``python -m docs.studies.friction docs/friction.md``.
 
-All take some ten minutes, most of them the piles (``--only piles``).
+All take some half an hour, most of them the piles (``--only piles``).
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ import itertools
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 from unittest import mock
@@ -23,6 +24,7 @@ import numpy as np
 from compare.kit.pages import Rows
 from docs.studies.tables import write
 from mjsim import Coulomb
+from mjsim.coulomb import doors, formulas
 
 G = 9.81
 SCENES = {
@@ -33,15 +35,20 @@ SCENES = {
     "ball": "ball held by rolling friction",
     "cart": "cart with its wheels braked",
 }
+PYRAMIDAL = {"cone": mujoco.mjtCone.mjCONE_PYRAMIDAL}
+SOFT: dict[str, Any] = {"law": {}}
+RIGID: dict[str, Any] = {"law": {"rigid": True}}
+PLAIN: dict[str, Any] = {}
 WAYS: dict[str, dict[str, Any]] = {
-    "plain": {},
-    "impratio 10": {"impratio": 10},
+    "plain": PLAIN,
     "impratio 100": {"impratio": 100},
     "noslip": {"noslip_iterations": 10},
-    "memory": {"memory": True},
-    "memory, pyramidal": {"memory": True, "cone": mujoco.mjtCone.mjCONE_PYRAMIDAL},
+    "soft": SOFT,
+    "soft, pyramidal": SOFT | PYRAMIDAL,
+    "rigid": RIGID,
+    "rigid, pyramidal": RIGID | PYRAMIDAL,
 }
-"""Options, and whether there is a memory."""
+"""Options of the model, and what is asked of `Coulomb`, if it is there."""
 PILES, BODIES, SETTLING, LAST = 100, 18, 5.0, 1.0
 STILL, RISES = 1e-9, (1e-9, 1e-2)
 """Most that a body at rest moves in the last second, m; rises of energy that are counted, J."""
@@ -52,7 +59,7 @@ class Stepper(Protocol):
 
 
 class Plain:
-    """`mj_step` with the methods of a memory."""
+    """`mj_step` with the methods of `Coulomb`."""
 
     def __init__(self, model: Any) -> None:
         self.model = model
@@ -61,24 +68,40 @@ class Plain:
         mujoco.mj_step(self.model, data, nstep)
 
 
-def start(model: Any, memory: bool = False, **options: Any) -> tuple[Any, Stepper]:
-    """Data of a model with other options, and what steps them."""
+class Installed(Coulomb):
+    """`mj_step` under the callback."""
+
+    def step(self, data: Any, nstep: int = 1) -> None:
+        with self.installed():
+            mujoco.mj_step(self.model, data, nstep)
+
+
+def start(model: Any, law: dict[str, Any] | None = None, door: Any = Coulomb, **options: Any) -> tuple[Any, Stepper]:
+    """Data of a model with other options, and what steps them; a law's own numbers go by their names in `law.Law`."""
     for name, value in options.items():
         setattr(model.opt, name, value)
-    return mujoco.MjData(model), Coulomb(model) if memory else Plain(model)
+    if law is None:
+        return mujoco.MjData(model), Plain(model)
+    offered = {name: value for name, value in law.items() if name in ("rigid", "restitution", "servo")}
+    stepper = door(model, **offered)
+    if len(law) > len(offered):
+        stepper._law = replace(stepper._law, **law)
+        stepper._own = doors.kernels.Simulation(model, stepper._law)
+    return mujoco.MjData(model), stepper
 
 
-def one(geom: str, mu: float = 0.6, slope: float = 0.0) -> Any:
+def one(geom: str, mu: float = 0.6, slope: float = 0.0, height: float = 0.05, step: float = 2e-3) -> Any:
     """A body on a plane; gravity is tilted instead of the plane, degrees."""
     a = math.radians(slope)
     return mujoco.MjModel.from_xml_string(
-        f'<mujoco><option cone="elliptic" tolerance="1e-12" gravity="{G * math.sin(a)} 0 {-G * math.cos(a)}"/>'
-        f'<default><geom friction="{mu}"/></default><worldbody><geom type="plane" size="9 9 1"/>'
-        f'<body pos="0 0 .05"><freejoint/>{geom}</body></worldbody></mujoco>'
+        f'<mujoco><option cone="elliptic" tolerance="1e-12" timestep="{step}" '
+        f'gravity="{G * math.sin(a)} 0 {-G * math.cos(a)}"/><default><geom friction="{mu}"/></default><worldbody>'
+        f'<geom type="plane" size="9 9 1"/><body pos="0 0 {height}"><freejoint/>{geom}</body></worldbody></mujoco>'
     )
 
 
 BOX, BALL = '<geom type="box" size=".05 .05 .05" mass="1"/>', '<geom type="sphere" size=".05" mass="1"/>'
+FLAT = '<geom type="box" size=".1 .1 .05" mass="1"/>'
 
 
 def creep(scene: str, way: dict[str, Any]) -> float:
@@ -114,45 +137,43 @@ def shaken(way: dict[str, Any]) -> float:
     return float(abs(data.qpos[0] - place))
 
 
-def wall() -> Any:
-    """A wall of nine boxes in three courses with 56 contacts, leaning on friction."""
-    boxes = "".join(
-        f'<body pos="{0.22 * i + 0.11 * row} 0 {0.05 + 0.1 * row}"><freejoint/>'
-        f'<geom type="box" size=".1 {0.06 - 0.01 * row} .05" mass="1"/></body>'
-        for row in range(3)
-        for i in range(4 - row)
+def columns(count: int) -> Any:
+    """Stacks of boxes with four contacts each; one ball for a single contact."""
+    across = max(round(math.sqrt(count / 4)), 1)
+    bodies = "".join(
+        f'<body pos="{0.3 * (k % across)} 0 {0.05 + 0.1 * (k // across)}"><freejoint/>{BOX}</body>'
+        for k in range(count // 4)
     )
+    bodies = bodies or f'<body pos="0 0 .05"><freejoint/>{BALL}</body>'
     return mujoco.MjModel.from_xml_string(
-        '<mujoco><option cone="elliptic" gravity="1 0 -9.6"/><worldbody><geom type="plane" size="9 9 1"/>'
-        f"{boxes}</worldbody></mujoco>"
+        '<mujoco><option cone="elliptic" gravity="1 0 -9.6"/><default><geom friction=".6"/></default><worldbody>'
+        f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
     )
 
 
-def cost(way: dict[str, Any], rounds: int = 25) -> float:
-    """Processor time of a step at `wall`, in units of plain MuJoCo's with the same cone: median of runs in turn.
+def heap(count: int) -> Any:
+    """Boxes that fall on a floor in layers of nine, each turned a little."""
+    rng, bodies = np.random.default_rng(count), ""
+    for k in range(count):
+        x, y, turn = 0.13 * (k % 3 - 1), 0.13 * (k // 3 % 3 - 1), rng.normal(size=3) * 10
+        place, angles = f"{x} {y} {0.1 + 0.15 * (k // 9)}", " ".join(f"{angle:.3f}" for angle in turn)
+        bodies += f'<body pos="{place}" euler="{angles}"><freejoint/>{BOX}</body>'
+    return mujoco.MjModel.from_xml_string(
+        '<mujoco><option cone="elliptic"/><size memory="50M"/><default><geom friction=".6"/></default><worldbody>'
+        f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
+    )
 
-    Both are at rest, in the state to which memory has brought them.
-    """
+
+def cost(model: Any, way: dict[str, Any], begin: Callable[[Any], None], rounds: int, steps: int) -> float:
+    """Processor time of a step in units of plain MuJoCo's with the same cone: median of runs in turn, from one state."""
     plain = {name: value for name, value in way.items() if name == "cone"}
-    settled, remembering = start(wall(), memory=True, **plain)
-    remembering.step(settled, 2500)
-    runs, times = [start(wall(), **each) for each in (plain, way)], np.empty((rounds, 2))
-    for data, stepper in runs:
-        data.qpos[:], data.qvel[:] = settled.qpos, settled.qvel
-        stepper.step(data, 1000)
+    runs, times = [start(model, **each) for each in (plain, way)], np.empty((rounds, 2))
     for row in times:
-        row[:] = [processor_time(stepper, data, 300) for data, stepper in runs]
+        for k, (data, stepper) in enumerate(runs):
+            begin(data)
+            stepper.step(data, 5)
+            row[k] = processor_time(stepper, data, steps)
     return float(np.median(times[:, 1] / times[:, 0]))
-
-
-def cost_in_motion(way: dict[str, Any]) -> float:
-    """The same while 18 boxes fall upon each other, up to 70 contacts: sums of ten piles, 2.4 s each."""
-    plain, times = {name: value for name, value in way.items() if name == "cone"}, np.zeros(2)
-    for seed in range(10):
-        runs = [start(pile(seed, mixed=False), **each) for each in (plain, way)]
-        for _ in range(4):
-            times += [processor_time(stepper, data, 300) for data, stepper in runs]
-    return float(times[1] / times[0])
 
 
 def processor_time(stepper: Stepper, data: Any, steps: int) -> float:
@@ -162,15 +183,60 @@ def processor_time(stepper: Stepper, data: Any, steps: int) -> float:
     return time.process_time() - begin
 
 
-def uncompiled(measure: Callable[[dict[str, Any]], float], way: dict[str, Any]) -> str:
-    """Cost of a memory without numba."""
-    with mock.patch.object(memory, "_kernels", memory.Formulas):
-        return f"{measure(way):.2f}" if "memory" in way else "–"
+def at_rest(count: int, way: dict[str, Any]) -> float:
+    """Cost of a step at rest with so many contacts."""
+    model = columns(count)
+    data, stepper = start(model, **SOFT)
+    stepper.step(data, 1500)
+    place = data.qpos.copy()
+
+    def begin(data: Any) -> None:
+        data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = place, 0, 0
+        data.time += 1.0  # what was remembered is of another state
+
+    return cost(model, way, begin, 15, max(3000 // count, 40))
+
+
+def sliding_cost(way: dict[str, Any]) -> float:
+    """Cost of a step of a box that slides."""
+    model = one(BOX, 0.25, 20)
+
+    def begin(data: Any) -> None:
+        mujoco.mj_resetData(model, data)
+        data.qvel[0] = 1.0
+
+    return cost(model, way, begin, 15, 500)
+
+
+def falling_cost(count: int, way: dict[str, Any]) -> float:
+    """Cost of a step of a heap in its first 1.2 s, 30 contacts of 8 boxes to 900 of 216."""
+    model = heap(count)
+    return cost(model, way, lambda data: mujoco.mj_resetData(model, data), 3 if count < 100 else 1, 600)
+
+
+def costs() -> Rows:
+    """What a step costs, in units of plain MuJoCo's."""
+    ways = {
+        "soft": SOFT,
+        "soft, installed": SOFT | {"door": Installed},
+        "soft, pyramidal": SOFT | PYRAMIDAL,
+        "rigid": RIGID,
+    }
+    scenes: dict[str, Callable[[dict[str, Any]], float]] = {
+        **{f"at rest, {count} contacts": functools.partial(at_rest, count) for count in (1, 12, 52, 200, 1000)},
+        "a box that slides": sliding_cost,
+        **{f"heap of {count} boxes that falls": functools.partial(falling_cost, count) for count in (8, 27, 64, 216)},
+    }
+    rows = [["cost of a step", *ways, "soft, no numba"]]
+    for name, measure in scenes.items():
+        found = [f"{measure(way):.2f}" for way in ways.values()]
+        with mock.patch.object(doors, "kernels", formulas):
+            rows.append([name, *found, f"{measure(SOFT):.2f}"])
+    return rows
 
 
 def holding() -> Rows:
-    """Creep in the scenes, breakaway, drift of a shaken box, and cost, one row each, for each way."""
-    costs = {"wall of boxes at rest, 56 contacts": cost, "boxes that fall upon each other": cost_in_motion}
+    """Creep in the scenes, breakaway, and drift of a shaken box, one row each, for each way."""
     return [
         ["", *WAYS],
         *(
@@ -179,53 +245,133 @@ def holding() -> Rows:
         ),
         ["box that is pulled: breaks away at, μN", *(f"{breakaway(way):.4f}" for way in WAYS.values())],
         ["box shaken on a slope of 10°: drift in 8 s, m", *(f"{shaken(way):.0e}" for way in WAYS.values())],
-        *(
-            row
-            for name, measure in costs.items()
-            for row in (
-                [f"{name}: cost of a step", *(f"{measure(way):.2f}" for way in WAYS.values())],
-                ["the same without numba", *(uncompiled(measure, way) for way in WAYS.values())],
-            )
-        ),
     ]
 
 
+def slide_down(step: float, way: dict[str, Any]) -> tuple[float, float]:
+    """A box that slides down 20°, mu 0.25: error of its acceleration, at most; share of steps without contact."""
+    data, stepper = start(one(BOX, 0.25, 20, step=step), **way)
+    stepper.step(data, round(1.5 / step))
+    speeds, lost = [data.qvel[0]], 0
+    for _ in range(round(0.5 / step)):
+        stepper.step(data)
+        speeds.append(data.qvel[0])
+        lost += data.efc_force.max(initial=0) <= 0
+    exact = G * (math.sin(math.radians(20)) - 0.25 * math.cos(math.radians(20)))
+    return float(np.abs(np.diff(speeds) / step / exact - 1).max()), lost * step / 0.5
+
+
+def pushed_off(step: float, way: dict[str, Any], mu: float = 0.4, speed: float = 2.0) -> tuple[float, float]:
+    """A box on the floor that gets a speed: by how much its height varies, m; how far it goes, relative to the exact way."""
+    data, stepper = start(one(FLAT, mu, step=step), **way)
+    stepper.step(data, round(1 / step))
+    data.qvel[0], begin, heights = speed, data.qpos[0], []
+    for _ in range(round(1.2 * speed / (mu * G * step))):
+        stepper.step(data)
+        heights.append(data.qpos[2])
+    return float(np.ptp(heights)), float((data.qpos[0] - begin) * 2 * mu * G / speed**2 - 1)
+
+
 def sliding() -> Rows:
-    """Motions that slide, relative to their closed forms, with and without memory."""
+    """Motions that slide, with their closed forms."""
+    ways = {name: WAYS[name] for name in ("soft", "soft, pyramidal", "rigid", "rigid, pyramidal")}
+    ways = {"plain": PLAIN, "plain, pyramidal": PYRAMIDAL} | ways
 
-    def acceleration(way: dict[str, Any]) -> float:
-        data, stepper = start(one(BOX, 0.3, 20), **way)
-        data.qvel[0] = speed = 1.0
-        stepper.step(data, 500)
-        exact = G * (math.sin(math.radians(20)) - 0.3 * math.cos(math.radians(20)))
-        return float((data.qvel[0] - speed) / exact - 1)  # in a second
-
-    def stopping(way: dict[str, Any]) -> float:
-        data, stepper = start(one(BOX, 0.3), **way)
-        stepper.step(data, 500)
-        data.qvel[0], place = 1.0, data.qpos[0]
-        stepper.step(data, 500)
-        return float((data.qpos[0] - place) * 2 * 0.3 * G - 1)
-
-    def rolling(way: dict[str, Any]) -> float:
-        data, stepper = start(one(BALL, 0.3), **way)
-        stepper.step(data, 500)
+    def rolling(step: float, way: dict[str, Any]) -> float:
+        data, stepper = start(one(BALL, 0.3, step=step), **way)
+        stepper.step(data, round(1 / step))
         data.qvel[0] = 1.0
-        stepper.step(data, 500)
+        stepper.step(data, round(1 / step))
         return float(data.qvel[0] * 7 / 5 - 1)
 
-    ways = {name: WAYS[name] for name in ("plain", "memory", "memory, pyramidal")}
-    ways["plain, pyramidal"] = {"cone": mujoco.mjtCone.mjCONE_PYRAMIDAL}
+    rows = [["", "step, ms", *ways]]
+    for step in (4e-3, 2e-3, 1e-3):
+        down, pushed = ([measure(step, way) for way in ways.values()] for measure in (slide_down, pushed_off))
+        rows += [
+            [
+                "box that slides down 20°, μ 0.25: error of its acceleration",
+                f"{1e3 * step:g}",
+                *(f"{x:.0e}" for x, _ in down),
+            ],
+            ["its contact is lost in", f"{1e3 * step:g}", *(f"{lost:.0%}" for _, lost in down)],
+            [
+                "box pushed off with 2 m/s, μ 0.4: its height varies by, µm",
+                f"{1e3 * step:g}",
+                *(f"{1e6 * x:.2g}" for x, _ in pushed),
+            ],
+            ["its way, relative to v²/(2 μ g)", f"{1e3 * step:g}", *(f"{way:+.1e}" for _, way in pushed)],
+            [
+                "ball that slides, then rolls: 5/7 v",
+                f"{1e3 * step:g}",
+                *(f"{rolling(step, way):+.0e}" for way in ways.values()),
+            ],
+        ]
+    return [rows[0], *sorted(rows[1:], key=lambda row: [r[0] for r in rows].index(row[0]))]
+
+
+def landing() -> Rows:
+    """A fall of 0.2 m: what speed is left after the blow, the depth, and how high a body bounces."""
+    rows = [
+        [
+            "falls 0.2 m, step 2 ms",
+            "speed in the second step after the blow",
+            "deepest, m",
+            "bounces to, share of 0.2 m",
+        ]
+    ]
+    ways = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
+    ways |= {f"rigid, restitution {e:g}": {"law": {"rigid": True, "restitution": e}} for e in (0.5, 0.9, 1.0)}
+    for (name, geom), (way, asked) in itertools.product({"box": BOX, "ball": BALL}.items(), ways.items()):
+        data, stepper = start(one(geom, height=0.25), **asked)
+        heights, speeds = [0.2], [0.0]
+        for _ in range(500):
+            stepper.step(data)
+            heights.append(data.qpos[2] - 0.05)
+            speeds.append(data.qvel[2])
+        blow = int(np.argmax(np.diff(speeds) > 0.2))
+        top = max(heights[blow + 2 :])
+        rows.append(
+            [f"{name}, {way}", f"{speeds[blow + 2]:+.0e} m/s", f"{max(-min(heights), 0):.0e}", f"{top / 0.2:.4f}"]
+        )
+    return rows
+
+
+def choices() -> Rows:
+    """What the numbers of the law decide: solutions a step, and what gets worse."""
+
+    def tried(law: dict[str, Any]) -> list[str]:
+        solves, steps, rest, rise = 0, 0, 0, 0.0
+        for seed, mixed in itertools.product(range(10), (False, True)):
+            model = pile(seed, mixed)
+            _, stepper = start(model, law=law)
+            drift, risen = settle(model, stepper)
+            rest, rise = rest + (drift < STILL and not mixed), max(rise, risen)
+            solves, steps = solves + stepper._own.solves, steps + 3000  # type: ignore[attr-defined]
+        height = max(pushed_off(4e-3, {"law": law}, mu, speed)[0] for mu, speed in ((0.2, 2.0), (1.2, 2.0), (1.2, 5.0)))
+        return [f"{solves / steps:.2f}", f"{rest} of 10", f"{rise:.0e}", f"{1e6 * height:.2g}"]
+
+    laws: dict[str, dict[str, Any]] = {
+        "**soft**: slip foreseen to a hundredth of gravity": {},
+        "to a tenth": {"share": 0.1},
+        "to a thousandth": {"share": 1e-3},
+        "foreseen, never solved for": {"most": 0},
+        "at most 5 solutions": {"most": 5},
+        "**rigid**: R = 1e-4": {"rigid": True},
+        "R = 1e-2": {"rigid": True, "softness": 1e-2},
+        "R = 1e-6": {"rigid": True, "softness": 1e-6},
+        "foreseen to a thousandth": {"rigid": True, "share": 1e-3},
+        "loses all its depth in a step": {"rigid": True, "push": 1.0},
+        "loses none": {"rigid": True, "push": 0.0},
+    }
     return [
-        ["motion, error relative to its closed form", *ways],
-        *(
-            [name, *(f"{measure(way):+.2e}" for way in ways.values())]
-            for name, measure in (
-                ("box that slides down 20° from 1 m/s: g (sin − μ cos)", acceleration),
-                ("box that slides to a stop: v²/(2 μ g)", stopping),
-                ("ball that slides, then rolls: 5/7 v", rolling),
-            )
-        ),
+        [
+            "rule",
+            "solutions a step more",
+            "piles of boxes at rest",
+            "energy rises by at most, J",
+            "height varies by, µm",
+        ],
+        *([name, *tried(law)] for name, law in laws.items()),
     ]
 
 
@@ -238,7 +384,7 @@ def servo() -> Rows:
 
     def settled(model: Any, servo: float | None) -> list[str]:
         model.geom_margin[:] = 4e-3 if servo else 0.0
-        data, stepper = mujoco.MjData(model), Coulomb(model, servo)
+        data, stepper = mujoco.MjData(model), Coulomb(model, servo=servo)
         stepper.step(data, 2500)
         place = data.xpos.copy()
         stepper.step(data, 500)
@@ -248,7 +394,7 @@ def servo() -> Rows:
         model = one('<geom size=".01" mass=".03"/>', slope=5)
         model.geom_margin[:] = 4e-3 if servo else 0.0
         model.qpos0[2] = 0.01
-        data, stepper = mujoco.MjData(model), Coulomb(model, servo)
+        data, stepper = mujoco.MjData(model), Coulomb(model, servo=servo)
         stepper.step(data, 500)
         speed = data.qvel[0]
         stepper.step(data, 500)
@@ -265,7 +411,7 @@ def servo() -> Rows:
         for seed in range(10):
             model = pile(seed, mixed=False)
             model.geom_margin[:] = 4e-3 if servo else 0.0
-            still += settle(model, Coulomb(model, servo))[0] < STILL
+            still += settle(model, Coulomb(model, servo=servo))[0] < STILL
         return ["–", f"{still} of 10"]
 
     scenes: dict[str, Callable[[float | None], list[str]]] = {
@@ -314,32 +460,37 @@ def settle(model: Any, stepper: Stepper) -> tuple[float, float]:
     return float(np.abs(data.xpos - place).max()), rise
 
 
-def fallen(remembers: bool, mixed: bool, seed: int) -> tuple[float, float]:
+def fallen(way: dict[str, Any], mixed: bool, seed: int) -> tuple[float, float]:
     """What `settle` finds of a pile."""
     model = pile(seed, mixed)
-    return settle(model, Coulomb(model) if remembers else Plain(model))
+    _, stepper = start(model, **way)
+    return settle(model, stepper)
 
 
 def piles() -> Rows:
     """How many piles come to rest, and how energy rises."""
     counted = [f"energy rises by more than {rise:.0e} J in" for rise in RISES]
     rows = [["piles", "way", "at rest to 1e-9 m", "largest drift in a second: median, m", *counted, "by at most, J"]]
-    for mixed, remembers in itertools.product((False, True), repeat=2):
+    ways: Iterable[tuple[str, dict[str, Any]]] = [("plain", PLAIN), ("soft", SOFT), ("rigid", RIGID)]
+    for mixed, (name, way) in itertools.product((False, True), ways):
         with ProcessPoolExecutor() as pool:
-            done = pool.map(functools.partial(fallen, remembers, mixed), range(PILES), chunksize=5)
+            done = pool.map(functools.partial(fallen, way, mixed), range(PILES), chunksize=5)
             drift, rise = np.transpose(list(done))
-        kind, way = f"{PILES} of {BODIES} {'mixed bodies' if mixed else 'boxes'}", "memory" if remembers else "plain"
+        kind = f"{PILES} of {BODIES} {'mixed bodies' if mixed else 'boxes'}"
         rose = [str((rise > least).sum()) for least in RISES]
-        rows.append([kind, way, str((drift < STILL).sum()), f"{np.median(drift):.0e}", *rose, f"{rise.max():.0e}"])
+        rows.append([kind, name, str((drift < STILL).sum()), f"{np.median(drift):.0e}", *rose, f"{rise.max():.0e}"])
     return rows
 
 
-TABLES: dict[str, Callable[[], Rows]] = {"holding": holding, "sliding": sliding, "servo": servo, "piles": piles}
+TABLES: dict[str, Callable[[], Rows]] = {
+    "holding": holding, "sliding": sliding, "landing": landing, "costs": costs, "choices": choices, "servo": servo,
+    "piles": piles,
+}  # fmt: skip
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure and write all tables, or those named."""
-    parser = argparse.ArgumentParser(description="Write the tables on the memory for friction.")
+    parser = argparse.ArgumentParser(description="Write the tables on Coulomb's law.")
     parser.add_argument("page", type=Path, metavar="FILE", help="docs/friction.md")
     parser.add_argument("--only", action="append", choices=list(TABLES), metavar="NAME", help="only this table")
     args = parser.parse_args(argv)

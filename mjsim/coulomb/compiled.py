@@ -1037,6 +1037,11 @@ class Simulation:
         self.reset()
         weakref.finalize(self, _free, self._head)
 
+    @property
+    def solves(self) -> int:
+        """Solutions for what is foreseen, since the beginning."""
+        return int(self._head[SOLVES])
+
     def reset(self) -> None:
         self._real[MOMENT], self._head[PENDING], self._head[TURNED] = math.nan, 0, 0
 
