@@ -178,7 +178,7 @@ class Contacts:
         }
         flat = chosen["rows"].reshape(6 * len(chosen["dim"]), self.rows.shape[2])
         _, sizes, directions = np.linalg.svd(flat, full_matrices=False)
-        chosen["rows"] = chosen["rows"] @ directions[sizes > 1e-9 * sizes[0]].T
+        chosen["rows"] = chosen["rows"] @ directions[sizes > 1e-9 * sizes.max(initial=0)].T
         return dataclasses.replace(self, **chosen)
 
     def matrices(self) -> tuple[Array, Array, Array]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
-from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -20,8 +19,9 @@ import numpy as np
 
 from compare.bench import advice
 from compare.bench.contact_law import LARGEST, Array, Contacts, contacts, replaced
-from compare.bench.measured import Loads, meet, rebound, slips, watched
+from compare.bench.measured import meet, rebound, slips, watched
 from compare.bench.settled import (
+    NOISE,
     WINDOW,
     Control,
     Settled,
@@ -39,6 +39,8 @@ CREEP, DEPTH = 1e-5, 0.01
 """What passes for good where nobody says: creep in m/s; depth divided by the radius of the smaller body."""
 LONG, CHECKED = 1.0, 3.0
 """What still moves is measured for so long, s; and a changed model must settle within so many to be advised."""
+UNEVEN = 0.05
+"""A pair rattles if its load, or the creep that its friction makes, scatters by more than this share."""
 SHOWN = 12
 """The worst pairs, which are shown, and let fall anew for their bounce."""
 G = 9.81
@@ -109,7 +111,8 @@ class Forecast:
             return ""
         rate = min(p.decay for p in self.pairs)
         hint = f"; disturbances of its contacts die out at {rate:.2g} 1/s only" if rate < 1 else ""
-        return f"what touches still moves: {few([*self.settled.moving.values()])}{hint}"
+        what = [*self.settled.moving.values()] or [p.name for p in self.pairs]
+        return f"what touches still moves: {few(what)}{hint}"
 
 
 @dataclass(frozen=True)
@@ -217,14 +220,20 @@ def _scene(
     start, bodies = copy.copy(data), model.geom_bodyid[those.geoms]
     moves = np.array([not moving.keys().isdisjoint(both) for both in bodies.tolist()])
     radius = radii(model)[bodies].min(1)
-    borne: Loads = defaultdict(lambda: np.zeros(3))
-    watching, time = (watched(step, borne), LONG) if moving else (step, WINDOW)
-    found = slips(model, data, those, number, bodies, watching, time)
-    steps = (data.time - start.time) / model.opt.timestep
-    for pair in np.unique(those.geoms[moves], axis=0):  # of what moves, the load of a moment says nothing
-        part, (load, sunk, times) = (those.geoms == pair).all(1), borne[tuple(pair.tolist())]
-        those.force[part] *= load / steps / those.force[part, 0].sum()
-        found["depth_measured"][part] = sunk / max(times, 1)
+    history: list[dict[tuple[int, int], Array]] = []
+    found = slips(model, data, those, number, bodies, watched(step, history), LONG if moving else WINDOW)
+    slow = those.law().creep
+    for pair in np.unique(those.geoms, axis=0):
+        part = (those.geoms == pair).all(1)
+        force, creeping = those.force[part], np.fmax.reduce(slow[part], initial=0)
+        series = np.array([each.get(tuple(pair.tolist()), np.zeros(6)) for each in history])
+        (load, sunk, times, *_), spread = series.mean(0), series.std(0)
+        shaken = creeping * np.hypot.reduce(spread[3:]) / max(np.hypot(*force[:, 1:3].T).sum(), 1e-300)
+        rattles = spread[0] > UNEVEN * load or shaken > UNEVEN * creeping + NOISE
+        if rattles or moves[part].any():  # what a moment bears says nothing
+            moves[part] = True
+            those.force[part] *= load / force[:, 0].sum()
+            found["depth_measured"][part] = sunk / max(times, 1e-300)
     good = np.full(len(number), depth) if depth else DEPTH * radius
     own = those.only(np.ones(len(number), bool))
     return _Scene(model, start, own, those.rows, number, radius, moves, found, creep, good)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from compare.bench.advice import FAULTS
 from compare.bench.contact_law import FAINT
 from compare.bench.forecast import SHOWN, Forecast, PairForecast
-from compare.bench.settled import STILL, few
+from compare.bench.settled import NOISE, few
 from compare.kit import pages
 
 OFF = 0.05
@@ -20,7 +20,8 @@ Table = tuple[str, list[list[str]]]
 
 def sentences(f: Forecast) -> Iterator[str]:
     """What to do, what was found when it was tried, and what else should be known, in words."""
-    sliding, moving = [p.name for p in f.pairs if p.slides], [*f.settled.moving.values()]
+    sliding, rattling = [p.name for p in f.pairs if p.slides], [p.name for p in f.pairs if p.moves]
+    moving = [*f.settled.moving.values()]
     if f.change:
         name, factor, unit = FAULTS[f.change.quantity]
         endless = "any" if f.change.quantity == "largest_step" else "∞"
@@ -36,14 +37,18 @@ def sentences(f: Forecast) -> Iterator[str]:
         yield f"Friction is used up, so these slide: {few(sliding)}. No setting but more friction holds them."
     if lost := [p.name for p in f.pairs if p.slides and p.creep_measured > p.hover]:
         yield f"These slide so fast that contact is lost again and again: {few(lost)}."
-    if off := [p.name for p in f.pairs if abs(p.creep_measured - p.creep) > OFF * p.creep + 1e2 * STILL]:
+    if off := [p.name for p in f.pairs if abs(p.creep_measured - p.creep) > OFF * p.creep + NOISE]:
         yield f"Creep is not what was predicted at {few(off)}: not settled yet, or the solver stops early (tolerance)."
     if f.settled.collapsed:
         how = "To hold it up: --ctrl, --keyframe, or in Python control."
         yield f"Collapsed since the start: {few(f.settled.collapsed)}. The table is of how it lies. {how}"
     if moving:
-        yield f"Not settled: {few(moving)}. Where these touch, all that is shown are means over a second."
-    if not (f.change or f.remedy or sliding or moving):
+        yield f"Not settled: {few(moving)}."
+    elif not f.settled.steady:
+        yield "Speeds still change, slowly: what is forecast is for this moment."
+    if rattling:
+        yield f"Nothing is forecast, and what is shown are means, where the load comes and goes: {few(rattling)}."
+    if not (f.change or f.remedy or sliding or moving or rattling or f.settled.collapsed):
         yield "Nothing needs to change."
     if f.settled.asleep:
         yield f"MuJoCo puts to sleep, so that nothing creeps till it wakes: {few(f.settled.asleep)}. Forecast awake."
@@ -69,7 +74,7 @@ def _number(value: float, factor: float = 1, endless: str = "any") -> str:
     value *= factor
     if not math.isfinite(value):
         return endless if math.isinf(value) else "–"
-    return f"{value:.0f}" if abs(value) >= 1e3 else f"{value:.3g}" if abs(value) >= 1e-3 else "0"
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}" if abs(value) >= 1e-3 else "0"
 
 
 def tables(f: Forecast) -> list[Table]:

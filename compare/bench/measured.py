@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator, MutableMapping
 from typing import Any
 
 import mujoco
@@ -13,9 +12,6 @@ import numpy as np
 from compare.bench.contact_law import MEETING, Array, Contacts
 from compare.bench.settled import WINDOW_STEPS, Step, advance
 
-Loads = MutableMapping[tuple[int, int], Array]
-"""Of pairs of geoms: sums over steps and contacts of normal force, N, depth, m, and one."""
-
 
 def meet(model: Any, data: Any, step: Step) -> None:
     """Step to the moment of a window at which most pairs of geoms bear a load: what rattles comes and goes."""
@@ -23,29 +19,31 @@ def meet(model: Any, data: Any, step: Step) -> None:
     for _ in range(WINDOW_STEPS):
         step(model, data, 1)
         mujoco.mj_forward(model, data)
-        bearing = len({(first, second) for (first, second), load, _ in _loads(model, data) if load > 0})
-        if bearing > most:
-            most, best = bearing, copy.copy(data)
+        if len(borne(model, data)) > most:
+            most, best = len(borne(model, data)), copy.copy(data)
     if most:
         mujoco.mj_copyData(data, model, best)
 
 
-def _loads(model: Any, data: Any) -> Iterator[tuple[tuple[int, int], float, float]]:
-    """Of each contact the geoms, normal force, N, and depth, m."""
+def borne(model: Any, data: Any) -> dict[tuple[int, int], Array]:
+    """Of each pair of geoms, summed over its contacts under load: load, N, depth, m, one, and friction, N (3)."""
+    found: dict[tuple[int, int], Array] = {}
     force = np.zeros(6)
-    for k, (first, second) in enumerate(data.contact.geom.tolist()):
+    for k, (geoms, depth) in enumerate(zip(data.contact.geom.tolist(), -data.contact.dist, strict=True)):
         mujoco.mj_contactForce(model, data, k, force)
-        yield (first, second), float(force[0]), -data.contact.dist[k]
+        if force[0] > 0:
+            friction = force[1:3] @ data.contact.frame[k, 3:].reshape(2, 3)
+            found[tuple(geoms)] = found.get(tuple(geoms), 0) + np.array([force[0], depth, 1, *friction])
+    return found
 
 
-def watched(step: Step, borne: Loads) -> Step:
-    """Steps that add up the loads of pairs, N, the depths of the contacts that bear them, m, and how many those are."""
+def watched(step: Step, history: list[dict[tuple[int, int], Array]]) -> Step:
+    """Steps that note what pairs of geoms bear."""
 
     def one_by_one(model: Any, data: Any, nstep: int) -> None:
         for _ in range(nstep):
             step(model, data, 1)
-            for geoms, load, depth in _loads(model, data):
-                borne[geoms] += (load, depth, 1) if load > 0 else 0
+            history.append(borne(model, data))
 
     return one_by_one
 

@@ -22,6 +22,8 @@ Step = Callable[[Any, Any, int], None]
 """Advances the data of a model by a number of steps, as `mujoco.mj_step` does."""
 STEADY, STILL = 2e-3, 1e-8
 """A speed that changes by less than this share, or by this (m/s), from one window to the next has settled."""
+NOISE = 1e-6
+"""Speeds that are not told apart, m/s."""
 RESTLESS, JOLT, TURNING = 0.3, 1e-3, 0.05
 """A body moves on if its speed changes by this share, or this (m/s), between windows, or if it turns by this, rad."""
 WINDOW, WINDOW_STEPS = 0.1, 50
@@ -40,6 +42,8 @@ class UnsettledError(RuntimeError):
 class Settled:
     """What a model has come to; bodies in words."""
 
+    steady: bool
+    """Whether no speed changes any more but by little."""
     moving: Mapping[int, str]
     """Bodies that have not settled, by number."""
     collapsed: tuple[str, ...]
@@ -122,16 +126,18 @@ def settle(model: Any, data: Any, limit: float, control: Control | None = None, 
     first, radius = copy.copy(data), radii(model)
     scale = np.where(np.isfinite(radius), radius, 0)[:, None] ** [0, 0, 0, 1, 1, 1]
     last = np.full((model.nbody, 6), 1e9)
-    begin, calm, restless, speed = data.time, 0, np.zeros(model.nbody, bool), np.zeros(model.nbody)
+    begin, calm, restless = data.time, 0, np.zeros(model.nbody, bool)
+    speed, change = np.zeros((2, model.nbody))
     while data.time < begin + limit and calm < 2:
         start, velocity = data.time, advance(model, data, step)
         speed, change = np.hypot.reduce(velocity * scale, 1), np.hypot.reduce((velocity - last) * scale, 1)
         turned, last = np.hypot.reduce(velocity[:, 3:], 1) * (data.time - start), velocity
-        restless = (change > np.minimum(RESTLESS * speed, JOLT) + 1e2 * STILL) | (turned > TURNING)
+        restless = (change > np.minimum(RESTLESS * speed, JOLT) + NOISE) | (turned > TURNING)
         restless[0] = False  # the world
         calm = calm + 1 if (change <= STEADY * speed + STILL).all() else 0  # a speed may pass through a maximum
     moving = {int(b): f"{_body(model, int(b))} at {speed[b]:.2g} m/s" for b in np.flatnonzero(restless)}
-    return Settled(moving, tuple(_collapsed(model, first, data)), tuple(_asleep(sleepy, model, data, step)))
+    steady = bool((change <= STEADY * speed + NOISE).all())
+    return Settled(steady, moving, tuple(_collapsed(model, first, data)), tuple(_asleep(sleepy, model, data, step)))
 
 
 def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:

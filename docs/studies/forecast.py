@@ -15,14 +15,12 @@ import mujoco
 import numpy as np
 
 from compare.bench.forecast import Forecast, forecast, geom_names
-from compare.bench.settled import UnsettledError, awake, load, settle
+from compare.bench.settled import NOISE, UnsettledError, awake, load, settle
 from compare.kit.pages import markdown
 from model import InputError
 
 SECOND, SETTLE = 1.0, 10.0
 """s."""
-TINY = 1e-7
-"""Creep of which nobody asks how exact it is, m/s."""
 
 
 def row(path: Path) -> list[str]:
@@ -32,12 +30,17 @@ def row(path: Path) -> list[str]:
         model, data = load(path)
         found = forecast(model, data, settle(model, data, SETTLE))
     except (InputError, UnsettledError) as error:
-        return [name, str(error).partition(":")[0].removeprefix(f"{path}"), "–", "–", _seconds(begin)]
+        return [name, str(error).partition(":")[0], "–", "–", "–", _seconds(begin)]
     took, still = _seconds(begin), [p for p in found.pairs if not p.moves and p.creep == p.creep]
     shown = _shown(awake(model), data)
-    apart = [abs(p.creep / max(shown[p.name], TINY) - 1) for p in still if max(p.creep, shown[p.name]) > TINY]
-    agreement = f"{max(apart, default=0):.1%} of {len(apart)}"
-    return [name, _verdict(found), f"{len(still)} of {len(found.pairs)}", agreement, took]
+    apart = [
+        abs(p.creep / max(shown[p.name], NOISE) - 1)
+        for p in still
+        if p.name in shown and max(p.creep, shown[p.name]) > NOISE
+    ]
+    agreement = f"{max(apart):.1%} of {len(apart)}" if apart else "–"
+    rest = "yes" if found.settled.steady and not found.settled.moving else "no"
+    return [name, _verdict(found), rest, f"{len(still)} of {len(found.pairs)}", agreement, took]
 
 
 def _seconds(begin: float) -> str:
@@ -76,5 +79,5 @@ def _shown(model: Any, data: Any) -> dict[str, float]:
 
 if __name__ == "__main__":
     mujoco.set_mju_user_warning(lambda _: None)
-    head = ["model", "verdict", "pairs at rest", "creep off by at most", "time, s"]
+    head = ["model", "verdict", "rests", "pairs at rest", "creep off by at most", "time, s"]
     print(markdown([head, *map(row, map(Path, sys.argv[1:]))]))
