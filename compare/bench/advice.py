@@ -57,7 +57,7 @@ class Change:
         if self.option not in ("solref", "solimp"):
             return f"<option {self.written}/>"
         more = len(self.geoms) - LINES
-        lines = [f'<geom name="{name}" {self.written}/>' for name in self.geoms[:LINES]]
+        lines = [f"<geom {self.written}/> <!-- {name} -->" for name in self.geoms[:LINES]]
         return "\n".join([*lines, *([f"<!-- and {more} more geoms -->"] if more > 0 else [])])
 
 
