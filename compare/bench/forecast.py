@@ -19,9 +19,8 @@ import numpy as np
 
 from compare.bench import advice
 from compare.bench.contact_law import LARGEST, Array, Contacts, contacts, replaced
-from compare.bench.measured import meet, rebound, slips, watched
+from compare.bench.measured import borne, meet, rebound, slips, watched
 from compare.bench.settled import (
-    NOISE,
     WINDOW,
     Control,
     Settled,
@@ -39,8 +38,6 @@ CREEP, DEPTH = 1e-5, 0.01
 """What passes for good where nobody says: creep in m/s; depth divided by the radius of the smaller body."""
 LONG, CHECKED = 1.0, 3.0
 """What still moves is measured for so long, s; and a changed model must settle within so many to be advised."""
-UNEVEN = 0.05
-"""A pair rattles if its load, or the creep that its friction makes, scatters by more than this share."""
 SHOWN = 12
 """The worst pairs, which are shown, and let fall anew for their bounce."""
 G = 9.81
@@ -51,7 +48,8 @@ G = 9.81
 class PairForecast:
     """Two geoms in contact, at the worst of their contacts: what is predicted of them, and what was measured.
 
-    Of a pair that `moves` the load and what was measured are means; depth, creep and turning aren't predicted: nan.
+    If speeds still change, loads are means over the second in which the rest was measured. Of a pair that `moves`, as
+    its bodies move on or lose contact, depth, creep and turning aren't predicted: nan.
     """
 
     name: str
@@ -221,19 +219,19 @@ def _scene(
     moves = np.array([not moving.keys().isdisjoint(both) for both in bodies.tolist()])
     radius = radii(model)[bodies].min(1)
     history: list[dict[tuple[int, int], Array]] = []
-    found = slips(model, data, those, number, bodies, watched(step, history), LONG if moving else WINDOW)
-    slow = those.law().creep
+    time = WINDOW if settled.steady and not moving else LONG
+    found = slips(model, data, those, number, bodies, watched(step, history), time)
+    now = borne(model, start)
     for pair in np.unique(those.geoms, axis=0):
-        part = (those.geoms == pair).all(1)
-        force, creeping = those.force[part], np.fmax.reduce(slow[part], initial=0)
-        series = np.array([each.get(tuple(pair.tolist()), np.zeros(6)) for each in history])
-        (load, sunk, times, *_), spread = series.mean(0), series.std(0)
-        shaken = creeping * np.hypot.reduce(spread[3:]) / max(np.hypot(*force[:, 1:3].T).sum(), 1e-300)
-        rattles = spread[0] > UNEVEN * load or shaken > UNEVEN * creeping + NOISE
-        if rattles or moves[part].any():  # what a moment bears says nothing
-            moves[part] = True
-            those.force[part] *= load / force[:, 0].sum()
-            found["depth_measured"][part] = sunk / max(times, 1e-300)
+        part, key = (those.geoms == pair).all(1), tuple(pair.tolist())
+        series = np.array([each.get(key, np.zeros(6)) for each in history])
+        moves[part] |= bool((series[:, 0] == 0).any())  # contact is lost
+        if moves[part].any() or time == LONG:  # the load of a moment may say nothing
+            mean = series.mean(0)
+            those.force[part] *= mean[0] / now[key][0]
+            friction = np.hypot.reduce([mean[3:], now[key][3:]], 1) / [mean[0], now[key][0]]
+            those.force[part, 1:] *= friction[0] / friction[1] if friction[1] > 1e-9 else 1
+            found["depth_measured"][part] = mean[1] / mean[2]
     good = np.full(len(number), depth) if depth else DEPTH * radius
     own = those.only(np.ones(len(number), bool))
     return _Scene(model, start, own, those.rows, number, radius, moves, found, creep, good)

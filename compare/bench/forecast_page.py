@@ -45,9 +45,9 @@ def sentences(f: Forecast) -> Iterator[str]:
     if moving:
         yield f"Not settled: {few(moving)}."
     elif not f.settled.steady:
-        yield "Speeds still change, slowly: what is forecast is for this moment."
+        yield "Speeds still change, slowly: loads, and what is forecast from them, are means over a second."
     if rattling:
-        yield f"Nothing is forecast, and what is shown are means, where the load comes and goes: {few(rattling)}."
+        yield f"Nothing is forecast, and what is shown are means, where bodies move or lose contact: {few(rattling)}."
     if not (f.change or f.remedy or sliding or moving or rattling or f.settled.collapsed):
         yield "Nothing needs to change."
     if f.settled.asleep:

@@ -1,11 +1,12 @@
 """Forecasts of models that others wrote: verdict, time, and predicted creep beside what a second shows, as a table.
 
-``python -m docs.studies.forecast MODEL.xml ...``; what a second shows is how far two points have slid apart that were
-one, on the two bodies of a contact.
+``python -m docs.studies.forecast MODEL.xml ...``; what a second shows is how far two points of the bodies have slid
+apart that were one where they touch.
 """
 
 from __future__ import annotations
 
+import copy
 import sys
 import time
 from pathlib import Path
@@ -28,11 +29,13 @@ def row(path: Path) -> list[str]:
     begin, name = time.perf_counter(), f"{path.parent.name}/{path.stem}"
     try:
         model, data = load(path)
-        found = forecast(model, data, settle(model, data, SETTLE))
+        settled = settle(model, data, SETTLE)
+        start = copy.copy(data)
+        found = forecast(model, data, settled)
     except (InputError, UnsettledError) as error:
         return [name, str(error).partition(":")[0], "–", "–", "–", _seconds(begin)]
     took, still = _seconds(begin), [p for p in found.pairs if not p.moves and p.creep == p.creep]
-    shown = _shown(awake(model), data)
+    shown = _shown(awake(model), start)
     apart = [
         abs(p.creep / max(shown[p.name], NOISE) - 1)
         for p in still
