@@ -67,6 +67,7 @@ class Contacts:
         return bool(self.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE)
 
     @property
+    @np.errstate(invalid="ignore")  # a contact that bears nothing
     def cone(self) -> Array:
         """Share of the friction cone, or pyramid, in use."""
         used = np.abs(self.force[:, 1:]) / self.friction * self._frictional

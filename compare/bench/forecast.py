@@ -227,11 +227,12 @@ def _scene(
         series = np.array([each.get(key, np.zeros(6)) for each in history])
         moves[part] |= bool((series[:, 0] == 0).any())  # contact is lost
         if moves[part].any() or time == LONG:  # the load of a moment may say nothing
-            mean = series.mean(0)
-            those.force[part] *= mean[0] / now[key][0]
-            friction = np.hypot.reduce([mean[3:], now[key][3:]], 1) / [mean[0], now[key][0]]
-            those.force[part, 1:] *= friction[0] / friction[1] if friction[1] > 1e-9 else 1
-            found["depth_measured"][part] = mean[1] / mean[2]
+            mean, then = series.mean(0), now[key]
+            friction, sideways = np.hypot.reduce([mean[3:], then[3:]], 1)
+            load = mean[0] / then[0]
+            those.force[part, 0] *= load
+            those.force[part, 1:] *= friction / sideways if sideways > 1e-9 * then[0] else load
+            found["depth_measured"][part] = mean[1] / max(mean[2], 1e-300)
     good = np.full(len(number), depth) if depth else DEPTH * radius
     own = those.only(np.ones(len(number), bool))
     return _Scene(model, start, own, those.rows, number, radius, moves, found, creep, good)

